@@ -3,6 +3,7 @@
 import gc
 import os
 import signal
+import tempfile
 from collections.abc import Generator
 from pathlib import Path
 
@@ -12,6 +13,9 @@ from hypothesis import settings
 from shared_data import ABSENT, SHARED_DATA
 
 pytest_plugins = ["standstill", "selection"]
+
+# What servos had in EEPROM before a run is kept there, and not where this account keeps it.
+os.environ["TAUSCOPE_STATE"] = tempfile.mkdtemp(prefix="tauscope-state-")
 
 # Deadlines measure the machine, not the code; on CI the same examples are drawn on every run.
 settings.register_profile("ci", derandomize=True, deadline=None, print_blob=True)

@@ -3,11 +3,13 @@
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from uuid import uuid4
 
 import can
 
+from tauscope_drivers.canopen.data_sheet.device_file import read_device_file
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_sim.canopen_bus.axis import AxisMeasurement, AxisMode, AxisScale
 from tauscope_sim.canopen_bus.drive import EmulatedDrive
@@ -21,12 +23,15 @@ START = (0.3, -0.2, 0.1)
 class EmulatedBus:
     """Drives in a thread of their own, on a bus of this process."""
 
-    def __init__(self) -> None:
+    def __init__(self, files: Sequence[Path | None] = (None, None, None)) -> None:
+        """Drives with the objects of EDS or DCF files, or with all of them."""
+        self.files = files
         self.channel = uuid4().hex
         scale = AxisScale(COUNTS_PER_TURN * GEAR / (2.0 * math.pi), RATED_TORQUE_MNM, GEAR)
-        self.drives = [EmulatedDrive(number, scale) for number in (1, 2, 3)]
-        self.position = list(START)
-        self.furthest = [0.0] * 3
+        sheets = [None if path is None else read_device_file(path, number) for number, path in enumerate(files, 1)]
+        self.drives = [EmulatedDrive(number, scale, sheet) for number, sheet in enumerate(sheets, 1)]
+        self.position = list(START[: len(files)])
+        self.furthest = [0.0] * len(files)
         self.deaf = False
         """whether the master misses the process data"""
         self.swallows: Callable[[can.Message], bool] = lambda _: False
@@ -45,7 +50,10 @@ class EmulatedBus:
 
     def joints(self) -> list[DriveJoint]:
         bus = {"interface": "virtual", "channel": self.channel}
-        drives = [{"node_id": number, "counts_per_turn": COUNTS_PER_TURN} for number in (1, 2, 3)]
+        drives = [
+            {"node_id": number, "counts_per_turn": COUNTS_PER_TURN} | ({} if path is None else {"eds": str(path)})
+            for number, path in enumerate(self.files, 1)
+        ]
         return [
             DriveJoint(f"joint{n}", drive | (bus if n == 1 else {}), gear_ratio=GEAR)
             for n, drive in enumerate(drives, 1)

@@ -14,13 +14,16 @@ GAIN, OFFSET, LABEL, COMMAND = "2001", "2002", "2003", "2004"
 Sections = dict[str, dict[str, str]]
 
 _UNSIGNED, _SIGNED = {1: 5, 2: 6, 4: 7}, {1: 2, 2: 3, 4: 4}  # CiA 301, table 44
+_STATED = ("6502", "16", "1A")
+"""What a file states as delivered: modes, and the mappings of PDOs."""
 _MAPPABLE = {"603F", "6040", "6041", "6060", "6064", "606C", "6071", "6077", "607A"}
 
 
-def sections(**device: str) -> Sections:
-    """Keywords of every section of the drive's EDS, which a test may change; `device` goes into DeviceInfo."""
+def sections(drive: EmulatedDrive | None = None, **device: str) -> Sections:
+    """Keywords of every section of a drive's EDS, which a test may change; `device` goes into DeviceInfo."""
+    drive = drive or EmulatedDrive(1, AxisScale(1.0, 500, 1.0))
     found: Sections = {"FileInfo": {"FileName": "drive.eds"}, "DeviceInfo": {"VendorName": "nobody", **device}}
-    entries = EmulatedDrive(1, AxisScale(1.0, 500, 1.0)).dictionary.entries
+    entries = {place: entry for place, entry in drive.dictionary.entries.items() if entry.is_visible}
     for index, places in groupby(sorted(entries), key=lambda place: place[0]):
         subindices = [subindex for _, subindex in places]
         section = f"{index:04X}"
@@ -57,7 +60,7 @@ def _variable(name: str, entry) -> dict[str, str]:
         "ObjectType": "0x7",
         "DataType": f"0x{(_SIGNED if entry.signed else _UNSIGNED)[entry.bytes]:04X}",
         "AccessType": "rw" if entry.writable else "ro",
-        "DefaultValue": "" if name == "1000" else "0",
+        "DefaultValue": str(entry.value) if name.startswith(_STATED) else "" if name == "1000" else "0",
         "PDOMapping": "1" if name in _MAPPABLE else "0",
     }
 

@@ -66,6 +66,8 @@ class Capabilities:
         shortest and longest time of the device's watchdog [s]
     policies_by_mode : mapping of ControlMode to frozenset of StopPolicy, or None
         ways to stop that the device carries out itself in each mode, where they differ; None where every mode has all
+    remarks : tuple of str
+        what the drives do not have, and what is done in place of it; known once the arm is connected
     """
 
     joint_count: int
@@ -78,6 +80,7 @@ class Capabilities:
     policies_by_mode: Mapping[ControlMode, frozenset[StopPolicy]] | None = None
     rate_limited_by: str = ""
     holds_before_torque: bool = True
+    remarks: tuple[str, ...] = ()
 
     def policies_in(self, mode: ControlMode) -> frozenset[StopPolicy]:
         """Ways to stop that the device carries out itself when its host is gone."""

@@ -19,6 +19,10 @@ class DriveJoint:
     torque_per_unit : float or None
         joint torque for one unit that the drive measures, signed as the robot file's ``sign`` and ``torque_constant``
         are; None where it does not say [Nm or N]
+    torque_limit, velocity_limit : float or None
+        of the joint; None where the robot file states none [Nm or N, rad/s or m/s]
+    position_range : tuple of two float, or None
+        lowest and highest; None where the robot file states none [rad or m]
     """
 
     name: str
@@ -26,6 +30,9 @@ class DriveJoint:
     _: KW_ONLY
     gear_ratio: float = 1.0
     torque_per_unit: float | None = None
+    torque_limit: float | None = None
+    velocity_limit: float | None = None
+    position_range: tuple[float, float] | None = None
 
 
 def require_known_keys(joints: Sequence[DriveJoint], bus_keys: Sequence[str], own_keys: Sequence[str]) -> None:

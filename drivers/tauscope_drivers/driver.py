@@ -100,6 +100,10 @@ class BusDriver(Driver):
         """Adapters of this machine that the bus may hang on: permissions, settings."""
 
     @abstractmethod
+    def check_blocks(self, joints: Sequence[DriveJoint]) -> list[Finding]:
+        """Everything doubtful in the ``drive`` blocks and the files that they name, without a port."""
+
+    @abstractmethod
     def examine(self, joints: Sequence[DriveJoint]) -> list[Finding]:
         """Adapter and every drive that the robot file names.
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope_drivers.backend import DriveLimits
+from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
 from tauscope_drivers.state import Setpoint
 
@@ -20,10 +21,25 @@ CATCH_S = 0.05
 SPEED_MARGIN = 1.1
 """Measured speed, and that of targets, may be this many times the limit."""
 
-PERSISTENCE = 2
-"""Cycles in a row after which a speed counts: one noisy reading is no runaway."""
+TORQUE_MARGIN = 1.1
+"""Measured torque may be this many times the limit: a drive estimates it from its current."""
 
+PERSISTENCE = 2
+"""Cycles in a row after which a speed or a torque counts: one noisy reading is no runaway."""
+
+_TORQUE_REMEDY = "the arm was stopped; look for an obstacle or slow the motion down, then acknowledge"
 _REMEDY = "the arm was stopped; correct the commanded torque, then acknowledge"
+
+
+def stated_limits(joints: Sequence[DriveJoint]) -> DriveLimits:
+    """Limits that a robot file states; infinite where it states none."""
+    ranges = [joint.position_range or (-np.inf, np.inf) for joint in joints]
+    return DriveLimits(
+        position_low=np.array([low for low, _ in ranges]),
+        position_high=np.array([high for _, high in ranges]),
+        velocity=np.array([joint.velocity_limit or np.inf for joint in joints]),
+        torque=np.array([joint.torque_limit or np.inf for joint in joints]),
+    )
 
 
 def require_sensible(limits: DriveLimits, position: Array, labels: Sequence[str]) -> None:
@@ -106,6 +122,37 @@ class RunawayWatch:
         for joint in np.flatnonzero(self._fast >= PERSISTENCE):
             detail = f"moves at {velocity[joint]:.4g}, its limit is {limits.velocity[joint]:.4g}"
             return Fault("over-speed", int(joint) + 1, detail, _REMEDY)
+        return None
+
+
+class TorqueWatch:
+    """Looks at the measured torque of joints whose drives have no torque limit of their own."""
+
+    def __init__(self, torque: Array) -> None:
+        """Begin with a sound arm.
+
+        Parameters
+        ----------
+        torque : (n,) float64
+            largest torque; infinite where the drive limits it, or where there is no limit [Nm or N]
+        """
+        self._torque = torque
+        self._over = np.zeros(len(torque), dtype=np.int64)
+
+    def look(self, effort: Array) -> Fault | None:
+        """The first joint beyond its limit for `PERSISTENCE` cycles; NaN is none.
+
+        Parameters
+        ----------
+        effort : (n,) float64
+            measured torque [Nm or N]
+        """
+        with np.errstate(invalid="ignore"):
+            over = np.abs(effort) > TORQUE_MARGIN * self._torque
+        self._over = np.where(over, self._over + 1, 0)
+        for joint in np.flatnonzero(self._over >= PERSISTENCE):
+            detail = f"torque of {effort[joint]:.4g}, its limit is {self._torque[joint]:.4g}"
+            return Fault("over-torque", int(joint) + 1, detail, _TORQUE_REMEDY)
         return None
 
 

@@ -24,6 +24,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "sim": ("mujoco",),
     "fleet": ("distributed",),
     "parquet": ("pyarrow",),
+    "ros1": ("rosbags",),
     "pandas": ("pandas",),
     "headroom": ("sklearn",),
 }

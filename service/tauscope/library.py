@@ -44,6 +44,10 @@ def read_recording(
     units: Mapping[str, str] | None = None,
     rate_hz: float | None = None,
     trust_units: bool = False,
+    columns: Mapping[str, Any] | str | Path | None = None,
+    decimal: str | None = None,
+    delimiter: str | None = None,
+    topic: str | None = None,
 ) -> "Recording":
     """Read a recording: CSV, Parquet, MCAP or rosbag2; samples that are none are masked or repaired.
 
@@ -55,15 +59,36 @@ def read_recording(
         units of columns that are not in SI, as in ``{"q": "deg", "t": "ms"}``; None takes those of the robot file
     rate_hz : float or None
         samples a second where t counts samples [Hz]
+    columns : mapping, str, path or None
+        where the columns are found, as in ``{"t": "time", "q": "position_{1}", "tau": "effort_{1}"}``; a preset, or a
+        file with such a mapping; None takes those of the robot file
+    decimal, delimiter : str or None
+        of a CSV; None detects it
+    topic : str or None
+        of a log that has several with joint states
 
     Raises
     ------
     RecordingError
         the file cannot be read, does not fit the robot, or can hardly be in its units
+    RobotFileError
+        the columns cannot be used
     """
     from tauscope.recording import Reading, open_recording
+    from tauscope.robot import RecordingLayout, layout_from_dict, read_layout
 
-    reading = Reading(dict(units or {}), rate_hz, trust_units)
+    layout = RecordingLayout()
+    if columns is not None:
+        layout = layout_from_dict(columns) if isinstance(columns, Mapping) else read_layout(str(columns))
+    reading = Reading(
+        {**layout.units, **(units or {})},
+        layout.rate_hz if rate_hz is None else rate_hz,
+        trust_units,
+        columns=layout.columns,
+        decimal=decimal or layout.decimal,
+        delimiter=delimiter or layout.delimiter,
+        topic=topic or layout.topic,
+    )
     return open_recording(path, None if robot is None else _robot(robot), reading)
 
 
@@ -129,14 +154,14 @@ def diagnose(
         the data or the robot cannot answer
     """
     from tauscope import diagnosis
-    from tauscope.diagnosis.extended_model.saved import read_model
     from tauscope.diagnosis.next_experiment import planned_experiment
+    from tauscope.export.model_file import read_extended_model
     from tauscope.identification import Options
     from tauscope.results import DiagnosisResult
 
     arm, options = _robot(robot), Options(cutoff_hz=cutoff_hz)
     is_saved = isinstance(against, str | Path) and Path(against).suffix.lower() == ".json"
-    saved = read_model(Path(str(against)), arm) if is_saved else None
+    saved = read_extended_model(Path(str(against)), arm) if is_saved else None
     simulated = () if is_saved or against in ("identified", "model") else _recordings(against, arm)
     train, judge = _recordings(recordings, arm), _recordings(held_out, arm)
     if headroom:

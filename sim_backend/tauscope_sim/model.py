@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from tauscope.errors import RobotFileError, TauscopeError
 from tauscope.robot.physical import about_centre, nearest_body
-from tauscope.robot.robot import Joint, JointType, LinkInertia, Robot, Segment
+from tauscope.robot.robot import JointType, LinkInertia, Robot, Segment
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,8 @@ _JOINT_TYPES = {
 def build_spec(robot: Robot) -> mujoco.MjSpec:
     """Editable MuJoCo model of an arm: ``robot.segments`` as joints, ``robot.model.links`` as rigid bodies.
 
-    The generalised coordinates are the joint variables of the robot file, in chain order. There are no geometries, no
+    The generalised coordinates are the positions of the segments, in chain order; what ties a segment to a joint that
+    it follows is not in the model, see `tauscope_sim.plant.rigid_bodies`. There are no geometries, no
     joint limits, no damping and no actuators: what is not in the robot file is not in the model. Friction is not part
     of it either; see `tauscope_sim.friction`.
 
@@ -43,10 +44,10 @@ def build_spec(robot: Robot) -> mujoco.MjSpec:
         where the robot file states no links, or where MuJoCo refuses the model
     """
     links = robot.model.links
-    if links is None or len(links) != robot.joint_count:
+    if links is None or len(links) != robot.link_count:
         stated = 0 if links is None else len(links)
         raise RobotFileError(
-            f"{_origin(robot)}: model.links states {stated} of {robot.joint_count} links; "
+            f"{_origin(robot)}: model.links states {stated} of {robot.link_count} links; "
             "a simulation needs mass, first_moment and inertia of each"
         )
     spec = mujoco.MjSpec()
@@ -58,9 +59,10 @@ def build_spec(robot: Robot) -> mujoco.MjSpec:
     spec.option.timestep = 1e-3
     body = spec.worldbody
     with _mujoco_refusals(robot):
-        for number, (joint, segment, link) in enumerate(zip(robot.joints, robot.segments, links, strict=True), 1):
+        rows = zip(robot.segment_labels, robot.segments, links, strict=True)
+        for number, (name, segment, link) in enumerate(rows, 1):
             body = body.add_body(name=f"link{number}")
-            _place(body, joint, segment)
+            _place(body, name, segment)
             _weigh(body, link)
     return spec
 
@@ -95,14 +97,14 @@ def _origin(robot: Robot) -> str:
     return str(robot.source) if robot.source is not None else robot.name
 
 
-def _place(body: mujoco.MjsBody, joint: Joint, segment: Segment) -> None:
+def _place(body: mujoco.MjsBody, name: str, segment: Segment) -> None:
     """Put the body at ``before · after`` and its joint axis where the z axis between the two placements lies."""
     before, after = segment.before, segment.after
     body.pos = before.translation + before.rotation @ after.translation
     body.quat = _quaternion(before.rotation @ after.rotation)
     # MuJoCo states the axis in the body's own frame: x = afterᵀ (z axis, origin)
     body.add_joint(
-        name=joint.name,
+        name=name,
         type=_JOINT_TYPES[segment.type],
         axis=after.rotation.T @ np.array([0.0, 0.0, 1.0]),
         pos=-after.rotation.T @ after.translation,

@@ -137,7 +137,11 @@ def _torque(
     friction_shape: Sequence[FrictionShape] | None,
 ) -> Array:
     """Rigid-body torque plus friction, (N, n)."""
-    torque = rigid_body_torque(build_model(robot), samples.position, samples.velocity, samples.acceleration)
+    ratios, offsets = robot.ratios, np.array([coupling.offset for coupling in robot.couplings])
+    position, velocity, acceleration = (
+        each @ ratios.T for each in (samples.position, samples.velocity, samples.acceleration)
+    )
+    torque = rigid_body_torque(build_model(robot), position + offsets, velocity, acceleration) @ ratios
     friction = friction if friction is not None else robot.model.friction
     if friction is None:
         return torque

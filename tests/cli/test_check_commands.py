@@ -8,6 +8,8 @@ import pytest
 
 from cli.conftest import Ended
 from cli.simulated_files import SimulatedFiles, record
+from emulated_data_sheet import sections, write_file
+from robot.robot_texts import URDF
 from tauscope.recording import read_recording
 from tauscope.robot import read_robot
 from tauscope_sim.examples import example_robot
@@ -84,3 +86,44 @@ def test_a_truncated_log_is_recovered_on_demand(run: Run, tmp_path: Path) -> Non
     assert (ended.status, ended.err) == (0, "")
     assert "damage passed over: " in ended.out
     assert 0 < len(read_recording(target)) < 10_000
+
+
+def test_recording_of_another_chain_than_the_default_one_is_refused_with_the_chain(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(URDF, encoding="utf-8")
+    (tmp_path / "run.csv").write_text("t,q1,tau1\n0,0,0\n0.1,0,0\n", encoding="utf-8")
+    ended = run("identify", tmp_path / "arm.urdf", tmp_path / "run.csv")
+    assert ended.status == 1
+    assert "its joints are 'shoulder', 'elbow'; where another is meant, write a robot file" in ended.err
+
+
+def write_arm(folder: Path, block: str) -> Path:
+    """A robot file whose drives stand on one bus."""
+    path = folder / "robot.yaml"
+    lines = example_robot("paper_arm").read_text(encoding="utf-8").splitlines()
+    nodes = iter(range(1, 9))
+    written = []
+    for line in lines:
+        written.append(line)
+        if line.lstrip().startswith("- name: joint"):
+            indent = " " * (len(line) - len(line.lstrip()) + 2)
+            bus = "interface: virtual, channel: none, counts_per_turn: 4096"
+            written.append(f"{indent}drive: {{node_id: {next(nodes)}, {bus}, {block}}}")
+    path.write_text("\n".join(written), encoding="utf-8")
+    return path
+
+
+def test_the_files_of_drives_are_checked_without_a_bus(run: Run, tmp_path: Path) -> None:
+    content = sections()
+    del content["6072"]
+    write_file(tmp_path, content)
+    ended = run("robot", "check", write_arm(tmp_path, "eds: drive.eds"))
+    assert (ended.status, ended.err) == (0, "")
+    assert "ok: joint joint1: drive.eds has no Max torque (0x6072:00): Tauscope stops the arm" in ended.out
+    for section in ("6077", "1016", "1016sub0", "1016sub1"):
+        del content[section]
+    write_file(tmp_path, content)
+    ended = run("robot", "check", tmp_path / "robot.yaml")
+    assert ended.status == 1
+    for words in ("joint joint3: ", "(0x6077:00) is missing", "(0x1016:01) is missing"):
+        assert words in ended.out
+    assert "3 findings of 3 to mend first" in ended.err

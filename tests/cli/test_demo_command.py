@@ -178,7 +178,7 @@ def test_z_scores_are_printed_and_plausible(demo: tuple[Path, str]) -> None:
 @in_whole_demo
 def test_the_concealed_spring_is_found_and_the_page_can_show_it(demo: tuple[Path, str]) -> None:
     folder, printed = demo
-    assert "joint_spring at joint1" in printed
+    assert "spring is missing at joint1" in printed
     assert "verdict: explained" in printed
     assert f"tauscope serve --data {folder / DATA}" in printed
     (result,) = (folder / DATA / "diagnoses").glob("*/result.json")

@@ -15,7 +15,10 @@ from cli.conftest import Ended
 from server.queue.paper_files import PAPER_ROBOT
 from server.queue.waiting import wait_until
 from shared_data import REPOSITORY
+from tauscope.cli.run_session import why_unfinished
 from tauscope.recording import read_recording
+from tauscope.runtime.record import RunProblem, new_record
+from tauscope.runtime.states import RunState
 from tauscope.trajectory import MoveSegment, Trajectory, write_trajectory
 
 Run = Callable[..., Ended]
@@ -145,3 +148,34 @@ def test_ctrl_c_stops_the_arm_and_keeps_what_was_recorded(tmp_path: Path) -> Non
     assert f"wrote {out}\n" in printed
     assert len(read_recording(out)) > 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["long.json", "out.csv"]
+
+
+def test_the_limits_of_lost_samples_are_options(run: Run, short: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.csv"
+    lenient = ["--stale-ms", "5", "--missed", "10", "--lost-s", "0.2", "--least-kept", "0.5"]
+    ended = run("run", PAPER_ROBOT, "--trajectory", short, "--out", out, "--rate", "200", START, *lenient)
+    assert (ended.status, ended.err) == (0, "")
+    assert "samples kept" in ended.out
+
+
+@pytest.mark.parametrize(
+    ("holds", "words"),
+    [
+        (True, "the disk is full; the arm was stopped and holds; its journal is /runs/journal.mcap; free disk space"),
+        (False, "the disk is full; the arm was stopped and is without power; its journal is"),
+        (
+            None,
+            "the disk is full; nobody has confirmed its stop, so its drives stop by themselves: look at the arm; its",
+        ),
+    ],
+)
+def test_a_failed_run_says_what_the_arm_does_and_where_the_journal_is(holds: bool | None, words: str) -> None:
+    record = new_record("arm", "canopen", "position").model_copy(
+        update={
+            "state": RunState.FAILED,
+            "played": 0.5,
+            "holds": holds,
+            "problem": RunProblem(code="acquisition", detail="the disk is full"),
+        }
+    )
+    assert words in why_unfinished(record, None, Path("/runs/journal.mcap"))

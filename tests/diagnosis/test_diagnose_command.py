@@ -16,9 +16,9 @@ from tauscope.cli.diagnose_command import diagnose
 from tauscope.cli.values import SeveralValuesCommand
 from tauscope.cli.verbs import add_verb
 from tauscope.diagnosis import Diagnosis, DiagnosisDocument
-from tauscope.diagnosis.extended_model.saved import read_model
 from tauscope.errors import ExcitationError
 from tauscope.excitation import require_within_limits
+from tauscope.export.model_file import read_extended_model
 from tauscope.recording import Recording
 from tauscope.robot import read_robot
 from tauscope.trajectory import motion_limits, read_trajectory
@@ -104,7 +104,7 @@ def test_a_terminal_shows_verdict_and_statement(files: list[str]) -> None:
 def test_everything_that_can_be_written_is_written_and_read_again(written_once: Written, files: list[str]) -> None:
     out = written_once.out
     arm = read_robot(example_robot("paper_arm"))
-    saved = read_model(out["model.json"], arm)
+    saved = read_extended_model(out["model.json"], arm)
     assert [term.effect.id for term in saved.terms] == ["joint_spring"]
     improved = read_robot(out["robot.yaml"])
     require_within_limits(read_trajectory(out["next.json"], arm), arm, motion_limits(arm))

@@ -34,7 +34,7 @@ def test_the_spring_that_the_simulation_lacks_is_found(capsys: pytest.CaptureFix
     assert [finding.effect for finding in run("compare_with_simulation")["result"].document.findings] == [
         "joint_spring"
     ]
-    assert "joint_spring at elbow" in capsys.readouterr().out
+    assert "spring is missing at elbow" in capsys.readouterr().out
 
 
 def test_the_campaign_decides_what_was_open() -> None:

@@ -88,7 +88,7 @@ class Site:
     def run(self, arm: Backend, name: str, backend_name: str) -> tuple[RunRecord, Path]:
         """A run in the emulator's own time."""
         folder = self.folder / f"{len(list(self.folder.iterdir()))}-{name}"
-        options = RunOptions(rate_hz=100.0, watchdog_s=0.2)
+        options = RunOptions(rate_hz=100.0, watchdog_s=0.2, least_kept=0.0)
         connect = lambda: Connection(arm, is_real_time=False)  # noqa: E731
         return run_trajectory(self.robot, self.motion, connect, folder, options, backend_name=backend_name), folder
 

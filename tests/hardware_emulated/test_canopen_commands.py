@@ -99,13 +99,28 @@ def test_run_moves_the_drives_and_records_torque(
     tauscope: Tauscope, folder: Path, emulator: EmulatorProcess, tmp_path: Path
 ) -> None:
     out = tmp_path / "recording.csv"
-    arguments = ("--backend", "canopen", "--trajectory", folder / "motion.json", "--rate", "50", "--out", out)
+    arguments = (
+        "--backend",
+        "canopen",
+        "--trajectory",
+        folder / "motion.json",
+        "--rate",
+        "50",
+        "--out",
+        out,
+        "--least-kept",
+        "0.5",
+    )
     status, _, err = tauscope("run", folder / "arm.json", *arguments)
     assert status == 0, err
     recording = read_recording(out)
     assert recording.effort_kind is EffortKind.TORQUE
     assert recording.joint_count == 3
     assert emulator.state["state"] == ["QUICK_STOP_ACTIVE"] * 3, "it holds"
+    status, out_text, err = tauscope("release", folder / "arm.json", "--supported")
+    assert status == 0, err
+    assert "no drive is under power" in out_text
+    assert emulator.state["state"] == ["SWITCH_ON_DISABLED"] * 3
 
 
 def test_run_beyond_the_bus_is_refused(tauscope: Tauscope, folder: Path, emulator: EmulatorProcess) -> None:

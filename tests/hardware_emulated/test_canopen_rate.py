@@ -58,7 +58,7 @@ def play(arm: dict[str, Any], folder: Path) -> RunRecord:
         robot=str(path),
         trajectory=str(folder / "motion.json"),
         backend=BackendOrder(name="canopen", settings={"patience_s": ANSWER_PATIENCE_S}),
-        options=RunOptions(rate_hz=RATE_HZ, watchdog_s=0.4, following_error=1.0, stale_misses=20, stale_s=0.3),
+        options=RunOptions(rate_hz=RATE_HZ, watchdog_s=0.4, following_error=1.0, missed=20, lost_s=0.3, least_kept=0.0),
     )
     with EmulatorProcess(order):
         return RunProcess(folder / "run", run, robot).wait(100.0)

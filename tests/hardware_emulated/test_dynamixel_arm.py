@@ -203,3 +203,17 @@ def test_rate_beyond_the_bus_is_refused_with_its_reason(three: Bench) -> None:
     error = refusal(arm.require_rate, 2000.0)
     assert error.kind is DriverErrorKind.REFUSED
     assert "latency timer" in str(error) or "the wire" in str(error)
+
+
+def test_the_delay_of_an_adapter_is_learnt_and_no_answer_is_late_for_it(tmp_path: Path) -> None:
+    delay_s = 0.006
+    with bench(tmp_path, latency_s=delay_s) as one:
+        arm = one.arm()
+        at_once = arm.capabilities.largest_rate_hz
+        arm.connect()
+        assert arm.capabilities.largest_rate_hz < min(at_once, 1.0 / (2.0 * delay_s))
+        arm.enable(ControlMode.POSITION, limits(3), StopPolicy.HOLD, WATCHDOG_S)
+        states = drive(arm, lambda _: setpoint([0.2] * 3), 1.0)
+        late = [state.late_ns for state in states if state.fresh.all()]
+        assert np.median(late) < 1_000_000, "a constant is no lateness"
+        assert len(late) > 0.9 * len(states)

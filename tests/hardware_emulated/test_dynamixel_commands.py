@@ -19,6 +19,9 @@ from tauscope_sim.emulation import FaultKind, InjectedFault
 
 pytestmark = pytest.mark.realtime
 
+PATIENT = ("--watchdog-s", "0.4", "--missed", "20", "--lost-s", "0.3", "--least-kept", "0.5")
+"""A run that a busy machine makes as well."""
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -116,7 +119,17 @@ def test_run_moves_the_servos_and_records_current(
     tauscope: Tauscope, folder: Path, emulator: EmulatorProcess, tmp_path: Path
 ) -> None:
     out = tmp_path / "recording.csv"
-    arguments = ("--backend", "dynamixel", "--trajectory", folder / "motion.json", "--rate", "50", "--out", out)
+    arguments = (
+        "--backend",
+        "dynamixel",
+        "--trajectory",
+        folder / "motion.json",
+        "--rate",
+        "50",
+        "--out",
+        out,
+        *PATIENT,
+    )
     status, _, err = tauscope("run", folder / "arm.json", *arguments)
     assert status == 0, err
     recording = read_recording(out)
@@ -133,3 +146,35 @@ def test_run_beyond_the_bus_is_refused(tauscope: Tauscope, folder: Path, emulato
     assert "bus allows" in err
     assert "the adapter's latency timer of 1 ms takes" in err or "the wire at 1e+06 baud takes" in err
     assert not any(emulator.state["enabled"])
+
+
+def test_an_arm_that_holds_after_a_run_is_let_go_and_has_its_settings_back(
+    tauscope: Tauscope, folder: Path, emulator: EmulatorProcess
+) -> None:
+    motion, out = folder / "motion.json", folder / "held.csv"
+    status, out_text, err = tauscope(
+        "run",
+        folder / "arm.json",
+        "--backend",
+        "dynamixel",
+        "--trajectory",
+        motion,
+        "--out",
+        out,
+        "--rate",
+        "50",
+        *PATIENT,
+    )
+    assert status == 0, err
+    assert "The arm is under power where it stopped" in out_text
+    assert "Return Delay Time 0 in place of 250" in out_text
+    assert all(emulator.state["enabled"])
+    status, _, err = tauscope("release", folder / "arm.json")
+    assert status == 1, "nobody stated that it is supported"
+    assert "--supported" in err
+    assert all(emulator.state["enabled"])
+    status, out_text, err = tauscope("release", folder / "arm.json", "--supported")
+    assert status == 0, err
+    assert "no drive is under power" in out_text
+    assert not any(emulator.state["enabled"])
+    assert [emulator.get(servo, "Return Delay Time") for servo in (1, 2, 3)] == [250] * 3

@@ -57,7 +57,13 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         control=str(folder / "control"),
     )
     options = RunOptions(
-        rate_hz=100.0, watchdog_s=WATCHDOG_S, following_error=1.0, stale_misses=20, stale_s=0.3, settle_s=0.0
+        rate_hz=100.0,
+        watchdog_s=WATCHDOG_S,
+        following_error=1.0,
+        missed=20,
+        lost_s=0.3,
+        settle_s=0.0,
+        least_kept=0.0,
     )
     order = RunOrder(
         robot=str(path),

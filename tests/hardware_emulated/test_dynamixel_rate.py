@@ -38,7 +38,7 @@ def test_six_joints_at_200_hz(tmp_path: Path) -> None:
         robot=str(path),
         trajectory=str(tmp_path / "motion.json"),
         backend=BackendOrder(name="dynamixel", settings={"patience_s": SLACK_S}),
-        options=RunOptions(rate_hz=RATE_HZ, watchdog_s=0.4, following_error=1.0, stale_misses=20, stale_s=0.3),
+        options=RunOptions(rate_hz=RATE_HZ, watchdog_s=0.4, following_error=1.0, missed=20, lost_s=0.3, least_kept=0.0),
     )
     with EmulatorProcess(order):
         record = RunProcess(tmp_path / "run", run, robot).wait(100.0)

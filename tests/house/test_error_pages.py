@@ -86,7 +86,7 @@ def test_robot_examples(code: str, robot: str, tmp_path: Path, monkeypatch: pyte
     ("code", "text"),
     [
         ("recording", spoilt_recording(57, "0.34,0.1,0.2,1.5,-0.5")),
-        ("recording", spoilt_recording(2, "[s],[rad],[rad],[Nm],[Nm]")),
+        ("recording", spoilt_recording(2, "[s],[rad],[rad],[lb],[lb]")),
         ("recording", spoilt_recording(1, "t,q1,tau1,tau2")),
         ("recording", ""),
         ("recording-mismatch", "t,q1,tau1\n" + "".join(f"{k},0.1,1.5\n" for k in range(200))),

@@ -47,6 +47,23 @@ SAME = {
     "blanks around fields": "\n".join(LINES).replace(",", " ,  ") + "\n",
     "quoted names": ",".join(f'"{name}"' for name in LINES[0].split(",")) + "\n" + "\n".join(LINES[1:]),
     "comma at each line's end": ",\n".join(LINES) + ",\n",
+    "blanks as separators": "\n".join(LINES).replace(",", " ") + "\n",
+    "runs of blanks": "\n".join("  " + line.replace(",", " \t ") for line in LINES) + "\n",
+    "bars": "\n".join(LINES).replace(",", "|") + "\n",
+    "decimal commas": "\n".join(LINES).replace(",", ";").replace(".", ",") + "\n",
+    "decimal commas and blanks": "\n".join(LINES).replace(",", " ").replace(".", ",") + "\n",
+    "names in a comment, as numpy.savetxt writes": "# " + "\n".join(LINES) + "\n",
+    "a row of units": "\n".join([LINES[0], "s,rad,rad,Nm,Nm", *LINES[1:]]),
+    "a row of units in brackets": "\n".join([LINES[0], "[s],[rad],(m),[Nm],[N·m]", *LINES[1:]]),
+    "every field in quotes": "\n".join(",".join(f'"{field}"' for field in line.split(",")) for line in LINES) + "\n",
+    "decimal commas in quotes": "\n".join(
+        ",".join(f'"{field}"'.replace(".", ",") for field in line.split(",")) for line in LINES
+    ),
+    "lines before the header": "Robot: arm 7\r\nrate [Hz], 250\r\n\r\n" + "\r\n".join(LINES) + "\r\n",
+    "words before semicolons": "Export, of today\n" + "\n".join(LINES).replace(",", ";") + "\n",
+    "a name of another code page": ("\n".join(f"{line},{'°C' if line == LINES[0] else 1}" for line in LINES)).encode(
+        "cp1252"
+    ),
     "pandas index": "," + LINES[0] + "\n" + "\n".join(f"{k},{line}" for k, line in enumerate(LINES[1:])),
     "text in a column that nobody reads": "\n".join(line + (",state" if line == LINES[0] else ",go") for line in LINES),
     "text in a first column that nobody reads": "\n".join(
@@ -115,9 +132,9 @@ BAD = {
     "header only": (HEADER_ONLY, "holds no sample"),
     "one row": ("\n".join(LINES[:2]), "holds only 1 sample"),
     "nine rows": ("\n".join(LINES[:10]), "holds only 9 samples"),
-    "no header": ("\n".join(LINES[1:]), "line 1 holds numbers where the column names are expected"),
-    "units row": (changed(1, LINES[0] + "\ns,rad,rad,Nm,Nm"), "line 2 looks like a row of units ('s,rad,rad,Nm,Nm')"),
-    "bracketed units": (changed(1, LINES[0] + "\n[s],[rad],[rad],[Nm],[Nm]"), "line 2 looks like a row of units"),
+    "no header": ("\n".join(LINES[1:]), "the first row holds numbers where the column names are expected"),
+    "units row": (changed(1, LINES[0] + "\ns,rad,rad,lb,lb"), "line 2 looks like a row of units ('s,rad,rad,lb,lb')"),
+    "torques in two units": (changed(1, LINES[0] + "\ns,rad,rad,Nm,mA"), "line 2 looks like a row of units"),
     "no time": (changed(1, "time,q1,q2,tau1,tau2"), "column t (time in seconds) is missing; the columns are time, q1"),
     "no position": (changed(1, "t,p1,p2,tau1,tau2"), "column q1 (position of joint 1) is missing"),
     "no effort": (changed(1, "t,q1,q2,a,b"), "column tau1 (or i1, torque or current of joint 1) is missing"),
@@ -134,7 +151,6 @@ BAD = {
     "two numbers": (field_changed(17, "tau2", "1 2"), "line 17, column tau2: '1 2' is not a number"),
     "nan with payload": (field_changed(17, "tau2", "nan(1)"), "line 17, column tau2: 'nan(1)' is not a number"),
     "other digits": (field_changed(17, "tau2", "\u0661"), "line 17, column tau2: '\u0661' is not a number"),
-    "quoted number": (field_changed(17, "q1", '"1.5"'), "column q1: '\"1.5\"' is not a number; write numbers without"),
     "json": (field_changed(17, "q1", "true"), "line 17, column q1: 'true' is not a number"),
     "null": (field_changed(17, "q1", "null"), "line 17, column q1: 'null' is not a number; leave the field empty"),
     "infinite": (field_changed(17, "q1", "inf"), "line 17, column q1: 'inf' is not a number; leave the field empty"),
@@ -156,11 +172,9 @@ BAD = {
         "\n".join([*LINES, "0.16,1,2"]),
         "line 42 has 3 fields where the header has 5 columns: the last line is",
     ),
-    "blanks as separators": ("\n".join(LINES).replace(",", " "), "line 1: the columns are separated by blanks"),
     "NUL": (field_changed(17, "q1", "1\0"), "line 17 holds a NUL byte"),
     "NUL in the header": (changed(1, "t\0" + LINES[0]), "line 1 holds a NUL byte"),
     "UTF-16": ("\n".join(LINES).encode("utf-16"), "is UTF-16 text; save it as UTF-8"),
-    "Latin-1 header": (changed(1, LINES[0] + ",°C").encode("latin-1"), "line 1: the header is not UTF-8 text"),
     "long line": (changed(17, "1," + "2" * 2**21), "line 17 has"),
     "long header": ("t" * 2**21, "line 1 has more than 1048576 characters"),
     "gzip": (b"\x1f\x8b\x08\0\0\0", "is compressed by gzip; unpack it first"),
@@ -268,3 +282,10 @@ def test_spooled_reading_gives_the_same_rows(tmp_path):
         assert np.array_equal(rows_of(spooled), rows_of(kept))
         assert np.array_equal(spooled.samples(777, 29_001).effort, kept.samples(777, 29_001).effort)
     assert [file.name for file in tmp_path.iterdir()] == ["long.csv"]
+
+
+def test_a_row_that_comes_nine_rows_early_is_refused_wherever_blocks_end(tmp_path):
+    lines = [*LINES[:6], field_changed(7, "t", "1").splitlines()[6], *LINES[7:16]]
+    assert "column t: time runs backwards" in message_of(lambda: read(tmp_path, "\n".join(lines)))
+    assert "column t: time runs backwards" in message_of(lambda: read(tmp_path, "\n".join(lines) + "\n"))
+    assert len(read(tmp_path, "\n".join(lines[:-1]) + "\n")) == 14

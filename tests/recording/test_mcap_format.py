@@ -20,7 +20,7 @@ from recording.recording_files import (
     write_plain_log,
 )
 from tauscope.errors import RecordingError, RecordingMismatchError
-from tauscope.recording import convert_recording, read_recording
+from tauscope.recording import Reading, convert_recording, read_recording
 
 MOTION = arrays()
 
@@ -149,11 +149,9 @@ def test_the_robots_joints_are_picked_and_ordered_by_name(tmp_path):
     picked = read_recording(path, joint_names=("elbow", "lift")).samples()
     assert np.array_equal(picked.position, motion["position"][:, [1, 0]])
     assert np.array_equal(picked.effort, motion["effort"][:, [1, 0]])
-    unnamed = read_recording(path, joint_names=("a", "b", "c"))
-    assert np.array_equal(unnamed.samples().position, motion["position"])
-    with pytest.raises(
-        RecordingMismatchError, match=r"joint wrist is missing \(the message names lift, elbow, gripper\)"
-    ):
+    with pytest.raises(RecordingMismatchError, match=r"\(lift, elbow, gripper\), the robot has 3 \(a, b, c\)"):
+        read_recording(path, joint_names=("a", "b", "c"))
+    with pytest.raises(RecordingMismatchError, match=r"the robot has 2 \(elbow, wrist\): wrist is missing"):
         read_recording(path, joint_names=("elbow", "wrist"))
     with pytest.raises(RecordingMismatchError, match=r"carries 3 joints \(lift, elbow, gripper\), the robot has 2 "):
         read_recording(path, joint_names=("a", "b"))
@@ -173,8 +171,11 @@ def test_messages_that_name_only_some_of_the_joints(tmp_path):
     log = messages(names=("lift", "elbow"))
     log[20][1]["name"] = ["lift", "finger"]
     path = log_file(tmp_path, {"/joint_states": log})
-    expected = "message 21: joint elbow is missing (the message names lift, finger)"
-    assert expected in message_of(lambda: read_recording(path, joint_names=("lift", "elbow")))
+    recording = read_recording(path, joint_names=("lift", "elbow"))
+    assert np.array_equal(recording.samples().position, np.delete(MOTION["position"], 20, axis=0))
+    (note,) = recording.notes
+    assert note.code == "other-publisher"
+    assert "topic /joint_states: 1 message holds only the joints lift, finger; left out" in note.text
 
 
 def test_joints_that_change_order_from_message_to_message(tmp_path):
@@ -191,9 +192,49 @@ def test_one_of_several_topics(tmp_path):
     both = {"/arm/joint_states": other, "/joint_states": messages()}
     assert len(read_recording(log_file(tmp_path, both))) == 40
     message = message_of(lambda: read_recording(log_file(tmp_path, {"/b": messages(), "/a": other})))
-    assert (
-        "several topics carry joint states (/a, /b); keep one of them in the file, or name it /joint_states" in message
-    )
+    assert "several topics carry joint states (/a, /b); choose one with --topic" in message
+    path = log_file(tmp_path, {"/b": messages(), "/a": other})
+    assert len(read_recording(path, reading=Reading(topic="/a"))) == 50
+    message = message_of(lambda: read_recording(path, reading=Reading(topic="/c")))
+    assert "no topic /c carries joint states; those that do: /a, /b" in message
+
+
+def test_a_topic_with_efforts_is_preferred(tmp_path):
+    for effort in ([], [np.nan, np.nan]):
+        without = messages()
+        for _, message in without:
+            message["effort"] = effort
+        path = log_file(tmp_path, {"/joint_states": without, "/arm": messages(), "/other": without})
+        assert np.array_equal(read_recording(path).samples().effort, MOTION["effort"])
+
+
+def test_another_publisher_of_the_same_joints_without_efforts(tmp_path):
+    arm = messages(names=("lift", "elbow"))
+    other = [(time + 1, joint_state(time + 1, [0.0, 0.0], [], (), ["lift", "elbow"])) for time, _ in arm[1::3]]
+    for names in (("elbow", "lift"), None):
+        recording = read_recording(
+            log_file(tmp_path, {"/joint_states": other[:1] + arm + other[1:]}), joint_names=names
+        )
+        order = [1, 0] if names else [0, 1]
+        assert np.array_equal(recording.samples().effort, MOTION["effort"][:, order])
+        assert f"{len(other)} messages hold no effort; left out" in recording.notes[0].text
+
+
+def test_a_gripper_without_efforts_is_none_of_the_arms_business(tmp_path):
+    arm = messages(names=("lift", "elbow"))
+    gripper = [(time - 1, joint_state(time - 1, [0.1], [], (), ["finger"])) for time, _ in arm]
+    path = log_file(tmp_path, {"/joint_states": gripper + arm})
+    for names in (("lift", "elbow"), None):
+        recording = read_recording(path, joint_names=names)
+        assert recording.notes == ()
+        assert np.array_equal(recording.samples().position, MOTION["position"])
+
+
+def test_messages_without_velocities_between_others(tmp_path):
+    recording = read_recording(log_file(tmp_path, {"/joint_states": edited(4, velocity=[])}))
+    velocity = recording.samples().velocity
+    assert velocity is not None
+    assert np.flatnonzero(np.isnan(velocity[:, 0])).tolist() == [4]
 
 
 def test_a_fault_in_a_topic_that_is_not_wanted_does_not_matter(tmp_path):
@@ -214,14 +255,14 @@ for _time, _message in NO_EFFORT:
 BAD_LOGS = [
     (edited(4, effort=[1.0]), "message 5: 2 positions and 1 efforts"),
     (edited(4, velocity=[1.0]), "message 5: 2 positions and 1 velocities"),
-    (edited(4, velocity=[]), "message 5: velocities are sent in some messages only"),
-    (edited(4, name=["a"]), "message 5: 1 joint names and 2 positions"),
-    (edited(4, name=["a", "a"]), "message 5: a joint is named twice (a, a)"),
-    (edited(4, name=["a", "joint2"]), "message 5: joint joint1 is missing (the message names a, joint2)"),
+    (edited(4, name=["joint1", "joint2", "x"]), "message 5: 3 joint names and 2 positions"),
+    (
+        edited(4, name=["joint1", "joint2", "joint2"], position=[1.0] * 3, effort=[1.0] * 3, velocity=[1.0] * 3),
+        "message 5: a joint is named twice (joint1, joint2, joint2)",
+    ),
     (edited(4, position=[1.0, np.inf]), "message 5, column q2: the value is infinite"),
-    (edited(0, position=[], effort=[], velocity=[], name=[]), "message 1: carries no positions"),
     (edited(14, header=messages()[2][1]["header"]), "message 15, column t: time runs backwards"),
-    (NO_EFFORT, "message 1: carries no effort"),
+    (NO_EFFORT, "topic /joint_states: carries no effort"),
     (messages(5), "holds only 5 samples"),
     ([], "no sensor_msgs/msg/JointState message was recorded"),
 ]
@@ -258,7 +299,7 @@ def test_a_late_stamp_in_a_log_without_stamps(tmp_path):
 
 @pytest.mark.parametrize(
     ("encoding", "schema"),
-    [("ros1", "sensor_msgs/JointState"), ("protobuf", "JointState"), ("cdr", "std_msgs/msg/String")],
+    [("ros1", "sensor_msgs/Imu"), ("protobuf", "JointState"), ("cdr", "std_msgs/msg/String")],
 )
 def test_other_messages_are_named(tmp_path, encoding, schema):
     path = write_plain_log(tmp_path / "log.mcap", encoded_messages(messages()), encoding=encoding, schema=schema)

@@ -85,8 +85,11 @@ def expected_rows(data: bytes) -> np.ndarray | None:
     lines = [line for line in lines if line.strip(" \t\r\v\f") and not line.strip(" \t\r\v\f").startswith("#")]
     if not lines:
         return None
+    lines = lines[first_line_of_names(lines) :]
     delimiter = next((mark for mark in ",;\t" if mark in lines[0]), ",")
     header = [name.strip(' \t\r"') for name in lines[0].split(delimiter)]
+    if header == list(COLUMNS) and lines[1:2] == ["s,rad,rad,Nm,Nm"]:
+        del lines[1]  # a row of units in SI
     rows = [line.split(delimiter) for line in lines[1:]]
     if not rows or any(header.count(name) != 1 for name in COLUMNS) or any(len(row) != len(header) for row in rows):
         return None
@@ -103,9 +106,30 @@ def expected_rows(data: bytes) -> np.ndarray | None:
     return table if len(table) >= 10 and not is_late else None
 
 
+def first_line_of_names(lines: list[str]) -> int:
+    """Lines before the names, with another number of fields than the first row of numbers, say something else."""
+
+    def is_number(field: str) -> bool:
+        try:
+            plain_number(field)
+        except ValueError:
+            return False
+        return bool(field.strip()) and "n" not in field.lower()
+
+    rows = (
+        k
+        for k, line in enumerate(lines)
+        if line.count(",") > 1 and 2 * sum(map(is_number, line.split(","))) > line.count(",") + 1
+    )
+    row = next(rows, 0)
+    return next((k for k in range(row) if lines[k].count(",") == lines[row].count(",")), 0)
+
+
 def plain_number(field: str) -> float:
     """A decimal number or NaN, after Python's own idea of them less what only Python allows."""
     field = field.strip(" \t")
+    if len(field) > 2 and field[0] == field[-1] == '"':
+        field = field[1:-1].strip(" \t")
     if not field:
         return np.nan
     if set(field) - set("0123456789+-.eEnaNA") or (not np.isfinite(float(field)) and "n" not in field.lower()):

@@ -2,6 +2,7 @@ import sqlite3
 
 import numpy as np
 import pytest
+import zstandard
 
 from recording.recording_files import arrays, message_of, messages, snapshot, write_database, write_log
 from tauscope.recording import read_recording
@@ -40,6 +41,22 @@ def test_a_sqlite_bag(tmp_path):
         assert np.array_equal(recording.samples().effort, MOTION["effort"])
         assert recording.table.names[-1] == "qd2"
     assert snapshot(folder) == before
+
+
+@pytest.mark.parametrize("suffix", [".mcap", ".db3"])
+@pytest.mark.parametrize("states_suffix", [False, True])
+def test_a_bag_whose_files_are_compressed(tmp_path, suffix, states_suffix):
+    folder = bag(tmp_path / "bag", [f"bag_0{suffix}" + ".zstd" * states_suffix])
+    plain = tmp_path / f"plain{suffix}"
+    if suffix == ".db3":
+        write_database(plain, messages())
+    else:
+        write_log(plain, {"/joint_states": messages()})
+    (folder / f"bag_0{suffix}.zstd").write_bytes(zstandard.ZstdCompressor().compress(plain.read_bytes()))
+    assert np.array_equal(read_recording(folder, 2).samples().effort, MOTION["effort"])
+    cut = zstandard.ZstdCompressor().compress(plain.read_bytes())[:-200]
+    (folder / f"bag_0{suffix}.zstd").write_bytes(cut)
+    assert message_of(lambda: read_recording(folder)).startswith(f"{folder}/bag_0{suffix}")
 
 
 def test_names_with_characters_that_mean_something_in_an_address(tmp_path):
@@ -97,7 +114,7 @@ def test_a_database_whose_table_names_are_no_text(tmp_path):
         ("rosbag2_bagfile_information: {relative_file_paths: 3}", "relative_file_paths is missing"),
         ("rosbag2_bagfile_information: {relative_file_paths: [gone.mcap]}", "names gone.mcap, which is not there"),
         ("rosbag2_bagfile_information: {relative_file_paths: [../out.mcap]}", "names out.mcap, which is not there"),
-        ("rosbag2_bagfile_information: {relative_file_paths: [x.mcap.zstd]}", "neither .mcap nor .db3; decompress"),
+        ("rosbag2_bagfile_information: {relative_file_paths: [x.mcap.zstd]}", "cannot be decompressed ("),
         ("rosbag2_bagfile_information: {relative_file_paths: [..]}", "which is not there"),
         ("\x00", "not a YAML file"),
     ],

@@ -42,7 +42,7 @@ def test_urdf_is_taken_from_the_given_files_only(tmp_path: Path) -> None:
     _assert_same(from_file, robot_from_dict(_data(URDF_ROBOT_YAML), urdf_files={"arm.urdf": URDF.encode()}))
     data = _data(URDF_ROBOT_YAML)
     data["kinematics"]["urdf"]["file"] = str(tmp_path / "arm.urdf")
-    with pytest.raises(RobotFileError, match=r"robot: kinematics\.urdf\.file: .* is not among the given files"):
+    with pytest.raises(RobotFileError, match=r"robot: kinematics\.urdf\.file: .* is not among the given ones"):
         robot_from_dict(data)
 
 
@@ -51,7 +51,7 @@ def test_uploaded_robot_file_opens_no_other_file(tmp_path: Path) -> None:
     data = URDF_ROBOT_YAML.encode()
     _assert_same(read_robot(path), robot_from_yaml(data, "upload", {"arm.urdf": URDF.encode()}))
     outside = data.replace(b"arm.urdf", str(tmp_path / "arm.urdf").encode())
-    with pytest.raises(RobotFileError, match=r"upload:3: kinematics\.urdf\.file: the URDF .* is not among the given"):
+    with pytest.raises(RobotFileError, match=r"upload:3: kinematics\.urdf\.file: the file .* is not among the given"):
         robot_from_yaml(outside, "upload", {"arm.urdf": URDF.encode()})
     with pytest.raises(RobotFileError, match="larger than 1024 KiB"):
         robot_from_yaml(b"#" * 2_000_000)

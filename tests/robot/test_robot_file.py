@@ -73,7 +73,7 @@ def test_urdf_beside_the_robot_file_fills_joints_and_model(tmp_path: Path) -> No
     assert robot.urdf == tmp_path / "arm.urdf"
     assert [joint.name for joint in robot.joints] == ["shoulder", "elbow"]
     assert robot.joints[0].limits == JointLimits((-2.0, 2.0), 1.5, None, 30.0)
-    assert robot.urdf_links == (("upper",), ("lower", "tool"))
+    assert robot.link_names == (("upper",), ("lower", "tool"))
     assert robot.model.links is not None
     assert robot.model.links[0].mass == 2.0
     np.testing.assert_allclose(robot.model.links[0].first_moment, [0.2, 0.0, 0.0])
@@ -84,6 +84,29 @@ def test_limits_of_the_robot_file_go_before_the_urdfs(tmp_path: Path) -> None:
     joints = "joints:\n  - {name: shoulder, limits: {velocity: 0.7}}\n  - name: elbow\n"
     robot = _read(tmp_path, URDF_ROBOT_YAML + joints, URDF)
     assert robot.joints[0].limits == JointLimits((-2.0, 2.0), 0.7, None, 30.0)
+
+
+def test_joints_are_matched_by_name_and_those_not_listed_take_the_urdfs_values(tmp_path: Path) -> None:
+    robot = _read(tmp_path, URDF_ROBOT_YAML + "joints:\n  - {name: elbow, gear_ratio: 50}\n", URDF)
+    assert [(joint.name, joint.gear_ratio) for joint in robot.joints] == [("shoulder", None), ("elbow", 50.0)]
+    assert robot.joints[0].limits.torque == 30.0
+
+
+def test_urdf_by_itself_is_a_robot_file(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF, encoding="utf-8")
+    robot = read_robot(path)
+    assert (robot.name, robot.source, robot.urdf) == ("two-joint-arm", path, path)
+    assert [joint.name for joint in robot.joints] == ["shoulder", "elbow"]
+    (note,) = robot.warnings
+    assert note.code == "default-chain"
+    assert "from 'base' to the deepest leaf 'tool'; its joints are 'shoulder', 'elbow'" in note.text
+    assert "kinematics: {urdf: {file: arm.urdf, base: …, tip: …}}" in str(note.remedy)
+
+
+def test_base_and_tip_may_be_left_out(tmp_path: Path) -> None:
+    robot = _read(tmp_path, "name: a\nkinematics: {urdf: {file: arm.urdf}}\n", URDF)
+    assert [note.code for note in robot.warnings] == ["default-chain"]
 
 
 def test_model_block_replaces_all_of_the_urdfs_model(tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ ERRORS = {
     "no description": (
         "  dh:",
         "  dh: null\nx:",
-        "unknown key 'x'; known here: gravity, joints, kinematics, model, name",
+        "unknown key 'x'; known here: gravity, joints, kinematics, locked, model",
     ),
     "unknown description": ("  dh:", "  mdhh:", "3: kinematics.mdhh: unknown key 'mdhh'; did you mean 'mdh'?"),
     "unknown key": (
@@ -190,7 +190,10 @@ def test_first_of_several_errors_is_said_to_be_so(tmp_path: Path) -> None:
         (b"name: \x00", "not valid YAML"),
         (b"just text", ":1: must be a mapping with name and kinematics, but is 'just text'"),
         (b"- a\n- b\n", ":1: must be a mapping with name and kinematics, but is a list of 2"),
-        (URDF.encode(), "is XML; write a robot file"),
+        (
+            b"<sdf version='1.7'/>",
+            ":1: its root element is <sdf>; give a URDF (<robot>), an MJCF (<mujoco>) or a robot file",
+        ),
         (b'a: "\\UFFFFFFFF"', "not valid YAML"),
         (b"[" * 5000, ":1: nested deeper than 24 levels"),
         (b"- " * 5000, ":1: nested deeper than 24 levels"),
@@ -233,17 +236,16 @@ def test_missing_urdf_names_the_place_in_the_robot_file(tmp_path: Path) -> None:
         read_robot(path)
 
 
-def test_joint_named_otherwise_than_in_the_urdf_is_refused_with_both_names(tmp_path: Path) -> None:
-    path = write_robot(tmp_path, URDF_ROBOT_YAML + "joints:\n  - name: elbow\n  - name: shoulder\n", URDF)
-    with pytest.raises(
-        RobotFileError, match=r":5: joints\[0\]\.name \(joint 1, 'elbow'\): 'elbow' is joint 'shoulder'"
-    ):
+def test_joint_that_the_chain_has_not_is_refused_with_the_chains_names(tmp_path: Path) -> None:
+    path = write_robot(tmp_path, URDF_ROBOT_YAML + "joints:\n  - name: flange\n", URDF)
+    message = r":5: joints\[0\]\.name \(joint 1, 'flange'\): 'flange' is no .*its joints are 'shoulder', 'elbow'"
+    with pytest.raises(RobotFileError, match=message):
         read_robot(path)
 
 
-def test_urdf_with_another_number_of_joints_is_refused(tmp_path: Path) -> None:
-    path = write_robot(tmp_path, URDF_ROBOT_YAML + "joints:\n  - name: shoulder\n", URDF)
-    with pytest.raises(RobotFileError, match=r":4: joints: number of entries is 1, of joints in kinematics\.urdf 2"):
+def test_locked_joint_of_rows_is_refused(tmp_path: Path) -> None:
+    path = write_robot(tmp_path, ROBOT_YAML + "locked: {slide: 0.1}\n")
+    with pytest.raises(RobotFileError, match=r"locked: needs kinematics from a URDF or MJCF"):
         read_robot(path)
 
 

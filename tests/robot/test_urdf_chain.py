@@ -8,7 +8,7 @@ import pytest
 
 from robot.robot_texts import URDF, replaced
 from tauscope.errors import RobotFileError
-from tauscope.robot import JointType, Severity, UrdfChain, link_placements, read_urdf_chain
+from tauscope.robot import Chain, Coupling, JointType, Severity, link_placements, read_urdf_chain
 from tauscope.robot.placement import rotation_of_z_to
 
 
@@ -131,7 +131,11 @@ def test_alignment_is_a_rotation_that_carries_z_to_the_axis(axis: tuple[float, f
     assert np.linalg.det(rotation) == pytest.approx(1.0)
 
 
-def _chain(text: str = URDF, base: str = "base", tip: str = "tool") -> UrdfChain:
+def _chain_of_bytes(data: bytes) -> Chain:
+    return read_urdf_chain(data, "arm.urdf", "base", "tool")
+
+
+def _chain(text: str = URDF, base: str = "base", tip: str = "tool") -> Chain:
     return read_urdf_chain(text.encode(), "arm.urdf", base, tip)
 
 
@@ -171,28 +175,53 @@ def test_link_without_inertial_is_massless_and_reported() -> None:
     ]
 
 
-def test_what_moves_beside_the_chain_is_reported_and_left_out() -> None:
-    finger = """
+FINGER = """
   <link name="finger">
     <inertial><mass value="7"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
   </link>
-  <joint name="grip" type="prismatic"><parent link="tool"/><child link="finger"/></joint>
+  <joint name="grip" type="prismatic"><parent link="tool"/><child link="finger"/><axis xyz="0 0 -1"/></joint>
 </robot>"""
-    chain = _chain(replaced(URDF, "</robot>", finger))
+
+
+def test_what_moves_beside_the_chain_counts_as_rigid_and_is_noted() -> None:
+    chain = _chain(replaced(URDF, "</robot>", FINGER))
     assert chain.links is not None
-    assert chain.links[1].mass == 1.0
-    (found,) = chain.findings
-    assert found.severity is Severity.WARNING
-    assert "'grip'" in found.where
-    assert "'finger'" in found.text
+    assert chain.links[1].mass == 8.0
+    assert chain.link_names == (("upper",), ("lower", "tool", "finger"))
+    (note,) = chain.notes
+    assert note.code == "rigid-branch"
+    assert "joint 'grip' moves beside the chain and counts as rigid, with 7 kg" in note.text
+    assert "locked: {grip: 0.02}" in str(note.remedy)
+
+
+def test_locked_joint_stands_where_it_is_stated() -> None:
+    text = replaced(URDF, "</robot>", FINGER)
+    chain = read_urdf_chain(text.encode(), "arm.urdf", "base", "tool", {"grip": 0.5})
+    assert chain.notes == ()
+    assert chain.links is not None
+    np.testing.assert_allclose(chain.links[1].first_moment, [0.0, 0.0, 7.0 * (0.2 - 0.5)])
+    inner = read_urdf_chain(text.encode(), "arm.urdf", "base", "tool", {"shoulder": 0.7, "grip": 0.5})
+    assert inner.joint_names == ("elbow",)
+    whole = link_placements(chain.segments, np.array([[0.7, 0.3]]))
+    np.testing.assert_allclose(link_placements(inner.segments, np.array([[0.3]]))[0, 0], whole[0, 1], atol=1e-15)
+    with pytest.raises(RobotFileError, match=r"locked: joint 'gripp' is not in the file; did you mean 'grip'\?"):
+        read_urdf_chain(text.encode(), "arm.urdf", "base", "tool", {"gripp": 0.5})
 
 
 def test_chain_may_end_before_the_last_joint() -> None:
     chain = _chain(tip="upper")
     assert chain.joint_names == ("shoulder",)
     assert chain.links is not None
-    assert chain.links[0].mass == 2.0
-    assert ["'elbow'" in finding.where for finding in chain.findings] == [True]
+    assert chain.links[0].mass == 3.0
+    assert ["'elbow'" in note.text for note in chain.notes] == [True]
+
+
+def test_chain_runs_from_the_root_to_the_deepest_leaf_by_default() -> None:
+    text = replaced(URDF, "</robot>", '<link name="world"/><joint name="free" type="floating"><parent link="world"/>'
+                    '<child link="base"/></joint></robot>')  # fmt: skip
+    chain = read_urdf_chain(text.encode(), "arm.urdf")
+    assert (chain.base, chain.tip, chain.joint_names) == ("base", "tool", ("shoulder", "elbow"))
+    assert [note.code for note in chain.notes] == ["default-chain"]
 
 
 def test_joint_below_the_base_is_reported_as_standing_still() -> None:
@@ -213,6 +242,8 @@ def test_axis_of_any_length_gives_its_direction() -> None:
         ('lower="-2" upper="2"', 'lower="0" upper="0"'),
         ('lower="-2" upper="2"', ""),
         ('lower="-2" upper="2"', 'lower="-1e16" upper="1e16"'),
+        ('lower="-2" upper="2"', 'lower="0" upper="-1"'),
+        ('lower="-2" upper="2"', 'lower="-inf" upper="inf"'),
         ('<limit lower="-2" upper="2" velocity="1.5" effort="30"/>', ""),
     ],
 )
@@ -220,8 +251,76 @@ def test_limits_that_exporters_write_for_unknown_are_not_stated(old: str, new: s
     assert _chain(replaced(URDF, old, new)).limits[0].position is None
 
 
-def test_zero_effort_is_not_stated() -> None:
-    assert _chain(replaced(URDF, 'effort="30"', 'effort="0"')).limits[0].torque is None
+@pytest.mark.parametrize("value", ["0", "-1", "1e300", "inf", "nan"])
+def test_effort_that_no_joint_has_is_not_stated(value: str) -> None:
+    assert _chain(replaced(URDF, 'effort="30"', f'effort="{value}"')).limits[0].torque is None
+
+
+def test_mimic_of_a_joint_that_is_not_there_moves_by_itself() -> None:
+    chain = _chain(replaced(URDF, '<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><mimic joint="elbo"/>'))
+    assert chain.joint_names == ("shoulder", "elbow")
+    assert ["mimics joint 'elbo', which is not in the file" in finding.text for finding in chain.findings] == [True]
+
+
+@pytest.mark.parametrize(("kind", "mass"), [("mass", 0.0), ("inertia", 2.0)])
+def test_inertial_without_a_part_counts_it_as_zero(kind: str, mass: float) -> None:
+    start = URDF.index(f"<{kind} ")
+    chain = _chain(URDF[:start] + URDF[URDF.index("/>", start) + 2 :])
+    assert chain.links is not None
+    assert chain.links[0].mass == mass
+    assert f"has no <{kind}>, which counts as zero" in chain.findings[0].text
+
+
+def test_reversed_limits_count_as_not_stated_and_are_reported() -> None:
+    chain = _chain(replaced(URDF, 'lower="-2"', 'lower="3"'))
+    assert chain.limits[0].position is None
+    assert ["lower 3 is above upper 2" in finding.text for finding in chain.findings] == [True]
+
+
+def test_undeclared_prefix_is_read_as_ros_reads_it() -> None:
+    gazebo = '<gazebo reference="upper"><sensor:camera name="c"><update>20</update></sensor:camera></gazebo></robot>'
+    assert _chain(replaced(URDF, "</robot>", gazebo)).joint_names == ("shoulder", "elbow")
+
+
+@pytest.mark.parametrize(("encoding", "declared"), [("latin-1", ""), ("latin-1", "latin-1"), ("utf-16", "utf-16")])
+def test_text_of_any_encoding_is_read(encoding: str, declared: str) -> None:
+    text = replaced(URDF, '"shoulder"', '"épaule"')
+    if declared:
+        text = replaced(text, "?>", f' encoding="{declared}"?>')
+    chain = _chain_of_bytes(text.encode(encoding))
+    assert chain.joint_names == ("épaule", "elbow")
+    assert ["Latin-1" in finding.text for finding in chain.findings] == [True] * (not declared)
+
+
+def test_definitions_left_over_from_xacro_are_ignored_and_named() -> None:
+    left = '<xacro:macro name="m"><link name="no"/></xacro:macro></robot>'
+    chain = _chain(replaced(URDF, "</robot>", left))
+    assert ["left over from xacro" in finding.text for finding in chain.findings] == [True]
+
+
+MIMIC = """
+  <link name="hand"><inertial><mass value="1.5"/><origin xyz="0.1 0.02 0"/>
+    <inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0.001" iyz="0"/></inertial></link>
+  <joint name="wrist" type="revolute"><parent link="tool"/><child link="hand"/><origin xyz="0.1 0 0.1" rpy="0.1 0 0"/>
+    <axis xyz="0 1 0"/><mimic joint="shoulder" multiplier="-0.5" offset="0.2"/></joint>
+</robot>"""
+
+
+def test_mimic_joint_follows_its_master() -> None:
+    chain = _chain(replaced(URDF, "</robot>", MIMIC), tip="hand")
+    assert chain.joint_names == ("shoulder", "elbow")
+    assert [each.coupling for each in chain.segments] == [None, None, Coupling(0, -0.5, 0.2)]
+    assert chain.link_names == (("upper",), ("lower", "tool"), ("hand",))
+
+
+def test_mimic_joint_beside_the_chain_follows_a_locked_master() -> None:
+    mirror = FINGER.replace("finger", "mirror").replace('"grip"', '"mirror"').replace(
+        "</joint>", '<mimic joint="grip" multiplier="2" offset="0.01"/></joint>')  # fmt: skip
+    text = replaced(replaced(URDF, "</robot>", FINGER), "</robot>", mirror)
+    chain = read_urdf_chain(text.encode(), "arm.urdf", "base", "tool", {"grip": 0.5})
+    assert chain.notes == ()
+    assert chain.links is not None
+    np.testing.assert_allclose(chain.links[1].first_moment, [0, 0, 7.0 * (0.2 - 0.5) + 7.0 * (0.2 - 1.01)], atol=1e-15)
 
 
 def test_default_namespace_is_accepted() -> None:
@@ -238,14 +337,12 @@ ERRORS = {
     "huge": ('value="2.0"', 'value="1e99"', r":7: mass: value=1e\+99 is beyond"),
     "Python's underscore": ('value="2.0"', 'value="2_0"', r":7: mass"),
     "two numbers": ('xyz="0 0 0.3"', 'xyz="0 0.3"', r":19: origin: xyz='0 0\.3' must hold three numbers"),
-    "no mass": ('<mass value="2.0"/>', "", r":5: inertial: of link 'upper' has no <mass>"),
     "no inertia entry": ('ixx="0.02" ', "", r":8: inertia: the attribute 'ixx' is missing"),
     "zero axis": ('xyz="0 1 0"', 'xyz="0 0 0"', r":18: joint 'shoulder': its axis is zero"),
-    "limits reversed": ('lower="-2"', 'lower="3"', r":18: joint 'shoulder': limits reversed: lower 3 is above"),
-    "negative velocity": ('velocity="1.5"', 'velocity="-1.5"', r"'shoulder': its velocity limit -1\.5 is negative"),
     "unknown joint type": ('type="revolute"', 'type="revolut"', r"joint 'shoulder': type 'revolut' .*'revolute'\?"),
     "planar joint": ('type="revolute"', 'type="planar"', r"joint 'shoulder': type planar is not supported"),
-    "mimic": ('<axis xyz="0 1 0"/>', '<mimic joint="elbow"/>', r"joint 'shoulder': the joint mimics another"),
+    "mimic of itself": ('<axis xyz="0 1 0"/>', '<mimic joint="shoulder"/>', r"joint 'shoulder': mimics itself"),
+    "expression": ('value="2.0"', 'value="${2*m}"', r":7: mass: value='\$\{2\*m\}' is an expression of xacro; expand"),
     "unknown parent": ('parent link="base"', 'parent link="bose"', r"link 'bose' is not in the file; .*'base'\?"),
     "no child": ('<child link="upper"/>', "", r"joint 'shoulder': must hold one <child link=…> element"),
     "link twice": ('<link name="tool"/>', '<link name="tool"/><link name="tool"/>', r"'tool': the link stands"),
@@ -255,7 +352,7 @@ ERRORS = {
     "broken XML": ("</robot>", "", r"arm\.urdf:39: not valid XML"),
     "not a robot": ("", "", r"root element is <robot>"),
     "DOCTYPE": ("<robot ", "<!DOCTYPE robot>\n<robot ", r"arm\.urdf:2: a DOCTYPE is not accepted"),
-    "xacro": ("<robot ", '<robot xmlns:x="http://www.ros.org/wiki/xacro" ', r"is a xacro; expand it first"),
+    "xacro": ("<robot ", '<robot xmlns:x="http://www.ros.org/wiki/xacro" ', r"is a xacro; expand the file first"),
 }
 
 
@@ -268,7 +365,7 @@ def test_invalid_urdf_is_refused_by_name_and_line(name: str) -> None:
     elif name == "not a robot":
         text = "<sdf/>"
     elif name == "xacro":
-        text = text.replace('<link name="tool"/>', '<link name="tool"/><x:macro name="m"/>')
+        text = text.replace('<link name="tool"/>', '<link name="tool"/><x:wrist name="m"/>')
     with pytest.raises(RobotFileError, match=message) as caught:
         _chain(text, tip=tip)
     assert "\n" not in str(caught.value)
@@ -308,7 +405,7 @@ def test_entity_that_reads_a_file_is_refused() -> None:
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-32", "latin-1"])
 def test_doctype_cannot_hide_in_another_encoding(encoding: str) -> None:
     text = f'<?xml version="1.0" encoding="{encoding}"?><!-- é --><!DOCTYPE robot><robot/>'
-    with pytest.raises(RobotFileError, match="not UTF-8"):
+    with pytest.raises(RobotFileError, match="a DOCTYPE is not accepted"):
         read_urdf_chain(text.encode(encoding), "arm.urdf", "base", "tool")
 
 

@@ -1,5 +1,6 @@
 """A run in virtual time, from the first call to the last file."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ from tauscope.errors import AcquisitionError
 from tauscope.recording import EffortKind, read_recording
 from tauscope.recording.journal_reading import read_journal
 from tauscope.recording.journal_rows import Phase
+from tauscope.robot import Robot
 from tauscope.runtime.in_process import run_trajectory
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.record import RunRecord, read_record
@@ -174,6 +176,36 @@ def test_an_answer_of_which_nobody_knows_the_instant_is_no_sample(tmp_path: Path
     assert record.timing is not None
     assert record.timing.stale_samples == (lost, lost)
     assert len(read_journal(tmp_path / "run" / "journal.mcap").rows) == len(arm.sent) - lost
+
+
+def late_answers(share: int) -> PointArm:
+    """An arm of whose answers one of so many is 2 ms late."""
+
+    def tamper(arm: PointArm, state: ArmState) -> ArmState:
+        return replace(state, late_ns=2_000_000) if len(arm.sent) % share == 0 else state
+
+    return PointArm(position=START, tamper=tamper)
+
+
+def test_a_run_that_keeps_too_few_samples_is_degraded_and_says_first_why(tmp_path: Path) -> None:
+    record, _, events = run(tmp_path / "run", late_answers(4))
+    assert record.state is RunState.DEGRADED
+    assert record.kept == pytest.approx(0.75, abs=0.01)
+    assert record.problem is not None
+    assert re.match(
+        r"\d+ answers came more than 1 ms later than usual: 75\.\d % of the motion's samples were kept, 98 %",
+        record.problem.detail,
+    )
+    assert "--least-kept" in record.problem.detail
+    assert record.recording is not None
+    assert record.recording.files
+    assert events[-1]["event"] == "end"
+
+
+@pytest.mark.parametrize(("share", "options"), [(100, {}), (4, {"least_kept": 0.7}), (4, {"stale_ms": 3.0})])
+def test_what_may_be_lost_is_an_option(tmp_path: Path, share: int, options: dict[str, float]) -> None:
+    record, _, _ = run(tmp_path / "run", late_answers(share), **options)
+    assert record.state is RunState.FINISHED
 
 
 def test_a_loop_that_is_late_skips_and_says_so(tmp_path: Path) -> None:
@@ -341,3 +373,47 @@ def test_a_run_ended_in_its_ramp_leaves_a_journal_and_no_recording(tmp_path: Pat
     assert record.recording.partial
     assert record.recording.files == ()
     assert any("before its motion began" in remark for remark in record.recording.remarks)
+
+
+RELEASED = {"stop_policy": "release"}
+
+
+def released_robot() -> Robot:
+    robot = point_robot()
+    return replace(robot, joints=tuple(replace(joint, drive=dict(RELEASED)) for joint in robot.joints))
+
+
+def released_run(folder: Path, arm: PointArm, **options: object) -> RunRecord:
+    robot = released_robot()
+    return run_trajectory(robot, short_motion(robot), connection(arm), folder, RunOptions.model_validate(options))
+
+
+def test_an_arm_that_is_safe_without_torque_is_let_go_once_it_stands_still(tmp_path: Path) -> None:
+    record = released_run(tmp_path / "run", arm := PointArm(position=START))
+    assert (record.state, record.stop_policy) == (RunState.FINISHED, "release")
+    assert (arm.stops[0], arm.stops[-1]) == (StopPolicy.HOLD, StopPolicy.TORQUE_OFF)
+    assert arm.stops.count(StopPolicy.TORQUE_OFF) == 1
+
+
+@pytest.mark.parametrize("trouble", ["moves", "unseen"])
+def test_one_that_does_not_come_to_rest_or_is_not_seen_stays_held(tmp_path: Path, trouble: str) -> None:
+    def tamper(arm: PointArm, state: ArmState) -> ArmState:
+        if not arm.stops:
+            return state
+        drift = np.full(2, np.nan) if trouble == "unseen" else 0.1 * len(arm.stops)
+        return replace(state, position=state.position + drift)
+
+    arm = PointArm(position=START, tamper=tamper)
+    released_run(tmp_path / "run", arm)
+    assert set(arm.stops) == {StopPolicy.HOLD}
+
+
+def test_a_run_that_was_broken_off_is_held(tmp_path: Path) -> None:
+    record = released_run(tmp_path / "run", arm := PointArm(position=START, tamper=silence(1, 300)))
+    assert record.state is RunState.FAILED
+    assert set(arm.stops) == {StopPolicy.HOLD}
+
+
+def test_only_the_robot_file_states_that_an_arm_is_safe_without_torque(tmp_path: Path) -> None:
+    with pytest.raises(AcquisitionError, match=r"state drive\.stop_policy: release for its joints"):
+        run(tmp_path / "run", stop_policy="release")

@@ -10,7 +10,7 @@ from tauscope.runtime.states import TRANSITIONS, RunState, after_stop, may_follo
 
 NOON = datetime(2026, 11, 3, 12, tzinfo=UTC)
 WAY = [RunState.CREATED, RunState.CONNECTING, RunState.ENABLING, RunState.RAMPING, RunState.RUNNING]
-ENDS = [RunState.FINISHED, RunState.STOPPED, RunState.FAILED, RunState.INTERRUPTED]
+ENDS = [RunState.FINISHED, RunState.DEGRADED, RunState.STOPPED, RunState.FAILED, RunState.INTERRUPTED]
 ALLOWED = {
     *pairwise(WAY),
     *((state, RunState.STOPPING) for state in WAY),

@@ -5,9 +5,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import can
+import numpy as np
 
 from tauscope_drivers.backend import Capabilities, ControlMode, DriveLimits, StopPolicy
-from tauscope_drivers.canopen.bus import NMT_PRE_OPERATIONAL, NMT_START, CanBus
+from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen.bus import NMT_START, CanBus
 from tauscope_drivers.canopen.commissioning import commission_drive, write_settings
 from tauscope_drivers.canopen.configuration import BusConfiguration, read_configuration, require_targets
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST
@@ -28,7 +30,7 @@ from tauscope_drivers.canopen.target_limiter import TargetLimiter
 from tauscope_drivers.clock import Clock, MonotonicClock
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
-from tauscope_drivers.limits import RunawayWatch, require_finite, require_sensible
+from tauscope_drivers.limits import RunawayWatch, TorqueWatch, require_finite, require_sensible
 from tauscope_drivers.state import ArmState, Setpoint
 
 WATCHDOG_RANGE_S = (0.02, 5.0)
@@ -70,6 +72,7 @@ class CanopenArm:
         self._policy = StopPolicy.HOLD
         self._limiter: TargetLimiter | None = None
         self._runaway: RunawayWatch | None = None
+        self._torque_watch: TorqueWatch | None = None
         self._caught: Fault | None = None
         self.clock = clock or MonotonicClock()
 
@@ -90,6 +93,7 @@ class CanopenArm:
             takes_feed_forward=False,
             rate_limited_by=rate_limited_by(self._configuration),
             holds_before_torque=False,
+            remarks=() if self._session is None else self._session.remarks,
         )
 
     def connect(self) -> ArmState:
@@ -98,8 +102,8 @@ class CanopenArm:
             raise DriverError(DriverErrorKind.CANNOT_CONNECT, "the arm is connected already; disconnect it first")
         session = self._session = self._open()
         try:
-            session.bus.command_nodes(NMT_PRE_OPERATIONAL)
             self._modes = frozenset.intersection(*(node.identify() for node in session.nodes))
+            session.make_pre_operational()
         except DriverError:
             self.disconnect()
             raise
@@ -145,8 +149,9 @@ class CanopenArm:
         try:
             for node in session.nodes:
                 commission_drive(node, mode, limits, stop_policy, watchdog_s, cycle_s)
+            _require_hold(session.nodes, mode, stop_policy)
             session.bus.command_nodes(NMT_START)
-            self._mode, self._policy = mode, stop_policy
+            self._mode, self._policy, session.brake = mode, stop_policy, None
             state, place = power_up(session, mode)
         except DriverError:
             self.stop(stop_policy)
@@ -155,6 +160,8 @@ class CanopenArm:
             node.glitches.limit = float(limits.velocity[node.joint - 1])
         self._limiter = TargetLimiter(limits, place, session.settling_ns * 1e-9)
         self._runaway = RunawayWatch(limits) if mode is ControlMode.TORQUE else None
+        is_limited = [node.has(objects.LARGEST_TORQUE) for node in session.nodes]
+        self._torque_watch = TorqueWatch(np.where(is_limited, np.inf, limits.torque))
         return state
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
@@ -167,10 +174,15 @@ class CanopenArm:
         session.bus.drain()
         if any(node.error_code == HEARTBEAT_LOST for node in session.nodes):
             return session.read_by_sdo()  # such a drive takes no process data any more
-        goal = Goal.OPERATION_ENABLED if session.caught is None else Goal.QUICK_STOP
-        state = session.cycle(mode, goal, limiter.limited(setpoint, self.clock.now_ns()), session.answer_ns)
+        targets = limiter.limited(setpoint, self.clock.now_ns())
+        # a stop that has begun goes on, whatever is asked for meanwhile
+        goal = Goal.OPERATION_ENABLED if session.caught is None and session.brake is None else Goal.QUICK_STOP
+        targets = targets if goal is Goal.OPERATION_ENABLED else session.stop_targets()
+        state = session.cycle(mode, goal, targets, session.answer_ns)
         if self._runaway is not None and session.caught is None:
             session.caught = self._runaway.look(state.position, state.velocity)
+        if self._torque_watch is not None and session.caught is None:
+            session.caught = self._torque_watch.look(state.effort)
         if goal is Goal.OPERATION_ENABLED and (session.caught is not None or state.faults):
             # one drive's trouble becomes that of all: they stop together
             return stop_promptly(session, mode, POLICY_GOALS[self._policy])
@@ -184,7 +196,7 @@ class CanopenArm:
         goal = POLICY_GOALS.get(policy, Goal.QUICK_STOP)
         for node in session.nodes:
             node.glitches.limit = math.inf
-        self._mode, self._limiter, self._runaway = None, None, None
+        self._mode, self._limiter, self._runaway, self._torque_watch = None, None, None, None
         is_stopped = mode is not None and stop_in_cycle(session, mode, goal)
         silent = stop_one_by_one(session.nodes, goal, is_stopped=is_stopped)
         session.bus.start_heartbeat(0.0)
@@ -231,3 +243,20 @@ class CanopenArm:
         if self._session is None:
             raise DriverError(DriverErrorKind.NOT_CONNECTED, "the CAN bus is not open; connect first")
         return self._session
+
+
+def _require_hold(nodes: Sequence[DriveNode], mode: ControlMode, policy: StopPolicy) -> None:
+    """Refuse torque mode where a drive would fall at a stop that is to hold: it has no targets of position to stay at.
+
+    Raises
+    ------
+    DriverError
+        ``refused``: names the joint
+    """
+    falling = [node for node in nodes if not node.stays_stopped]
+    if falling and mode is ControlMode.TORQUE and policy is StopPolicy.HOLD:
+        raise DriverError(
+            DriverErrorKind.REFUSED,
+            f"{falling[0].place}: has no power after a quick stop ({objects.QUICK_STOP_OPTION}), and cannot hold in "
+            "torque mode; run in position mode, or state stop_policy torque_off for an arm that may be let go",
+        )

@@ -1,7 +1,7 @@
 """What a drive is told before it gets power: the values of its DCF file, mode, limits, watchdog, process data."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from canopen.sdo.exceptions import SdoAbortedError
@@ -11,34 +11,21 @@ from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import MASTER_NODE
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile
 from tauscope_drivers.canopen.data_sheet.settings import Setting, settings_of
-from tauscope_drivers.canopen.node import MODES, DriveNode
-from tauscope_drivers.canopen.process_data import (
-    MOTION_PDO,
-    RECEIVED_ID,
-    SENT_IDS,
-    STATE_PDO,
-    TARGET_PDOS,
-    PdoLayout,
-    PdoParameters,
-    mapping_entries,
-    received_parameters,
-    sent_parameters,
-)
+from tauscope_drivers.canopen.node import DriveNode
+from tauscope_drivers.canopen.objects import DriveObject
+from tauscope_drivers.canopen.optional_objects import STAYING_OPTIONS
+from tauscope_drivers.canopen.pdo_mapping import map_process_data
 from tauscope_drivers.canopen.state_machine import POWERED, decode_state
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 
 PRODUCER_HEARTBEAT_MS = 100
 
-_PDO_OFF = 1 << 31
-_MAPPINGS = 2
-"""What is not kept the first time may have been altered on its way."""
-
-_EVERY_SYNC = 1
-_QUICK_STOP_AND_HOLD = 6
-_RAMP_AND_LET_GO = 2
-_ABORT_BY_QUICK_STOP = 3
-_ABORT_BY_DISABLING = 2
-_FAULT_BY_QUICK_STOP = 2
+_STAYS_STOPPED = (6, 5)
+"""Quick stop options that keep the power: by the quick stop ramp, by the slow one."""
+_LETS_GO = (2, 1)
+_ABORT_BY_QUICK_STOP, _ABORT_BY_FAULT, _ABORT_BY_DISABLING = 3, 1, 2
+_FAULT_BY_RAMP = (2, 1)
+_NOTHING = 0
 
 
 def write_settings(node: DriveNode) -> bool:
@@ -54,6 +41,20 @@ def write_settings(node: DriveNode) -> bool:
     file = node.configuration.device_file
     if file is None:
         return False
+    missing = find_missing(node, file)
+    for setting in missing:
+        _give(node, file, setting)
+    return bool(missing)
+
+
+def find_missing(node: DriveNode, file: DeviceFile) -> list[Setting]:
+    """Values of a DCF file that a drive does not have yet; only reads.
+
+    Raises
+    ------
+    DriverError
+        ``refused``: it does not have their objects, or is under power; ``cannot-connect``: it does not answer
+    """
     missing = [one for one in settings_of(file).written if _kept(node, file, one) != one.data]
     if missing and decode_state(node.dictionary.read(objects.STATUSWORD)) in POWERED:
         raise DriverError(
@@ -61,9 +62,7 @@ def write_settings(node: DriveNode) -> bool:
             f"{node.place}: is under power, and {missing[0].entry} is not yet {missing[0].text} as {file.name} has it; "
             "support the arm and let go of it first",
         )
-    for setting in missing:
-        _give(node, file, setting)
-    return bool(missing)
+    return missing
 
 
 def _kept(node: DriveNode, file: DeviceFile, setting: Setting) -> bytes:
@@ -121,18 +120,43 @@ def commission_drive(
     """
     write = node.dictionary.write
     holds = stop_policy is StopPolicy.HOLD
-    write(objects.MODE_OF_OPERATION, MODES[mode])
-    write(objects.QUICK_STOP_OPTION, _QUICK_STOP_AND_HOLD if holds else _RAMP_AND_LET_GO)
-    write(objects.ABORT_CONNECTION, _ABORT_BY_QUICK_STOP if holds else _ABORT_BY_DISABLING)
-    write(objects.FAULT_REACTION_OPTION, _FAULT_BY_QUICK_STOP)
+    write(objects.MODE_OF_OPERATION, node.mode_numbers[mode])
+    option = _choose(node, objects.QUICK_STOP_OPTION, _STAYS_STOPPED if holds else _LETS_GO)
+    node.stays_stopped = option in STAYING_OPTIONS
+    _arm_abort(node, holds=holds and node.stays_stopped)
+    _choose(node, objects.FAULT_REACTION_OPTION, _FAULT_BY_RAMP)
     _write_limits(node, limits)
     if cycle_s is not None:
         _tell_cycle(node, cycle_s)
     write(objects.CONSUMER_HEARTBEAT, MASTER_NODE << 16 | round(watchdog_s * 1e3))
-    write(objects.PRODUCER_HEARTBEAT, PRODUCER_HEARTBEAT_MS)
-    _map(node, received_parameters(TARGET_PDOS[mode]), RECEIVED_ID, TARGET_PDOS[mode])
-    for number, (identifier, layout) in enumerate(zip(SENT_IDS, (STATE_PDO, MOTION_PDO), strict=True)):
-        _map(node, sent_parameters(number, layout), identifier, layout)
+    if node.has(objects.PRODUCER_HEARTBEAT):
+        write(objects.PRODUCER_HEARTBEAT, PRODUCER_HEARTBEAT_MS)
+    map_process_data(node, mode)
+
+
+def _choose(node: DriveNode, entry: DriveObject, values: Sequence[int]) -> int | None:
+    """Write the first value that a drive takes; what it keeps otherwise, None where it has no such object."""
+    for value in values if node.has(entry) else ():
+        if _takes(node, entry, value):
+            return value
+    return node.dictionary.read_optional(entry)
+
+
+def _arm_abort(node: DriveNode, *, holds: bool) -> None:
+    """Make the drive stop by itself where its master is silent.
+
+    Raises
+    ------
+    DriverError
+        ``refused``: it would go on
+    """
+    values = (_ABORT_BY_QUICK_STOP if holds else _ABORT_BY_DISABLING, _ABORT_BY_FAULT)
+    if _choose(node, objects.ABORT_CONNECTION, values) == _NOTHING:
+        raise DriverError(
+            DriverErrorKind.REFUSED,
+            f"{node.place}: {objects.ABORT_CONNECTION} stays 0: it goes on when the host is gone; "
+            "set it to 1, 2 or 3 with the maker's tool",
+        )
 
 
 def _write_limits(node: DriveNode, limits: DriveLimits) -> None:
@@ -145,55 +169,50 @@ def _write_limits(node: DriveNode, limits: DriveLimits) -> None:
     caps = [] if stated is None else [stated]
     if math.isfinite(torque):
         caps.append(node.units.torque_cap(torque))
-    if caps:
+    if caps and node.has(objects.LARGEST_TORQUE):
         write(objects.LARGEST_TORQUE, min(*caps, node.dictionary.read(objects.LARGEST_TORQUE)))
     if math.isfinite(low) and math.isfinite(high):
         counts = sorted((node.units.counts(low), node.units.counts(high)))
-        write(objects.LOWEST_POSITION, counts[0])
-        write(objects.HIGHEST_POSITION, counts[1])
+        for entry, count in zip((objects.LOWEST_POSITION, objects.HIGHEST_POSITION), counts, strict=True):
+            if node.has(entry):
+                write(entry, count)
 
 
 def _tell_cycle(node: DriveNode, cycle_s: float) -> None:
     """Tell the time between two targets; a drive without this object finds it from SYNC."""
-    if node.dictionary.read_optional(objects.INTERPOLATION_VALUE) is None:
+    if not node.has(objects.INTERPOLATION_VALUE):
         return
+    known = node.dictionary.read_optional(objects.INTERPOLATION_EXPONENT)
+    exponents = (_MILLISECONDS,) if known is None else _PERIOD_EXPONENTS
     try:
-        value, exponent = interpolation_period(cycle_s)
+        value, exponent = interpolation_period(cycle_s, exponents)
+        if known not in (None, exponent) and not _takes(node, objects.INTERPOLATION_EXPONENT, exponent):
+            value, _ = interpolation_period(cycle_s, (known,))
     except ValueError as error:
         raise DriverError(DriverErrorKind.REFUSED, f"{node.place}: {error}; choose another rate") from error
-    if node.dictionary.read(objects.INTERPOLATION_EXPONENT) != exponent:
-        node.dictionary.write(objects.INTERPOLATION_EXPONENT, exponent)
     node.dictionary.write(objects.INTERPOLATION_VALUE, value)
 
 
-def _map(node: DriveNode, places: PdoParameters, identifier: int, layout: PdoLayout) -> None:
-    """Write a PDO's parameters by explicit SDOs, in the order that CiA 301 asks for."""
-    number, write = node.configuration.node_id, node.dictionary.write
-    write(places.identifier, _PDO_OFF | identifier + number)
-    write(places.kind, _EVERY_SYNC)
-    entries = dict(zip(places.entries, mapping_entries(layout.objects), strict=True))
-    for _ in range(_MAPPINGS):
-        write(places.count, 0)
-        for place, entry in entries.items():
-            node.dictionary.send(place, entry)
-        write(places.count, len(entries))
-        # some drives show them only when they count
-        strange = [place for place, entry in entries.items() if node.dictionary.read(place) != entry]
-        if not strange:
-            break
-    else:
-        raise DriverError(DriverErrorKind.REFUSED, f"{node.place}: {strange[0]} is not kept; its PDOs are fixed")
-    write(places.identifier, identifier + number)
+def _takes(node: DriveNode, entry: DriveObject, value: int) -> bool:
+    """Write a value; False where the drive refuses it."""
+    try:
+        node.dictionary.write(entry, value)
+    except DriverError as error:
+        if error.kind is not DriverErrorKind.REFUSED:
+            raise
+        return False
+    return True
 
 
 _PERIOD_EXPONENTS = range(-3, -7, -1)
 """Milliseconds first: some drives know nothing else."""
+_MILLISECONDS = -3
 
 _LARGEST_PERIOD = 0xFF
 _ROUNDING = 1e-6
 
 
-def interpolation_period(cycle_s: float) -> tuple[int, int]:
+def interpolation_period(cycle_s: float, exponents: Sequence[int] = _PERIOD_EXPONENTS) -> tuple[int, int]:
     """Value and exponent (0x60C2) of a cycle, value · 10^exponent seconds: exact where possible, else the nearest.
 
     A drive moves to a target within this time: too short a time makes a halt at every target, too long a time a lag.
@@ -204,7 +223,7 @@ def interpolation_period(cycle_s: float) -> tuple[int, int]:
         the cycle is shorter or longer than the object can tell
     """
     best: tuple[float, int, int] | None = None
-    for exponent in _PERIOD_EXPONENTS:
+    for exponent in exponents:
         value = round(cycle_s / 10.0**exponent)
         if not 1 <= value <= _LARGEST_PERIOD:
             continue
@@ -212,5 +231,6 @@ def interpolation_period(cycle_s: float) -> tuple[int, int]:
         if best is None or error < best[0] - _ROUNDING:
             best = (error, value, exponent)
     if best is None:
-        raise ValueError(f"a cycle of {cycle_s:g} s is not between 1 µs and {_LARGEST_PERIOD} ms")
+        finest, coarsest = 10.0 ** min(exponents), _LARGEST_PERIOD * 10.0 ** max(exponents)
+        raise ValueError(f"a cycle of {cycle_s:g} s is not between {finest:g} and {coarsest:g} s")
     return best[1:]

@@ -39,6 +39,8 @@ class NodeConfiguration:
 
     rated_torque_nm : float or None
         at the motor shaft, in place of what the drive states (0x6076): makers scale it differently [Nm]
+    torque_limit : float or None
+        of the joint; None where there is none [Nm or N]
     """
 
     node_id: int
@@ -48,6 +50,7 @@ class NodeConfiguration:
     direction: int = 1
     rated_torque_nm: float | None = None
     device_file: DeviceFile | None = None
+    torque_limit: float | None = None
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,7 @@ def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
     """
     first = joints[0]
     require_known_keys(joints, _BUS_KEYS, _NODE_KEYS)
-    nodes = tuple(_node(joint) for joint in joints)
+    nodes = tuple(read_node(joint) for joint in joints)
     require_distinct(joints, "node_id")
     return BusConfiguration(
         nodes=nodes,
@@ -107,8 +110,14 @@ def require_targets(configuration: BusConfiguration, mode: ControlMode) -> None:
             raise DriverError(DriverErrorKind.REFUSED, text) from error
 
 
-def _node(joint: DriveJoint) -> NodeConfiguration:
-    """The drive of a joint."""
+def read_node(joint: DriveJoint) -> NodeConfiguration:
+    """The drive of a joint.
+
+    Raises
+    ------
+    DriverError
+        ``refused``: as `read_configuration`
+    """
     counts_per_turn = read_positive(joint, "counts_per_turn")
     if counts_per_turn is None:
         raise refusal(joint, "counts_per_turn", "is missing; give the position counts of a motor turn")
@@ -122,6 +131,7 @@ def _node(joint: DriveJoint) -> NodeConfiguration:
         direction=read_direction(joint),
         rated_torque_nm=rated_torque_nm,
         device_file=_device_file(joint, node_id, reads_rated_torque=rated_torque_nm is None),
+        torque_limit=joint.torque_limit,
     )
 
 

@@ -9,7 +9,10 @@ from tauscope_drivers.canopen.bus import CanBus
 from tauscope_drivers.canopen.configuration import BusConfiguration, read_configuration
 from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile
 from tauscope_drivers.canopen.data_sheet.settings import settings_of
-from tauscope_drivers.canopen.node import MODES, DriveNode
+from tauscope_drivers.canopen.drive_modes import TARGETS
+from tauscope_drivers.canopen.node import DriveNode
+from tauscope_drivers.canopen.optional_objects import DOUBTFUL
+from tauscope_drivers.canopen.rehearsal import rehearse
 from tauscope_drivers.canopen.session import possible_rate_hz
 from tauscope_drivers.canopen.state_machine import POWERED
 from tauscope_drivers.drive_block import DriveJoint
@@ -56,20 +59,22 @@ def examine(joints: Sequence[DriveJoint]) -> list[Finding]:
         return [failure(subject, str(error))]
     try:
         findings = [Finding(Severity.GOOD, subject, f"open, {configuration.bit_rate / 1e3:g} kbit/s")]
-        return findings + _examine_drives(bus, configuration, subject)
+        return findings + _examine_drives(bus, configuration, joints, subject)
     except DriverError as error:
         return [failure(subject, str(error))]
     finally:
         bus.close()
 
 
-def _examine_drives(bus: CanBus, configuration: BusConfiguration, subject: str) -> list[Finding]:
+def _examine_drives(
+    bus: CanBus, configuration: BusConfiguration, joints: Sequence[DriveJoint], subject: str
+) -> list[Finding]:
     findings: list[Finding] = []
     sound: list[DriveNode] = []
     for joint, wanted in enumerate(configuration.nodes, 1):
         node = DriveNode.on_bus(bus, wanted, joint)
         try:
-            findings += _examine_drive(node)
+            findings += _examine_drive(node, joints[joint - 1])
         except DriverError as error:
             findings.append(failure(node.place, str(error), f"node {wanted.node_id}"))
             continue
@@ -79,7 +84,7 @@ def _examine_drives(bus: CanBus, configuration: BusConfiguration, subject: str) 
     return findings
 
 
-def _examine_drive(node: DriveNode) -> list[Finding]:
+def _examine_drive(node: DriveNode, joint: DriveJoint) -> list[Finding]:
     """Name, modes, units, and what stands in the way of a run."""
     modes = node.identify()
     dictionary = node.dictionary
@@ -89,10 +94,10 @@ def _examine_drive(node: DriveNode) -> list[Finding]:
     findings = [Finding(Severity.GOOD, node.place, f"{name}, firmware {version}, {torque:.4g} Nm a per mille")]
     if node.configuration.device_file is not None:
         findings += _examine_file(node.configuration.device_file, node.place)
-    missing = [str(mode) for mode in MODES if mode not in modes]
+    missing = [str(mode) for mode in TARGETS if mode not in modes]
     if missing:
         detail = f"has no cyclic synchronous {' and '.join(missing)} mode (0x6502)"
-        severity = Severity.FAILURE if len(missing) == len(MODES) else Severity.WARNING
+        severity = Severity.FAILURE if len(missing) == len(TARGETS) else Severity.WARNING
         findings.append(Finding(severity, node.place, detail, "run the arm in the other mode, or update its firmware"))
     node.read_now()
     for fault in node.faults():
@@ -100,10 +105,19 @@ def _examine_drive(node: DriveNode) -> list[Finding]:
     if node.state in POWERED:
         remedy = "none where it holds the arm; else support the arm and switch it off"
         findings.append(Finding(Severity.WARNING, node.place, f"is under power: {node.state}", remedy))
-    if dictionary.read_optional(objects.ABORT_CONNECTION) is None:
-        detail = "has no abort connection option (0x6007): it does not stop by itself when the host is gone"
-        findings.append(Finding(Severity.FAILURE, node.place, detail, "use a drive that has one, or an emergency stop"))
+    findings += [_remark(node.place, remark) for remark in node.remarks]
+    findings += rehearse(node, joint)
     return findings
+
+
+def _remark(place: str, remark: str) -> Finding:
+    """What a drive does not have, and the substitute: a warning where an operator has to try it."""
+    if "is taken in" in remark:
+        return Finding(Severity.WARNING, place, remark, "state drive.rated_torque_nm to settle it")
+    if any(str(entry) in remark for entry in DOUBTFUL):
+        detail, _, effect = remark.partition(": ")
+        return Finding(Severity.WARNING, place, detail, effect)
+    return Finding(Severity.GOOD, place, remark)
 
 
 def _examine_file(file: DeviceFile, place: str) -> list[Finding]:

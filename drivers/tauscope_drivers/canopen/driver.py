@@ -40,6 +40,12 @@ class CanopenDriver(BusDriver):
 
         return can_interfaces()
 
+    def check_blocks(self, joints: Sequence[DriveJoint]) -> list[Finding]:
+        """Blocks, and the EDS or DCF files that they name."""
+        from tauscope_drivers.canopen.block_check import check_blocks
+
+        return check_blocks(joints)
+
     def examine(self, joints: Sequence[DriveJoint]) -> list[Finding]:
         """Bus, and every drive that the robot file names."""
         from tauscope_drivers.canopen.doctor import examine

@@ -10,9 +10,10 @@ from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import HEARTBEAT_ID, MASTER_NODE, NMT_ID, NMT_PRE_OPERATIONAL, NMT_START, SYNC_ID
 from tauscope_drivers.canopen.commissioning import commission_drive, write_settings
 from tauscope_drivers.canopen.configuration import NodeConfiguration, read_configuration, require_targets
+from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects
+from tauscope_drivers.canopen.drive_modes import select_modes
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import DriveObject
-from tauscope_drivers.canopen.process_data import RECEIVED_ID
 from tauscope_drivers.canopen.state_machine import DriveState, Goal, next_controlword
 from tauscope_drivers.canopen.units import drive_units
 from tauscope_drivers.drive_block import DriveJoint
@@ -22,6 +23,7 @@ from tauscope_drivers.limits import require_sensible
 
 _TO_POWER = (DriveState.SWITCH_ON_DISABLED, DriveState.READY, DriveState.SWITCHED_ON)
 _DOWNLOAD, _LONG_DOWNLOAD, _UPLOAD = 0x23, 0x21, 0x40
+_ALL_MODES = 0xFFFF
 _AS_DELIVERED = {
     objects.LARGEST_TORQUE: 0xFFFF,
     objects.INTERPOLATION_VALUE: 1,
@@ -128,6 +130,11 @@ def _planned_node(joint: int, configuration: NodeConfiguration) -> tuple[DriveNo
     dictionary = _PlannedDictionary(configuration, label)
     node = DriveNode(configuration, joint, dictionary)  # pyright: ignore[reportArgumentType]
     node.units = drive_units(configuration, configuration.rated_torque_nm)
+    node.mode_numbers = select_modes(_ALL_MODES)
+    if configuration.device_file is not None:
+        node.present, node.slots = present_objects(configuration.device_file), pdo_slots(configuration.device_file)
+        supported = configuration.device_file.objects[objects.SUPPORTED_MODES.index, 0].default
+        node.mode_numbers = select_modes(supported or _ALL_MODES)
     return node, dictionary
 
 
@@ -136,10 +143,9 @@ def _cycle(
 ) -> Iterator[PlannedFrame]:
     """Targets of all nodes, then SYNC."""
     for node, place in zip(nodes, position, strict=True):
-        payload = node.target(mode, word, float(place), 0.0)
         what = f"{place:.4f}" if mode is ControlMode.POSITION else "0"
-        identifier = RECEIVED_ID + node.configuration.node_id
-        yield _frame(phase, f"{node.place}: controlword 0x{word:04X}, target {mode} {what}", identifier, payload)
+        for identifier, payload in node.targets(mode, word, float(place), 0.0):
+            yield _frame(phase, f"{node.place}: controlword 0x{word:04X}, target {mode} {what}", identifier, payload)
     yield _frame(phase, "all nodes: SYNC", SYNC_ID, b"")
 
 

@@ -1,6 +1,7 @@
 """Taking commissioned drives under power where the arm stands, all of them together."""
 
 from tauscope_drivers.backend import ControlMode
+from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import NMT_START
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.observation import listed
@@ -11,6 +12,8 @@ from tauscope_drivers.state import ArmState, Array
 
 TRANSITION_S = 2.0
 """Time for all drives together to reach a power state."""
+
+_NO_MODE = 0
 
 STILL_CYCLES = 4
 """Cycles at one place before anything moves: drives interpolate between the last few targets."""
@@ -47,7 +50,18 @@ def power_up(session: Session, mode: ControlMode) -> tuple[ArmState, Array]:
         session.wait_for_next(state)
         state = session.step_until(lambda: all(node.has_answered for node in session.nodes), cycle, TRANSITION_S)
     _require_up(session, state)
+    session.learn_answer_time()
+    for node in session.nodes:
+        _note_mode(node, mode)
     return state, place
+
+
+def _note_mode(node: DriveNode, mode: ControlMode) -> None:
+    """Keep that a drive shows another mode than it was given: the guard finds an arm that does not follow."""
+    wanted, shown = node.mode_numbers[mode], node.dictionary.read_optional(objects.MODE_DISPLAY)
+    remark = f"{objects.MODE_DISPLAY} shows {shown}, not {wanted}: it may not have changed its mode"
+    if shown not in (None, _NO_MODE, wanted) and remark not in node.remarks:
+        node.remarks += (remark,)
 
 
 def _settled_place(session: Session, mode: ControlMode) -> Array:

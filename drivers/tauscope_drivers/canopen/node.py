@@ -8,27 +8,34 @@ from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, NMT_OPERATIONAL_STATE, CanBus
 from tauscope_drivers.canopen.configuration import NodeConfiguration
-from tauscope_drivers.canopen.data_sheet.needs import require_identity
+from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects, require_identity
+from tauscope_drivers.canopen.drive_modes import TARGETS, select_modes
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST, decode_emergency, describe_error
 from tauscope_drivers.canopen.glitch_filter import GlitchFilter
 from tauscope_drivers.canopen.objects import DriveObject
-from tauscope_drivers.canopen.process_data import (
-    MOTION_PDO,
-    SENT_IDS,
-    STATE_PDO,
-    TARGET_PDOS,
-    PdoLayout,
-    decode_pdo,
-    encode_pdo,
+from tauscope_drivers.canopen.optional_objects import STAYING_OPTIONS, SUBSTITUTES, describe_absent
+from tauscope_drivers.canopen.pdo_plan import (
+    MEASURED,
+    MEASURED_WHERE_THERE,
+    PdoPlan,
+    PdoSlots,
+    plan_pdos,
+    received_identifier,
+    sent_identifier,
 )
+from tauscope_drivers.canopen.process_data import PdoLayout, decode_pdo, encode_pdo
+from tauscope_drivers.canopen.rated_torque import read_rated_torque
 from tauscope_drivers.canopen.sdo import NodeDictionary
-from tauscope_drivers.canopen.state_machine import DriveState, Goal, decode_state, next_controlword
+from tauscope_drivers.canopen.state_machine import ENABLE_OPERATION, DriveState, Goal, decode_state, next_controlword
 from tauscope_drivers.canopen.units import DriveUnits, drive_units
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
 
-MODES = {ControlMode.POSITION: objects.CYCLIC_POSITION, ControlMode.TORQUE: objects.CYCLIC_TORQUE}
-
 _CIA_402 = 402
+_INTERPOLATE = 0x10
+"""Bit of the controlword that starts interpolation, in the mode of that name."""
+
+Listener = Callable[[int, Callable[[int, bytes], None]], None]
+"""Hands the frames of an identifier to a handler."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +63,16 @@ class DriveNode:
         number of its joint, from 1
     last_position : float
         of the joint when it last answered: the place to stay at, never a measurement [rad or m]
+    last_velocity : float
+        of the joint when it last told one [rad/s or m/s]
+    present : frozenset of DriveObject
+        optional objects that it has
+    mode_numbers : mapping of ControlMode to int
+        mode of operation for each control mode that it has
+    held : dict
+        of DriveObject to int: values of other objects in its RPDOs of fixed mapping
+    stays_stopped : bool
+        whether it keeps its power after a quick stop
     """
 
     configuration: NodeConfiguration
@@ -68,8 +85,17 @@ class DriveNode:
     measurement: Measurement = Measurement(math.nan, math.nan, math.nan)
     last_state: DriveState | None = None
     last_position: float = math.nan
+    last_velocity: float = 0.0
     is_deaf: bool = False
     glitches: GlitchFilter = field(default_factory=GlitchFilter)
+    present: frozenset[DriveObject] = frozenset(SUBSTITUTES)
+    mode_numbers: dict[ControlMode, int] = field(default_factory=dict)
+    slots: PdoSlots = field(default_factory=PdoSlots)
+    plan: PdoPlan = field(default=PdoPlan((), ()))
+    held: dict[DriveObject, int] = field(default_factory=dict)
+    stays_stopped: bool = True
+    remarks: tuple[str, ...] = ()
+    listen: Listener = field(default=lambda _identifier, _handler: None)
 
     @staticmethod
     def on_bus(bus: CanBus, configuration: NodeConfiguration, joint: int) -> "DriveNode":
@@ -81,9 +107,8 @@ class DriveNode:
             number of its joint, from 1
         """
         node_id = configuration.node_id
-        node = DriveNode(configuration, joint, bus.add_node(node_id))
-        for identifier, layout in zip(SENT_IDS, (STATE_PDO, MOTION_PDO), strict=True):
-            bus.subscribe(identifier + node_id, lambda _, data, layout=layout: node._take(layout, data))
+        node = DriveNode(configuration, joint, bus.add_node(node_id), listen=bus.subscribe)
+        node.use_plan(node.plan_for(ControlMode.POSITION))
         bus.subscribe(EMERGENCY_ID + node_id, lambda _, data: node._take_emergency(data))
         bus.subscribe(HEARTBEAT_ID + node_id, lambda _, data: node._take_heartbeat(data))
         return node
@@ -96,8 +121,24 @@ class DriveNode:
 
     @property
     def has_answered(self) -> bool:
-        """Whether both of its frames came in this cycle."""
-        return objects.STATUSWORD in self.values and objects.VELOCITY_ACTUAL in self.values
+        """Whether all of its frames came in this cycle."""
+        return all(pdo.layout.objects[0] in self.values for pdo in self.plan.sent)
+
+    def has(self, entry: DriveObject) -> bool:
+        """Whether it has an optional object, which can be written where the driver writes it."""
+        return entry in self.present
+
+    def plan_for(self, mode: ControlMode) -> PdoPlan:
+        """Its PDOs for a mode."""
+        number = self.mode_numbers.get(mode, next(iter(TARGETS[mode])))
+        return plan_pdos(self.slots, TARGETS[mode][number], [one for one in MEASURED_WHERE_THERE if self.has(one)])
+
+    def use_plan(self, plan: PdoPlan) -> None:
+        """Listen to the frames of a plan from now on."""
+        self.plan = plan
+        for pdo in plan.sent:
+            identifier = sent_identifier(pdo.number, self.configuration.node_id)
+            self.listen(identifier, lambda _, data, layout=pdo.layout: self._take(layout, data))
 
     def identify(self) -> frozenset[ControlMode]:
         """Make sure that it is the drive that is meant, learn its units, and return the modes that it has.
@@ -106,7 +147,7 @@ class DriveNode:
         ------
         DriverError
             ``cannot-connect``: it does not answer or is no CiA 402 drive; ``refused``: its rated torque is not usable,
-            or it is not the drive of its EDS or DCF file
+            it does not watch its master, or it is not the drive of its EDS or DCF file
         """
         kind = self.dictionary.read(objects.DEVICE_TYPE) & 0xFFFF
         if kind != _CIA_402:
@@ -114,31 +155,44 @@ class DriveNode:
                 DriverErrorKind.CANNOT_CONNECT,
                 f"{self.place}: its device profile is {kind}, not 402 (drives); check drive.node_id",
             )
-        if self.configuration.device_file is not None:
-            require_identity(self.configuration.device_file, self.dictionary, self.place)
+        file = self.configuration.device_file
+        if file is not None:
+            require_identity(file, self.dictionary, self.place)
+            self.slots = pdo_slots(file)
+        self._require_watchdog()
+        found = (entry for entry in SUBSTITUTES if self.dictionary.read_optional(entry) is not None)
+        self.present = frozenset(found) & (frozenset(SUBSTITUTES) if file is None else present_objects(file))
+        self.remarks = tuple(describe_absent(self.present))
+        self.stays_stopped = self.dictionary.read_optional(objects.QUICK_STOP_OPTION) in STAYING_OPTIONS
         self.units = self._learn_units()
-        supported = self.dictionary.read(objects.SUPPORTED_MODES)
-        return frozenset(mode for mode, number in MODES.items() if supported >> (number - 1) & 1)
+        self.mode_numbers = select_modes(self.dictionary.read(objects.SUPPORTED_MODES))
+        if not self.has(objects.VELOCITY_ACTUAL):
+            self.mode_numbers.pop(ControlMode.TORQUE, None)
+        if self.mode_numbers.get(ControlMode.POSITION) == objects.INTERPOLATED_POSITION:
+            self.remarks += ("has no cyclic synchronous position mode (0x6502): interpolated position is used",)
+        return frozenset(self.mode_numbers)
 
     def remember(self, time_ns: int) -> None:
         """Keep state and place of this cycle for cycles without an answer; a frame that cannot be true is none."""
         self.measurement = measured = self._measured()
         if not self.glitches.believes_place(measured.position, time_ns):
-            self._forget(STATE_PDO)
+            self._forget(objects.POSITION_ACTUAL)
         elif not math.isnan(measured.position):
             self.last_position = measured.position
         if not self.glitches.believes_speed(measured.velocity):
-            self._forget(MOTION_PDO)
+            self._forget(objects.VELOCITY_ACTUAL)
+        elif not math.isnan(measured.velocity):
+            self.last_velocity = measured.velocity
         self.last_state = self.state or self.last_state
 
     def read_now(self) -> None:
         """Fill `values` by SDO: for an arm that is not in its cycle."""
-        self.values = {entry: self.dictionary.read(entry) for entry in (*STATE_PDO.objects, *MOTION_PDO.objects)}
-        if self.values[objects.ERROR_CODE]:
-            self.error_code = self.values[objects.ERROR_CODE]
+        entries = (*MEASURED, *(entry for entry in MEASURED_WHERE_THERE if self.has(entry)))
+        self.values = {entry: self.dictionary.read(entry) for entry in entries}
+        self.error_code = self.values.get(objects.ERROR_CODE) or self.error_code
 
-    def target(self, mode: ControlMode, controlword: int, position: float, torque: float) -> bytes:
-        """Payload of its target frame.
+    def targets(self, mode: ControlMode, controlword: int, position: float, torque: float) -> list[tuple[int, bytes]]:
+        """Identifier and payload of its target frames.
 
         Parameters
         ----------
@@ -152,16 +206,33 @@ class DriveNode:
         DriverError
             ``refused``: the target is beyond what the drive can be told
         """
-        layout = TARGET_PDOS[mode]
+        target = TARGETS[mode][self.mode_numbers[mode]]
         quantity = self.units.counts(position) if mode is ControlMode.POSITION else self.units.permille(torque)
+        is_enabled = controlword == ENABLE_OPERATION and self.last_state is DriveState.OPERATION_ENABLED
+        if target == objects.INTERPOLATION_DATA and is_enabled:
+            controlword |= _INTERPOLATE
+        values = {**self.held, objects.CONTROLWORD: controlword, target: quantity}
         try:
-            return encode_pdo(layout, {objects.CONTROLWORD: controlword, layout.objects[1]: quantity})
+            return [
+                (received_identifier(pdo.number, self.configuration.node_id), encode_pdo(pdo.layout, values))
+                for pdo in self.plan.received
+            ]
         except OverflowError as error:
             raise DriverError(DriverErrorKind.REFUSED, f"{self.place}: {error}; check counts_per_turn") from error
 
     def controlword(self, goal: Goal) -> int:
-        """Next controlword towards a goal; a lost answer changes nothing, or it would drop an arm under power."""
+        """Next controlword towards a goal; a lost answer changes nothing, or it would drop an arm under power.
+
+        A drive that has no power after a quick stop is stopped by its targets, and stays enabled.
+        """
+        if self.holds_by_targets and goal is Goal.QUICK_STOP:
+            goal = Goal.OPERATION_ENABLED
         return next_controlword(self.last_state, goal)
+
+    @property
+    def holds_by_targets(self) -> bool:
+        """Whether a stop that holds keeps it enabled: it is, and would let go by a quick stop."""
+        return not self.stays_stopped and self.last_state is DriveState.OPERATION_ENABLED
 
     def faults(self) -> tuple[Fault, ...]:
         """What it reports: a code in its cycle or by emergency, and the state of fault without one."""
@@ -193,13 +264,31 @@ class DriveNode:
 
     def _learn_units(self) -> DriveUnits:
         configuration = self.configuration
-        rated = configuration.rated_torque_nm or self.dictionary.read_surely(objects.RATED_TORQUE) / 1000.0
-        if rated <= 0.0:
+        if configuration.rated_torque_nm is not None:
+            return drive_units(configuration, configuration.rated_torque_nm)
+        flaw = "is not there"
+        if self.dictionary.read_optional(objects.RATED_TORQUE) is not None:
+            value = self.dictionary.read_surely(objects.RATED_TORQUE)
+            current = self.dictionary.read_optional(objects.RATED_CURRENT)
+            try:
+                rated = read_rated_torque(value, configuration.gear_ratio, configuration.torque_limit, current)
+            except ValueError as error:
+                flaw = str(error)
+            else:
+                self.remarks += (f"its rated torque (0x6076) {rated.remark}",) if rated.remark else ()
+                return drive_units(configuration, rated.nm)
+        raise DriverError(
+            DriverErrorKind.REFUSED, f"{self.place}: its rated torque (0x6076) {flaw}; give drive.rated_torque_nm"
+        )
+
+    def _require_watchdog(self) -> None:
+        """Refuse a drive that would not notice that the host is gone."""
+        if self.dictionary.read_optional(objects.CONSUMER_HEARTBEAT) is None:
             raise DriverError(
                 DriverErrorKind.REFUSED,
-                f"{self.place}: its rated torque (0x6076) reads 0; give drive.rated_torque_nm",
+                f"{self.place}: has no {objects.CONSUMER_HEARTBEAT}: it would not notice that the host is gone; "
+                "use a drive that watches the host's heartbeat",
             )
-        return drive_units(configuration, rated)
 
     def _take(self, layout: PdoLayout, data: bytes) -> None:
         values = decode_pdo(layout, data)
@@ -207,8 +296,10 @@ class DriveNode:
             self.values.update(values)
             self.is_deaf = False
 
-    def _forget(self, layout: PdoLayout) -> None:
-        self.values = {entry: value for entry, value in self.values.items() if entry not in layout.objects}
+    def _forget(self, doubted: DriveObject) -> None:
+        """Drop a whole frame by one of its values."""
+        gone = {entry for pdo in self.plan.sent if doubted in pdo.layout.objects for entry in pdo.layout.objects}
+        self.values = {entry: value for entry, value in self.values.items() if entry not in gone}
         self.measurement = self._measured()
 
     def _take_heartbeat(self, data: bytes) -> None:

@@ -56,9 +56,13 @@ TORQUE_ACTUAL = DriveObject("Torque actual value", 0x6077, 0, 16, signed=True)
 TARGET_POSITION = DriveObject("Target position", 0x607A, 0, 32, signed=True)
 LOWEST_POSITION = DriveObject("Software position limit, lowest", 0x607D, 1, 32, signed=True)
 HIGHEST_POSITION = DriveObject("Software position limit, highest", 0x607D, 2, 32, signed=True)
+INTERPOLATION_DATA = DriveObject("Interpolation data record", 0x60C1, 1, 32, signed=True)
 INTERPOLATION_VALUE = DriveObject("Interpolation time period, value", 0x60C2, 1, 8)
 INTERPOLATION_EXPONENT = DriveObject("Interpolation time period, exponent", 0x60C2, 2, 8, signed=True)
 SUPPORTED_MODES = DriveObject("Supported drive modes", 0x6502, 0, 32)
+
+INTERPOLATED_POSITION = 7
+"""Mode of operation: interpolated position, which older drives have in place of the cyclic one."""
 
 CYCLIC_POSITION = 8
 """Mode of operation: cyclic synchronous position."""

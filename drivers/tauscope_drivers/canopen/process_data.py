@@ -4,8 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from tauscope_drivers.backend import ControlMode
-from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.objects import DriveObject
 
 
@@ -65,14 +63,8 @@ def mapping_entries(objects: Sequence[DriveObject]) -> list[int]:
 
 
 RECEIVED_ID = 0x200
-SENT_IDS = (0x180, 0x280)
-
-STATE_PDO = PdoLayout((objects.STATUSWORD, objects.TORQUE_ACTUAL, objects.POSITION_ACTUAL))
-MOTION_PDO = PdoLayout((objects.VELOCITY_ACTUAL, objects.ERROR_CODE))
-TARGET_PDOS = {
-    ControlMode.POSITION: PdoLayout((objects.CONTROLWORD, objects.TARGET_POSITION)),
-    ControlMode.TORQUE: PdoLayout((objects.CONTROLWORD, objects.TARGET_TORQUE)),
-}
+SENT_ID = 0x180
+"""Identifiers of the first PDOs of node 0, by CiA 301's default connection set."""
 
 
 @dataclass(frozen=True)
@@ -85,28 +77,37 @@ class PdoParameters:
     entries: tuple[DriveObject, ...]
 
 
-def received_parameters(layout: PdoLayout) -> PdoParameters:
-    """Parameters of the PDO with the targets."""
-    return _parameters(0x1400, 0x1600, layout)
+def received_parameters(number: int, entries: int) -> PdoParameters:
+    """Parameters of a PDO with targets.
+
+    Parameters
+    ----------
+    number : int
+        from 0
+    entries : int
+        objects that it holds
+    """
+    return _parameters(0x1400 + number, 0x1600 + number, entries)
 
 
-def sent_parameters(number: int, layout: PdoLayout) -> PdoParameters:
+def sent_parameters(number: int, entries: int) -> PdoParameters:
     """Parameters of a PDO with measurements.
 
     Parameters
     ----------
     number : int
-        from 0, as in `SENT_IDS`
+        from 0
+    entries : int
+        objects that it holds
     """
-    return _parameters(0x1800 + number, 0x1A00 + number, layout)
+    return _parameters(0x1800 + number, 0x1A00 + number, entries)
 
 
-def _parameters(communication: int, mapping: int, layout: PdoLayout) -> PdoParameters:
+def _parameters(communication: int, mapping: int, entries: int) -> PdoParameters:
     """Communication and mapping parameter, CiA 301."""
-    places = range(1, len(layout.objects) + 1)
     return PdoParameters(
         identifier=DriveObject("PDO COB-ID", communication, 1, 32),
         kind=DriveObject("PDO transmission type", communication, 2, 8),
         count=DriveObject("PDO number of entries", mapping, 0, 8),
-        entries=tuple(DriveObject("PDO entry", mapping, subindex, 32) for subindex in places),
+        entries=tuple(DriveObject("PDO entry", mapping, subindex, 32) for subindex in range(1, entries + 1)),
     )

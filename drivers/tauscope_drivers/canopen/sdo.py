@@ -7,9 +7,10 @@ from typing import Protocol, TypeVar
 import can
 from canopen.objectdictionary import ObjectDictionary
 from canopen.sdo.client import SdoClient
-from canopen.sdo.exceptions import SdoCommunicationError, SdoError
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError, SdoError
 
 from tauscope_drivers.canopen.objects import DriveObject
+from tauscope_drivers.canopen.sdo_aborts import describe_abort
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 
 SDO_TIMEOUT_S = 0.3
@@ -52,7 +53,7 @@ class NodeDictionary:
         Raises
         ------
         DriverError
-            ``cannot-connect``: the node does not answer, or has no such entry
+            ``cannot-connect``: the node does not answer; ``refused``: it has no such entry
         """
         return int.from_bytes(self.read_data(entry), "little", signed=entry.signed)
 
@@ -62,7 +63,8 @@ class NodeDictionary:
         Raises
         ------
         DriverError
-            ``cannot-connect``: the node does not answer, has no such entry, or gives another value each time
+            ``cannot-connect``: the node does not answer, or gives another value each time; ``refused``: it has no such
+            entry
         """
         values = [self.read(entry)]
         for _ in range(_READINGS):
@@ -80,7 +82,7 @@ class NodeDictionary:
         Raises
         ------
         DriverError
-            ``cannot-connect``: the node does not answer, or has no such entry
+            ``cannot-connect``: the node does not answer; ``refused``: it has no such entry
         """
         try:
             data = bytes(_transferred(lambda: self._client.upload(entry.index, entry.subindex)))
@@ -110,7 +112,7 @@ class NodeDictionary:
         Raises
         ------
         DriverError
-            ``refused``: the drive keeps another value; ``cannot-connect``: it does not answer or forbids the write
+            ``refused``: the drive keeps another value or forbids the write; ``cannot-connect``: it does not answer
         """
         kept = None
         for _ in range(_WRITES):
@@ -129,7 +131,7 @@ class NodeDictionary:
         Raises
         ------
         DriverError
-            ``cannot-connect``: the drive does not answer or forbids the write
+            ``cannot-connect``: the drive does not answer; ``refused``: it forbids the write
         """
         self.send_data(entry, value.to_bytes(entry.bits // 8, "little", signed=entry.signed), str(value))
 
@@ -139,7 +141,7 @@ class NodeDictionary:
         Raises
         ------
         DriverError
-            ``cannot-connect``: the drive does not answer or forbids the write
+            ``cannot-connect``: the drive does not answer; ``refused``: it forbids the write
         """
         try:
             _transferred(lambda: self._client.download(entry.index, entry.subindex, data))
@@ -147,6 +149,11 @@ class NodeDictionary:
             raise self._failure(f"{entry} = {text} cannot be written", error) from error
 
     def _failure(self, what: str, error: Exception) -> DriverError:
+        if isinstance(error, SdoAbortedError):
+            meaning, remedy = describe_abort(error.code)
+            return DriverError(
+                DriverErrorKind.REFUSED, f"node {self.node_id}: {what}: {meaning} (abort 0x{error.code:08X}); {remedy}"
+            )
         return DriverError(
             DriverErrorKind.CANNOT_CONNECT,
             f"node {self.node_id}: {what} ({' '.join(str(error).split())}); check node number, power and wiring",

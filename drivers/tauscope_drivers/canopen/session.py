@@ -4,46 +4,59 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from statistics import median
 
 import numpy as np
 
+from tauscope_drivers.answer_time import AnswerTime
 from tauscope_drivers.backend import ControlMode
-from tauscope_drivers.canopen.bus import SYNC_ID, CanBus
+from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen.bus import NMT_PRE_OPERATIONAL, SYNC_ID, CanBus
 from tauscope_drivers.canopen.bus_budget import CycleFrames, largest_rate_hz, rate_limit
 from tauscope_drivers.canopen.configuration import BusConfiguration
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.observation import arm_faults, arm_state
-from tauscope_drivers.canopen.process_data import MOTION_PDO, RECEIVED_ID, STATE_PDO, TARGET_PDOS
-from tauscope_drivers.canopen.state_machine import Goal
+from tauscope_drivers.canopen.pdo_plan import MEASURED_WHERE_THERE, PdoSlots, plan_pdos
+from tauscope_drivers.canopen.state_machine import DriveState, Goal, decode_state
 from tauscope_drivers.clock import Clock
 from tauscope_drivers.errors import Fault
 from tauscope_drivers.state import ArmState, Array, Setpoint
 
-REMEMBERED = 31
-"""Answers by which it is known what is usual: adapters take their time, each its own."""
+BRAKING_S = 0.1
+"""Time in which a joint is brought to rest by targets, as fast as it may come to its speed limit [s]."""
 
 
-class AnswerTime:
-    """Compares how long each answer took with what is usual on this bus and adapter."""
+class HostBrake:
+    """Brings joints to rest by targets, with constant deceleration."""
 
-    def __init__(self) -> None:
-        """Nothing is known yet, and nothing is late."""
-        self._taken_ns: deque[int] = deque(maxlen=REMEMBERED)
-
-    def late_ns(self, taken_ns: int) -> int:
-        """How much later than usual an answer came [ns].
+    def __init__(self, position: Array, velocity: Array, begin_ns: int) -> None:
+        """Begin at the present motion.
 
         Parameters
         ----------
-        taken_ns : int
-            from SYNC to the last frame of the answer [ns]
+        position : (n,) float64
+            [rad or m]
+        velocity : (n,) float64
+            [rad/s or m/s]
+        begin_ns : int
+            present instant [ns]
         """
-        self._taken_ns.append(taken_ns)
-        return max(0, taken_ns - round(median(self._taken_ns)))
+        self._position, self._velocity, self._begin_ns = position, velocity, begin_ns
+
+    def targets(self, now_ns: int) -> Array:
+        """Q + q̇ (t - t²/2T), until t = T, shape (n,) [rad or m]."""
+        time_s = min(max(0.0, (now_ns - self._begin_ns) * 1e-9), BRAKING_S)
+        return self._position + self._velocity * (time_s - time_s**2 / (2.0 * BRAKING_S))
+
+    def is_at_rest(self, now_ns: int) -> bool:
+        """Whether the last target is sent from now on."""
+        return (now_ns - self._begin_ns) * 1e-9 >= BRAKING_S
 
 
-CYCLE_FRAMES = CycleFrames((TARGET_PDOS[ControlMode.POSITION].size,), (STATE_PDO.size, MOTION_PDO.size))
+_PLAN = plan_pdos(PdoSlots(), objects.TARGET_POSITION, MEASURED_WHERE_THERE)
+CYCLE_FRAMES = CycleFrames(
+    tuple(pdo.layout.size for pdo in _PLAN.received), tuple(pdo.layout.size for pdo in _PLAN.sent)
+)
+"""Frames of a drive that has everything and whose PDOs are free."""
 
 SETTLING_CYCLE_S = 0.01
 """Cycle while drives change state, before and after the control loop's own, where that is not known."""
@@ -76,6 +89,7 @@ class Session:
     caught: Fault | None = None
     settling_ns: int = round(SETTLING_CYCLE_S * 1e9)
     answer_time: AnswerTime = field(default_factory=AnswerTime)
+    brake: HostBrake | None = None
 
     @property
     def unhurried_ns(self) -> int:
@@ -87,6 +101,25 @@ class Session:
         """What is wrong with the arm."""
         return arm_faults(self.nodes, self.caught)
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the drives do not have, and the substitute; drives that agree share a line."""
+        places: dict[str, list[str]] = {}
+        for node in self.nodes:
+            for remark in node.remarks:
+                places.setdefault(remark, []).append(str(node.joint))
+        return tuple(f"joint {', '.join(joints)}: {remark}" for remark, joints in places.items())
+
+    def make_pre_operational(self) -> None:
+        """Take nodes out of process data, but for those that hold their joint by it: they would let go."""
+        states = [decode_state(node.dictionary.read(objects.STATUSWORD)) for node in self.nodes]
+        if DriveState.OPERATION_ENABLED not in states:
+            self.bus.command_nodes(NMT_PRE_OPERATIONAL)
+            return
+        for node, state in zip(self.nodes, states, strict=True):
+            if state is not DriveState.OPERATION_ENABLED:
+                self.bus.command_nodes(NMT_PRE_OPERATIONAL, node.configuration.node_id)
+
     def learn_cycle(self, cycle_s: float | None) -> None:
         """Settle in the control loop's own cycle from now on.
 
@@ -97,6 +130,25 @@ class Session:
         """
         self.settling_ns = round((SETTLING_CYCLE_S if cycle_s is None else cycle_s) * 1e9)
 
+    @property
+    def has_braked(self) -> bool:
+        """Whether the targets of `stop_targets` have come to rest."""
+        return self.brake is None or self.brake.is_at_rest(self.clock.now_ns())
+
+    def stop_targets(self) -> Setpoint:
+        """Targets of a stop: they bring drives to rest that stop by targets; others do not follow them."""
+        now_ns = self.clock.now_ns()
+        if self.brake is None:
+            speed = np.array([node.last_velocity for node in self.nodes])
+            self.brake = HostBrake(self.standstill().position, speed, now_ns)
+        return stay_at(self.brake.targets(now_ns))
+
+    def learn_answer_time(self) -> None:
+        """Wait longer for answers from now on where this bus and adapter usually take most of the time for them."""
+        usual_ns = self.answer_time.usual_ns
+        if 2 * usual_ns > self.answer_ns:
+            self.answer_ns += usual_ns
+
     def standstill(self) -> Setpoint:
         """Targets where the joints are, by the last answer of each."""
         return stay_at(np.array([node.last_position for node in self.nodes]))
@@ -104,10 +156,8 @@ class Session:
     def cycle(self, mode: ControlMode, goal: Goal, setpoint: Setpoint, answer_ns: int) -> ArmState:
         """One cycle on the bus: targets out, SYNC, answers in."""
         pairs = zip(self.nodes, setpoint.position, setpoint.torque, strict=True)
-        frames = [
-            (RECEIVED_ID + node.configuration.node_id, node.target(mode, node.controlword(goal), float(q), float(tau)))
-            for node, q, tau in pairs
-        ]
+        told = [node.targets(mode, node.controlword(goal), float(q), float(tau)) for node, q, tau in pairs]
+        frames = [frame for frames in told for frame in frames]
         self.bus.drain()
         for node in self.nodes:
             node.values = {}

@@ -31,13 +31,13 @@ def stop_in_cycle(session: Session, mode: ControlMode, goal: Goal) -> bool:
 
     Nobody waits for a drive that takes no process data any more: it has stopped by itself.
     """
-    still = session.standstill()
 
     def is_nothing_left_to_wait_for() -> bool:
-        return all(has_stopped(node, goal) or node.is_deaf for node in session.nodes)
+        are_stopped = all(has_stopped(node, goal) or node.is_deaf for node in session.nodes)
+        return are_stopped and (session.has_braked or not any(node.holds_by_targets for node in session.nodes))
 
     def cycle() -> ArmState:
-        return session.cycle(mode, goal, still, session.unhurried_ns)
+        return session.cycle(mode, goal, session.stop_targets(), session.unhurried_ns)
 
     session.step_until(is_nothing_left_to_wait_for, cycle, STOP_S)
     return all(has_stopped(node, goal) for node in session.nodes)
@@ -49,9 +49,8 @@ def stop_promptly(session: Session, mode: ControlMode, goal: Goal) -> ArmState:
     Those that missed the master have stopped by themselves and answer no SYNC: they are asked by SDO, for
     what they told last is from before.
     """
-    still = session.standstill()
     for _ in range(PROMPT_CYCLES):
-        state = session.cycle(mode, goal, still, session.answer_ns)
+        state = session.cycle(mode, goal, session.stop_targets(), session.answer_ns)
         if all(has_stopped(node, goal) for node in session.nodes):
             return state
         if all(node.is_deaf for node in session.nodes):
@@ -74,7 +73,8 @@ def stop_one_by_one(nodes: Sequence[DriveNode], goal: Goal, *, is_stopped: bool)
     for node in nodes:
         try:
             node.read_now()
-            if not is_stopped and (goal is not Goal.QUICK_STOP or node.state is DriveState.OPERATION_ENABLED):
+            is_driven = node.state is DriveState.OPERATION_ENABLED and node.stays_stopped
+            if not is_stopped and (goal is not Goal.QUICK_STOP or is_driven):
                 node.dictionary.write(objects.CONTROLWORD, next_controlword(node.state, goal))
             node.dictionary.write(objects.CONSUMER_HEARTBEAT, 0)
             node.read_now()
@@ -88,6 +88,8 @@ def stop_one_by_one(nodes: Sequence[DriveNode], goal: Goal, *, is_stopped: bool)
 
 def has_stopped(node: DriveNode, goal: Goal) -> bool:
     """Whether a drive is where a stop takes it; one in fault has stopped by itself."""
+    if goal is Goal.QUICK_STOP and not node.stays_stopped:
+        return node.state in (DriveState.OPERATION_ENABLED, DriveState.FAULT)
     if goal is Goal.QUICK_STOP:
         return node.state in (DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT)
     return node.state not in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, None)
@@ -110,7 +112,7 @@ def reset_faults(session: Session) -> ArmState:
         if node.state is DriveState.FAULT:
             for word in (DISABLE_VOLTAGE, FAULT_RESET, DISABLE_VOLTAGE):
                 node.dictionary.write(objects.CONTROLWORD, word)
-        node.error_code, node.acknowledged_code = 0, node.values[objects.ERROR_CODE]
+        node.error_code, node.acknowledged_code = 0, node.values.get(objects.ERROR_CODE, 0)
     # a drive whose cause persists needs a moment to be back in its fault
     session.clock.wait_until_ns(session.clock.now_ns() + session.settling_ns)
     return session.step_until(lambda: not session.faults, session.read_by_sdo, RESET_S)

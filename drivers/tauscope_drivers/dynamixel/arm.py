@@ -56,8 +56,20 @@ class DynamixelArm:
     limit of position or speed: the driver does, and catches the arm by holding it. Effort is motor current.
     """
 
-    def __init__(self, joints: Sequence[DriveJoint], *, slack_s: float = 0.002, clock: Clock | None = None) -> None:
+    def __init__(
+        self,
+        joints: Sequence[DriveJoint],
+        *,
+        slack_s: float = 0.002,
+        keeps_settings: bool = False,
+        clock: Clock | None = None,
+    ) -> None:
         """Nothing is opened yet.
+
+        Parameters
+        ----------
+        keeps_settings : bool
+            whether changes of EEPROM stay after the arm is let go
 
         Raises
         ------
@@ -67,6 +79,7 @@ class DynamixelArm:
         self._configuration = read_configuration(joints)
         self._clock = MonotonicClock() if clock is None else clock
         self._port = SerialPort(self._configuration.port, self._configuration.baud, slack_s)
+        self._keeps_settings = keeps_settings
         self._session: Session | None = None
         self._mode: ControlMode | None = None
         self._policy = StopPolicy.HOLD
@@ -94,6 +107,7 @@ class DynamixelArm:
             policies_by_mode=_POLICIES,
             rate_limited_by=", ".join(largest_part(traffic, timing)),
             holds_before_torque=False,
+            remarks=() if self._session is None else self._session.changes,
         )
 
     @property
@@ -252,6 +266,10 @@ class DynamixelArm:
         """Let go of the port; an arm that is still enabled is stopped by its policy first."""
         if self._mode is not None:
             self.stop(self._policy)
+        if self._session is not None and not self._keeps_settings:
+            # a servo that does not answer now has them put back with the next release
+            with contextlib.suppress(DriverError):
+                self._session.restore()
         self._session = None
         self._port.close()
 

@@ -5,6 +5,7 @@ import time
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from tauscope_drivers.answer_time import AnswerTime
 from tauscope_drivers.clock import Clock, MonotonicClock
 from tauscope_drivers.dynamixel import packets
 from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
@@ -91,12 +92,15 @@ class Answers:
     asked_ns : int
         instant at which the question had left [ns, by the bus' clock]
     late_ns : int
-        how much later than bus and adapter take the last answer came [ns]
+        how much later than usual the last answer came [ns]
+    beyond_ns : int
+        how much longer than bus and adapter should take for it [ns]
     """
 
     asked_ns: int
     late_ns: int
     statuses: dict[int, Status]
+    beyond_ns: int = 0
 
 
 class ServoBus:
@@ -110,6 +114,7 @@ class ServoBus:
         self.discarded_bytes = 0
         self._missed_ns: dict[tuple[int, int], int] = {}
         self._answered_ns = 0
+        self._answer_times: dict[tuple[tuple[int, ...], bool], AnswerTime] = {}
 
     def ping(self, servo: int) -> tuple[int, int] | None:
         """Model number and firmware of a servo; None where it does not answer."""
@@ -217,9 +222,12 @@ class ServoBus:
         found = receive(servos, length, len(request), waits_s, owed)
         answer_bytes = _fast_bytes(servos, length) if fast else len(servos) * (_STATUS_BYTES + length)
         usual_s = answer_bytes * BITS_PER_BYTE / self.port.baudrate + len(servos) * self.return_delay_s
-        late_ns = self._answered_ns - asked_ns - round((usual_s + self.port.latency_s) * 1e9)
+        taken_ns = self._answered_ns - asked_ns - round((usual_s + self.port.latency_s) * 1e9)
         wanted = {servo: replace(status, data=status.data[surplus:]) for servo, status in found.items()}
-        return Answers(asked_ns, max(0, late_ns), wanted)
+        if not found:
+            return Answers(asked_ns, 0, wanted)
+        times = self._answer_times.setdefault((tuple(servos), fast), AnswerTime())
+        return Answers(asked_ns, times.late_ns(taken_ns), wanted, max(0, taken_ns))
 
     def _owed(self, servos: Sequence[int], length: int) -> set[int]:
         """Servos whose answer of this length to an earlier question may still be under way."""

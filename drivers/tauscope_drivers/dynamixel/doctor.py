@@ -1,30 +1,39 @@
 """Looks at a port and the servos on it, moves nothing, writes nothing, and says what to do about what it finds."""
 
+import math
 import os
 import time
 from collections.abc import Iterator, Sequence
 
 from serial.tools.list_ports import comports
 
+from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.bus import ServoBus
 from tauscope_drivers.dynamixel.bus_budget import BusTiming, CycleTraffic, largest_rate_hz
 from tauscope_drivers.dynamixel.configuration import BusConfiguration, read_configuration
 from tauscope_drivers.dynamixel.control_table import model_names
+from tauscope_drivers.dynamixel.enabling import plan_tasks
 from tauscope_drivers.dynamixel.faults import hardware_faults, watchdog_fault
-from tauscope_drivers.dynamixel.models import WATCHDOG_MOST
+from tauscope_drivers.dynamixel.health import Health
+from tauscope_drivers.dynamixel.models import WATCHDOG_MOST, WATCHDOG_STEP_S
 from tauscope_drivers.dynamixel.port import SerialPort, read_latency_timer_ms
-from tauscope_drivers.dynamixel.preparation import drive_mode
+from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, drive_mode, operating_mode
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
-from tauscope_drivers.dynamixel.session import read_items
-from tauscope_drivers.errors import DriverError
+from tauscope_drivers.dynamixel.session import Session, make_session, read_items, read_settings
+from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.inspection import Finding, FoundDevice, Severity, failure
+from tauscope_drivers.limits import stated_limits
 from tauscope_drivers.port_holder import find_holder
 
 MEASURED_CYCLES = 50
 """Reads of which the loop rate is measured."""
 
-_EXAMINED = ("Return Delay Time", "Drive Mode", "Current Limit", "Torque Enable", "Bus Watchdog")
+_SECONDARY = ("Secondary ID", "Secondary(Shadow) ID")
+_MOST_TURNS = 256
+"""Goal Position reaches this many turns both ways."""
+
+_EXAMINED = ("Torque Enable", "Bus Watchdog", *_SECONDARY)
 _LEAST_FIRMWARE = 45
 """Of the X series for Fast Sync Read and all bits of Drive Mode."""
 
@@ -46,17 +55,17 @@ def examine(joints: Sequence[DriveJoint], *, slack_s: float = 0.002) -> list[Fin
     try:
         findings = [Finding(Severity.GOOD, port.path, f"open at {port.baudrate} baud, locked for this program")]
         findings.append(latency_finding(port.path))
-        return findings + _examine_servos(ServoBus(port), configuration)
+        return findings + _examine_servos(ServoBus(port), configuration, joints)
     except DriverError as error:
         return [failure(configuration.port, str(error))]
     finally:
         port.close()
 
 
-def _examine_servos(bus: ServoBus, configuration: BusConfiguration) -> list[Finding]:
+def _examine_servos(bus: ServoBus, configuration: BusConfiguration, joints: Sequence[DriveJoint]) -> list[Finding]:
     findings: list[Finding] = []
     servos: list[JointServo] = []
-    delays: list[int] = []
+    found: list[dict[str, int]] = []
     for number, wanted in enumerate(configuration.servos, 1):
         subject = f"joint {wanted.joint} (servo {wanted.servo})"
         identity = bus.ping(wanted.servo)
@@ -66,15 +75,88 @@ def _examine_servos(bus: ServoBus, configuration: BusConfiguration) -> list[Find
             continue
         try:
             servo = make_servo(number, wanted, identity)
-            settings = read_items(bus, servo, (*_EXAMINED, servo.model.error_item.name))
+            settings = read_settings(bus, servo)
+            settings |= read_items(bus, servo, (*_EXAMINED, servo.model.error_item.name))
         except DriverError as error:
-            findings.append(failure(subject, str(error)))
+            findings.append(_unreadable(bus, wanted.servo, subject, error))
             continue
         findings += _examine_servo(servo, settings)
         servos.append(servo)
-        delays.append(settings["Return Delay Time"])
+        found.append(settings)
     if len(servos) == len(configuration.servos):
-        findings.append(_loop_rate(bus, servos, max(delays) * 2e-6))
+        findings += _examine_secondary(servos, found)
+        findings += _rehearse(make_session(bus, servos, found), joints)
+        slowest = max(settings["Return Delay Time"] for settings in found)
+        findings.append(_loop_rate(bus, servos, slowest * 2e-6))
+    return findings
+
+
+def _unreadable(bus: ServoBus, servo: int, subject: str, error: DriverError) -> Finding:
+    """A servo that is not fit, or answers pings alone."""
+    if error.kind is DriverErrorKind.CANNOT_CONNECT and bus.ping(servo) and bus.read_once(servo, 0, 1) is None:
+        remedy = "set Status Return Level to 2 with the DYNAMIXEL Wizard"
+        return Finding(Severity.FAILURE, subject, "answers pings and no reads", remedy)
+    return failure(subject, str(error))
+
+
+def _rehearse(session: Session, joints: Sequence[DriveJoint]) -> list[Finding]:
+    """Everything that a run checks before it writes, by the limits that the robot file states, joint by joint."""
+    findings: list[Finding] = []
+    for joint, described in enumerate(joints):
+        servo, limits = session.servos[joint], stated_limits([described])
+        alone = Session(session.bus, (servo,), [session.settings[joint]], session.group, Health([servo]))
+        alone.health.has_torque[0] = session.health.has_torque[joint]
+        try:
+            plan_tasks(alone, ControlMode.POSITION, limits, WATCHDOG_STEP_S)
+        except DriverError as error:
+            findings.append(failure(servo.label, str(error)))
+            findings += _turn_offset(alone, described)
+        findings += _slow_servo(servo, session.settings[joint], described)
+    return findings
+
+
+def _turn_offset(session: Session, joint: DriveJoint) -> list[Finding]:
+    """Whether a joint would stand within its range but for whole turns of its servo."""
+    servo = session.servos[0]
+    counts = session.read(0, ["Present Position"])["Present Position"]
+    turn = servo.model.counts_per_radian * 2.0 * math.pi
+    low, high = joint.position_range or (-math.inf, math.inf)
+    place = servo.units.position(counts)
+    for turns in range(-_MOST_TURNS, _MOST_TURNS + 1):
+        if turns and not low <= place <= high and low <= servo.units.position(counts - round(turns * turn)) <= high:
+            detail = f"its multi-turn position is off by {_count_turns(turns)}"
+            remedy = "support the arm and switch the servo's power off and on, or correct drive.zero_count"
+            return [Finding(Severity.FAILURE, servo.label, detail, remedy)]
+    return []
+
+
+def _count_turns(turns: int) -> str:
+    """Turns in words."""
+    return f"{turns} turn{'s' if abs(turns) > 1 else ''}"
+
+
+def _slow_servo(servo: JointServo, settings: dict[str, int], joint: DriveJoint) -> list[Finding]:
+    """Whether the servo's own Velocity Limit (44 on X) is below the speed that the joint may have."""
+    own = settings.get("Velocity Limit", 0)
+    wanted = 0 if joint.velocity_limit is None else servo.units.velocity_cap(joint.velocity_limit)
+    if not own or own >= wanted:
+        return []
+    speed = abs(servo.units.velocity(own))
+    detail = f"Velocity Limit {own} is {speed:.3g} rad/s, below the joint's limit of {joint.velocity_limit:g}"
+    remedy = "raise it with the DYNAMIXEL Wizard, or lower limits.velocity: faster motions lag behind"
+    return [Finding(Severity.WARNING, servo.label, detail, remedy)]
+
+
+def _examine_secondary(servos: Sequence[JointServo], settings: Sequence[dict[str, int]]) -> list[Finding]:
+    """A servo that listens to a second ID follows the instructions of that servo as well."""
+    own = {servo.servo: servo.label for servo in servos}
+    findings: list[Finding] = []
+    for servo, values in zip(servos, settings, strict=True):
+        for name in _SECONDARY:
+            if (other := values.get(name)) in own:
+                detail = f"its {name} {other} is the ID of {own[other]}: it would follow that one's goals"
+                remedy = f"set {name} to 255 with the DYNAMIXEL Wizard"
+                findings.append(Finding(Severity.FAILURE, servo.label, detail, remedy))
     return findings
 
 
@@ -90,10 +172,17 @@ def _examine_servo(servo: JointServo, settings: dict[str, int]) -> list[Finding]
         find(Severity.WARNING, f"firmware {servo.firmware} is old", "update it with the DYNAMIXEL Wizard")
     if settings["Return Delay Time"]:
         delay = f"Return Delay Time {settings['Return Delay Time'] * 2} µs"
-        find(Severity.WARNING, delay, "none: the driver sets it to 0 when it connects")
+        find(Severity.WARNING, delay, "none: the driver sets it to 0, and puts it back as it lets go")
     if settings["Drive Mode"] != drive_mode(servo, settings["Drive Mode"]):
         mode = f"Drive Mode {settings['Drive Mode']}: profiles by time, or torque that a goal switches on"
-        find(Severity.WARNING, mode, "none: the driver clears these bits when it connects")
+        find(Severity.WARNING, mode, "none: the driver clears these bits, and puts them back as it lets go")
+    wanted = operating_mode(servo, ControlMode.POSITION)
+    if settings["Operating Mode"] != wanted:
+        change = f"Operating Mode {settings['Operating Mode']}: a run sets {wanted} in EEPROM"
+        findings.append(Finding(Severity.GOOD, servo.label, f"{change}, and puts it back when it lets go of the arm"))
+    if settings["Status Return Level"] != ANSWERS_ALL:
+        level = f"Status Return Level {settings['Status Return Level']}: it does not answer every instruction"
+        find(Severity.WARNING, level, "none: the driver sets it to 2 when it connects")
     if not settings["Current Limit"]:
         find(Severity.FAILURE, "Current Limit is 0: it cannot exert any torque", "raise it with the DYNAMIXEL Wizard")
     if settings["Torque Enable"]:

@@ -5,7 +5,8 @@ from typing import Any
 
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.driver import PATIENCE, ArmDescription, BusDriver, Connection, Option
-from tauscope_drivers.inspection import Finding, FoundDevice, FrameRequest, PlannedFrame
+from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.inspection import Finding, FoundDevice, FrameRequest, PlannedFrame, failure
 
 
 class DynamixelDriver(BusDriver):
@@ -13,7 +14,11 @@ class DynamixelDriver(BusDriver):
 
     name = "dynamixel"
     titles = {"en": "Dynamixel servos", "de": "Dynamixel-Servos"}  # noqa: RUF012 - never changed
-    options = (Option("port", "serial device, in place of the robot file's"), PATIENCE)
+    options = (
+        Option("port", "serial device, in place of the robot file's"),
+        PATIENCE,
+        Option("keep_settings", "whether servos keep in EEPROM what a run changed", default=False),
+    )
     block_example = "{id: 1}"
     port_help = "serial device"
     bus_options = ("port",)
@@ -26,13 +31,28 @@ class DynamixelDriver(BusDriver):
         """The arm in real time."""
         from tauscope_drivers.dynamixel.arm import DynamixelArm
 
-        return Connection(DynamixelArm(arm.joints, slack_s=self.read_patience_s(settings)), is_real_time=True)
+        keeps = settings.get("keep_settings", False)
+        if not isinstance(keeps, bool):
+            text = f"backend {self.name}: keep_settings is {keeps!r:.60}; give true or false"
+            raise DriverError(DriverErrorKind.REFUSED, text)
+        servos = DynamixelArm(arm.joints, slack_s=self.read_patience_s(settings), keeps_settings=keeps)
+        return Connection(servos, is_real_time=True)
 
     def list_adapters(self) -> list[Finding]:
         """Serial ports of this machine."""
         from tauscope_drivers.dynamixel.doctor import serial_adapters
 
         return serial_adapters()
+
+    def check_blocks(self, joints: Sequence[DriveJoint]) -> list[Finding]:
+        """Blocks: servo IDs, port and units."""
+        from tauscope_drivers.dynamixel.configuration import read_configuration
+
+        try:
+            read_configuration(joints)
+        except DriverError as error:
+            return [failure(self.name, str(error))]
+        return []
 
     def examine(self, joints: Sequence[DriveJoint]) -> list[Finding]:
         """Port, and every servo that the robot file names."""

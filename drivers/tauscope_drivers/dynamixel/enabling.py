@@ -16,6 +16,7 @@ from tauscope_drivers.dynamixel.preparation import (
     position_counts,
     preparing_writes,
     taking_writes,
+    velocity_cap,
     watchdog_steps,
 )
 from tauscope_drivers.dynamixel.servo import JointServo
@@ -79,6 +80,30 @@ def enable_servos(
     DriverError
         ``refused`` or ``cannot-connect``: no servo has torque that had none before
     """
+    tasks, ranges = plan_tasks(session, mode, limits, watchdog_s)
+    taken = _give_torque(session, tasks)
+    lows, highs = zip(*ranges, strict=True)
+    caps = tuple(task.current_cap for task in tasks)
+    return Bounds(tuple(lows), tuple(highs), caps, tuple(task.velocity_cap for task in tasks)), taken
+
+
+def plan_tasks(
+    session: Session, mode: ControlMode, limits: DriveLimits, watchdog_s: float
+) -> tuple[list[ServoTask], list[tuple[int, int]]]:
+    """Check everything that enabling needs, and plan it; only reads.
+
+    Returns
+    -------
+    list of ServoTask
+        one a joint
+    list of tuple of two int
+        lowest and highest Goal Position, one a joint [counts]
+
+    Raises
+    ------
+    DriverError
+        ``refused`` or ``cannot-connect``: names the joint
+    """
     steps = watchdog_steps(watchdog_s)
     present = [_present_position(session, joint) for joint in range(len(session.servos))]
     places = np.array([servo.units.position(count) for servo, count in zip(session.servos, present, strict=True)])
@@ -90,14 +115,11 @@ def enable_servos(
         cap = current_cap(servo, settings, float(limits.torque[joint]))
         _require_in_own_range(session, joint, mode, present[joint])
         ranges.append(_range(session, joint, limits, mode))
-        velocity_cap = servo.units.velocity_cap(float(limits.velocity[joint]))
-        tasks.append(ServoTask(mode, cap, velocity_cap, present[joint], steps))
+        speed = velocity_cap(servo, settings, float(limits.velocity[joint]))
+        tasks.append(ServoTask(mode, cap, speed, present[joint], steps))
         if session.health.has_torque[joint]:
             _require_adoptable(session, joint, mode)
-    taken = _give_torque(session, tasks)
-    lows, highs = zip(*ranges, strict=True)
-    caps = tuple(task.current_cap for task in tasks)
-    return Bounds(tuple(lows), tuple(highs), caps, tuple(task.velocity_cap for task in tasks)), taken
+    return tasks, ranges
 
 
 def _give_torque(session: Session, tasks: list[ServoTask]) -> list[int]:

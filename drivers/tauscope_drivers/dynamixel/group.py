@@ -66,6 +66,11 @@ class ServoGroup:
         self.fast = any(statuses.keys() == self._ids for statuses in probes)
         return self.fast
 
+    def beyond_ns(self) -> int:
+        """How much longer than bus and adapter should take for it an answer of all servos takes at least [ns]."""
+        answers = [self._read_all(fast=self.fast, patience_s=PATIENCE_S) for _ in range(PROBES)]
+        return min((one.beyond_ns for one in answers if one.statuses), default=0)
+
     def write(self, name: str, values: Sequence[int | None]) -> None:
         """Write an item of all servos, without an answer."""
         for _, members in self._families:
@@ -160,7 +165,8 @@ class ServoGroup:
             for block, members in self._families
         ]
         statuses = {servo: status for answers in found for servo, status in answers.statuses.items()}
-        return Answers(found[0].asked_ns, max(answers.late_ns for answers in found), statuses)
+        late_ns, beyond_ns = (max(getattr(one, name) for one in found) for name in ("late_ns", "beyond_ns"))
+        return Answers(found[0].asked_ns, late_ns, statuses, beyond_ns)
 
     def _reading(self, answers: Answers) -> GroupReading:
         position, velocity, current = np.full((3, len(self.servos)), np.nan)

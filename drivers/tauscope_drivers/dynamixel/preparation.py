@@ -19,8 +19,12 @@ SETTINGS = (
     "Max Position Limit",
     "Min Position Limit",
     "Status Return Level",
+    "Velocity Limit",
 )
 """Items that are read of each servo when it is reached."""
+
+ANSWERS_ALL = 2
+"""Status Return Level of a servo that answers every instruction."""
 
 _TIME_BASED_PROFILE = 0x04
 _TORQUE_ON_BY_GOAL = 0x08
@@ -68,7 +72,7 @@ def drive_mode(servo: JointServo, present: int) -> int:
 
 def commissioning_writes(servo: JointServo, settings: Mapping[str, int], *, holds: bool) -> list[RegisterWrite]:
     """What is written when a servo is reached; nothing that moves it, and EEPROM only where it differs."""
-    wanted = [("Status Return Level", 2, "every instruction is answered")]
+    wanted = [("Status Return Level", ANSWERS_ALL, "every instruction is answered")]
     if not holds:
         wanted.append(("Return Delay Time", 0, "no wait before an answer"))
         wanted.append(
@@ -156,6 +160,29 @@ def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -
     if cap <= 0:
         raise DriverError(DriverErrorKind.REFUSED, f"{servo.label}: its limits leave no current at all; raise them")
     return cap
+
+
+def velocity_cap(servo: JointServo, settings: Mapping[str, int], velocity: float) -> int:
+    """Profile Velocity within a speed limit and the servo's own Velocity Limit, beyond which it refuses it [units].
+
+    Parameters
+    ----------
+    velocity : float
+        limit of the joint, infinite where there is none [rad/s or m/s]
+
+    Raises
+    ------
+    DriverError
+        ``refused``: the servo's own limit leaves no motion
+    """
+    cap, own = servo.units.velocity_cap(velocity), settings.get("Velocity Limit")
+    if own is None:
+        return cap
+    if own == 0:
+        raise DriverError(
+            DriverErrorKind.REFUSED, f"{servo.label}: its Velocity Limit is 0; raise it with the DYNAMIXEL Wizard"
+        )
+    return min(cap or own, own)
 
 
 def position_counts(

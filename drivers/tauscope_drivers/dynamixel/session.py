@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope_drivers.dynamixel.bus import FACTORY_RETURN_DELAY_S, ServoBus
+from tauscope_drivers.dynamixel.bus import FACTORY_RETURN_DELAY_S, PATIENCE_S, ServoBus
 from tauscope_drivers.dynamixel.configuration import ServoConfiguration
 from tauscope_drivers.dynamixel.group import ServoGroup
 from tauscope_drivers.dynamixel.health import Health
 from tauscope_drivers.dynamixel.models import CURRENT_MODE, gear_ratio_of
-from tauscope_drivers.dynamixel.preparation import SETTINGS, RegisterWrite, commissioning_writes
+from tauscope_drivers.dynamixel.original_settings import CHANGED, OriginalSettings
+from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, SETTINGS, RegisterWrite, commissioning_writes
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 
@@ -32,6 +33,7 @@ class Session:
     settings: list[dict[str, int]]
     group: ServoGroup
     health: Health
+    originals: tuple[OriginalSettings, ...] = ()
 
     def read(self, joint: int, names: Iterable[str]) -> dict[str, int]:
         """Items of one servo.
@@ -52,12 +54,43 @@ class Session:
             index of the joint, from 0
         """
         servo = self.servos[joint]
+        before = self.settings[joint].get(name)
+        if self.originals and name in CHANGED and before not in (None, value):
+            self.originals[joint].remember(name, before, value)
         try:
             self.bus.write(servo.servo, servo.model.items[name], value)
         except DriverError as error:
             raise DriverError(error.kind, f"{servo.label}: {error}") from error
         if name in self.settings[joint]:
             self.settings[joint][name] = value
+
+    def restore(self) -> None:
+        """Put back what was changed in EEPROM, on servos without torque; others keep it until they are let go.
+
+        Raises
+        ------
+        DriverError
+            a servo does not answer, or does not take it
+        """
+        for joint, kept in enumerate(self.originals):
+            before = kept.before
+            if not before or self.read(joint, ["Torque Enable"])["Torque Enable"]:
+                continue
+            for name in CHANGED:
+                if name in before:
+                    self.bus.write(self.servos[joint].servo, self.servos[joint].model.items[name], before[name])
+                    self.settings[joint][name] = before[name]
+            kept.forget()
+
+    @property
+    def changes(self) -> tuple[str, ...]:
+        """What was changed in EEPROM, one line a servo."""
+        return tuple(
+            f"joint {servo.joint}: in EEPROM until the arm is let go: "
+            + ", ".join(f"{name} {self.settings[joint][name]} in place of {value}" for name, value in before.items())
+            for joint, servo in enumerate(self.servos)
+            if self.originals and (before := self.originals[joint].before)
+        )
 
     def carry_out(self, joint: int, writes: Iterable[RegisterWrite]) -> None:
         """Write what a plan says, one after the other, each read back.
@@ -93,18 +126,41 @@ def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) ->
     """
     bus.return_delay_s = FACTORY_RETURN_DELAY_S
     servos = tuple(_reach(bus, number, servo) for number, servo in enumerate(configurations, 1))
-    settings = [read_items(bus, servo, SETTINGS) for servo in servos]
-    for servo in servos:
-        _require_delivered_gear(bus, servo)
-    session = Session(bus, servos, settings, ServoGroup(bus, servos), Health(servos))
-    session.read_health()
+    session = make_session(bus, servos, [read_settings(bus, servo) for servo in servos])
+    settings = session.settings
+    session.originals = tuple(OriginalSettings(bus.port.path, servo.servo) for servo in servos)
+    for kept, present in zip(session.originals, settings, strict=True):
+        kept.check(present)
     for joint, servo in enumerate(servos):
         holds = bool(session.health.has_torque[joint])
         session.carry_out(joint, commissioning_writes(servo, settings[joint], holds=holds))
     slowest = max(values["Return Delay Time"] for values in settings) * _RETURN_DELAY_UNIT_S
     bus.return_delay_s = max(SHORTEST_RETURN_DELAY_S, slowest)
     session.group.probe_fast()
+    # an adapter that is slow by a constant is no slower than that in any answer
+    bus.port.latency_s += session.group.beyond_ns() * 1e-9
     return session
+
+
+def make_session(bus: ServoBus, servos: Sequence[JointServo], settings: Sequence[dict[str, int]]) -> Session:
+    """The servos as they are, with their health; nothing is written."""
+    servos = tuple(servos)
+    session = Session(bus, servos, list(settings), ServoGroup(bus, servos), Health(servos))
+    session.read_health()
+    return session
+
+
+def read_settings(bus: ServoBus, servo: JointServo) -> dict[str, int]:
+    """Settings of a servo whose counts and speeds are those of its model's table.
+
+    Raises
+    ------
+    DriverError
+        ``cannot-connect``: it does not answer, or its gear is another one
+    """
+    settings = read_items(bus, servo, SETTINGS)
+    _require_delivered_gear(bus, servo)
+    return settings
 
 
 def _require_delivered_gear(bus: ServoBus, servo: JointServo) -> None:
@@ -143,4 +199,13 @@ def _reach(bus: ServoBus, number: int, configuration: ServoConfiguration) -> Joi
             f"joint {configuration.joint}: servo {configuration.servo} does not answer on {bus.port.path} at "
             f"{bus.port.baudrate} baud; check its power, cable, ID and baud rate",
         )
-    return make_servo(number, configuration, identity)
+    servo = make_servo(number, configuration, identity)
+    _let_answer(bus, servo)
+    return servo
+
+
+def _let_answer(bus: ServoBus, servo: JointServo) -> None:
+    """Let a servo answer every instruction that answers pings alone (Status Return Level 0)."""
+    level = servo.model.items["Status Return Level"]
+    if bus.read_once(servo.servo, level.address, level.size, PATIENCE_S) is None:
+        bus.sync_write([level], {servo.servo: [ANSWERS_ALL]})

@@ -162,7 +162,10 @@ def _let_go(session: Session, joint: int) -> None:
 
 def _confirm_hold(session: Session, joint: int) -> None:
     """Make sure of what was written without an answer."""
-    session.settings[joint] |= session.read(joint, ["Operating Mode"])
+    before, found = session.settings[joint]["Operating Mode"], session.read(joint, ["Operating Mode"])
+    session.settings[joint] |= found
+    if session.originals and found["Operating Mode"] != before:
+        session.originals[joint].remember("Operating Mode", before, found["Operating Mode"])
     _end_watchdog(session, joint)
 
 

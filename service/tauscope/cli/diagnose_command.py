@@ -5,7 +5,17 @@ from typing import Annotated, Any
 
 import typer
 
-from tauscope.cli.arguments import Rate, RobotFile, TrustUnits, Units, parse_unit_option
+from tauscope.cli.arguments import (
+    Columns,
+    Decimal,
+    Delimiter,
+    Rate,
+    RobotFile,
+    Topic,
+    TrustUnits,
+    Units,
+    reading_fields,
+)
 from tauscope.cli.identify_command import Cutoff, HeldOut, parse_cutoff
 
 Recordings = Annotated[
@@ -13,7 +23,7 @@ Recordings = Annotated[
     typer.Argument(
         metavar="RECORDING",
         exists=True,
-        help="Recordings of the real arm that are to be explained: CSV, Parquet, MCAP or rosbag2.",
+        help="Recordings of the real arm that are to be explained: CSV, Parquet, NumPy, MCAP or a bag.",
         show_default=False,
     ),
 ]
@@ -47,6 +57,10 @@ def diagnose(
     units: Units = None,
     rate: Rate = None,
     trust_units: TrustUnits = False,
+    columns: Columns = None,
+    decimal: Decimal = None,
+    delimiter: Delimiter = None,
+    topic: Topic = None,
     headroom: Annotated[
         bool, typer.Option("--headroom", help="Train a black box, and say what it still predicts of held-out motion.")
     ] = False,
@@ -55,9 +69,11 @@ def diagnose(
     next_trajectory: Annotated[
         Path | None, _output("Write the motion to record next: what best separates, or shows, what is open.")
     ] = None,
-    model: Annotated[Path | None, _output("Write the model with all findings, for --against.", "OUT.json")] = None,
+    model: Annotated[
+        Path | None, _output("Write the model with all findings, for export and --against.", "OUT.json")
+    ] = None,
     export: Annotated[
-        list[Path] | None, _output("Write compensation code of the model with all findings.", "OUT.py|OUT.h")
+        list[Path] | None, _output("Write the model with all findings, by suffix as in tauscope export.", "FILE")
     ] = None,
     scenario: Annotated[Path | None, _output("Write the findings for the simulated arm.", "OUT.yaml")] = None,
     improved_robot: Annotated[
@@ -76,14 +92,15 @@ def diagnose(
     rate : float or None
         samples a second where t counts samples [Hz]
     """
-    cutoff_hz, unit_of = parse_cutoff(cutoff), parse_unit_option(units)
+    cutoff_hz = parse_cutoff(cutoff)
+    fields = reading_fields(columns, units, rate, trust_units, decimal, delimiter, topic)
     if next_trajectory is not None and next_trajectory.suffix.lower() not in TRAJECTORIES:
         text = f"{str(next_trajectory)!r}: a trajectory file ends in .json or .csv"
         raise typer.BadParameter(text, param_hint="--next-trajectory")
     from tauscope.cli.diagnose_summary import show_diagnosis
     from tauscope.cli.task_run import export_outputs, make_request, run_task
     from tauscope.cli.terminal import output
-    from tauscope.export.formats import CODE_FILES
+    from tauscope.export.formats import CODE_FILES, EXPORT_FILES
     from tauscope.tasks import diagnose as task
 
     what, simulated, saved = parse_against(against)
@@ -93,9 +110,7 @@ def diagnose(
         cutoff_hz=cutoff_hz,
         next_trajectory=next_trajectory is not None,
         headroom=headroom,
-        units=unit_of,
-        rate_hz=rate,
-        trust_units=trust_units,
+        **fields,
     )
     held, compared = held_out or [], [*simulated, *([] if saved is None else [saved])]
     request = task.Request(
@@ -108,7 +123,7 @@ def diagnose(
     )
     outputs = [
         (model, "model.json"),
-        *export_outputs(export or (), CODE_FILES),
+        *export_outputs(export or (), {**EXPORT_FILES, **CODE_FILES}),
         (scenario, "scenario.yaml"),
         (improved_robot, "improved-robot.yaml"),
         (next_trajectory, f"trajectory{next_trajectory.suffix.lower()}" if next_trajectory else ""),

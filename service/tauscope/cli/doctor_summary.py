@@ -6,7 +6,8 @@ from pathlib import Path
 from rich.console import Console
 
 from tauscope.cli.terminal import output, plain, shown_progress
-from tauscope.errors import AcquisitionError
+from tauscope.errors import AcquisitionError, MissingExtraError
+from tauscope.extras import require_extra
 from tauscope.number_text import counted
 from tauscope.robot import read_robot
 from tauscope.runtime.drivers import (
@@ -35,7 +36,18 @@ def show_findings(robot: Path | None, backend: str | None) -> None:
         findings = _adapters(backend) if robot is None else _drives(robot, backend)
     console = output()
     for finding in findings:
-        _show(console, finding)
+        show_finding(console, finding)
+    require_sound(findings)
+
+
+def require_sound(findings: Sequence[Finding]) -> None:
+    """Refuse to go on where a finding is a failure.
+
+    Raises
+    ------
+    AcquisitionError
+        names the first
+    """
     failures = [finding for finding in findings if finding.severity is Severity.FAILURE]
     if failures:
         first = failures[0]
@@ -43,6 +55,28 @@ def show_findings(robot: Path | None, backend: str | None) -> None:
             f"{counted(len(failures), 'finding')} of {len(findings)} to mend first: {first.subject}: {first.detail}; "
             f"{first.remedy}"
         )
+
+
+def check_drives(path: Path) -> list[Finding]:
+    """Everything doubtful in a robot file's ``drive`` blocks and the files that they name, without a port.
+
+    Nothing where no bus is meant, or where the drivers are not installed.
+
+    Raises
+    ------
+    AcquisitionError
+        a joint has no ``drive`` block, and another one has
+    """
+    robot = read_robot(path)
+    meant = [bus for bus in bus_drivers().values() if any(bus.is_meant(joint.drive or {}) for joint in robot.joints)]
+    if len(meant) != 1:
+        return []
+    (bus,) = meant
+    try:
+        with require_extra("checking the drives"):
+            return bus.check_blocks(to_drive_joints(bus, robot))
+    except MissingExtraError as error:
+        return [Finding(Severity.WARNING, bus.name, "its files were not read", str(error))]
 
 
 def _adapters(backend: str | None) -> list[Finding]:
@@ -62,7 +96,8 @@ def _drives(path: Path, backend: str | None) -> Sequence[Finding]:
         return bus.examine(to_drive_joints(bus, robot))
 
 
-def _show(console: Console, finding: Finding) -> None:
+def show_finding(console: Console, finding: Finding) -> None:
+    """Show one finding on a line."""
     remedy = f"; {finding.remedy}" if finding.remedy else ""
     line = f"{_MARKS[finding.severity]}: {finding.subject}: {finding.detail}{remedy}"
     console.print(plain(line), soft_wrap=True)

@@ -73,7 +73,7 @@ def require_options(backend: str, options: Collection[str]) -> None:
     for option in options:
         owners = [name for name in driver_names() if option in find_driver(name).option_names]
         if backend not in owners:
-            raise typer.BadParameter(f"--{option} belongs to --backend {' or '.join(owners)}")
+            raise typer.BadParameter(f"--{option.replace('_', '-')} belongs to --backend {' or '.join(owners)}")
 
 
 def _check(name: str, known: Collection[str]) -> str:

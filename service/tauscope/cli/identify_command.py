@@ -6,14 +6,24 @@ from typing import Annotated, Literal
 
 import typer
 
-from tauscope.cli.arguments import Rate, RobotFile, TrustUnits, Units, parse_unit_option
+from tauscope.cli.arguments import (
+    Columns,
+    Decimal,
+    Delimiter,
+    Rate,
+    RobotFile,
+    Topic,
+    TrustUnits,
+    Units,
+    reading_fields,
+)
 
 Recordings = Annotated[
     list[Path],
     typer.Argument(
         metavar="RECORDING",
         exists=True,
-        help="Recordings that the model is made from: CSV, Parquet, MCAP or rosbag2.",
+        help="Recordings that the model is made from: CSV, Parquet, NumPy, MCAP or a bag.",
         show_default=False,
     ),
 ]
@@ -66,6 +76,10 @@ def identify(
     units: Units = None,
     rate: Rate = None,
     trust_units: TrustUnits = False,
+    columns: Columns = None,
+    decimal: Decimal = None,
+    delimiter: Delimiter = None,
+    topic: Topic = None,
     json: Annotated[
         Path | None, typer.Option(metavar="OUT", dir_okay=False, help="Write the result as JSON; - is standard output.")
     ] = None,
@@ -73,6 +87,10 @@ def identify(
         Path | None, typer.Option(metavar="OUT.html", dir_okay=False, help="Write a page to read, figures included.")
     ] = None,
     export: Export = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(metavar="OUT.json", dir_okay=False, help="Write the model for tauscope export and --against."),
+    ] = None,
 ) -> None:
     """Find an arm's parameters from recordings.
 
@@ -86,7 +104,8 @@ def identify(
     rate : float or None
         samples a second where t counts samples [Hz]
     """
-    cutoff_hz, unit_of = parse_cutoff(cutoff), parse_unit_option(units)
+    cutoff_hz = parse_cutoff(cutoff)
+    fields = reading_fields(columns, units, rate, trust_units, decimal, delimiter, topic)
     from tauscope.cli.identify_summary import show_identification
     from tauscope.cli.task_run import export_outputs, make_request, run_task
     from tauscope.cli.terminal import output
@@ -99,9 +118,7 @@ def identify(
         cutoff_hz=cutoff_hz,
         rotor_inertia=rotor_inertia,
         prior=prior,
-        units=unit_of,
-        rate_hz=rate,
-        trust_units=trust_units,
+        **fields,
     )
     held = held_out or []
     request = task.Request(
@@ -110,7 +127,12 @@ def identify(
         held_out=tuple(map(str, held)),
         options=options,
     )
-    outputs = [(json, "result.json"), (report, "report.html"), *export_outputs(export or (), EXPORT_FILES)]
+    outputs = [
+        (json, "result.json"),
+        (report, "report.html"),
+        (model, "model.json"),
+        *export_outputs(export or (), EXPORT_FILES),
+    ]
     run_task(
         task,
         request,

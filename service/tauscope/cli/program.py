@@ -28,6 +28,7 @@ from tauscope.cli.diagnose_command import diagnose
 from tauscope.cli.doctor_command import doctor
 from tauscope.cli.driver_choice import DriverCommand
 from tauscope.cli.excite_command import excite
+from tauscope.cli.export_command import export
 from tauscope.cli.fleet_command import fleet
 from tauscope.cli.identify_command import identify
 from tauscope.cli.job_command import job
@@ -35,6 +36,7 @@ from tauscope.cli.key_command import key
 from tauscope.cli.model_command import model
 from tauscope.cli.prove_command import prove
 from tauscope.cli.recording_command import recording
+from tauscope.cli.release_command import release
 from tauscope.cli.robot_command import robot
 from tauscope.cli.run_command import run
 from tauscope.cli.serve_command import serve
@@ -69,10 +71,12 @@ app = typer.Typer(
 add_verb(app, identify, SeveralValuesCommand)
 add_verb(app, diagnose, SeveralValuesCommand)
 add_verb(app, excite)
+add_verb(app, export)
 app.add_typer(robot, name="robot")
 app.add_typer(recording, name="recording")
 add_verb(app, run, DriverCommand)
 add_verb(app, campaign, DriverCommand)
+add_verb(app, release, DriverCommand)
 add_verb(app, doctor, DriverCommand)
 app.add_typer(bus, name="bus")
 add_verb(app, serve, DriverCommand)

@@ -5,26 +5,43 @@ from typing import Annotated
 
 import typer
 
-from tauscope.cli.arguments import Rate, RecordingFile, TrustUnits, Units, parse_unit_option
+from tauscope.cli.arguments import (
+    Columns,
+    Decimal,
+    Delimiter,
+    Rate,
+    RecordingFile,
+    Topic,
+    TrustUnits,
+    Units,
+    reading_fields,
+)
 from tauscope.cli.verbs import add_verb
+
+RobotOption = Annotated[
+    Path | None,
+    typer.Option(
+        exists=True, dir_okay=False, metavar="ROBOT", help="Robot file: its names, limits, masses and layout."
+    ),
+]
 
 recording = typer.Typer(help="Look at recordings, and convert them.", no_args_is_help=True, rich_markup_mode=None)
 
 
 def check(
     file: RecordingFile,
+    *,
     joints: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Number of joints that it has to have.")
     ] = None,
-    robot: Annotated[
-        Path | None,
-        typer.Option(
-            exists=True, dir_okay=False, metavar="ROBOT", help="Robot file: its names, limits, masses and units."
-        ),
-    ] = None,
+    robot: RobotOption = None,
     units: Units = None,
     rate: Rate = None,
     trust_units: TrustUnits = False,
+    columns: Columns = None,
+    decimal: Decimal = None,
+    delimiter: Delimiter = None,
+    topic: Topic = None,
 ) -> None:
     """Show what a recording holds, and what to look at before trusting it.
 
@@ -33,12 +50,12 @@ def check(
     rate : float or None
         samples a second where t counts samples [Hz]
     """
-    unit_of = parse_unit_option(units)
+    fields = reading_fields(columns, units, rate, trust_units, decimal, delimiter, topic)
     from tauscope.cli.recording_summary import show_recording
     from tauscope.cli.task_run import make_request
     from tauscope.tasks.task import ReadingOptions
 
-    options = make_request(ReadingOptions, units=unit_of, rate_hz=rate, trust_units=trust_units)
+    options = make_request(ReadingOptions, **fields)
     show_recording(file, joints, robot, options.reading)
 
 
@@ -47,14 +64,49 @@ def convert(
     target: Annotated[
         Path, typer.Argument(metavar="TARGET", dir_okay=False, help="File to make: .csv, .parquet or .mcap.")
     ],
+    *,
     recover: Annotated[bool, typer.Option(help="Keep what comes before the damage of a truncated MCAP file.")] = False,
     overwrite: Annotated[bool, typer.Option(help="Replace TARGET where it exists.")] = False,
+    robot: RobotOption = None,
+    units: Units = None,
+    rate: Rate = None,
+    columns: Columns = None,
+    decimal: Decimal = None,
+    delimiter: Delimiter = None,
+    topic: Topic = None,
 ) -> None:
-    """Write a recording in another format; the source stays as it is."""
+    """Write a recording in another format, in SI; the source stays as it is.
+
+    Parameters
+    ----------
+    rate : float or None
+        samples a second where t counts samples [Hz]
+    """
+    fields = reading_fields(columns, units, rate, False, decimal, delimiter, topic)
     from tauscope.cli.recording_summary import convert_file
+    from tauscope.cli.task_run import make_request
+    from tauscope.tasks.task import ReadingOptions
 
-    convert_file(source, target, recover=recover, overwrite=overwrite)
+    reading = make_request(ReadingOptions, **fields).reading
+    convert_file(source, target, robot, reading, recover=recover, overwrite=overwrite)
 
 
+def map_file(
+    file: RecordingFile,
+    robot: RobotOption = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="OUT.yaml", dir_okay=False, help="File to write, for --columns.")
+    ] = None,
+    ask: Annotated[
+        bool | None, typer.Option("--ask/--no-ask", help="Ask for each column; by default on a terminal.")
+    ] = None,
+) -> None:
+    """Write the mapping of another tool's columns: a guess, which questions correct."""
+    from tauscope.cli.recording_mapping import map_recording
+
+    map_recording(file, robot, out, ask)
+
+
+add_verb(recording, map_file, name="map")
 add_verb(recording, check)
 add_verb(recording, convert)

@@ -37,7 +37,9 @@ def show_recording(path: Path, joint_count: int | None, robot_file: Path | None,
     console.print(plain(f"{path}: valid"), soft_wrap=True)
 
 
-def convert_file(source: Path, target: Path, *, recover: bool, overwrite: bool) -> None:
+def convert_file(
+    source: Path, target: Path, robot_file: Path | None, reading: Reading, *, recover: bool, overwrite: bool
+) -> None:
     """Write a recording in another format and say what was left out.
 
     Raises
@@ -53,7 +55,8 @@ def convert_file(source: Path, target: Path, *, recover: bool, overwrite: bool) 
         )
     with shown_progress() as progress:
         progress(f"convert {source}")
-        done = convert_recording(source, target, recover=recover, overwrite=overwrite)
+        robot = None if robot_file is None else read_robot(robot_file)
+        done = convert_recording(source, target, recover=recover, overwrite=overwrite, robot=robot, reading=reading)
     console = output()
     console.print(plain(f"wrote {done.target}: {counted(done.samples, 'sample')}"), soft_wrap=True)
     if done.dropped_columns:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from tauscope.cli.doctor_summary import check_drives, require_sound, show_finding
 from tauscope.cli.terminal import output, plain, table
 from tauscope.number_text import ABSENT, counted, given
 from tauscope.report.table import Table
@@ -15,6 +16,8 @@ def show_robot(path: Path) -> None:
     ------
     RobotFileError
         if the file is not valid
+    AcquisitionError
+        if a drive block or the EDS or DCF file that it names is not usable
     """
     report = check_robot(path)
     console = output()
@@ -37,6 +40,10 @@ def show_robot(path: Path) -> None:
     console.print(table("Joints", Table(columns, [_row(joint) for joint in report.joints], words=3)))
     for finding in report.findings:
         console.print(plain(f"{finding.severity}: {finding.where}: {finding.text}"), soft_wrap=True)
+    findings = check_drives(path)
+    for finding in findings:
+        show_finding(console, finding)
+    require_sound(findings)
     console.print(plain(f"{path}: valid"), soft_wrap=True)
 
 

@@ -58,8 +58,11 @@ def run(
         ),
     ] = None,
     stop_policy: Annotated[
-        Literal["hold", "damp", "torque_off"] | None,
-        typer.Option(help="How the arm is stopped; as the robot file says by default, else hold."),
+        Literal["hold", "damp", "torque_off", "release"] | None,
+        typer.Option(
+            help="How the arm is stopped; as the robot file says by default, else hold. "
+            "release: hold, then let go once it stands still, where the robot file states that."
+        ),
     ] = None,
     watchdog_s: Annotated[
         float, typer.Option(metavar="S", help="Time without a cycle after which the device stops itself.")
@@ -70,10 +73,16 @@ def run(
     following_error: Annotated[
         float | None, typer.Option(help="Allowed distance of arm and target; 0.2 rad or 0.05 m by default.")
     ] = None,
-    stale_misses: Annotated[int, typer.Option(help="Readings in a row that a joint may not fail to answer.")] = 3,
-    stale_s: Annotated[
+    missed: Annotated[int, typer.Option(help="Readings in a row that a joint may not fail to answer.")] = 3,
+    lost_s: Annotated[
         float, typer.Option(metavar="S", help="Time after which a joint that does not answer counts as lost.")
     ] = 0.05,
+    stale_ms: Annotated[
+        float, typer.Option(metavar="MS", help="How much later than usual an answer may come and be a sample.")
+    ] = 1.0,
+    least_kept: Annotated[
+        float, typer.Option(help="Share of the motion's samples below which the run ends as degraded.")
+    ] = 0.98,
     temperature_c: Annotated[float, typer.Option(metavar="C", help="Hottest motor that is allowed [°C].")] = 80.0,
     feed_forward: Annotated[
         bool, typer.Option("--feed-forward/--no-feed-forward", help="Give the drives the torque of the robot's model.")
@@ -83,6 +92,9 @@ def run(
     seed: Annotated[int, typer.Option(min=0, help="Of the default excitation.")] = 0,
     acknowledge_faults: Annotated[
         bool, typer.Option("--acknowledge-faults", help="Clear the faults that the drives have latched.")
+    ] = False,
+    keep_settings: Annotated[
+        bool, typer.Option("--keep-settings", help="Leave in servos' EEPROM what the run changed; else it is put back.")
     ] = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Show the frames that would be sent to the bus, and send none.")
@@ -101,6 +113,7 @@ def run(
     """
     posture = parse_posture(start)
     given = {"scenario": scenario, "start": start, "time": None if time == "virtual" else time}
+    given["keep_settings"] = keep_settings or None
     require_options(backend, [name for name, value in given.items() if value is not None])
     from tauscope.cli.task_run import make_request
     from tauscope.runtime.options import RunOptions
@@ -113,8 +126,10 @@ def run(
         watchdog_s=watchdog_s,
         heartbeat_s=heartbeat_s,
         following_error=following_error,
-        stale_misses=stale_misses,
-        stale_s=stale_s,
+        missed=missed,
+        lost_s=lost_s,
+        stale_ms=stale_ms,
+        least_kept=least_kept,
         temperature_c=temperature_c,
         feed_forward=feed_forward,
         bandwidth_rad_s=bandwidth_rad_s,
@@ -131,7 +146,7 @@ def run(
 
     request = task.Request(
         robot=str(robot),
-        backend=make_request(task.BackendChoice, name=backend, time=time, start=posture),
+        backend=make_request(task.BackendChoice, name=backend, time=time, start=posture, keep_settings=keep_settings),
         scenario=None if scenario is None else str(scenario),
         trajectory=None if trajectory is None else str(trajectory),
         seed=seed,

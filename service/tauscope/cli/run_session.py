@@ -38,7 +38,8 @@ def run_arm(request: run.Request, asked: Path | None) -> None:
         with shown_progress() as told:
             result = run.perform(request, LocalFiles({"run": folder / "run"}), told)
         made = keep_recording(result, out)
-        is_settled = True
+        journal = None if made else _unsaved_journal(result)
+        is_settled = journal is None
     finally:
         # Whatever happened, a journal that nobody has saved stays.
         if is_settled or not run.recording_file(folder / "run", "mcap").exists():
@@ -47,7 +48,7 @@ def run_arm(request: run.Request, asked: Path | None) -> None:
     if made:
         output().print(plain(f"wrote {out}"), soft_wrap=True)
     if result.record.state is not RunState.FINISHED:
-        raise AcquisitionError(why_unfinished(result.record, out if made else None))
+        raise AcquisitionError(why_unfinished(result.record, out if made else None, journal))
 
 
 def keep_recording(result: run.Result, out: Path) -> bool:
@@ -69,11 +70,30 @@ def keep_recording(result: run.Result, out: Path) -> bool:
     return recording is not None
 
 
-def why_unfinished(record: RunRecord, recording: Path | None) -> str:
+def _unsaved_journal(result: run.Result) -> Path | None:
+    """The journal of a run whose recording could not be saved; None where it holds nothing."""
+    journal, recording = run.recording_file(result.folder, "mcap"), result.record.recording
+    is_empty = recording is not None and not recording.samples and not recording.remarks
+    return None if is_empty or not journal.exists() else journal
+
+
+def why_unfinished(record: RunRecord, recording: Path | None, journal: Path | None = None) -> str:
     """One line on a run that did not finish."""
     reason = record.stop if record.problem is None else record.problem.detail
-    kept = "nothing was recorded" if recording is None else f"what was recorded until then is in {recording}"
-    return one_line(f"the run {record.state}: {reason or 'no reason is known'}; {kept}")
+    until = "" if record.state is RunState.DEGRADED else " until then"
+    kept = "nothing was recorded" if recording is None else f"what was recorded{until} is in {recording}"
+    if journal is not None:
+        kept = f"its journal is {journal}; free disk space, then tauscope recording convert"
+    return one_line(f"the run {record.state}: {reason or 'no reason is known'}; {_describe_arm(record)}{kept}")
+
+
+def _describe_arm(record: RunRecord) -> str:
+    """What the arm does now; empty where it never had power, or did all that was asked for."""
+    if record.state is RunState.DEGRADED or not record.played:
+        return ""
+    if record.holds is None:
+        return "nobody has confirmed its stop, so its drives stop by themselves: look at the arm; "
+    return f"the arm was stopped and {'holds' if record.holds else 'is without power'}; "
 
 
 def _output(asked: Path | None) -> Path:

@@ -6,14 +6,25 @@ from tauscope.cli.terminal import plain, table
 from tauscope.number_text import ABSENT, counted, significant
 from tauscope.report.table import Table
 from tauscope.robot import JointType, Robot
+from tauscope.runtime.drivers import find_driver
 from tauscope.runtime.record import RunRecord
+
+HELD = (
+    "! The arm is under power where it stopped, and its watchdog is off. Support it, then let go of it with: tauscope "
+    "release."
+)
 
 
 def show_run(console: Console, record: RunRecord, robot: Robot) -> None:
     """Show how a run went, and how it kept its time."""
-    console.print(plain(f"Robot {record.robot} on {record.backend}: {record.state}"), soft_wrap=True)
+    reason = f": {record.problem.detail}" if record.problem is not None else ""
+    console.print(plain(f"Robot {record.robot} on {record.backend}: {record.state}{reason}"), soft_wrap=True)
+    for line in record.drives:
+        console.print(plain(f"! {line}."), soft_wrap=True)
     for warning in robot.warnings:
         console.print(plain(f"! {warning.sentence}."), soft_wrap=True)
+    if record.holds and not find_driver(record.backend).is_simulated:
+        console.print(plain(HELD), soft_wrap=True)
     console.print(table("Run", _whole(record)))
     if record.worst_following:
         console.print(table("Joints", _joints(record, robot)))
@@ -30,6 +41,7 @@ def _whole(record: RunRecord) -> Table:
         ("motion", ABSENT if record.motion_s is None else f"{significant(record.motion_s, 4)} s"),
         ("stop policy", record.stop_policy or ABSENT),
         ("samples", ABSENT if recording is None else str(recording.samples)),
+        ("samples kept", ABSENT if record.kept is None else f"{significant(100.0 * record.kept, 4)} %"),
     ]
     if timing is not None:
         lateness = ", ".join(f"{name} {significant(value, 3)}" for name, value in timing.lateness_us.items())

@@ -62,8 +62,7 @@ def run_task(
     require_distinct(recordings)
     require_free(paths, (robot_file, *recordings))
     robot = read_robot(robot_file)
-    if robot.urdf is not None:
-        require_free(paths, [robot.urdf])
+    require_free(paths, [path for _, path in robot.files])
     with shown_progress() as progress:
         result, written = write_outputs(task, request, dict(outputs), progress)
     if show is not None:
@@ -110,15 +109,22 @@ def export_outputs(paths: Sequence[Path], files: Mapping[ExportFormat, ExportFil
     typer.BadParameter
         where a suffix names no format
     """
-    made = []
-    for path in paths:
-        kind = SUFFIXES.get(path.suffix.lower())
-        file = None if kind is None else files.get(kind)
-        if file is None:
-            known = ", ".join(suffix for suffix, kind in SUFFIXES.items() if kind in files)
-            raise typer.BadParameter(f"{str(path)!r}: the suffix names no format; use {known}", param_hint="'--export'")
-        made.append((path, file.output))
-    return made
+    return [(path, files[parse_export_format(path, files, "'--export'")].output) for path in paths]
+
+
+def parse_export_format(path: Path, files: Mapping[ExportFormat, ExportFile], option: str) -> ExportFormat:
+    """The format that the suffix of a file names.
+
+    Raises
+    ------
+    typer.BadParameter
+        where it names none
+    """
+    kind = SUFFIXES.get(path.suffix.lower())
+    if kind is None or kind not in files:
+        known = ", ".join(suffix for suffix, kind in SUFFIXES.items() if kind in files)
+        raise typer.BadParameter(f"{str(path)!r}: the suffix names no format; use {known}", param_hint=option)
+    return kind
 
 
 def _show_warnings(robot: Robot, result: Any, *, summarised: bool) -> None:

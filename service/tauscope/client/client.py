@@ -22,7 +22,7 @@ from tauscope.server.http.runs import RunAnswer, StopAnswer
 
 PREFIX = "/api/v1"
 ENDS = frozenset(
-    {"finished", "stopped", "failed", "interrupted", "succeeded", "cancelled", "damaged"},
+    {"finished", "degraded", "stopped", "failed", "interrupted", "succeeded", "cancelled", "damaged"},
 )
 """States after which nothing happens any more."""
 

@@ -61,6 +61,8 @@ class BaseParameters:
         standard parameters that no motion of the arm shows
     combination : (m, k) float64
         B, equation (12)
+    first_links : tuple of int, length n
+        first link that each joint moves, from 0
     """
 
     independent_columns: Columns
@@ -71,6 +73,7 @@ class BaseParameters:
     expressions: tuple[str, ...]
     terms: tuple[Mapping[str, float], ...]
     unidentifiable: tuple[str, ...]
+    first_links: tuple[int, ...]
 
     def is_independent(self, index: int) -> bool:
         """Whether a base parameter is one standard parameter alone: its row of B is zero.
@@ -90,7 +93,9 @@ class BaseParameters:
         joint : int
             joint index, from 0
         """
-        return slice(int(np.searchsorted(self.independent_columns, len(STANDARD_PARAMETERS) * joint)), None)
+        return slice(
+            int(np.searchsorted(self.independent_columns, len(STANDARD_PARAMETERS) * self.first_links[joint])), None
+        )
 
     def project(self, parameters: Array) -> Array:
         """Values of the base parameters, Θ* = Θ_L + B Θ_K, equation (14).
@@ -117,7 +122,7 @@ def base_parameters(robot: Robot, *, seed: int = 0) -> BaseParameters:
     independent = _leading_columns(triangle, scales, np.flatnonzero(~null))
     dependent = np.setdiff1d(np.flatnonzero(~null), independent)
     combination = _combination(triangle[:, independent], triangle[:, dependent])
-    standard = tuple(f"{name}{link + 1}" for link in range(robot.joint_count) for name in STANDARD_PARAMETERS)
+    standard = tuple(f"{name}{link + 1}" for link in range(robot.link_count) for name in STANDARD_PARAMETERS)
     terms = tuple(_terms(standard, lead, dependent, row) for lead, row in zip(independent, combination, strict=True))
     return BaseParameters(
         independent_columns=independent,
@@ -128,6 +133,7 @@ def base_parameters(robot: Robot, *, seed: int = 0) -> BaseParameters:
         expressions=tuple(_expression(of_one) for of_one in terms),
         terms=terms,
         unidentifiable=tuple(standard[column] for column in np.flatnonzero(null)),
+        first_links=robot.first_links,
     )
 
 
@@ -162,7 +168,7 @@ def _column_triangle(robot: Robot, rng: np.random.Generator) -> Array:
     everywhere. Velocities and accelerations are such that inertia, centrifugal and gravity terms have similar size.
     """
     shape = (_STATES, robot.joint_count)
-    reach = [np.pi if segment.type is JointType.REVOLUTE else 1.0 for segment in robot.segments]
+    reach = [np.pi if joint.type is JointType.REVOLUTE else 1.0 for joint in robot.joints]
     q, qd, qdd = (rng.uniform(-1.0, 1.0, shape) * scale for scale in (np.array(reach), 4.0, 15.0))
     phi = torque_regressor(robot, q, qd, qdd)
     return np.asarray(np.linalg.qr(phi.reshape(-1, phi.shape[-1]), mode="r"))

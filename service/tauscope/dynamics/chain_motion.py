@@ -5,7 +5,8 @@ For each link j, seen in its own link frame j:
 * ω, ω̇  angular velocity and acceleration,
 * a      acceleration of the frame's origin minus gravity (an arm at rest "accelerates" upwards),
 * M      = S(ω̇) + S(ω)², so that a + M r is the acceleration (minus gravity) of the link's point r,
-* the joint screws (w_i, v_i), i ≤ j: the link's angular velocity, and its origin's velocity, per unit of q̇_i.
+* the joint screws (w_i, v_i), one a joint met so far: the link's angular velocity, and its origin's velocity, per unit
+  of q̇_i. A segment that follows joint i adds its own axis, times the multiplier, to this screw.
 
 Link frame j in link frame j-1 is ``before · motion_z(q_j) · after`` (`tauscope.robot.robot.Segment`). Going along it,
 with p the translation of `before` (in frame j-1), then that of `after` (in frame j):
@@ -45,7 +46,7 @@ class LinkMotion(NamedTuple):
     """Motion of link j in link frame j: views that hold until the next link is asked for.
 
     screw_angular, screw_linear : three (j, N) float64
-        w_i and v_i of the joints i ≤ j
+        w_i and v_i of the j joints met so far
     angular_velocity, angular_acceleration, acceleration : three (N,) float64
         ω [rad/s], ω̇ [rad/s²], a [m/s²] of the origin, minus gravity
     products : three (N,) float64
@@ -69,6 +70,7 @@ class ChainMotion:
     def __init__(self, robot: Robot, capacity: int) -> None:
         rows = _FIRST_SCREW + 2 * robot.joint_count
         self._steps = [Step(segment) for segment in robot.segments]
+        self._couplings = robot.couplings
         self._gravity = robot.gravity
         self._blocks = aligned_empty(3, rows, capacity)
         self._scratch = aligned_empty(2, rows, capacity)
@@ -89,19 +91,27 @@ class ChainMotion:
         """
         moving = _Frame(self._blocks, self._scratch, self._field, self._products, samples=q.shape[1])
         moving.rest(self._gravity)
-        for joint, step in enumerate(self._steps):
+        for coupling, step in zip(self._couplings, self._steps, strict=True):
+            joint, ratio = coupling.joint, coupling.multiplier
+            position, velocity, acceleration = q[joint], qd[joint], qdd[joint]
+            if (ratio, coupling.offset) != (1.0, 0.0):
+                position, velocity, acceleration = (
+                    ratio * position + coupling.offset,
+                    ratio * velocity,
+                    ratio * acceleration,
+                )
             moving.shift(step.before)
             for plane, cosine, sine in step.turns_before:
                 moving.turn(plane, cosine, sine)
             if step.revolute:
-                moving.turn(ABOUT_Z, *_cosine_and_sine(q[joint] + step.angle))
-                moving.spin(qd[joint], qdd[joint])
+                moving.turn(ABOUT_Z, *_cosine_and_sine(position + step.angle))
+                moving.spin(joint, ratio, velocity, acceleration)
             else:
-                moving.slide(qd[joint], qdd[joint])
+                moving.slide(joint, ratio, velocity, acceleration)
             for plane, cosine, sine in step.turns_after:
                 moving.turn(plane, cosine, sine)
             moving.update_field()
-            moving.shift(step.after if step.revolute else step.slid(q[joint]))
+            moving.shift(step.after if step.revolute else step.slid(position))
             yield moving.view()
 
 
@@ -156,7 +166,7 @@ class _Frame:
         second *= cosine
         second -= from_first
 
-    def spin(self, qd: Array, qdd: Array) -> None:
+    def spin(self, joint: int, ratio: float, qd: Array, qdd: Array) -> None:
         """Pass a revolute joint: ω + ẑ q̇, ω̇ + ẑ q̈ + ω × ẑ q̇, and its screw."""
         x, y, z = self._blocks
         scratch = self._scratch[0, 0]
@@ -164,22 +174,26 @@ class _Frame:
         np.add(z[1], qdd, out=z[1])
         _add_product(x[1], y[0], qd, scratch)
         _subtract_product(y[1], x[0], qd, scratch)
-        self._append_screw(angular=1.0, linear=0.0)
+        self._add_to_screw(joint, angular=ratio, linear=0.0)
 
-    def slide(self, qd: Array, qdd: Array) -> None:
+    def slide(self, joint: int, ratio: float, qd: Array, qdd: Array) -> None:
         """Pass a prismatic joint: a + ẑ q̈ + 2 ω × ẑ q̇, and its screw; the way along ẑ is left to `shift`."""
         x, y, z = self._blocks
         twice, scratch = np.multiply(qd, 2.0, out=self._scratch[0, 0]), self._scratch[1, 0]
         np.add(z[2], qdd, out=z[2])
         _add_product(x[2], y[0], twice, scratch)
         _subtract_product(y[2], x[0], twice, scratch)
-        self._append_screw(angular=0.0, linear=1.0)
+        self._add_to_screw(joint, angular=0.0, linear=ratio)
 
-    def _append_screw(self, angular: float, linear: float) -> None:
-        for block, along in zip(self._blocks, (0.0, 0.0, 1.0), strict=True):
-            block[self._rows] = angular * along
-            block[self._rows + 1] = linear * along
-        self._rows += 2
+    def _add_to_screw(self, joint: int, angular: float, linear: float) -> None:
+        """Add a motion along z to a joint's screw, which starts at zero where the joint is met first."""
+        row = _FIRST_SCREW + 2 * joint
+        if row == self._rows:
+            for block in self._blocks:
+                block[row : row + 2] = 0.0
+            self._rows += 2
+        self._blocks[2][row] += angular
+        self._blocks[2][row + 1] += linear
 
     def update_field(self) -> None:
         """M = S(ω̇) + S(ω)², and the products of ω's components that it is made of."""

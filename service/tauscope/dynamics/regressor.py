@@ -51,7 +51,7 @@ def torque_regressor(robot: Robot, q: Array, qd: Array, qdd: Array, *, columns: 
     qdd : (N, n) float64
         joint acceleration [rad/s² or m/s²]
     columns : (C,) int or None
-        the standard parameters wanted, ascending, counted over all links from 0; all 10 n where None
+        the standard parameters wanted, ascending, counted over all links from 0; all of them where None
 
     Returns
     -------
@@ -75,18 +75,18 @@ class TorqueRegressor:
     Parameters
     ----------
     columns : (C,) int or None
-        the standard parameters wanted, ascending, counted over all links from 0; all 10 n where None
+        the standard parameters wanted, ascending, counted over all links from 0; all of them where None
     """
 
     def __init__(self, robot: Robot, *, columns: Columns | None = None, chunk: int = CHUNK) -> None:
-        wanted = np.arange(_PER_LINK * robot.joint_count) if columns is None else np.asarray(columns)
+        wanted = np.arange(_PER_LINK * robot.link_count) if columns is None else np.asarray(columns)
         self.column_count = len(wanted)
         self._chunk = chunk
         self._motion = ChainMotion(robot, chunk)
         self._scratch = aligned_empty(2, robot.joint_count, chunk)
         self._difference = aligned_empty(chunk)
-        places = [np.flatnonzero(wanted // _PER_LINK == link) for link in range(robot.joint_count)]
-        self._inner_columns = [int(np.searchsorted(wanted, _PER_LINK * joint)) for joint in range(robot.joint_count)]
+        places = [np.flatnonzero(wanted // _PER_LINK == link) for link in range(robot.link_count)]
+        self._inner_columns = [int(np.searchsorted(wanted, _PER_LINK * link)) for link in robot.first_links]
         self._columns = [[(int(at), _COLUMNS[wanted[at] % _PER_LINK]) for at in of_link] for of_link in places]
 
     def write(self, q: Array, qd: Array, qdd: Array, out: Array) -> None:
@@ -126,11 +126,11 @@ class TorqueRegressor:
                 part = slice(start, start + self._chunk)
                 state = [np.ascontiguousarray(array[part].T) for array in (q, qd, qdd)]
                 for link, motion in enumerate(self._motion.links(*state)):
-                    self._write_link(link, motion, out[: link + 1, :, part])
+                    self._write_link(link, motion, out[: len(motion.screw_angular[0]), :, part])
 
     def _write_link(self, link: int, motion: LinkMotion, out: Array) -> None:
         samples = out.shape[-1]
-        scratch, difference = self._scratch[:, : link + 1, :samples], self._difference[:samples]
+        scratch, difference = self._scratch[:, : len(out), :samples], self._difference[:samples]
         for at, column in self._columns[link]:
             _write_sum(column(motion, difference), out[:, at], scratch)
 

@@ -14,6 +14,7 @@ how they depend on the motion, all seen from link j, s_i = (w_i, v_i), [x, y] th
     a  = v' + ω × v + γ,  ∂γ/∂q_k = γ × w_k                      (γ: minus gravity)
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -42,14 +43,19 @@ class RegressorGradient:
     Parameters
     ----------
     columns : (C,) int or None
-        the standard parameters that the regressor has columns for, ascending; all 10 n where None
+        the standard parameters that the regressor has columns for, ascending; all of them where None
     """
 
     def __init__(self, robot: Robot, *, columns: Columns | None = None, capacity: int) -> None:
-        joints = robot.joint_count
-        wanted = np.arange(_PER_LINK * joints) if columns is None else np.asarray(columns)
-        self._motion = ChainMotion(robot, capacity)
-        self._places = [np.flatnonzero(wanted // _PER_LINK == link) for link in range(joints)]
+        links = robot.link_count
+        wanted = np.arange(_PER_LINK * links) if columns is None else np.asarray(columns)
+        # The screws of one joint's segments are added up in Φ but change apart: each segment counts as a joint here.
+        apart = tuple(replace(segment, coupling=None) for segment in robot.segments)
+        self._motion = ChainMotion(replace(robot, joints=(robot.joints * links)[:links], segments=apart), capacity)
+        self._is_coupled = any(segment.coupling for segment in robot.segments)
+        self._offsets = np.array([each.offset for each in robot.couplings])
+        self._ratios = robot.ratios
+        self._places = [np.flatnonzero(wanted // _PER_LINK == link) for link in range(links)]
         self._parameters = [wanted[places] % _PER_LINK for places in self._places]
 
     def contract(self, q: Array, qd: Array, qdd: Array, weight: Array) -> tuple[Array, Array, Array]:
@@ -71,7 +77,10 @@ class RegressorGradient:
         tuple of (N, n) float64
             ∂S/∂q, ∂S/∂q̇, ∂S/∂q̈
         """
-        state = [np.ascontiguousarray(array.T) for array in (q, qd, qdd)]
+        state = [self._ratios @ array.T for array in (q, qd, qdd)]
+        state[0] += self._offsets[:, None]
+        if self._is_coupled:
+            weight = np.tensordot(self._ratios, weight, axes=1)
         gradient = [np.zeros_like(array) for array in state]
         for link, motion in enumerate(self._motion.links(*state)):
             bodies = np.zeros((_PER_LINK, link + 1, len(q)))
@@ -80,7 +89,7 @@ class RegressorGradient:
             parts = _link_gradient(motion, bodies, state[1][inner], state[2][inner])
             for total, part in zip(gradient, parts, strict=True):
                 total[inner] += part
-        q_bar, qd_bar, qdd_bar = (np.ascontiguousarray(array.T) for array in gradient)
+        q_bar, qd_bar, qdd_bar = (np.ascontiguousarray((self._ratios.T @ array).T) for array in gradient)
         return q_bar, qd_bar, qdd_bar
 
 

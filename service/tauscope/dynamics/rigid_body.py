@@ -17,8 +17,8 @@ def inverse_dynamics(robot: Robot, parameters: Array, q: Array, qd: Array, qdd: 
 
     Parameters
     ----------
-    parameters : (10 n,) float64
-        Θ, ten standard parameters a link in the order of `STANDARD_PARAMETERS`
+    parameters : (10 m,) float64
+        Θ, ten standard parameters of each of the m links in the order of `STANDARD_PARAMETERS`
     q : (N, n) float64
         joint position [rad or m]
     qd : (N, n) float64
@@ -36,10 +36,10 @@ def inverse_dynamics(robot: Robot, parameters: Array, q: Array, qd: Array, qdd: 
     torque = np.zeros((joints, len(q)))
     for part in _chunks(len(q)):
         state = [np.ascontiguousarray(each[part].T) for each in (q, qd, qdd)]
-        for link, (wrench_of, moved) in enumerate(zip(maps, motion.links(*state), strict=True)):
+        for wrench_of, moved in zip(maps, motion.links(*state), strict=True):
             wrench = wrench_of @ np.stack([*moved.acceleration, *(entry for row in moved.field for entry in row)])
             for screw, component in zip((*moved.screw_angular, *moved.screw_linear), wrench, strict=True):
-                torque[: link + 1, part] += screw * component
+                torque[: len(screw), part] += screw * component
     return np.ascontiguousarray(torque.T)
 
 
@@ -48,7 +48,7 @@ def gravity_torque(robot: Robot, parameters: Array, q: Array) -> Array:
 
     Parameters
     ----------
-    parameters : (10 n,) float64
+    parameters : (10 m,) float64
         Θ, ten standard parameters a link
     q : (N, n) float64
         joint position [rad or m]
@@ -69,7 +69,7 @@ def mass_matrix(robot: Robot, parameters: Array, q: Array) -> Array:
 
     Parameters
     ----------
-    parameters : (10 n,) float64
+    parameters : (10 m,) float64
         Θ, ten standard parameters a link
     q : (N, n) float64
         joint position [rad or m]
@@ -86,10 +86,11 @@ def mass_matrix(robot: Robot, parameters: Array, q: Array) -> Array:
     for part in _chunks(len(q)):
         position = np.ascontiguousarray(q[part].T)
         rest = np.zeros_like(position)
-        for link, (inertia, moved) in enumerate(zip(inertias, motion.links(position, rest, rest), strict=True)):
+        for inertia, moved in zip(inertias, motion.links(position, rest, rest), strict=True):
             screws = np.stack([*moved.screw_angular, *moved.screw_linear])
+            met = screws.shape[1]
             momenta = np.tensordot(inertia, screws, axes=1)
-            mass[part, : link + 1, : link + 1] += np.einsum("ain,akn->nik", screws, momenta)
+            mass[part, :met, :met] += np.einsum("ain,akn->nik", screws, momenta)
     return mass
 
 

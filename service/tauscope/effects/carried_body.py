@@ -39,7 +39,7 @@ def body_columns(signals: Signals) -> Array:
     def made() -> Array:
         state = [np.ascontiguousarray(each.T) for each in (signals.position, signals.velocity, signals.acceleration)]
         count = len(STANDARD_PARAMETERS)
-        last = np.arange(count * (signals.robot.joint_count - 1), count * signals.robot.joint_count)
+        last = np.arange(count * (signals.robot.link_count - 1), count * signals.robot.link_count)
         return np.ascontiguousarray(torque_regressor(signals.robot, *state, columns=last).transpose(2, 1, 0))
 
     return signals.remembered_of_motion("body at the last link", made)

@@ -102,7 +102,7 @@ def transposed_jacobian(signals: Signals) -> Array:
     It is the torque that a unit mass there would ask for in a gravity of one unit along -x, -y, -z.
     """
     robot = signals.robot
-    unit_mass = np.zeros(len(STANDARD_PARAMETERS) * robot.joint_count)
+    unit_mass = np.zeros(len(STANDARD_PARAMETERS) * robot.link_count)
     unit_mass[-len(STANDARD_PARAMETERS) + STANDARD_PARAMETERS.index("m")] = 1.0
     position = np.ascontiguousarray(signals.position.T)
     rows = [gravity_torque(replace(robot, gravity=-axis), unit_mass, position).T for axis in np.eye(3)]

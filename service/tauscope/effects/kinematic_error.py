@@ -39,7 +39,7 @@ class KinematicError(Effect):
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One for the arm; its shapes are links and axes, without the last link: its load hangs at its own frame."""
-        links = np.arange(1.0, context.robot.joint_count)
+        links = np.arange(1.0, context.robot.link_count)
         grid = np.stack(np.meshgrid(links, np.arange(1.0, 4.0), indexing="ij"), axis=-1).reshape(-1, 2)
         return [cls(None, grid, grid[0], grid[-1])] if len(grid) else []
 

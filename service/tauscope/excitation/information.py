@@ -77,7 +77,7 @@ class ExcitationRegressor:
         self._gradient = RegressorGradient(robot, columns=self.base_columns, capacity=capacity)
         self._weight = np.ones(robot.joint_count) if noise_std is None else 1.0 / np.asarray(noise_std)
         self._slopes = [_slopes(robot, joint, steepest) for joint in range(robot.joint_count)]
-        first = np.searchsorted(self.base_columns, len(STANDARD_PARAMETERS) * np.arange(robot.joint_count))
+        first = np.searchsorted(self.base_columns, len(STANDARD_PARAMETERS) * np.array(robot.first_links))
         self._first = [int(place) for place in first]
         self._columns: list[Columns] = []
         self.column_count = len(self.base_columns)

@@ -93,7 +93,7 @@ class WorkspaceUsage:
     def __init__(self, robot: Robot, workspace: Workspace) -> None:
         self._robot = robot
         self._workspace = workspace
-        self._sliding = np.array([joint.type is JointType.PRISMATIC for joint in robot.joints])
+        self._sliding = np.array([segment.type is JointType.PRISMATIC for segment in robot.segments])
         self._before = np.stack([homogeneous(segment.before) for segment in robot.segments])
         self._points = self._moving_points()
 
@@ -145,13 +145,14 @@ class WorkspaceUsage:
             sloped = np.zeros_like(points)
             np.put_along_axis(sloped, axis, side * next(columns)[..., None], axis=-1)
             force += sloped
-        gradient = np.zeros_like(motion.position)
+        gradient = np.zeros((len(points), self._robot.link_count))
         axes, origins = chain.joints[..., :3, 2], chain.joints[..., :3, 3]
         for place, point in enumerate(self._points):
             arm = points[:, place, None] - origins[:, : point.joints]
             moment = np.cross(arm, force[:, place, None])
             push = np.where(self._sliding[: point.joints, None], force[:, place, None], moment)
             gradient[:, : point.joints] += (axes[:, : point.joints] * push).sum(axis=-1)
+        gradient = gradient @ self._robot.ratios
         zero = np.zeros_like(gradient)
         return MotionGradient(gradient, zero, zero)
 
@@ -174,9 +175,9 @@ class WorkspaceUsage:
         """Origins of the joints' and links' frames, and the tool, without those that stand still or coincide."""
         robot, zero = self._robot, np.zeros(3)
         points = []
-        for j, joint in enumerate(robot.joints):
-            points.append(_Point(f"the origin of {joint.name}", j, True, zero, j))
-            last = j == robot.joint_count - 1
+        for j in range(robot.link_count):
+            points.append(_Point(f"the origin of {robot.joint_of_link(j).name}", j, True, zero, j))
+            last = j == robot.link_count - 1
             offset = self._workspace.tool_m if last else zero
             points.append(_Point("the tool" if last else f"the end of link {j + 1}", j, False, offset, j + 1))
         self._points = points

@@ -1,28 +1,19 @@
 """The identified model in every format that controllers and simulators take, or why it cannot be had in one."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime
 from enum import StrEnum
-
-import numpy as np
+from typing import Any
 
 from tauscope.errors import ExportError
-from tauscope.export import JointModel, joint_models, patch_urdf, to_mjcf
-from tauscope.export.compensation import (
-    CompensationModel,
-    JointCompensation,
-    JointFriction,
-    RecordingSource,
-    drive_units,
-    to_c_header,
-    to_json,
-    to_python,
-    to_yaml,
-)
-from tauscope.identification import Identification
-from tauscope.recording import EffortKind
-from tauscope.version import tauscope_version
+from tauscope.export.actuators import ActuatorChoice
+from tauscope.export.compensation import to_json, to_yaml
+from tauscope.export.extended_compensation import source_code
+from tauscope.export.mjcf import to_mjcf
+from tauscope.export.mjcf_findings import effects_in
+from tauscope.export.model import ExportModel
+from tauscope.export.urdf import patch_urdf
+from tauscope.robot.messages import one_line
 
 
 class ExportFormat(StrEnum):
@@ -78,21 +69,15 @@ SUFFIXES = {
 """Formats by the suffix of a file."""
 
 
-@dataclass(frozen=True, eq=False)
-class ExportInput:
-    """What exports are made from."""
-
-    identification: Identification
-    sources: Sequence[RecordingSource]
-    effort_kind: EffortKind
-    urdf: bytes | None
-    created: datetime
-
-
-def make_export(export_format: ExportFormat, given: ExportInput) -> bytes:
+def make_export(export_format: ExportFormat, model: ExportModel, choice: ActuatorChoice | None = None) -> bytes:
     """The content of an export.
 
     Controllers get the delivered friction; simulators the physically consistent links with the friction that fits them.
+
+    Parameters
+    ----------
+    choice : ActuatorChoice or None
+        actuators of an MJCF; None writes torque motors
 
     Raises
     ------
@@ -101,66 +86,38 @@ def make_export(export_format: ExportFormat, given: ExportInput) -> bytes:
     """
     match export_format:
         case ExportFormat.JSON:
-            return to_json(compensation_model(given)).encode()
+            return to_json(model.compensation, effect_entries(model)).encode()
         case ExportFormat.YAML:
-            return to_yaml(compensation_model(given)).encode()
+            return to_yaml(model.compensation, effect_entries(model)).encode()
         case ExportFormat.C:
-            return to_c_header(compensation_model(given)).encode()
+            return source_code(model, ".h").encode()
         case ExportFormat.PYTHON:
-            return to_python(compensation_model(given)).encode()
+            return source_code(model, ".py").encode()
         case ExportFormat.URDF:
-            if given.urdf is None:
-                name = given.identification.robot.name
-                raise ExportError(f"robot {name}: its chain does not come from a URDF; take the export mjcf instead")
-            return patch_urdf(given.urdf, simulator_models(given.identification)).data
+            if model.origin.urdf is None:
+                text = "its chain does not come from a URDF; export an MJCF (.xml) instead"
+                raise ExportError(one_line(f"robot {model.robot.name}: {text}"))
+            notes = effects_in(model, (), "a URDF has no such element")
+            return patch_urdf(model.origin.urdf, model.joint_models, notes).data
         case ExportFormat.MJCF:
-            return to_mjcf(given.identification.robot, simulator_models(given.identification)).text.encode()
+            return to_mjcf(model, choice or ActuatorChoice()).text.encode()
 
 
-def compensation_model(given: ExportInput) -> CompensationModel:
-    """Friction compensation of an identified robot.
-
-    Raises
-    ------
-    ExportError
-        if a coefficient is not usable, or the drive's units contradict each other
-    """
-    identification = given.identification
-    frictions = joint_frictions(identification, identification.parameters)
-    joints = tuple(
-        JointCompensation(joint.name, joint.type, friction, drive_units(joint, given.effort_kind))
-        for joint, friction in zip(identification.robot.joints, frictions, strict=True)
-    )
-    name = identification.robot.name
-    return CompensationModel(name, joints, given.created, tuple(given.sources), tauscope_version())
-
-
-def simulator_models(identification: Identification) -> dict[str, JointModel]:
-    """Physically consistent links, friction and rotors by joint name."""
-    parameters = identification.consistent_parameters
-    robot = identification.robot
-    rotors = [_coefficient(identification, parameters, joint, "rotor_inertia") for joint in range(robot.joint_count)]
-    frictions = joint_frictions(identification, parameters)
-    return joint_models(robot, identification.consistent.links, frictions, rotors)
-
-
-def joint_frictions(identification: Identification, parameters: np.ndarray) -> list[JointFriction]:
-    """Friction of each joint; terms that the model lacks are zero.
-
-    Parameters
-    ----------
-    parameters : (p,) float64
-        of the model's columns
-    """
-    frictions = []
-    for joint, shape in enumerate(identification.shapes):
-        names = ("stiction", "stribeck", "viscous", "offset")
-        values = {name: _coefficient(identification, parameters, joint, name) or 0.0 for name in names}
-        frictions.append(JointFriction(**values, k_v=shape.k_v, delta=shape.delta))
-    return frictions
-
-
-def _coefficient(identification: Identification, parameters: np.ndarray, joint: int, name: str) -> float | None:
-    """One coefficient of a joint; None where the model lacks it."""
-    column = identification.structure.coefficient(joint, name)
-    return None if column is None else float(parameters[column])
+def effect_entries(model: ExportModel) -> list[dict[str, Any]]:
+    """Findings as plain data."""
+    names = [joint.name for joint in model.robot.joints]
+    return [
+        {
+            "effect": found.effect.id,
+            "joint": None if found.effect.joint is None else names[found.effect.joint],
+            "equation": found.effect.equation,
+            "parameters": {
+                each.name: float(value)
+                for each, value in (
+                    *zip(found.effect.coefficients, found.coefficients, strict=True),
+                    *zip(found.effect.shapes, found.shape, strict=True),
+                )
+            },
+        }
+        for found in model.effects
+    ]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tauscope.errors import ExportError
 from tauscope.export.compensation.model import JointFriction, check_friction
-from tauscope.robot import LinkInertia, Robot, find_defect
+from tauscope.robot import LinkInertia, Robot, find_defect, nearest_body
 from tauscope.robot.messages import one_line, shown
 
 
@@ -22,11 +22,14 @@ class JointModel:
 
     rotor_inertia : float or None
         the motor's inertia reflected to the joint [kg m² or kg]
+    branch : LinkInertia or None
+        the part of the link that the file has on moving joints beside the chain
     """
 
     link: LinkInertia | None = None
     friction: JointFriction | None = None
     rotor_inertia: float | None = None
+    branch: LinkInertia | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,16 +55,26 @@ def joint_models(
     friction: Sequence[JointFriction],
     rotor_inertia: Sequence[float | None] | None = None,
 ) -> dict[str, JointModel]:
-    """The whole robot's model by joint name, as the exports take it.
+    """The whole robot's model by the labels of its segments, as the exports take it.
 
     Parameters
     ----------
+    links : sequence of LinkInertia
+        one a segment
+    friction : sequence of JointFriction
+        one a joint
     rotor_inertia : sequence of float or None, length n, optional
         identified rotor inertias [kg m² or kg]
     """
     rotors = [None] * robot.joint_count if rotor_inertia is None else rotor_inertia
-    rows = zip(robot.joints, links, friction, rotors, strict=True)
-    return {joint.name: JointModel(link, coefficients, rotor) for joint, link, coefficients, rotor in rows}
+    own = {link: joint for joint, link in enumerate(robot.own_links)}
+    made: dict[str, JointModel] = {}
+    for index, (label, link) in enumerate(zip(robot.segment_labels, links, strict=True)):
+        branch = robot.branches[index] if robot.branches else None
+        joint = own.get(index)
+        mine = (None, None) if joint is None else (friction[joint], rotors[joint])
+        made[label] = JointModel(link, *mine, branch)
+    return made
 
 
 def centred(joint: str, link: LinkInertia) -> CentredInertia:
@@ -119,3 +132,26 @@ def friction_notes(joint: str, friction: JointFriction, format_name: str) -> lis
         if value < 0.0:
             notes.append(f"{joint}: the identified {label} = {value:.6g} would drive the joint; 0 is written.")
     return notes
+
+
+def without_branch(name: str, model: JointModel) -> tuple[LinkInertia, list[str]]:
+    """A joint's own link, without the bodies that the file has elsewhere; and notes.
+
+    Raises
+    ------
+    ExportError
+        if these bodies weigh more than the link
+    """
+    link = model.link or LinkInertia.from_vector(np.zeros(10))
+    if model.branch is None or not np.any(model.branch.to_vector()):
+        return link, []
+    own = LinkInertia.from_vector(link.to_vector() - model.branch.to_vector())
+    if own.mass > 0.0 and find_defect(own) is None:
+        return own, []
+    text = f"{name}: the identified link less the bodies beside the chain is no body; the nearest body is written."
+    body = nearest_body(own)
+    if not body.mass > 0.0:
+        raise ExportError(
+            one_line(f"joint {shown(name)}: the bodies beside the chain weigh more than its link; export .xml instead")
+        )
+    return body, [text]

@@ -18,6 +18,8 @@ from tauscope.diagnosis.model.torque_scale import on_the_arm
 from tauscope.effects import Effect, Entry
 from tauscope.effects.plain_terms import TorqueOffset
 from tauscope.robot import LinkInertia, Robot
+from tauscope.robot.robot_file import describe_bare_file
+from tauscope.robot.xml_text import is_xml
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
@@ -26,10 +28,12 @@ def improved_robot(diagnosis: Diagnosis, source: Path, target: Path) -> str:
     """The robot file with the identified links, friction and shapes of friction in place of its own."""
     yaml = YAML(typ="rt")
     yaml.width = 4096
-    data = yaml.load(source.read_text(encoding="utf-8"))
-    urdf = data["kinematics"].get("urdf")
-    if urdf is not None and not Path(urdf["file"]).is_absolute():
-        urdf["file"] = os.path.relpath(source.parent / urdf["file"], target.parent)
+    content = source.read_bytes()
+    data = describe_bare_file(content, source.name) if is_xml(content) else yaml.load(content.decode("utf-8"))
+    for kind in ("urdf", "mjcf"):
+        named = data["kinematics"].get(kind)
+        if named is not None and not Path(named["file"]).is_absolute():
+            named["file"] = os.path.relpath(source.parent / named["file"], target.parent)
     model = diagnosis.selection.fit.model
     values = dict(zip(model.structure.names, map(float, model.parameters), strict=True))
     friction: list[Entry] = []

@@ -1,6 +1,6 @@
 """The identified model written into the user's own URDF: inertials and joint dynamics, nothing else."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +9,14 @@ import numpy as np
 from tauscope.errors import ExportError
 from tauscope.export.compensation.identifiers import comment_text
 from tauscope.export.compensation.model import JointFriction
-from tauscope.export.joint_model import CentredInertia, JointModel, centred, dry_friction_and_damping, friction_notes
+from tauscope.export.joint_model import (
+    CentredInertia,
+    JointModel,
+    centred,
+    dry_friction_and_damping,
+    friction_notes,
+    without_branch,
+)
 from tauscope.export.xml_spans import Element, XmlText
 from tauscope.robot.messages import nearest, one_line, shown
 
@@ -25,13 +32,19 @@ class PatchedUrdf:
     notes: tuple[str, ...]
 
 
-def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel]) -> PatchedUrdf:
+def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel], remarks: Sequence[str] = ()) -> PatchedUrdf:
     """Write links and friction into a URDF in place; comments, meshes, order and white space stay byte for byte.
 
     A link's ``<inertial>`` gets the centre of mass, rpy 0, and the inertia about the centre of mass along the link
     frame's axes. ``<dynamics>`` gets damping = τ_v and friction = τ_s + τ_sc, the Coulomb level at speed. Links on
     fixed joints below are part of the identified link: their own inertials are set to zero, not removed, because
-    simulators make up a mass from the shapes of a link that has none.
+    simulators make up a mass from the shapes of a link that has none. Bodies on joints beside the chain stay, and
+    their mass is taken off the link that carries them.
+
+    Parameters
+    ----------
+    remarks : sequence of str
+        further lines of the comment
 
     Raises
     ------
@@ -47,13 +60,15 @@ def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel]) -> Patche
     for name, model in models.items():
         joint = tree.moving_joint(name)
         if model.link is not None:
-            inertia = centred(name, model.link)
-            _write_inertial(text, tree.link(joint.child), inertia)
+            own, moved = without_branch(name, model)
+            notes += moved
+            _write_inertial(text, tree.link(joint.child), centred(name, own))
             notes += _zero_fixed_children(text, tree, joint.child, frozenset(models))
         if model.friction is not None:
             notes += _write_dynamics(text, joint.element, name, model.friction)
         if model.rotor_inertia:
             notes.append(f"{name}: URDF has no rotor inertia; the identified value is {model.rotor_inertia:.6g}.")
+    notes += remarks
     lines = [comment_text(note) for note in notes]
     text.set_comment(text.root, _MARKER, "".join(f"\n       {line}" for line in lines))
     return PatchedUrdf(text.edited(), tuple(notes))
@@ -147,8 +162,8 @@ def _zero_fixed_children(text: XmlText, tree: _Tree, link: str, identified: froz
             if below.type != "fixed":
                 if name not in identified:
                     notes.append(
-                        f"{below.child} moves on joint {name}, which was not identified: it is left as it was. If that "
-                        f"joint stood still in the recordings, its mass is part of link {link} too."
+                        f"{below.child} moves on joint {name} beside the chain: it is left as it was. Link {link} has "
+                        "the identified mass less that of the branch."
                     )
             elif below.child not in seen:
                 seen.add(below.child)

@@ -77,6 +77,10 @@ class XmlText:
         if added:
             self._edits.append(Edit(last, last, added))
 
+    def replace_element(self, element: Element, line: str) -> None:
+        """Write a line of XML in place of an element and all that it holds."""
+        self._edits.append(Edit(element.start, element.end, line.encode()))
+
     def append_child(self, parent: Element, lines: list[str]) -> None:
         """Add lines of XML as the last child of an element, indented as its other children are."""
         inner = self._indent(parent.children[0]) if parent.children else self._indent(parent) + b"  "
@@ -163,7 +167,7 @@ def _parse(data: bytes, label: str) -> Element:
         stack[-1].comments.append((start, data.index(b"-->", start) + 3))
 
     def doctype(*_declaration: object) -> None:
-        raise ExportError(f"{label}: a DOCTYPE is not accepted in a URDF; remove it")
+        raise ExportError(f"{label}: a DOCTYPE is not accepted in a robot description; remove it")
 
     parser.StartElementHandler = start_element
     parser.EndElementHandler = end_element

@@ -24,7 +24,7 @@ class FullParameters:
     @staticmethod
     def of(structure: ModelStructure) -> "FullParameters":
         """Those of a model."""
-        base, standard = structure.base, 10 * structure.robot.joint_count
+        base, standard = structure.base, 10 * structure.robot.link_count
         own = structure.size - structure.base_count
         full = np.zeros((structure.size, standard + own))
         full[np.arange(structure.base_count), base.independent_columns] = 1.0

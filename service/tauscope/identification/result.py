@@ -188,7 +188,7 @@ class IdentificationDocument(ResultModel):
 def document(identification: Identification) -> IdentificationDocument:
     """The document of an identification."""
     result = identification
-    names = _standard_names(result.robot.joint_count)
+    names = _standard_names(result.robot.link_count)
     return IdentificationDocument(
         warnings=identification_warnings(result),
         robot=result.robot.name,
@@ -222,8 +222,8 @@ def _floats(values: np.ndarray) -> list[float]:
     return [float(value) for value in values]
 
 
-def _standard_names(joint_count: int) -> list[str]:
-    return [f"{name}{link + 1}" for link in range(joint_count) for name in STANDARD_PARAMETERS]
+def _standard_names(link_count: int) -> list[str]:
+    return [f"{name}{link + 1}" for link in range(link_count) for name in STANDARD_PARAMETERS]
 
 
 def _std(result: Identification) -> list[float | None]:

@@ -49,9 +49,9 @@ def robot_warnings(robot: Robot) -> list[ResultWarning]:
     far = [
         ResultWarning(
             code="repaired-inertial",
-            joint=robot.joints[link].name,
-            text=f"{robot.joints[link].name}: the stated inertia of its link is that of a body a hundred times as large"
-            " as the arm; a compact body is believed instead",
+            joint=robot.joint_of_link(link).name,
+            text=f"{robot.joint_of_link(link).name}: the stated inertia of its link is that of a body a hundred times"
+            " as large as the arm; a compact body is believed instead",
             remedy="state the inertia in kg m² and the mass in kg",
         )
         for link in far_reaching(robot)

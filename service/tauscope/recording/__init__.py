@@ -3,6 +3,7 @@
 from tauscope.recording.checks import RecordingReport, check_recording, report_recording
 from tauscope.recording.convert import Conversion, convert_recording, write_recording
 from tauscope.recording.examination import examine_recording, open_recording
+from tauscope.recording.layout.guess import flow_text
 from tauscope.recording.reading import read_recording
 from tauscope.recording.recording import EffortKind, Recording, Samples
 from tauscope.recording.units import Reading, parse_units
@@ -17,6 +18,7 @@ __all__ = [
     "check_recording",
     "convert_recording",
     "examine_recording",
+    "flow_text",
     "open_recording",
     "parse_units",
     "read_recording",

@@ -1,12 +1,20 @@
 """Which column of a recording file means what: names of CONTRACT.md, their order, and what is wrong with a header."""
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from tauscope.errors import RecordingError, RecordingMismatchError
+from tauscope.recording.layout.families import BY_NAME, words_of
+from tauscope.recording.layout.guess import guess_layout, is_numbered, layout_text
+from tauscope.recording.layout.presets import PRESET_OF
+from tauscope.recording.layout.rename import NANOSECONDS, rename_columns
+from tauscope.recording.layout.roles import role_of
 from tauscope.recording.samples import EffortKind
+from tauscope.recording.units import Reading
 from tauscope.recording.words import listed, printable
+from tauscope.result_warning import ResultWarning
+from tauscope.robot.recording_layout import RecordingLayout
 
 OPTIONAL_GROUPS = ("qd", "qdd", "qref", "taucmd", "temp", "qlink")
 """Columns of which a joint may have one, in the order in which a table keeps them."""
@@ -24,6 +32,9 @@ class ColumnLayout:
     joint_count: int
     effort_kind: EffortKind
     ignored: tuple[str, ...]
+    counts_rows: bool = False
+    nanoseconds: int | None = None
+    notes: tuple[ResultWarning, ...] = ()
 
 
 def table_columns(joint_count: int, effort_kind: EffortKind, groups: Sequence[str] = ()) -> tuple[str, ...]:
@@ -33,8 +44,102 @@ def table_columns(joint_count: int, effort_kind: EffortKind, groups: Sequence[st
     return (*names, "period") if "period" in groups else tuple(names)
 
 
-def find_columns(header: Sequence[str], file: str) -> ColumnLayout:
-    """Find the columns of CONTRACT.md in a file's header.
+def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLayout:
+    """Find the columns of CONTRACT.md in a file's header, as its mapping, its preset or their own names say.
+
+    Raises
+    ------
+    RecordingError
+        a column is missing; the message holds the mapping that the header suggests
+    RecordingMismatchError
+        the file names other joints than the robot
+    """
+    renamed = rename_columns(header, reading, file)
+    counts_rows = reading.units.get("t") == "index" and "t" not in renamed
+    try:
+        layout = find_columns(["t", *renamed] if counts_rows else renamed, file, counts_rows=counts_rows)
+        return replace(layout, notes=_note_command(header, renamed))
+    except RecordingError as error:
+        named = [name for name in header if name]
+        if reading.columns is not None or isinstance(error, RecordingMismatchError) or len(set(named)) < len(named):
+            raise
+        guess = _guess_sound(header, reading, file)
+        if guess is None and _is_ours(header):
+            raise
+        if guess is None:
+            _require_known_names(header, reading, file)
+        if guess is None:
+            raise RecordingError(f"{error}; `tauscope recording map` maps columns of other names") from error
+        text = (
+            f"{file}: the first row holds numbers where the column names are expected" if is_numbered(header) else error
+        )
+        layout = layout_text(replace(guess, decimal=reading.decimal, delimiter=reading.delimiter))
+        raise RecordingError(f"{text}; if this maps them, give it as --columns FILE.yaml: {layout}") from error
+
+
+def _guess_sound(header: Sequence[str], reading: Reading, file: str) -> RecordingLayout | None:
+    """The mapping that the header suggests, None where a file with it would be refused again."""
+    guess = guess_layout(header, reading.joint_names, prefers_torque=reading.prefers_torque)
+    if guess is None:
+        return None
+    try:
+        find_columns(rename_columns(header, replace(reading, columns=guess.columns), file), file)
+    except RecordingError:
+        return None
+    return replace(guess, units={**_units_of_tool(header, reading, guess), **guess.units})
+
+
+def _units_of_tool(header: Sequence[str], reading: Reading, guess: RecordingLayout) -> Mapping[str, str]:
+    """Units of the preset that reads the same columns, such as LeRobot's degrees."""
+    for name, preset in PRESET_OF.items():
+        if preset.units:
+            layout = guess_layout(header, reading.joint_names, preset=name, prefers_torque=reading.prefers_torque)
+            if layout is not None and layout.columns == guess.columns:
+                return preset.units
+    return {}
+
+
+def _require_known_names(header: Sequence[str], reading: Reading, file: str) -> None:
+    """Refuse columns that name other joints than the robot's: the message lists both."""
+    named = guess_layout(header) if reading.joint_names is not None else None
+    if named is not None and isinstance(named.columns, Mapping) and BY_NAME in str(named.columns["q"]):
+        rename_columns(header, replace(reading, columns=named.columns), file)
+
+
+def _is_ours(header: Sequence[str]) -> bool:
+    """Whether columns have the names of CONTRACT.md, so that no mapping is missing."""
+    return "t" in header and "q1" in header
+
+
+def _note_command(header: Sequence[str], renamed: Sequence[str]) -> tuple[ResultWarning, ...]:
+    """A warning where the effort is a command and no measurement."""
+    column = next((name for name, target in zip(header, renamed, strict=True) if target == "tau1"), "tau1")
+    role = None if column == "tau1" else role_of(words_of(column))
+    if role is None or role[0] != "taucmd":
+        return ()
+    text = f"column {printable(column)}: this effort is commanded, not measured; it holds the controller's own model"
+    remedy = "record measured torques or currents, and state torque_constant for currents"
+    return (ResultWarning(code="commanded-effort", text=text, remedy=remedy),)
+
+
+def choose_reading(header: Sequence[str], reading: Reading, file: str) -> Reading:
+    """The reading of a file: in SI where Tauscope made it, and the robot file describes those of another tool."""
+    if not (reading.is_usual and _is_ours(header)):
+        return reading
+    try:
+        rename_columns(header, reading, file)
+    except RecordingError:
+        return replace(reading, columns=None, units={}, rate_hz=None)
+    return reading
+
+
+def find_columns(header: Sequence[str], file: str, *, counts_rows: bool = False) -> ColumnLayout:
+    """Find the columns of CONTRACT.md in a header.
+
+    Parameters
+    ----------
+    counts_rows : bool
+        whether t is the number of the row, and the header's first name is no column of the file
 
     Raises
     ------
@@ -56,11 +161,13 @@ def find_columns(header: Sequence[str], file: str) -> ColumnLayout:
     used = set(names)
     return ColumnLayout(
         names=names,
-        source=tuple(where[name] for name in names),
-        width=len(header),
+        source=tuple(max(where[name] - counts_rows, 0) for name in names),
+        width=len(header) - counts_rows,
         joint_count=joint_count,
         effort_kind=effort_kind,
-        ignored=tuple(name for name in header if name and name not in used),
+        ignored=tuple(name.strip() for name in header if name and name not in used),
+        counts_rows=counts_rows,
+        nanoseconds=where.get(NANOSECONDS),
     )
 
 

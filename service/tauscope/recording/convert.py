@@ -15,6 +15,8 @@ from tauscope.recording.mcap_writing import write_mcap
 from tauscope.recording.parquet_format import write_parquet
 from tauscope.recording.reading import first_bytes, read_recording
 from tauscope.recording.recording import Recording
+from tauscope.recording.units import SI, Reading
+from tauscope.robot.robot import Robot
 
 FORMATS = (".csv", ".parquet", ".mcap")
 """Formats that can be written, by suffix."""
@@ -38,8 +40,10 @@ def convert_recording(
     recover: bool = False,
     overwrite: bool = False,
     joint_names: Sequence[str] | None = None,
+    robot: Robot | None = None,
+    reading: Reading = SI,
 ) -> Conversion:
-    """Write a recording in the format that the target's suffix names.
+    """Write a recording, in SI, in the format that the target's suffix names.
 
     MCAP holds time from the first sample on in whole nanoseconds, positions, torques and velocities; CSV and Parquet
     hold every column exactly.
@@ -52,7 +56,9 @@ def convert_recording(
     source_path, target_path = Path(source), Path(target)
     _require_other(source_path, target_path)
     _require_writable(target_path, overwrite=overwrite)
-    recording, damage = _read(source_path, str(source), joint_names, recover=recover)
+    if robot is not None:
+        joint_names = [joint.name for joint in robot.joints]
+    recording, damage = _read(source_path, str(source), joint_names, reading.for_robot(robot), recover=recover)
     dropped = write_recording(recording, target_path, joint_names=joint_names, overwrite=overwrite)
     return Conversion(str(source), str(target), len(recording), (*dropped, *recording.ignored_columns), damage)
 
@@ -85,13 +91,15 @@ def write_recording(
     return dropped
 
 
-def _read(path: Path, name: str, joint_names: Sequence[str] | None, *, recover: bool) -> tuple[Recording, str | None]:
+def _read(
+    path: Path, name: str, joint_names: Sequence[str] | None, reading: Reading, *, recover: bool
+) -> tuple[Recording, str | None]:
     """The recording, and the damage that was passed over where that was asked for."""
     if recover and path.is_file() and first_bytes(path, name).startswith(MCAP_MAGIC):
         names = tuple(joint_names) if joint_names is not None else None
-        salvage = recover_mcap(path, Choice(name, len(names) if names else None, names))
+        salvage = recover_mcap(path, Choice(name, len(names) if names else None, names, reading=reading))
         return salvage.recording, salvage.damage
-    return read_recording(path, joint_names=joint_names), None
+    return read_recording(path, joint_names=joint_names, reading=reading), None
 
 
 def _require_other(source: Path, target: Path) -> None:

@@ -2,25 +2,28 @@
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
 from tauscope.errors import RecordingError
-from tauscope.recording.columns import ColumnLayout, find_columns, require_joint_count
+from tauscope.recording.clocks import SplitClock
+from tauscope.recording.columns import ColumnLayout, choose_reading, map_columns, require_joint_count
+from tauscope.recording.csv_dialect import BLANK, Dialect, find_delimiter, find_first_row
 from tauscope.recording.csv_numbers import Clock, is_number, parse_number, parse_quickly, shown
 from tauscope.recording.intake import RowIntake
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
 from tauscope.recording.units import SI, Reading
+from tauscope.recording.units_row import read_units_row
 
 _CHUNK_BYTES = 2**18
 _LONGEST_LINE_BYTES = 2**20
 _ROWS_WRITTEN_AT_ONCE = 8192
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-_DELIMITERS = (b",", b";", b"\t")
+_SAMPLE_BYTES = 2**16
 
 
 def read_csv(
@@ -32,7 +35,7 @@ def read_csv(
 ) -> Recording:
     """Read a CSV recording, in time linear and in memory bounded in its number of lines.
 
-    Comma, semicolon or tab between the fields; an empty field or ``nan`` is a missed sample.
+    Comma, semicolon, tab, | or blanks between the fields; an empty field or ``nan`` is a missed sample.
 
     Parameters
     ----------
@@ -49,18 +52,33 @@ def read_csv(
         the file has another number of joints
     """
     with path.open("rb") as file:
-        header = _read_header(file, name)
+        header = _read_header(file, name, reading)
+        reading = header.reading
         require_joint_count(header.layout.joint_count, joint_count, name)
         layout = header.layout
         intake: RowIntake | None = None
         for chunk in _chunks(file, header.line + 1, name):
             block, lines = _parse_chunk(chunk, header, name, is_first=intake is None or not len(intake))
+            if layout.counts_rows:
+                block[:, 0] = np.arange(len(block)) + (0 if intake is None else len(intake))
             if intake is None:
                 expected = int(len(block) * os.fstat(file.fileno()).st_size / len(chunk.text) * 1.01) + 16
                 intake = RowIntake(name, layout.names, layout.effort_kind, reading, expected, spool_above_bytes)
             intake.add(block, lambda row, lines=lines: f"line {lines[row]}")
     intake = intake or RowIntake(name, layout.names, layout.effort_kind, reading)
-    return intake.finish(layout.joint_count, layout.ignored)
+    return intake.finish(layout.joint_count, layout.ignored, layout.notes)
+
+
+def read_csv_header(path: Path, name: str, reading: Reading = SI) -> list[str]:
+    """Names of a file's columns, or numbers from 1 where it has none.
+
+    Raises
+    ------
+    RecordingError
+        the file holds no line of text
+    """
+    with path.open("rb") as file:
+        return _read_names(file, name, reading).names
 
 
 def write_csv(recording: Recording, file: BinaryIO) -> None:
@@ -74,13 +92,24 @@ def write_csv(recording: Recording, file: BinaryIO) -> None:
 
 
 @dataclass(frozen=True)
-class _Header:
-    """The header line: its number, what separates the fields, and which column is which."""
+class _Names:
+    """The line before the first row, how fields are separated, and names of the columns."""
 
     line: int
-    delimiter: bytes
+    dialect: Dialect
+    names: list[str]
+
+
+@dataclass(frozen=True)
+class _Header:
+    """The line before the first row, how fields are separated, and which column is which."""
+
+    line: int
+    dialect: Dialect
     layout: ColumnLayout
+    reading: Reading
     clock: Clock
+    split: SplitClock
 
 
 @dataclass(frozen=True)
@@ -92,9 +121,34 @@ class _Chunk:
     unterminated: bool
 
 
-def _read_header(file: BinaryIO, name: str) -> _Header:
-    """Read up to the first line that is neither blank nor a comment."""
-    number = 0
+def _read_header(file: BinaryIO, name: str, reading: Reading) -> _Header:
+    """Read the names of the columns and find those that are wanted."""
+    found = _read_names(file, name, reading)
+    reading = choose_reading(found.names, reading, name)
+    layout = map_columns(found.names, reading, name)
+    at, number, line = file.tell(), found.line, b"\n"
+    while line and _is_empty(line):
+        line, number = file.readline(_LONGEST_LINE_BYTES), number + 1
+    units = _find_units(found.dialect.split(line.strip(b"\r\n")), layout)
+    if units is None:
+        file.seek(at)
+        number = found.line
+    else:  # stated units override it
+        reading = replace(reading, units={**units, **reading.units})
+    return _Header(number, found.dialect, layout, reading, Clock(), SplitClock())
+
+
+def _find_units(cells: Sequence[bytes], layout: ColumnLayout) -> dict[str, str] | None:
+    """Units in the row below the names, None where it is none."""
+    if len(cells) != layout.width or any(map(is_number, cells)):
+        return None
+    return read_units_row(layout.names, [_decode(cells[index]) for index in layout.source])
+
+
+def _read_names(file: BinaryIO, name: str, reading: Reading) -> _Names:
+    """Read up to the first line that is neither blank nor a comment; leave the file at the first row."""
+    number, comment = 0, b""
+    at = 0
     while line := file.readline(_LONGEST_LINE_BYTES):
         number += 1
         if number == 1:
@@ -105,27 +159,64 @@ def _read_header(file: BinaryIO, name: str) -> _Header:
             )
         _require_text(line, number, name)
         if not _is_empty(line):
-            return _parse_header(line.strip(b"\r\n"), number, name)
+            return _parse_names(file, line.strip(b"\r\n"), number, at, comment, name, reading)
+        comment = line.strip(b"\r\n\t #") or comment
+        at = file.tell()
     raise RecordingError(f"{name}: the file is empty; expected a header line with the columns t, q1…, tau1…")
 
 
-def _parse_header(line: bytes, number: int, name: str) -> _Header:
+def _parse_names(
+    file: BinaryIO, line: bytes, number: int, at: int, comment: bytes, name: str, reading: Reading
+) -> _Names:
+    """Names of the columns: of the first line, of the comment before numbers, or numbers for want of names."""
     if b"\r" in line:
         raise RecordingError(f"{name}: the lines end with carriage returns alone; save the file with newlines")
-    delimiter = next((candidate for candidate in _DELIMITERS if candidate in line), b",")
-    fields = [field.strip(b' \t"') for field in line.split(delimiter)]
-    if any(is_number(field) for field in fields) and all(is_number(field) or not field for field in fields):
-        raise RecordingError(
-            f"{name}: line {number} holds numbers where the column names are expected; "
-            "add a header line such as t,q1,q2,tau1,tau2, without '#' in front"
-        )
-    if len(fields) == 1 and len(line.split()) > 1:
-        raise RecordingError(f"{name}: line {number}: the columns are separated by blanks; separate them by commas")
+    sign = None if reading.delimiter_sign is None else reading.delimiter_sign.encode()
+    start = file.tell()
+    raw = file.read(_SAMPLE_BYTES).split(b"\n")[:-1]
+    sample = [line, *(each.strip(b"\r") for each in raw)]
+    first, dialect = find_first_row(sample, sign) or (1, Dialect(sign or find_delimiter(line)))
+    row = sample[first] if first < len(sample) else b""
+    named = _find_header(sample[:first], row, dialect)
+    if named is None and first:  # the lines differ: the first one says how they are meant
+        dialect = Dialect(sign or find_delimiter(line))
+    has_comma = dialect.shows_decimal_comma(sample[first:]) if reading.decimal is None else reading.decimal == ","
+    rows = replace(dialect, has_decimal_comma=has_comma)
+    if first == 0:
+        fields = _name_numbers(comment, rows.split(line), dialect)
+        start, number = at, number - 1
+    else:
+        index = named or 0
+        fields = dialect.name_fields(sample[index], row)
+        start += sum(len(each) + 1 for each in raw[:index])
+        number += index
+    file.seek(start)
+    return _Names(number, rows, [_decode(field) for field in fields])
+
+
+def _find_header(lines: Sequence[bytes], row: bytes, dialect: Dialect) -> int | None:
+    """The first line with as many names as the row has fields; lines before it say something else."""
+    cells = len(dialect.split(row))
+    for index, line in enumerate(lines):
+        if not _is_empty(line) and len(dialect.name_fields(line, row)) == cells:
+            return index
+    return None
+
+
+def _name_numbers(comment: bytes, row: Sequence[bytes], dialect: Dialect) -> list[bytes]:
+    """Names in the comment before a row, where it has as many; else numbers from 1."""
+    for sign in (dialect, Dialect(BLANK)):
+        if comment and len(names := sign.split(comment)) == len(row):
+            return names
+    return [b"%d" % column for column in range(1, len(row) + 1)]
+
+
+def _decode(field: bytes) -> str:
+    """A column's name, of a file in UTF-8 or in the code page of Windows."""
     try:
-        header = [field.decode("utf-8") for field in fields]
-    except UnicodeDecodeError as error:
-        raise RecordingError(f"{name}: line {number}: the header is not UTF-8 text; save the file as UTF-8") from error
-    return _Header(number, delimiter, find_columns(header, name), Clock())
+        return field.decode("utf-8")
+    except UnicodeDecodeError:
+        return field.decode("cp1252", "replace")
 
 
 def _chunks(file: BinaryIO, line: int, name: str) -> Iterator[_Chunk]:
@@ -156,12 +247,14 @@ def _count_lines(text: bytes) -> int:
 def _parse_chunk(chunk: _Chunk, header: _Header, name: str, *, is_first: bool) -> tuple[Array, Sequence[int]]:
     """The rows of a chunk and the line on which each stands."""
     layout = header.layout
-    block = parse_quickly(chunk.text, header.delimiter, layout.width, layout.source)
+    source = layout.source if layout.nanoseconds is None else (*layout.source, layout.nanoseconds)
+    normal = header.dialect.normalize(chunk.text)
+    block = parse_quickly(normal, header.dialect.separator, layout.width, source)
     if block is not None:
-        return block, range(chunk.first_line, chunk.first_line + len(block))
+        return _join_time(block, header), range(chunk.first_line, chunk.first_line + len(block))
     rows: list[list[float]] = []
     lines: list[int] = []
-    text = chunk.text[:-1].split(b"\n")
+    text = normal[:-1].split(b"\n")
     for number, raw_line in enumerate(text, chunk.first_line):
         line = raw_line.rstrip(b"\r")  # two of them: text mode has translated a translated line end
         if _is_empty(line):
@@ -170,25 +263,33 @@ def _parse_chunk(chunk: _Chunk, header: _Header, name: str, *, is_first: bool) -
         fields = _split_line(line, number, header, name, is_truncated=is_truncated)
         if is_first and not rows:
             _refuse_units(fields, number, header, name)
-        time, *others = zip(layout.names, layout.source, strict=True)
+        time, *others = zip((*layout.names, "t"), source, strict=False)
         row = [parse_number(fields[index], name, number, column) for column, index in others]
         rows.append([header.clock.parse(fields[time[1]], name, number), *row])
         lines.append(number)
-    return np.array(rows, dtype=np.float64).reshape(len(rows), len(layout.names)), lines
+    return _join_time(np.array(rows, dtype=np.float64).reshape(len(rows), len(source)), header), lines
+
+
+def _join_time(block: Array, header: _Header) -> Array:
+    """Rows with one time, where seconds and nanoseconds have columns of their own."""
+    if header.layout.nanoseconds is None:
+        return block
+    block[:, 0] = header.split.join(block[:, 0], block[:, -1])
+    return block[:, :-1]
 
 
 def _split_line(line: bytes, number: int, header: _Header, name: str, *, is_truncated: bool) -> list[bytes]:
     """The fields of a line, as many as the header has."""
     _require_text(line, number, name)
-    fields = line.split(header.delimiter)
+    fields = line.split(header.dialect.separator)
     width = header.layout.width
     if len(fields) == width:
         return fields
     if is_truncated and len(fields) < width:
         hint = ": the last line is truncated; delete it or copy the file again"
-    elif header.delimiter == b"," and len(fields) > width and b";" in line:
+    elif header.dialect.delimiter == b"," and len(fields) > width and b";" in line:
         hint = "; separate all lines alike"
-    elif header.delimiter == b"," and len(fields) >= 2 * width - 1 and all(map(is_number, fields)):
+    elif header.dialect.delimiter == b"," and len(fields) >= 2 * width - 1 and all(map(is_number, fields)):
         hint = ": are these decimal commas? write decimals with a point"
     else:
         hint = "; complete or delete the line"

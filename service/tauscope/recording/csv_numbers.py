@@ -157,6 +157,4 @@ def _hint(text: bytes) -> str:
         return "; leave the field empty or write nan where a sample was missed"
     if re.fullmatch(rb"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?", text):
         return "; write decimals with a point"
-    if len(text) > 2 and text[:1] == text[-1:] == b'"':
-        return "; write numbers without quotes"
     return ""

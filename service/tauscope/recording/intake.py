@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tauscope.errors import RecordingError
 from tauscope.recording.recording import Recording
@@ -44,6 +45,7 @@ class RowIntake:
         self._check = RowCheck(file, self._conversion.names)
         self._builder = TableBuilder(self._conversion.names, expected_rows, spool_above_bytes)
         self._tail = np.empty((0, len(names)))
+        self._tail_rows = np.empty(0, dtype=np.intp)
         self._origin: float | None = None
         self._last = -np.inf
         self._rows = self._repeated = self._late = 0
@@ -67,20 +69,23 @@ class RowIntake:
             names the row and the column at fault
         """
         self._check(block, place)
+        rows = np.append(self._tail_rows, np.arange(self._rows, self._rows + len(block)))
         self._rows += len(block)
         block = self._convert(block)
         kept = len(self._tail)
         if kept:
             block = np.concatenate([self._tail, block])
         if not (np.diff(block[:, 0], prepend=self._last) > 0).all():
-            block = self._order(block, lambda row: place(max(row - kept, 0)))
+            block, rows = self._order(block, rows, lambda row: place(max(row - kept, 0)))
         split = max(len(block) - LATE_ROWS, 0)
         if split:
             self._last = float(block[split - 1, 0])
             self._builder.append(block[:split])
-        self._tail = block[split:].copy()
+        self._tail, self._tail_rows = block[split:].copy(), rows[split:]
 
-    def finish(self, joint_count: int, ignored: tuple[str, ...] = ()) -> Recording:
+    def finish(
+        self, joint_count: int, ignored: tuple[str, ...] = (), notes: tuple[ResultWarning, ...] = ()
+    ) -> Recording:
         """The recording of all rows.
 
         Raises
@@ -96,7 +101,7 @@ class RowIntake:
                 f" at t = {self._first_repeated:.6g} s; write t with more digits"
             )
         kind, table = self._conversion.effort_kind, self._builder.finish()
-        return Recording(self._file, joint_count, kind, table, ignored, tuple(self._warnings()))
+        return Recording(self._file, joint_count, kind, table, ignored, (*notes, *self._warnings()))
 
     def _convert(self, block: Array) -> Array:
         """Rows in SI."""
@@ -108,11 +113,14 @@ class RowIntake:
             converted[:, 0] = (block[:, 0] - self._origin) * self._conversion.factor[0]
         return converted
 
-    def _order(self, block: Array, place: Callable[[int], str]) -> Array:
-        """Rows in order of time, the first of those with one stamp."""
+    def _order(
+        self, block: Array, rows: NDArray[np.intp], place: Callable[[int], str]
+    ) -> tuple[Array, NDArray[np.intp]]:
+        """Rows in order of time, the first of those with one stamp, and their numbers in the file."""
         time = block[:, 0]
         order = np.argsort(time, kind="stable")
-        if np.abs(order - np.arange(len(order))).max() > LATE_ROWS or time[order[0]] < self._last:
+        place_in_file = np.arange(self._rows - len(block), self._rows)
+        if np.abs(rows[order] - place_in_file).max() > LATE_ROWS or time[order[0]] < self._last:
             row = int(np.argmax(np.diff(time, prepend=self._last) < 0))
             require_rising(
                 time[row:], self._last if row == 0 else float(time[row - 1]), self._file, lambda _: place(row)
@@ -126,7 +134,7 @@ class RowIntake:
         if not is_new.all():
             self._first_repeated = self._first_repeated if self._repeated else float(block[np.argmin(is_new), 0])
             self._repeated += int((~is_new).sum())
-        return block[is_new]
+        return block[is_new], rows[order][is_new]
 
     def _warnings(self) -> Sequence[ResultWarning]:
         """Warnings about stamps that were put in order."""

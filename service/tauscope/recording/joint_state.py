@@ -69,7 +69,7 @@ class JointStateLayout:
         ValueError
             it is no JointState
         """
-        cursor = _Cursor(message)
+        cursor = CdrCursor(message)
         self.first = _decode(cursor)
         self._size = len(message)
         self._order = cursor.order
@@ -113,7 +113,7 @@ def decode_cdr(message: bytes) -> JointState:
     ValueError
         it is no JointState
     """
-    return _decode(_Cursor(message))
+    return _decode(CdrCursor(message))
 
 
 def decode_json(message: bytes) -> JointState:
@@ -133,10 +133,10 @@ def decode_json(message: bytes) -> JointState:
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise ValueError("field name is not a list of joint names")
     arrays = [_json_array(content.get(field), field) for field in ("position", "velocity", "effort")]
-    return JointState(_json_stamp(stamp), tuple(names), *arrays)
+    return JointState(json_stamp(stamp), tuple(names), *arrays)
 
 
-def _json_stamp(stamp: object) -> int:
+def json_stamp(stamp: object) -> int:
     """Nanoseconds of a stamp, 0 where there is none."""
     if not isinstance(stamp, dict):
         return 0
@@ -148,17 +148,7 @@ def _json_stamp(stamp: object) -> int:
     return seconds * _NANOSECONDS + nanoseconds
 
 
-def _json_array(value: object, field: str) -> Array:
-    """A list of numbers; null stands for NaN, which JSON cannot write."""
-    if value is None:
-        return np.empty(0)
-    entries = value if isinstance(value, list) else [value]
-    if not isinstance(value, list) or any(isinstance(entry, bool | str | list | dict) for entry in entries):
-        raise ValueError(f"field {field} is not a list of numbers")
-    return np.array([np.nan if entry is None else entry for entry in entries], dtype=np.float64)
-
-
-class _Cursor:
+class CdrCursor:
     """Reads CDR primitives one after the other and notes where the numbers are and which bytes never change."""
 
     def __init__(self, message: bytes) -> None:
@@ -198,7 +188,13 @@ class _Cursor:
         return value.decode("utf-8")
 
     def numbers(self) -> Array:
-        """A float64 sequence."""
+        """A sequence of numbers.
+
+        Returns
+        -------
+        (n,) float64
+            as the message has them
+        """
         count = self.length()
         if count:
             self._align(8)
@@ -219,7 +215,17 @@ class _Cursor:
         self._at += -(self._at - 4) % size
 
 
-def _decode(cursor: _Cursor) -> JointState:
+def _json_array(value: object, field: str) -> Array:
+    """A list of numbers; null stands for NaN, which JSON cannot write."""
+    if value is None:
+        return np.empty(0)
+    entries = value if isinstance(value, list) else [value]
+    if not isinstance(value, list) or any(isinstance(entry, bool | str | list | dict) for entry in entries):
+        raise ValueError(f"field {field} is not a list of numbers")
+    return np.array([np.nan if entry is None else entry for entry in entries], dtype=np.float64)
+
+
+def _decode(cursor: CdrCursor) -> JointState:
     """Read the fields in the order of the message definition."""
     stamp = cursor.stamp()
     cursor.string()  # frame_id

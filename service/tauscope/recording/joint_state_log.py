@@ -3,13 +3,11 @@
 from collections.abc import Callable, Mapping, Sequence
 
 from tauscope.errors import RecordingError
+from tauscope.recording.joint_state_decoders import find_decoder
 from tauscope.recording.joint_state_topic import Choice, JointStateTopic
 from tauscope.recording.recording import Recording
 from tauscope.recording.words import listed
 
-JOINT_STATE_TYPES = ("sensor_msgs/msg/JointState", "sensor_msgs/JointState")
-
-_JSON_TYPES = (*JOINT_STATE_TYPES, "JointState")
 _PREFERRED_TOPICS = ("/joint_states", "joint_states")
 
 MessageHandler = Callable[[int, bytes], None]
@@ -25,15 +23,16 @@ class JointStateLog:
         self._topics: dict[str, JointStateTopic] = {}
         self._others: list[str] = []
 
-    def handler(self, topic: str, type_name: str, encoding: str) -> MessageHandler | None:
-        """Whoever takes the messages of a topic, None where they are not joint states."""
-        known = JOINT_STATE_TYPES if encoding == "cdr" else _JSON_TYPES if encoding == "json" else ()
-        if type_name not in known:
+    def handler(self, topic: str, type_name: str, encoding: str, schema: bytes = b"") -> MessageHandler | None:
+        """The taker of a topic's messages, None where they are not joint states, or not the wanted ones."""
+        decoder = find_decoder(type_name, encoding, schema)
+        if decoder is None:
             self._others.append(f"{topic} ({type_name}, {encoding})" if type_name else topic)
             return None
         if topic not in self._topics:
-            self._topics[topic] = JointStateTopic(topic, encoding, self._choice)
-        return self._topics[topic].add
+            self._topics[topic] = JointStateTopic(topic, decoder, self._choice)
+        is_wanted = self._choice.reading.topic in (None, topic)
+        return self._topics[topic].add if is_wanted else None
 
     @property
     def samples(self) -> int:
@@ -44,11 +43,15 @@ class JointStateLog:
 
     def finish(self) -> Recording:
         """The recording that the log holds; raises `RecordingError` where there is none, or more than one."""
+        wanted = self._choice.reading.topic
+        if wanted is not None and wanted not in self._topics:
+            known = listed(sorted(self._topics)) or "none"
+            raise RecordingError(f"{self._choice.file}: no topic {wanted} carries joint states; those that do: {known}")
         return choose_topic(self._topics, self._others, self._choice.file).finish()
 
 
 def choose_topic(topics: Mapping[str, JointStateTopic], other_topics: Sequence[str], file: str) -> JointStateTopic:
-    """The one topic with joint states, or the one that ROS itself would call so.
+    """The one topic with efforts of the wanted joints, or the one of several that ROS itself would take.
 
     Raises
     ------
@@ -59,12 +62,17 @@ def choose_topic(topics: Mapping[str, JointStateTopic], other_topics: Sequence[s
     if not filled:
         found = f"; it holds the topics {listed(sorted(set(other_topics)))}" if other_topics else ""
         raise RecordingError(f"{file}: no sensor_msgs/msg/JointState message was recorded{found}")
+    for topic in filled.values():
+        topic.flush()
+    usable = {name: topic for name, topic in filled.items() if topic.has_effort}
+    best = usable or {name: topic for name, topic in filled.items() if topic.samples} or filled
     for name in _PREFERRED_TOPICS:
-        if name in filled:
-            return filled[name]
-    if len(filled) > 1:
+        if name in best:
+            return best[name]
+    plain = {name: topic for name, topic in best.items() if topic.is_plain}  # beside ros2_control's dynamic states
+    best = plain if len(plain) == 1 else best
+    if len(best) > 1:
         raise RecordingError(
-            f"{file}: several topics carry joint states ({listed(sorted(filled))}); "
-            "keep one of them in the file, or name it /joint_states"
+            f"{file}: several topics carry joint states ({listed(sorted(best))}); choose one with --topic"
         )
-    return next(iter(filled.values()))
+    return next(iter(best.values()))

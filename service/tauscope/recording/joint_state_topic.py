@@ -1,17 +1,19 @@
 """From the JointState messages of one topic to a recording: which joints, which clock."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.errors import RecordingError, RecordingMismatchError
+from tauscope.errors import RecordingError
 from tauscope.recording.columns import table_columns
 from tauscope.recording.intake import RowIntake
-from tauscope.recording.joint_state import JointState, JointStateLayout, JointStates, decode_cdr, decode_json
+from tauscope.recording.joint_state import JointState, JointStateLayout, JointStates, decode_cdr
+from tauscope.recording.joint_state_decoders import Decoder
+from tauscope.recording.message_compression import decompress_message
+from tauscope.recording.other_publishers import OtherPublishers
 from tauscope.recording.recording import EffortKind, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
 from tauscope.recording.units import SI, Reading
@@ -24,6 +26,9 @@ LONGEST_FROM_ZERO_NS = 10**12
 """A stamp of zero beside stamps above this is none [ns]; simulated time may begin at zero."""
 
 Decoded = TypeVar("Decoded")
+Rows: TypeAlias = NDArray[np.intp]
+Batch: TypeAlias = tuple[Rows, JointStates]
+"""Messages of one layout, and their places among those that were taken at once."""
 
 
 @dataclass(frozen=True)
@@ -46,17 +51,18 @@ class Choice:
 class JointStateTopic:
     """Collects the messages of one topic; a fault is kept until it is known whether this topic is the wanted one."""
 
-    def __init__(self, topic: str, encoding: str, choice: Choice) -> None:
+    def __init__(self, topic: str, decoder: Decoder, choice: Choice) -> None:
         """Start empty."""
         self.topic = topic
         self.messages = 0
         self.fault: RecordingError | None = None
-        self._is_cdr = encoding == "cdr"
+        self._decoder = decoder
         self._choice = choice
-        self._layout: JointStateLayout | None = None
+        self._layouts: dict[int, JointStateLayout] = {}
         self._pending: list[tuple[int, bytes]] = []
         self._rows: _Rows | None = None
-        self._skipped_names: tuple[str, ...] = ()
+        self._others = OtherPublishers()
+        self._wanted = choice.joint_names
 
     def add(self, log_time: int, message: bytes) -> None:
         """Take the next message.
@@ -78,10 +84,16 @@ class JointStateTopic:
         if not pending or self.fault is not None:
             return
         first = self.messages - len(pending) + 1
+        log_time = np.array([time for time, _ in pending], dtype=np.uint64).astype(np.int64)
         try:
-            for start, states in self._decode([message for _, message in pending], first):
-                times = [time for time, _ in pending[start : start + len(states.stamp)]]
-                self._take(states, np.array(times, dtype=np.uint64).astype(np.int64), first + start)
+            messages = [
+                self._decode_one(decompress_message, message, first + row) for row, (_, message) in enumerate(pending)
+            ]
+            batches = sorted(self._decode(messages, first), key=lambda batch: batch[0][0])
+            own = [(rows, self._arrange(states)) for rows, states in batches if self._is_own(states, first + rows[0])]
+            if own:
+                rows, states = _merge(own)
+                self._take(states, log_time[rows], first + rows)
         except RecordingError as error:
             self.fault = error
 
@@ -89,6 +101,16 @@ class JointStateTopic:
     def samples(self) -> int:
         """Number of samples collected so far."""
         return 0 if self._rows is None else len(self._rows)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it carries sensor_msgs/JointState of ROS 2."""
+        return self._decoder is decode_cdr
+
+    @property
+    def has_effort(self) -> bool:
+        """Whether any sample has an effort."""
+        return self._rows is not None and self._rows.has_effort
 
     def finish(self) -> Recording:
         """The recording that this topic holds.
@@ -102,24 +124,33 @@ class JointStateTopic:
         if self.fault is not None:
             raise self.fault
         if self._rows is None:
-            wanted, found = self._choice.joint_names or (), self._skipped_names
-            raise RecordingMismatchError(
-                f"{self._choice.file}: topic {self.topic} carries {len(found)} joints ({listed(found)}), "
-                f"the robot has {len(wanted)} ({listed(wanted)}); give the robot file of the recorded arm"
-            )
-        return self._rows.finish()
+            raise self._others.error(f"{self._choice.file}: topic {self.topic}", self._choice.joint_names)
+        recording = self._rows.finish()
+        return replace(recording, notes=(*recording.notes, *self._others.notes(self.topic, self._wanted or ())))
 
-    def _decode(self, messages: Sequence[bytes], first: int) -> Iterable[tuple[int, JointStates]]:
-        """Batches of equal layout and where they start; all at once where the publisher kept to one layout."""
-        if self._is_cdr:
-            if self._layout is None:
-                self._layout = self._decode_one(JointStateLayout, messages[0], first)
-            if (states := self._layout.decode(messages)) is not None:
-                return [(0, states)]
-        decode = decode_cdr if self._is_cdr else decode_json
-        decoded = [self._decode_one(decode, message, first + index) for index, message in enumerate(messages)]
-        runs = groupby(enumerate(decoded), key=lambda entry: _layout_of(entry[1]))
-        return [(run[0][0], _stack([state for _, state in run])) for run in (list(group) for _, group in runs)]
+    def _decode(self, messages: Sequence[bytes], first: int) -> list[Batch]:
+        """Batches of equal layout; all of one size at once, where a publisher keeps to one layout."""
+        whole = np.arange(len(messages))
+        if self._decoder is not decode_cdr:
+            return self._decode_each(messages, whole, first)
+        sizes = np.array([len(message) for message in messages])
+        batches: list[Batch] = []
+        for size in dict.fromkeys(sizes.tolist()):
+            rows = whole[sizes == size]
+            alike = [messages[row] for row in rows]
+            if size not in self._layouts:
+                self._layouts[size] = self._decode_one(JointStateLayout, alike[0], first + rows[0])
+            states = self._layouts[size].decode(alike)
+            batches += [(rows, states)] if states is not None else self._decode_each(alike, rows, first)
+        return batches
+
+    def _decode_each(self, messages: Sequence[bytes], rows: Rows, first: int) -> list[Batch]:
+        """Batches of equal layout, decoded message by message."""
+        groups: dict[object, list[tuple[int, JointState]]] = {}
+        for row, message in zip(rows.tolist(), messages, strict=True):
+            state = self._decode_one(self._decoder, message, first + row)
+            groups.setdefault(_layout_of(state), []).append((row, state))
+        return [(np.array([row for row, _ in g]), _stack([state for _, state in g])) for g in groups.values()]
 
     def _decode_one(self, decode: Callable[[bytes], Decoded], message: bytes, number: int) -> Decoded:
         """`decode(message)`, its complaint turned into one that names the message."""
@@ -130,28 +161,44 @@ class JointStateTopic:
                 f"{self._choice.file}: topic {self.topic}, message {number}: not a JointState message ({reason(error)})"
             ) from error
 
-    def _take(self, states: JointStates, log_time: NDArray[np.int64], number: int) -> None:
-        """Add a batch to the rows, in the order of the wanted joints."""
-        place = f"{self._choice.file}: topic {self.topic}, message {number}"
-        _require_complete(states, place)
-        wanted = self._rows.joint_names if self._rows is not None else self._choice.joint_names
-        order = _joint_order(states.names, states.position.shape[1], wanted, place)
-        if order is None:
-            self._skipped_names = states.names
-            return
+    def _is_own(self, states: JointStates, number: int) -> bool:
+        """Whether messages are of the wanted joints, by their names, and hold positions and efforts."""
+        count, names = states.position.shape[1], states.names
+        wanted = self._wanted
+        if wanted is not None:
+            is_own = set(wanted) <= set(names) if names else count == len(wanted)
+            if not is_own:
+                self._others.add(names or (f"{count} joints without names",), wanted, len(states.stamp))
+                return False
+        if not (count and states.effort.shape[1]):
+            self._others.add_incomplete(names, "effort" if count else "positions", len(states.stamp))
+            return False
+        _require_equal(states, f"{self._choice.file}: topic {self.topic}, message {number}")
+        self._wanted = wanted or names or None
+        return True
+
+    def _arrange(self, states: JointStates) -> JointStates:
+        """Messages with the wanted joints in their order."""
+        names = states.names
+        if self._wanted is None or not names or names == self._wanted:
+            return states
+        order = [names.index(name) for name in self._wanted]
+        has_velocity = states.velocity.shape[1] > 0
+        velocity = states.velocity[:, order] if has_velocity else states.velocity
+        return JointStates(states.stamp, self._wanted, states.position[:, order], velocity, states.effort[:, order])
+
+    def _take(self, states: JointStates, log_time: NDArray[np.int64], number: Rows) -> None:
+        """Add messages to the rows."""
         if self._rows is None:
-            names = tuple(states.names[index] for index in order) if states.names else None
-            self._rows = _Rows(self._choice, self.topic, names, len(order), has_velocity=states.velocity.shape[1] > 0)
-        self._rows.append(states, order, log_time, number)
+            count, has_velocity = states.position.shape[1], states.velocity.shape[1] > 0
+            self._rows = _Rows(self._choice, self.topic, count, has_velocity=has_velocity)
+        self._rows.append(states, log_time, number)
 
 
 class _Rows:
     """The rows of one topic: relative time, positions, efforts and, where they are sent, velocities."""
 
-    def __init__(
-        self, choice: Choice, topic: str, joint_names: tuple[str, ...] | None, joint_count: int, *, has_velocity: bool
-    ) -> None:
-        self.joint_names = joint_names
+    def __init__(self, choice: Choice, topic: str, joint_count: int, *, has_velocity: bool) -> None:
         self._name, self._topic = choice.file, topic
         self._joint_count, self._has_velocity = joint_count, has_velocity
         columns = table_columns(joint_count, EffortKind.TORQUE, ("qd",) if has_velocity else ())
@@ -160,22 +207,16 @@ class _Rows:
         self._origin: int | None = None
         self._by_log_time = False
         self._unset = 0
+        self.has_effort = False
 
     def __len__(self) -> int:
         return len(self._intake)
 
-    def append(self, states: JointStates, order: Sequence[int], log_time: NDArray[np.int64], number: int) -> None:
+    def append(self, states: JointStates, log_time: NDArray[np.int64], number: Rows) -> None:
         """Add messages; the clock is the header stamp, or the log's where the first batch has no stamps at all."""
-        if (states.velocity.shape[1] > 0) != self._has_velocity:
-            raise RecordingError(
-                f"{self._name}: topic {self._topic}, message {number}: velocities are sent in some messages only; "
-                "record again with one publisher"
-            )
         stamp = states.stamp
         unset = (stamp == 0) & (stamp.max() > LONGEST_FROM_ZERO_NS)
-        if (
-            unset.any() and not self._by_log_time
-        ):  # what the log's clock is ahead of the publisher's, it is for these messages, too
+        if unset.any() and not self._by_log_time:  # the log's clock is as far ahead as for the other messages
             ahead = np.median((log_time - stamp)[~unset]).astype(np.int64)
             stamp = np.where(unset, log_time - ahead, stamp)
             self._unset += int(unset.sum())
@@ -184,14 +225,18 @@ class _Rows:
             self._origin = int(log_time[0] if self._by_log_time else stamp[0])
         elif self._by_log_time and stamp.any():
             raise RecordingError(
-                f"{self._name}: topic {self._topic}, message {number + int(np.argmax(stamp != 0))}: "
+                f"{self._name}: topic {self._topic}, message {number[np.argmax(stamp != 0)]}: "
                 "has a time stamp where the messages before it have none"
             )
         clock = log_time if self._by_log_time else stamp
         time = (clock - self._origin).astype(np.float64) * 1e-9
-        parts = [time[:, None], states.position[:, order], states.effort[:, order]]
-        block = np.hstack([*parts, states.velocity[:, order]] if self._has_velocity else parts)
-        self._intake.add(block, lambda row: f"topic {self._topic}, message {number + row}")
+        parts = [time[:, None], states.position, states.effort]
+        self.has_effort = self.has_effort or bool(np.isfinite(parts[2]).any())
+        if self._has_velocity:
+            is_sent = states.velocity.shape[1] > 0
+            parts.append(states.velocity if is_sent else np.full_like(parts[2], np.nan))
+        block = np.hstack(parts)
+        self._intake.add(block, lambda row: f"topic {self._topic}, message {number[row]}")
 
     def finish(self) -> Recording:
         recording = self._intake.finish(self._joint_count)
@@ -218,36 +263,33 @@ def _stack(states: Sequence[JointState]) -> JointStates:
     return JointStates(stamp, states[0].names, *(np.array([getattr(s, field) for s in states]) for field in fields))
 
 
-def _require_complete(states: JointStates, place: str) -> None:
-    """Every joint has a position and an effort, and a velocity where any has."""
+def _merge(batches: Sequence[Batch]) -> Batch:
+    """Batches of one publisher in the order of its messages; velocities are NaN where some messages lack them."""
+    rows = np.concatenate([rows for rows, _ in batches])
+    order = np.argsort(rows)
+    states = [states for _, states in batches]
+    has_velocity = any(each.velocity.shape[1] for each in states)
+    velocity = [
+        each.velocity if each.velocity.shape[1] or not has_velocity else np.full_like(each.position, np.nan)
+        for each in states
+    ]
+    merged = JointStates(
+        np.concatenate([each.stamp for each in states])[order],
+        states[0].names,
+        np.concatenate([each.position for each in states])[order],
+        np.concatenate(velocity)[order],
+        np.concatenate([each.effort for each in states])[order],
+    )
+    return rows[order], merged
+
+
+def _require_equal(states: JointStates, place: str) -> None:
+    """Every joint has a name, where any has, a position and an effort, and a velocity where any has."""
     joints = states.position.shape[1]
     if states.names and len(states.names) != joints:
         raise RecordingError(f"{place}: {len(states.names)} joint names and {joints} positions")
-    if not joints:
-        raise RecordingError(f"{place}: carries no positions")
-    if not states.effort.shape[1]:
-        raise RecordingError(f"{place}: carries no effort; record the torques or currents of the joints too")
     for field, count in (("efforts", states.effort.shape[1]), ("velocities", states.velocity.shape[1] or joints)):
         if count != joints:
             raise RecordingError(f"{place}: {joints} positions and {count} {field}")
     if len(set(states.names)) != len(states.names):
         raise RecordingError(f"{place}: a joint is named twice ({listed(states.names)})")
-
-
-def _joint_order(
-    names: tuple[str, ...], count: int, wanted: tuple[str, ...] | None, place: str
-) -> Sequence[int] | None:
-    """Index of each wanted joint in a message; None where the message is about other joints (a gripper's, say)."""
-    if wanted is None or not names:
-        if wanted is not None and count != len(wanted):
-            return None
-        return range(count)
-    missing = [name for name in wanted if name not in names]
-    if not missing:
-        return [names.index(name) for name in wanted]
-    if len(missing) < len(wanted):
-        raise RecordingMismatchError(
-            f"{place}: joint {listed(missing)} is missing (the message names {listed(names)}); "
-            "name the robot's joints as the recording does"
-        )
-    return range(count) if count == len(wanted) else None

@@ -102,9 +102,9 @@ class _Collector:
         self.events: list[dict[str, Any]] = []
         self._messages: dict[str, list[bytes]] = {JOINT_STATE_TOPIC: [], REFERENCE_TOPIC: [], CYCLE_TOPIC: []}
 
-    def handler(self, topic: str, type_name: str, encoding: str) -> MessageHandler | None:
+    def handler(self, topic: str, type_name: str, encoding: str, schema: bytes = b"") -> MessageHandler | None:
         """Takes the messages of a journal's own topics."""
-        del type_name, encoding
+        del type_name, encoding, schema
         if topic == EVENT_TOPIC:
             return lambda _, data: self.events.append(from_json(data))
         if topic in self._messages:

@@ -1,8 +1,8 @@
 """Recordings as MCAP: joint states as ROS 2 logs them, or as JSON.
 
-The container is read record by record from the front and never through its index, so that a file without one (the
-writer was killed) differs from a whole file only in how it ends. Records and checksums are the mcap library's; the
-walk over a chunk's messages is our own, which is much quicker.
+Where joint states are a small part of the file, its index leads to them. Otherwise the container is read record by
+record from the front, so that a file without an index (the writer was killed) differs from a whole file only in how it
+ends. Records and checksums are the mcap library's; the walk over a chunk's messages is our own, which is much quicker.
 """
 
 import os
@@ -11,40 +11,34 @@ import zlib
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO, Protocol
+from typing import BinaryIO
 
-import zstandard
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Schema
-from mcap.stream_reader import get_chunk_data_stream
+from mcap.records import Channel, Schema
 
 from tauscope.errors import RecordingError
 from tauscope.recording.inflation import require_plausible_inflation
 from tauscope.recording.joint_state_log import JointStateLog, MessageHandler
 from tauscope.recording.joint_state_topic import Choice
+from tauscope.recording.mcap_chunk import (
+    MESSAGE,
+    RECORD,
+    UNREADABLE,
+    DamageError,
+    MessageSink,
+    find_handler,
+    unpack_chunk,
+)
+from tauscope.recording.mcap_index import read_by_index
 from tauscope.recording.recording import Recording
 from tauscope.recording.row_check import MINIMUM_ROWS
 from tauscope.recording.words import reason
 
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 
-_RECORD = struct.Struct("<BQ")
-_MESSAGE = struct.Struct("<HIQQ")
 _MESSAGE_INDEX = struct.Struct("<HI")
-_LARGEST_CHUNK_BYTES = 2**28
 _COPY_BYTES = 2**20
-_UNREADABLE = (
-    McapError,
-    ValueError,
-    struct.error,
-    RuntimeError,
-    EOFError,
-    MemoryError,
-    OverflowError,
-    zstandard.ZstdError,
-)
 
 
 @dataclass(frozen=True)
@@ -80,7 +74,7 @@ def add_mcap(path: Path, name: str, log: JointStateLog) -> None:
     RecordingError
         the file is truncated or damaged
     """
-    damage = scan_mcap(path, log)
+    damage = _read_whole(path, log)
     if damage is not None:
         samples = log.samples
         keeps = "`tauscope recording convert --recover` keeps them"
@@ -103,14 +97,6 @@ def recover_mcap(path: Path, choice: Choice) -> Salvage:
     return Salvage(log.finish(), damage)
 
 
-class MessageSink(Protocol):
-    """Whoever wants the messages of an MCAP file."""
-
-    def handler(self, topic: str, type_name: str, encoding: str) -> MessageHandler | None:
-        """Whoever takes the messages of a topic, None where nobody does."""
-        ...
-
-
 def scan_mcap(path: Path, sink: MessageSink) -> str | None:
     """Hand the messages of an MCAP file over, in the order of the file, up to its end or its first damage.
 
@@ -122,13 +108,20 @@ def scan_mcap(path: Path, sink: MessageSink) -> str | None:
     with path.open("rb") as file:
         try:
             _Scan(file, os.fstat(file.fileno()).st_size, sink).run()
-        except _DamageError as damage:
+        except DamageError as damage:
             return str(damage)
     return None
 
 
-class _DamageError(Exception):
-    """The container cannot be read further; the message completes "file: "."""
+def _read_whole(path: Path, log: JointStateLog) -> str | None:
+    """Read by the index, else from the front; the damage, None where there is none."""
+    try:
+        with path.open("rb") as file:
+            if read_by_index(file, os.fstat(file.fileno()).st_size, log):
+                return None
+    except DamageError as damage:
+        return str(damage)
+    return scan_mcap(path, log)
 
 
 def _count(samples: int) -> str:
@@ -142,7 +135,7 @@ class _Scan:
     def __init__(self, file: BinaryIO, size: int, sink: MessageSink) -> None:
         self._file, self._size, self._sink = file, size, sink
         self._checksum = self._unpacked_bytes = self._messages = 0
-        self._schemas: dict[int, str] = {}
+        self._schemas: dict[int, Schema] = {}
         self._handlers: dict[int, MessageHandler | None] = {}
 
     def run(self) -> None:
@@ -150,9 +143,9 @@ class _Scan:
         self._read(len(MCAP_MAGIC))
         while True:
             at, checksum = self._file.tell(), self._checksum
-            opcode, length = _RECORD.unpack(self._read(_RECORD.size))
+            opcode, length = RECORD.unpack(self._read(RECORD.size))
             if length > self._size - self._file.tell():
-                raise _DamageError(f"the file is truncated: it ends within the record at byte {at}")
+                raise DamageError(f"the file is truncated: it ends within the record at byte {at}")
             try:
                 if opcode == Opcode.CHUNK:
                     self._walk_chunk(self._read(length))
@@ -162,45 +155,35 @@ class _Scan:
                 elif opcode == Opcode.DATA_END:
                     (expected,) = struct.unpack_from("<I", self._read(length))
                     if expected not in (0, checksum):
-                        raise _DamageError("the file is damaged: its data fail their checksum")
+                        raise DamageError("the file is damaged: its data fail their checksum")
                 elif opcode == Opcode.MESSAGE_INDEX:
                     _require_filled(self._read(length))
                 elif opcode == Opcode.STATISTICS:
                     self._require_all(*struct.unpack_from("<Q", self._read(length)))
                 else:
                     self._skip(length)
-            except _UNREADABLE as error:
+            except UNREADABLE as error:
                 place = f"the record at byte {at}"
-                raise _DamageError(f"the file is damaged: {place} cannot be read ({reason(error)})") from error
+                raise DamageError(f"the file is damaged: {place} cannot be read ({reason(error)})") from error
             if opcode == Opcode.FOOTER:
                 break
         if self._file.read() != MCAP_MAGIC:
-            raise _DamageError("the file does not end as an MCAP file does")
+            raise DamageError("the file does not end as an MCAP file does")
 
     def _require_all(self, stated: int) -> None:
         """A record whose kind was damaged is passed over as one that is not known: its messages are missed here."""
         if stated != self._messages:
-            raise _DamageError(f"the file is damaged: it states {stated} messages and holds {self._messages}")
+            raise DamageError(f"the file is damaged: it states {stated} messages and holds {self._messages}")
 
     def _walk_chunk(self, body: bytes) -> None:
         """Walk the records within a chunk."""
-        chunk = Chunk.read(ReadDataStream(BytesIO(body)))
-        if chunk.compression not in ("", "zstd", "lz4"):
-            raise ValueError(f"unknown compression {chunk.compression[:20]!r}")
-        declared = [chunk.uncompressed_size]
-        if chunk.compression == "zstd":
-            # The frame states its own size and the decompressor believes it: look before it allocates.
-            declared.append(max(zstandard.frame_content_size(chunk.data), 0))
-        if max(declared) > _LARGEST_CHUNK_BYTES:
-            raise ValueError("implausible chunk size")
-        self._unpacked_bytes += max(declared)
+        data = unpack_chunk(body)
+        self._unpacked_bytes += len(data)
         require_plausible_inflation(self._file.tell(), self._unpacked_bytes, "what was read so far")
-        stream, size = get_chunk_data_stream(chunk, validate_crc=True)
-        data = stream.read(size)
         at = 0
         while at < len(data):
-            opcode, length = _RECORD.unpack_from(data, at)
-            at += _RECORD.size
+            opcode, length = RECORD.unpack_from(data, at)
+            at += RECORD.size
             if length > len(data) - at:
                 raise ValueError("a record leaves its chunk")
             self._take(opcode, data, at, at + length)
@@ -209,26 +192,25 @@ class _Scan:
     def _take(self, opcode: int, data: bytes, start: int, stop: int) -> None:
         """Take one record of the data section."""
         if opcode == Opcode.MESSAGE:
-            channel, _, log_time, _ = _MESSAGE.unpack_from(data, start)
-            if stop - start < _MESSAGE.size or channel not in self._handlers:
+            channel, _, log_time, _ = MESSAGE.unpack_from(data, start)
+            if stop - start < MESSAGE.size or channel not in self._handlers:
                 raise ValueError("a message without a channel")
             self._messages += 1
             handler = self._handlers[channel]
             if handler is not None:
-                handler(log_time, data[start + _MESSAGE.size : stop])
+                handler(log_time, data[start + MESSAGE.size : stop])
         elif opcode == Opcode.SCHEMA:
             schema = Schema.read(ReadDataStream(BytesIO(data[start:stop])))
-            self._schemas[schema.id] = schema.name
+            self._schemas[schema.id] = schema
         elif opcode == Opcode.CHANNEL:
             channel = Channel.read(ReadDataStream(BytesIO(data[start:stop])))
             if channel.id not in self._handlers:
-                type_name = self._schemas.get(channel.schema_id, "")
-                self._handlers[channel.id] = self._sink.handler(channel.topic, type_name, channel.message_encoding)
+                self._handlers[channel.id] = find_handler(self._sink, channel, self._schemas)
 
     def _read(self, length: int) -> bytes:
         data = self._file.read(length)
         if len(data) < length:
-            raise _DamageError("the file is truncated: it ends without a footer")
+            raise DamageError("the file is truncated: it ends without a footer")
         self._checksum = zlib.crc32(data, self._checksum)
         return data
 

@@ -7,8 +7,8 @@ import numpy as np
 from mcap_ros2.writer import Writer
 
 from tauscope.errors import RecordingError
+from tauscope.recording.joint_state_decoders import JOINT_STATE_TYPES
 from tauscope.recording.joint_state_encoding import JOINT_STATE_DEFINITION
-from tauscope.recording.joint_state_log import JOINT_STATE_TYPES
 from tauscope.recording.recording import Array, EffortKind, Recording
 
 _ROWS_WRITTEN_AT_ONCE = 8192

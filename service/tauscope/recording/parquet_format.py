@@ -1,7 +1,7 @@
 """Recordings as Parquet, by pyarrow, which comes with the extra ``tauscope[parquet]``."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
@@ -10,18 +10,21 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from tauscope.errors import RecordingError
-from tauscope.recording.columns import find_columns, require_joint_count
+from tauscope.recording.clocks import EpisodeClock, SplitClock
+from tauscope.recording.columns import ColumnLayout, choose_reading, map_columns, require_joint_count
 from tauscope.recording.inflation import require_plausible_inflation
 from tauscope.recording.intake import RowIntake
+from tauscope.recording.parquet_columns import FileColumn, take_column, unfold_columns
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
-from tauscope.recording.units import SI, Reading
+from tauscope.recording.units import SECONDS, SI, Reading
 from tauscope.recording.words import printable, reason
 
 PARQUET_MAGIC = b"PAR1"
 
 _NUMBER_TYPE = re.compile(r"u?int(8|16|32|64)|halffloat|float|double")
 _ROWS_AT_ONCE = 2**16
+_EPISODE = "episode_index"
 
 
 def read_parquet(
@@ -50,24 +53,53 @@ def read_parquet(
     arrow = _arrow(name)
     with path.open("rb") as stream, _arrow_errors(arrow, name):
         file = arrow.parquet.ParquetFile(stream, page_checksum_verification=True)
-        layout = find_columns([str(column) for column in file.schema_arrow.names], name)
+        found = unfold_columns(arrow, file, path, name)
+        header = list(found)
+        reading = choose_reading(header, reading, name)
+        layout = map_columns(header, reading, name)
         require_joint_count(layout.joint_count, joint_count, name)
-        _require_numbers(file.schema_arrow, layout.names, name)
+        wanted = [found[header[index]] for index in layout.source]
+        nanoseconds = None if layout.nanoseconds is None else found[header[layout.nanoseconds]]
+        split = SplitClock()
+        _require_numbers(file.schema_arrow, wanted, layout, name)
         unpacked_bytes = file.metadata.num_rows * len(layout.names) * 8
         require_plausible_inflation(path.stat().st_size, unpacked_bytes, name)
         rows, first_stamp = file.metadata.num_rows, None
         intake = RowIntake(name, layout.names, layout.effort_kind, reading, rows, spool_above_bytes)
-        for batch in file.iter_batches(batch_size=_ROWS_AT_ONCE, columns=list(layout.names), use_threads=False):
+        episodes = EpisodeClock(SECONDS.get(reading.units.get("t", "s"), 1.0)) if _EPISODE in found else None
+        read = sorted(
+            {column.column for column in (*wanted, nanoseconds or wanted[0])} | ({_EPISODE} if episodes else set())
+        )
+        for batch in file.iter_batches(batch_size=_ROWS_AT_ONCE, columns=read, use_threads=False):
             first = len(intake) + 1
-            columns = [batch.column(column) for column in layout.names]
+            columns = [take_column(arrow, batch, column) for column in wanted]
             if _is_stamp(columns[0].type):
                 stamps = columns[0].cast("timestamp[ns]", safe=False).cast("int64")
                 first_stamp = next((stamp.as_py() for stamp in stamps), 0) if first_stamp is None else first_stamp
                 time = arrow.compute.subtract(stamps, first_stamp or 0)
                 columns[0] = arrow.compute.multiply(time.cast("float64"), 1e-9)
             block = np.column_stack([_numbers(column) for column in columns])
+            if nanoseconds is not None:
+                block[:, 0] = split.join(block[:, 0], _numbers(take_column(arrow, batch, nanoseconds)))
+            if layout.counts_rows:
+                block[:, 0] = np.arange(len(block)) + len(intake)
+            elif episodes is not None:
+                block[:, 0] = episodes.shift(block[:, 0], _numbers(batch.column(_EPISODE)))
             intake.add(block, lambda row, first=first: f"row {first + row}")
-    return intake.finish(layout.joint_count, layout.ignored)
+    return intake.finish(layout.joint_count, layout.ignored, (*layout.notes, *(episodes.notes if episodes else ())))
+
+
+def read_parquet_header(path: Path, name: str) -> list[str]:
+    """Names of a file's columns, lists unfolded.
+
+    Raises
+    ------
+    RecordingError
+        pyarrow is not installed, or the file is damaged
+    """
+    arrow = _arrow(name)
+    with path.open("rb") as stream, _arrow_errors(arrow, name):
+        return list(unfold_columns(arrow, arrow.parquet.ParquetFile(stream), path, name))
 
 
 def write_parquet(recording: Recording, file: BinaryIO) -> None:
@@ -111,13 +143,14 @@ def _arrow_errors(arrow: Any, name: str) -> Iterator[None]:
         raise RecordingError(f"{name}: not a readable Parquet file ({reason(error)})") from error
 
 
-def _require_numbers(schema: Any, names: tuple[str, ...], name: str) -> None:
+def _require_numbers(schema: Any, wanted: Sequence[FileColumn], layout: ColumnLayout, name: str) -> None:
     """Refuse columns of text, dates and the like."""
-    for column in names:
-        kind = schema.field(column).type
-        if not _NUMBER_TYPE.fullmatch(str(kind)) and not (column == "t" and _is_stamp(kind)):
-            hint = "seconds as a float are needed" if column == "t" else "numbers are needed"
-            raise RecordingError(f"{name}: column {column} is of type {printable(str(kind))}; {hint}")
+    for target, column in zip(layout.names, wanted, strict=True):
+        kind = schema.field(column.column).type
+        is_number = column.element is not None or _NUMBER_TYPE.fullmatch(str(kind))
+        if not is_number and not (target == "t" and _is_stamp(kind)):
+            hint = "seconds as a float are needed" if target == "t" else "numbers are needed"
+            raise RecordingError(f"{name}: column {column.column} is of type {printable(str(kind))}; {hint}")
 
 
 def _is_stamp(kind: Any) -> bool:

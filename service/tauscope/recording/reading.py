@@ -2,15 +2,18 @@
 
 import errno
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from tauscope.errors import RecordingError
 from tauscope.recording.columns import require_joint_count
-from tauscope.recording.csv_format import read_csv
+from tauscope.recording.csv_format import read_csv, read_csv_header
 from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.mcap_format import MCAP_MAGIC, read_mcap
-from tauscope.recording.parquet_format import PARQUET_MAGIC, read_parquet
+from tauscope.recording.npz_format import ZIP_MAGIC, read_npz, read_npz_header
+from tauscope.recording.parquet_format import PARQUET_MAGIC, read_parquet, read_parquet_header
 from tauscope.recording.recording import Recording
+from tauscope.recording.ros1_bag import ROS1_MAGIC, read_ros1_bag
 from tauscope.recording.rosbag2_format import SQLITE_MAGIC, read_database, read_rosbag2
 from tauscope.recording.units import SI, Reading
 from tauscope.recording.words import printable
@@ -22,11 +25,10 @@ _FOREIGN = (
     (b"\x28\xb5\x2f\xfd", "is compressed by zstd; unpack it first"),
     (b"BZh", "is compressed by bzip2; unpack it first"),
     (b"\xfd7zXZ", "is compressed by xz; unpack it first"),
-    (b"PK\x03\x04", "is a zip archive or a spreadsheet; unpack it, or export the sheet as CSV"),
     (b"\x89HDF", "is an HDF5 or MATLAB file; export it as CSV"),
     (b"MATLAB 5.0", "is a MATLAB file; export it as CSV"),
-    (b"\x93NUMPY", "is a NumPy file; make a CSV or use Recording.from_arrays"),
-    (b"#ROSBAG V", "is a ROS 1 bag; convert it with `rosbags-convert`"),
+    (b"\x93NUMPY", "is one NumPy array; save time, positions and torques by np.savez"),
+    (b"#ROSBAG V1", "is a bag of ROS 0.x; run `rosbag fix` on it first"),
     (b"\xff\xfe", "is UTF-16 text; save it as UTF-8"),
     (b"\xfe\xff", "is UTF-16 text; save it as UTF-8"),
 )
@@ -38,7 +40,7 @@ def read_recording(
     joint_names: Sequence[str] | None = None,
     reading: Reading = SI,
 ) -> Recording:
-    """Read a recording: CSV, Parquet, MCAP, or a rosbag2 folder or database; told apart by content.
+    """Read a recording: CSV, Parquet, MCAP, a ROS 1 bag, or a rosbag2 folder or database; told apart by content.
 
     Parameters
     ----------
@@ -54,6 +56,7 @@ def read_recording(
     """
     path, name = Path(path), printable(str(path), _LONGEST_PATH)
     names = tuple(joint_names) if joint_names is not None else None
+    reading = replace(reading, joint_names=names)
     if joint_count is None and names is not None:
         joint_count = len(names)
     try:
@@ -62,6 +65,29 @@ def read_recording(
         raise RecordingError(f"{name}: {_reason(error)}") from error
     require_joint_count(recording.joint_count, joint_count, name)
     return recording
+
+
+def read_header(path: Path) -> list[str]:
+    """Names of the columns of a CSV or Parquet file; numbers from 1 where there are none.
+
+    Raises
+    ------
+    RecordingError
+        the file cannot be read, or is a log, which names its joints itself
+    """
+    name = printable(str(path), _LONGEST_PATH)
+    try:
+        magic = b"" if path.is_dir() else first_bytes(path, name)
+        if path.is_dir() or magic.startswith((MCAP_MAGIC, SQLITE_MAGIC, ROS1_MAGIC)):
+            raise RecordingError(f"{name}: a log names its joints itself; choose a topic with --topic")
+        if magic.startswith(PARQUET_MAGIC):
+            return read_parquet_header(path, name)
+        if magic.startswith(ZIP_MAGIC):
+            return read_npz_header(path, name)
+        _refuse_foreign(magic, path, name)
+        return read_csv_header(path, name)
+    except OSError as error:
+        raise RecordingError(f"{name}: {_reason(error)}") from error
 
 
 def first_bytes(path: Path, name: str) -> bytes:
@@ -91,13 +117,22 @@ def _read(path: Path, name: str, joint_count: int | None, choice: Choice) -> Rec
         return read_mcap(path, choice)
     if magic.startswith(SQLITE_MAGIC):
         return read_database(path, choice)
+    if magic.startswith(ROS1_MAGIC):
+        return read_ros1_bag(path, choice)
+    if magic.startswith(ZIP_MAGIC):
+        return read_npz(path, name, joint_count, reading=choice.reading)
+    _refuse_foreign(magic, path, name)
+    return read_csv(path, name, joint_count, reading=choice.reading)
+
+
+def _refuse_foreign(magic: bytes, path: Path, name: str) -> None:
+    """Refuse a file that is no text."""
     for start, words in _FOREIGN:
         if magic.startswith(start):
             raise RecordingError(f"{name}: {words}")
-    if path.suffix.lower() in (".mcap", ".parquet", ".db3"):
+    if path.suffix.lower() in (".mcap", ".parquet", ".db3", ".bag"):
         found = "is empty" if not magic else f"does not begin as a {path.suffix.lower()} file does"
         raise RecordingError(f"{name}: the file {found}; it is damaged or of another format")
-    return read_csv(path, name, joint_count, reading=choice.reading)
 
 
 def _reason(error: OSError) -> str:

@@ -2,6 +2,7 @@
 
 import sqlite3
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 from urllib.parse import quote
 
@@ -12,6 +13,7 @@ from tauscope.errors import RecordingError
 from tauscope.recording.joint_state_log import JointStateLog
 from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.mcap_format import add_mcap
+from tauscope.recording.message_compression import decompress_file
 from tauscope.recording.recording import Recording
 from tauscope.recording.words import printable, reason
 
@@ -33,17 +35,26 @@ def read_rosbag2(folder: Path, choice: Choice) -> Recording:
     for file in _files(folder, choice.file):
         name = f"{choice.file}/{printable(file)}"
         path = folder / file
+        if not path.is_file() and (folder / f"{file}.zstd").is_file():  # the names that rosbag2 wrote at first
+            path = folder / f"{file}.zstd"
         if not path.is_file():
             raise RecordingError(f"{choice.file}: {METADATA} names {printable(file)}, which is not there")
-        if path.suffix == ".mcap":
-            add_mcap(path, name, log)
-        elif path.suffix == ".db3":
-            _add_database(path, name, log)
+        if path.suffix == ".zstd":
+            with TemporaryDirectory(prefix="tauscope-") as temporary:
+                _add_file(decompress_file(path, Path(temporary) / path.stem, name), name, log)
         else:
-            raise RecordingError(
-                f"{name}: neither .mcap nor .db3; decompress or convert the bag with `ros2 bag convert` first"
-            )
+            _add_file(path, name, log)
     return log.finish()
+
+
+def _add_file(path: Path, name: str, log: JointStateLog) -> None:
+    """Add the messages of one file of a bag to a log."""
+    if path.suffix == ".mcap":
+        add_mcap(path, name, log)
+    elif path.suffix == ".db3":
+        _add_database(path, name, log)
+    else:
+        raise RecordingError(f"{name}: neither .mcap nor .db3; convert the bag with `ros2 bag convert` first")
 
 
 def read_database(path: Path, choice: Choice) -> Recording:
@@ -100,14 +111,15 @@ def _add_database(path: Path, name: str, log: JointStateLog) -> None:
                 "SELECT id, name, type, serialization_format FROM topics"
             ):
                 handlers[number] = log.handler(str(topic), str(kind), str(encoding))
+            wanted = {topic: handler for topic, handler in handlers.items() if handler is not None}
+            marks = ", ".join("?" * len(wanted))  # images of other topics are not read
             for topic, time, message in connection.execute(
-                "SELECT topic_id, timestamp, data FROM messages ORDER BY id"
+                f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({marks}) ORDER BY id",  # noqa: S608
+                tuple(wanted),
             ):
-                handler = handlers.get(topic)
-                if handler is not None:
-                    if not isinstance(message, bytes) or not isinstance(time, int) or time < 0:
-                        raise RecordingError(f"{name}: the message at time {time!r} is damaged")
-                    handler(time, message)
+                if not isinstance(message, bytes) or not isinstance(time, int) or time < 0:
+                    raise RecordingError(f"{name}: the message at time {time!r} is damaged")
+                wanted[topic](time, message)
         finally:
             connection.close()
     except (sqlite3.Error, UnicodeDecodeError) as error:

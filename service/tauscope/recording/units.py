@@ -6,8 +6,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tauscope.errors import RecordingError
+from tauscope.recording.layout.presets import PRESET_OF
 from tauscope.recording.samples import Array, EffortKind
-from tauscope.robot.recording_layout import RecordingLayout, find_fault
+from tauscope.robot.recording_layout import DELIMITERS, RecordingLayout, Source, find_fault
 from tauscope.robot.robot import JointType, Robot
 
 SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -35,12 +36,27 @@ class Reading:
         samples a second where t counts samples [Hz]
     joint_types : tuple of JointType or None
         of the robot, where it is known: degrees are of revolute joints only, mm of prismatic ones
+    joint_names : tuple of str or None
+        of the robot, where it is known
+    prefers_torque : bool
+        whether currents are of no use, because no torque constant is known
+    columns, decimal, delimiter, topic
+        as in `RecordingLayout`
+    is_usual : bool
+        whether the columns are those of the robot file: recordings that Tauscope made have their own
     """
 
     units: Mapping[str, str] = field(default_factory=dict)
     rate_hz: float | None = None
     trust_units: bool = False
     joint_types: tuple[JointType, ...] | None = None
+    joint_names: tuple[str, ...] | None = None
+    prefers_torque: bool = False
+    columns: Mapping[str, Source] | str | None = None
+    decimal: str | None = None
+    delimiter: str | None = None
+    topic: str | None = None
+    is_usual: bool = False
 
     def for_robot(self, robot: Robot | None) -> "Reading":
         """The same reading, with the units of the robot file where this one states none.
@@ -51,13 +67,31 @@ class Reading:
             a unit is not known, or the rate is missing
         """
         layout = RecordingLayout() if robot is None else robot.recording
-        units = {**layout.units, **self.units}
+        columns = layout.columns if self.columns is None else self.columns
+        units = {**preset_units(columns), **layout.units, **self.units}
         rate_hz = self.rate_hz if self.rate_hz is not None or units.get("t") != "index" else layout.rate_hz
         fault = find_fault(units, rate_hz)
         if fault is not None:
             raise RecordingError(f"units: {fault[1]}")
-        types = None if robot is None else tuple(joint.type for joint in robot.joints)
-        return replace(self, units=units, rate_hz=rate_hz, joint_types=types)
+        joints = None if robot is None else robot.joints
+        return replace(
+            self,
+            units=units,
+            rate_hz=rate_hz,
+            columns=columns,
+            is_usual=self.columns is None and columns is not None,
+            decimal=self.decimal or layout.decimal,
+            delimiter=self.delimiter or layout.delimiter,
+            topic=self.topic or layout.topic,
+            joint_types=None if joints is None else tuple(joint.type for joint in joints),
+            joint_names=None if joints is None else tuple(joint.name for joint in joints),
+            prefers_torque=joints is not None and not all(joint.has_torque_constant for joint in joints),
+        )
+
+    @property
+    def delimiter_sign(self) -> str | None:
+        """The sign between fields, None where the file shows it."""
+        return None if self.delimiter is None else DELIMITERS[self.delimiter]
 
 
 SI = Reading()
@@ -100,6 +134,11 @@ class Conversion:
     def is_needed(self) -> bool:
         """Whether anything changes."""
         return self.from_first or bool((self.factor != 1.0).any())
+
+
+def preset_units(columns: Mapping[str, Source] | str | None) -> Mapping[str, str]:
+    """Units of a preset, none where columns are not one."""
+    return PRESET_OF[columns].units if isinstance(columns, str) else {}
 
 
 def parse_units(text: str) -> dict[str, str]:

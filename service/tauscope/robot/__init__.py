@@ -1,13 +1,23 @@
 """What the arm is: joints, chain, limits, and what the user's simulation believes; the robot file."""
 
+from tauscope.robot.chain import Chain
 from tauscope.robot.check import JointSummary, RobotReport, check_robot
 from tauscope.robot.denavit_hartenberg import DenavitHartenbergRow, modified_segments, standard_segments
 from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.kinematics import homogeneous, link_placements
 from tauscope.robot.physical import find_defect, nearest_body, pseudo_inertia
-from tauscope.robot.recording_layout import RecordingLayout, find_fault
+from tauscope.robot.recording_layout import (
+    PRESETS,
+    RecordingLayout,
+    find_column_fault,
+    find_fault,
+    find_separator_fault,
+)
+from tauscope.robot.recording_layout_file import layout_from_dict, read_layout
 from tauscope.robot.robot import (
     STANDARD_PARAMETERS,
+    Actuator,
+    Coupling,
     FrictionCoefficients,
     FrictionShape,
     Joint,
@@ -22,10 +32,14 @@ from tauscope.robot.robot import (
 )
 from tauscope.robot.robot_data import robot_from_dict, robot_from_yaml, robot_to_dict
 from tauscope.robot.robot_file import read_robot
-from tauscope.robot.urdf import UrdfChain, read_urdf_chain
+from tauscope.robot.urdf import read_urdf_chain
 
 __all__ = [
+    "PRESETS",
     "STANDARD_PARAMETERS",
+    "Actuator",
+    "Chain",
+    "Coupling",
     "DenavitHartenbergRow",
     "Finding",
     "FrictionCoefficients",
@@ -43,15 +57,18 @@ __all__ = [
     "RobotReport",
     "Segment",
     "Severity",
-    "UrdfChain",
     "check_robot",
+    "find_column_fault",
     "find_defect",
     "find_fault",
+    "find_separator_fault",
     "homogeneous",
+    "layout_from_dict",
     "link_placements",
     "modified_segments",
     "nearest_body",
     "pseudo_inertia",
+    "read_layout",
     "read_robot",
     "read_urdf_chain",
     "robot_from_dict",

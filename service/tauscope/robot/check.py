@@ -77,8 +77,8 @@ def check_robot(path: Path | str) -> RobotReport:
         name=robot.name,
         source=str(path),
         joints=tuple(
-            _summary(number, joint, segment, None if links is None else links[number - 1].mass)
-            for number, (joint, segment) in enumerate(zip(robot.joints, robot.segments, strict=True), start=1)
+            _summary(number, joint, robot.segments[link], None if links is None else links[link].mass)
+            for number, (joint, link) in enumerate(zip(robot.joints, robot.own_links, strict=True), start=1)
         ),
         gravity=_triple(robot.gravity),
         total_mass=None if links is None else float(sum(link.mass for link in links)),
@@ -107,6 +107,9 @@ def _summary(number: int, joint: Joint, segment: Segment, mass: float | None) ->
 
 def _remarks(robot: Robot, source: str) -> Iterator[Finding]:
     """What other commands repair, will miss or stumble over."""
+    for note in robot.notes:
+        place, _, text = note.text.partition(": ")
+        yield Finding(Severity.INFO, place, f"{text}; {note.remedy}")
     for repair in robot.repairs:
         yield Finding(Severity.WARNING, repair.place, f"{repair.text}; {repair.remedy}")
     size = float(np.linalg.norm(robot.gravity))

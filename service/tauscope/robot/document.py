@@ -1,28 +1,33 @@
 """The robot file as CONTRACT.md defines it, one class a mapping; what the fields mean stands there."""
 
-from typing import Self
+from typing import Annotated, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from tauscope.robot.document_fields import (
     Document,
     Motion,
     Name,
     Nonzero,
+    NotNegative,
     Number,
     PlainMapping,
     Positive,
     Range,
     Rotation,
     Sign,
+    Text,
     Vector,
+    check_source,
     refusal,
 )
 from tauscope.robot.messages import shown
-from tauscope.robot.recording_layout import find_fault
+from tauscope.robot.recording_layout import RecordingLayout, Source, find_column_fault, find_fault, find_separator_fault
 from tauscope.robot.robot import JointType
 
 MOST_JOINTS = 100
+
+Columns = Annotated[Source, BeforeValidator(check_source)]
 
 
 class DenavitHartenbergRowDocument(Document):
@@ -45,12 +50,26 @@ class DenavitHartenbergRowDocument(Document):
     type: Motion = JointType.REVOLUTE
 
 
-class UrdfDocument(Document):
-    """Where the URDF is, and between which of its links the chain runs."""
+class CouplingDocument(Document):
+    """The joint that a segment follows.
+
+    joint : int
+        index of the joint, from 0
+    offset : float
+        position of the segment where the joint is at zero [rad or m]
+    """
+
+    joint: Annotated[int, Field(ge=0, lt=MOST_JOINTS, strict=True)]
+    multiplier: Number
+    offset: Number
+
+
+class ChainDocument(Document):
+    """Where the URDF or MJCF is, and between which of its links or bodies the chain runs."""
 
     file: Name
-    base: Name
-    tip: Name
+    base: Name | None = None
+    tip: Name | None = None
 
 
 Rows = list[DenavitHartenbergRowDocument]
@@ -61,7 +80,8 @@ class KinematicsDocument(Document):
 
     dh: Rows | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
     mdh: Rows | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
-    urdf: UrdfDocument | None = None
+    urdf: ChainDocument | None = None
+    mjcf: ChainDocument | None = None
 
     @model_validator(mode="after")
     def _check_one(self) -> Self:
@@ -166,10 +186,15 @@ class FrictionDocument(Document):
 
 
 class ModelDocument(Document):
-    """What the user's simulation believes."""
+    """What the user's simulation believes.
+
+    rotor_inertia : list of float, or None
+        reflected to the joint, one a joint [kg m² or kg]
+    """
 
     links: list[LinkDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
     friction: list[FrictionDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
+    rotor_inertia: list[NotNegative] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
 
 
 class RecordingDocument(Document):
@@ -179,28 +204,46 @@ class RecordingDocument(Document):
         samples a second where t counts samples [Hz]
     """
 
+    columns: dict[Name, Columns] | Name | None = None
     units: dict[Name, Name] = Field(default_factory=dict)
     rate_hz: Positive | None = None
+    decimal: Text | None = None
+    delimiter: Text | None = None
+    topic: Name | None = None
 
     @model_validator(mode="after")
-    def _check_units(self) -> Self:
-        """Units that are known."""
+    def _check_layout(self) -> Self:
+        """Columns, units and separators that are known."""
+        columns = find_column_fault(self.columns)
+        if columns is not None:
+            raise refusal(columns, "columns")
         fault = find_fault(self.units, self.rate_hz)
         if fault is not None:
             raise refusal(fault[1], None if fault[0] == "rate_hz" else "units")
+        separator = find_separator_fault(self.decimal, self.delimiter)
+        if separator is not None:
+            raise refusal(separator[1], separator[0])
         return self
+
+    @property
+    def layout(self) -> RecordingLayout:
+        """The same for those who read."""
+        return RecordingLayout(self.units, self.rate_hz, self.columns, self.decimal, self.delimiter, self.topic)
 
 
 class RobotDocument(Document):
     """The whole robot file.
 
-    gravity : list of three float
-        in the base frame [m/s²]
+    gravity : list of three float, or None
+        in the base frame [m/s²]; None: the gravity of the MJCF, else [0, 0, -9.81]
+    locked : dict of str to float
+        position of joints that do not move [rad or m]
     """
 
     name: Name
     kinematics: KinematicsDocument
-    gravity: Vector = Field(default=[0.0, 0.0, -9.81])
+    gravity: Vector | None = None
+    locked: dict[Name, Number] = Field(default_factory=dict)
     joints: list[JointDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
     model: ModelDocument | None = None
     recording: RecordingDocument | None = None
@@ -213,6 +256,13 @@ class RobotDocument(Document):
             if name in names[:index]:
                 first, second = names.index(name) + 1, index + 1
                 raise refusal(f"joints {first} and {second} are both named {shown(name)}; rename one", "joints")
+        return self
+
+    @model_validator(mode="after")
+    def _check_locked(self) -> Self:
+        """Rows of dh or mdh hold moving joints only."""
+        if self.locked and self.kinematics.urdf is None and self.kinematics.mjcf is None:
+            raise refusal("needs kinematics from a URDF or MJCF; put the fixed joint into the rows instead", "locked")
         return self
 
 
@@ -233,6 +283,7 @@ class SegmentDocument(Document):
     type: Motion
     before: PlacementDocument
     after: PlacementDocument
+    coupling: CouplingDocument | None = None
 
 
 class PlainKinematicsDocument(KinematicsDocument):

@@ -57,6 +57,13 @@ def _positive(value: float) -> float:
     return value
 
 
+def _not_negative(value: float) -> float:
+    """A number of zero or more."""
+    if value < 0.0:
+        raise refusal(f"must not be below zero, but is {value:g}; write its size")
+    return value
+
+
 def _nonzero(value: float) -> float:
     """A number other than zero."""
     if value == 0.0:
@@ -72,6 +79,25 @@ def _name(value: Any) -> str:
         raise refusal("must not be empty")
     if len(value) > LONGEST_NAME or not value.isprintable():
         raise refusal(f"{shown(value)} must be printable text of at most {LONGEST_NAME} characters")
+    return value
+
+
+def _text(value: Any) -> str:
+    """Text that may be blank."""
+    if not isinstance(value, str) or not value:
+        raise refusal(f"must be text, but is {shown(value)}; put it in quotes")
+    return value
+
+
+def check_source(value: Any) -> Any:
+    """A column by name or by number from 1, or a list of them."""
+    entries = value if isinstance(value, list) else [value]
+    for entry in entries:
+        is_number = isinstance(entry, int) and not isinstance(entry, bool) and entry > 0
+        if not (is_number or (isinstance(entry, str) and entry)):
+            raise refusal(f"{shown(entry)} is no column; write its name, or its number from 1")
+    if not entries:
+        raise refusal("must not be empty")
     return value
 
 
@@ -145,8 +171,10 @@ def _plain_mapping(value: Any) -> dict[str, Any]:
 
 Number = Annotated[float, BeforeValidator(_number)]
 Positive = Annotated[Number, AfterValidator(_positive)]
+NotNegative = Annotated[Number, AfterValidator(_not_negative)]
 Nonzero = Annotated[Number, AfterValidator(_nonzero)]
 Name = Annotated[str, BeforeValidator(_name)]
+Text = Annotated[str, BeforeValidator(_text)]
 Motion = Annotated[JointType, BeforeValidator(_motion)]
 Sign = Annotated[int, BeforeValidator(_sign)]
 Range = Annotated[list[Number], AfterValidator(_range)]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.errors import RecordingMismatchError
-from tauscope.robot.robot import JointType, Placement, Robot, Segment
+from tauscope.robot.robot import JointType, Placement, Robot, Segment, segment_couplings
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ def link_placements(chain: Robot | Sequence[Segment], q: Array) -> Array:
 
     Returns
     -------
-    (N, n, 4, 4) float64
+    (N, m, 4, 4) float64
         homogeneous transforms; [:, j] is link frame j + 1 in the base frame [m]
 
     Raises
@@ -33,15 +33,17 @@ def link_placements(chain: Robot | Sequence[Segment], q: Array) -> Array:
     """
     segments = chain.segments if isinstance(chain, Robot) else tuple(chain)
     position = np.asarray(q, dtype=np.float64)
-    if position.ndim != 2 or position.shape[1] != len(segments):
+    couplings = segment_couplings(segments)
+    joints = max((coupling.joint for coupling in couplings), default=-1) + 1
+    if position.ndim != 2 or position.shape[1] != joints:
         raise RecordingMismatchError(
-            f"joint positions of shape {position.shape} do not fit an arm of {len(segments)} joints; "
-            "give one column a joint"
+            f"joint positions of shape {position.shape} do not fit an arm of {joints} joints; give one column a joint"
         )
     placements = np.empty((len(position), len(segments), 4, 4))
     frame = np.broadcast_to(np.eye(4), (len(position), 4, 4))
-    for j, segment in enumerate(segments):
-        frame = frame @ homogeneous(segment.before) @ _motion(segment.type, position[:, j]) @ homogeneous(segment.after)
+    for j, (segment, coupling) in enumerate(zip(segments, couplings, strict=True)):
+        moved = coupling.multiplier * position[:, coupling.joint] + coupling.offset
+        frame = frame @ homogeneous(segment.before) @ _motion(segment.type, moved) @ homogeneous(segment.after)
         placements[:, j] = frame
     return placements
 

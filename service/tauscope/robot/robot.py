@@ -1,6 +1,6 @@
 """What the arm is: an open chain of joints, and what the user's simulation believes about its links."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -59,6 +59,23 @@ class FrictionShape:
 
 
 @dataclass(frozen=True)
+class Actuator:
+    """The drive of a joint in a simulator's file.
+
+    kind : str
+        ``motor``, ``position`` or ``velocity``
+    kp : float
+        torque per position error [Nm/rad or N/m]
+    kv : float
+        torque per velocity [Nm s/rad or N s/m]
+    """
+
+    kind: str
+    kp: float
+    kv: float
+
+
+@dataclass(frozen=True)
 class Joint:
     """One joint: its name, its limits and what turns a recorded drive signal into joint torque.
 
@@ -66,6 +83,8 @@ class Joint:
         motor turns per joint turn; None where not stated
     has_torque_constant : bool
         whether the robot file states the constant; 1 stands where it does not
+    actuator : Actuator or None
+        of the joint in the user's MJCF
     """
 
     name: str
@@ -77,6 +96,7 @@ class Joint:
     friction_shape: FrictionShape = FrictionShape()
     drive: Mapping[str, Any] | None = None
     has_torque_constant: bool = False
+    actuator: Actuator | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,18 +113,48 @@ class Placement:
     translation: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
 
+@dataclass(frozen=True)
+class Coupling:
+    """A segment that follows a joint: its own position is multiplier · q_joint + offset.
+
+    joint : int
+        index of the joint, from 0
+    multiplier : float
+        turn or slide of the segment per turn or slide of the joint
+    offset : float
+        position of the segment at q_joint = 0 [rad or m]
+    """
+
+    joint: int
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """One joint of the chain: link frame j seen from link frame j-1 is ``before · motion_z(q_j) · after``.
+    """One motion of the chain: link frame j seen from link frame j-1 is ``before · motion_z(q_j) · after``.
 
     The joint turns about, or slides along, the z axis between the two placements. Standard DH puts a and α into
     `after`, modified DH into `before`; a URDF puts the axis' orientation into both, so that the link frame stays the
     URDF's own.
+
+    coupling : Coupling or None
+        None where the segment is the next joint's own
     """
 
     type: JointType
     before: Placement
     after: Placement
+    coupling: Coupling | None = None
+
+
+def segment_couplings(segments: Iterable[Segment]) -> tuple[Coupling, ...]:
+    """The joint that moves each segment: its own, which is the next one, or the one that it follows."""
+    found: list[Coupling] = []
+    for segment in segments:
+        following = max((each.joint for each in found), default=-1) + 1
+        found.append(segment.coupling or Coupling(following))
+    return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,10 +229,19 @@ class FrictionCoefficients:
 
 @dataclass(frozen=True)
 class Model:
-    """What the user's simulation believes; None where the robot file says nothing."""
+    """What the user's simulation believes; None where the robot file says nothing.
+
+    links : tuple of LinkInertia, or None
+        one a segment
+    friction : tuple of FrictionCoefficients, or None
+        one a joint
+    rotor_inertia : tuple of float, or None
+        reflected to the joint, one a joint [kg m² or kg]
+    """
 
     links: tuple[LinkInertia, ...] | None = None
     friction: tuple[FrictionCoefficients, ...] | None = None
+    rotor_inertia: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,8 +250,17 @@ class Robot:
 
     joints : tuple of Joint
         base first
+    segments : tuple of Segment
+        base first; one a joint, and one for each joint that follows another
     gravity : (3,) float64
         acceleration of gravity in the base frame [m/s²]
+    segment_names : tuple of str
+        joint of the URDF or MJCF that each segment is; empty without such a file, as are the next two
+    link_names : tuple of tuple of str
+        links of that file that make up each link
+    branches : tuple of LinkInertia
+        the part of each link that an export leaves where the file has it: of a URDF the bodies on joints beside the
+        chain, of an MJCF all but the body of the joint
     """
 
     name: str
@@ -202,8 +270,12 @@ class Robot:
     model: Model = Model()
     source: Path | None = None
     urdf: Path | None = None
-    urdf_links: tuple[tuple[str, ...], ...] = ()
+    mjcf: Path | None = None
+    segment_names: tuple[str, ...] = ()
+    link_names: tuple[tuple[str, ...], ...] = ()
+    branches: tuple[LinkInertia, ...] = ()
     findings: tuple[Finding, ...] = ()
+    notes: tuple[ResultWarning, ...] = ()
     repairs: tuple[Repair, ...] = ()
     recording: RecordingLayout = field(default_factory=RecordingLayout)
 
@@ -213,14 +285,74 @@ class Robot:
         return len(self.joints)
 
     @property
+    def files(self) -> tuple[tuple[str, Path], ...]:
+        """Role and path of the files that describe the robot, each once."""
+        roles = (("robot", self.source), ("urdf", self.urdf), ("mjcf", self.mjcf))
+        paths = {path: role for role, path in reversed(roles) if path is not None}
+        return tuple((role, path) for path, role in reversed(paths.items()))
+
+    @property
+    def link_count(self) -> int:
+        """Number of moving links, one a segment."""
+        return len(self.segments)
+
+    @property
+    def couplings(self) -> tuple[Coupling, ...]:
+        """The joint that moves each segment, and how."""
+        return segment_couplings(self.segments)
+
+    @property
+    def own_links(self) -> tuple[int, ...]:
+        """Index of the link that moves as each joint does, or of the first one that follows it."""
+        links = {coupling.joint: link for link, coupling in reversed([*enumerate(self.couplings)])}
+        for link, coupling in reversed([*enumerate(self.couplings)]):
+            if (coupling.multiplier, coupling.offset) == (1.0, 0.0):
+                links[coupling.joint] = link
+        return tuple(links[joint] for joint in range(self.joint_count))
+
+    @property
+    def ratios(self) -> NDArray[np.float64]:
+        """Motion of each segment per unit of each joint, (links, joints)."""
+        matrix = np.zeros((self.link_count, self.joint_count))
+        for link, coupling in enumerate(self.couplings):
+            matrix[link, coupling.joint] = coupling.multiplier
+        return matrix
+
+    @property
+    def segment_labels(self) -> tuple[str, ...]:
+        """A name for each segment: its joint, or the joint of the file that follows."""
+        if self.segment_names:
+            return self.segment_names
+        own = self.own_links
+        names = (self.joint_of_link(link).name for link in range(self.link_count))
+        return tuple(name if link in own else f"{name} at link {link + 1}" for link, name in enumerate(names))
+
+    def joint_of_link(self, link: int) -> Joint:
+        """The joint that moves a link.
+
+        Parameters
+        ----------
+        link : int
+            index of the link, from 0
+        """
+        return self.joints[self.couplings[link].joint]
+
+    @property
+    def first_links(self) -> tuple[int, ...]:
+        """Index of the first link that each joint moves."""
+        moved = [each.joint for each in self.couplings]
+        return tuple(moved.index(joint) for joint in range(self.joint_count))
+
+    @property
     def warnings(self) -> tuple[ResultWarning, ...]:
-        """One for each inertial that no body has, with the numbers before and after."""
-        return tuple(
+        """Notes on the description, and one for each inertial that no body has, with the numbers before and after."""
+        repaired = (
             ResultWarning(
                 code="repaired-inertial",
-                joint=self.joints[repair.link].name,
+                joint=self.joint_of_link(repair.link).name,
                 text=f"{repair.place}: {repair.text}",
                 remedy=repair.remedy,
             )
             for repair in self.repairs
         )
+        return (*self.notes, *repaired)

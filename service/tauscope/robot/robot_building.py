@@ -1,59 +1,84 @@
 """A validated document to a Robot."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from tauscope.robot.chain import Chain
 from tauscope.robot.denavit_hartenberg import DenavitHartenbergRow, modified_segments, standard_segments
 from tauscope.robot.document import (
     JointDocument,
-    KinematicsDocument,
     LinkDocument,
     ModelDocument,
     PlacementDocument,
     PlainKinematicsDocument,
     RobotDocument,
     Rows,
-    UrdfDocument,
+    SegmentDocument,
 )
 from tauscope.robot.document_origin import DocumentOrigin
 from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.messages import shown
+from tauscope.robot.mjcf import read_mjcf_chain
 from tauscope.robot.physical import nearest_body, repair_text
 from tauscope.robot.recording_layout import RecordingLayout
 from tauscope.robot.robot import (
+    Coupling,
     FrictionCoefficients,
     FrictionShape,
     Joint,
     JointLimits,
+    JointType,
     LinkInertia,
     Model,
     Placement,
     Repair,
     Robot,
     Segment,
+    segment_couplings,
 )
-from tauscope.robot.urdf import UrdfChain, read_urdf_chain
+from tauscope.robot.urdf import read_urdf_chain
+
+EARTH = np.array([0.0, 0.0, -9.81])
+"""Gravity in the base frame where nothing is stated [m/s²]."""
 
 REPAIR_REMEDY = "correct the link (inertia is about the link frame's origin, not about the centre of mass)"
 
-UrdfSource = Callable[[str], tuple[bytes, str, Path | None]]
-"""Looks up the URDF that a document names: its content, its label for messages, and its path where it has one."""
+
+@dataclass(frozen=True)
+class SourceFile:
+    """A file that a document names: its content, its label for messages, and its path where it has one."""
+
+    data: bytes
+    label: str
+    path: Path | None = None
+
+
+FileSource = Callable[[str, str], SourceFile]
+"""Looks up a file by the kind of kinematics and the name that a document gives."""
 
 
 @dataclass(frozen=True)
-class _Chain:
-    """Segments, what a URDF says beside them, and the place in the document that they come from."""
+class _Kinematics:
+    """Segments, what a file says beside them, and the place in the document that they come from."""
 
     segments: tuple[Segment, ...]
     key: str
-    urdf: UrdfChain | None = None
-    urdf_path: Path | None = None
+    chain: Chain | None = None
+    path: Path | None = None
+
+    @property
+    def joint_types(self) -> tuple[JointType, ...]:
+        """How each joint moves."""
+        moved = [each.joint for each in segment_couplings(self.segments)]
+        if self.chain is not None:
+            return self.chain.joint_types
+        return tuple(self.segments[moved.index(joint)].type for joint in range(max(moved) + 1))
 
 
-def build_robot(document: RobotDocument, origin: DocumentOrigin, urdf_source: UrdfSource) -> Robot:
+def build_robot(document: RobotDocument, origin: DocumentOrigin, file_source: FileSource) -> Robot:
     """The robot of a document; a link of its model that no body can be is replaced by the nearest body.
 
     Raises
@@ -61,44 +86,62 @@ def build_robot(document: RobotDocument, origin: DocumentOrigin, urdf_source: Ur
     RobotFileError
         if parts of the document do not fit each other, or the URDF is not valid
     """
-    chain = _chain(document.kinematics, origin, urdf_source)
-    findings: list[Finding] = [*(chain.urdf.findings if chain.urdf else ())]
-    joints = _joints(document.joints, chain, origin)
-    model, repairs = _model(document.model, chain, origin, findings)
+    kinematics = _kinematics(document, origin, file_source)
+    chain = kinematics.chain
+    findings: list[Finding] = [*(chain.findings if chain else ())]
+    joints = _joints(document.joints, kinematics, origin)
+    model, repairs = _model(document.model, kinematics, origin, findings)
     layout = document.recording
     return Robot(
         name=document.name,
         joints=joints,
-        segments=chain.segments,
-        gravity=np.array(document.gravity),
+        segments=kinematics.segments,
+        gravity=_gravity(document, chain),
         model=model,
-        urdf=chain.urdf_path,
-        urdf_links=chain.urdf.link_names if chain.urdf else (),
+        urdf=kinematics.path if kinematics.key == "urdf" else None,
+        mjcf=kinematics.path if kinematics.key == "mjcf" else None,
+        segment_names=chain.segment_names if chain else (),
+        link_names=chain.link_names if chain else (),
+        branches=chain.branches if chain else (),
         findings=tuple(findings),
+        notes=chain.notes if chain else (),
         repairs=repairs,
-        recording=RecordingLayout() if layout is None else RecordingLayout(layout.units, layout.rate_hz),
+        recording=RecordingLayout() if layout is None else layout.layout,
     )
 
 
-def _chain(kinematics: KinematicsDocument, origin: DocumentOrigin, urdf_source: UrdfSource) -> _Chain:
+def _gravity(document: RobotDocument, chain: Chain | None) -> np.ndarray:
+    """Gravity in the base frame, (3,) [m/s²]: as the robot file says, else as its MJCF."""
+    if document.gravity is not None:
+        return np.array(document.gravity)
+    return EARTH if chain is None or chain.gravity is None else chain.gravity
+
+
+def _kinematics(document: RobotDocument, origin: DocumentOrigin, file_source: FileSource) -> _Kinematics:
     """Segments of whichever description the document holds."""
+    kinematics = document.kinematics
     if kinematics.dh is not None:
-        return _Chain(standard_segments(_rows(kinematics.dh)), "dh")
+        return _Kinematics(standard_segments(_rows(kinematics.dh)), "dh")
     if kinematics.mdh is not None:
-        return _Chain(modified_segments(_rows(kinematics.mdh)), "mdh")
-    if kinematics.urdf is not None:
-        return _urdf_chain(kinematics.urdf, urdf_source)
+        return _Kinematics(modified_segments(_rows(kinematics.mdh)), "mdh")
+    if (named := kinematics.urdf) is not None:
+        file = file_source("urdf", named.file)
+        chain = read_urdf_chain(file.data, file.label, named.base, named.tip, document.locked)
+        return _Kinematics(chain.segments, "urdf", chain, file.path)
+    if (named := kinematics.mjcf) is not None:
+        file = file_source("mjcf", named.file)
+        chain = read_mjcf_chain(file.data, file.label, file.path, named.base, named.tip, document.locked)
+        return _Kinematics(chain.segments, "mjcf", chain, file.path)
     if isinstance(kinematics, PlainKinematicsDocument) and kinematics.segments is not None:
-        segments = tuple(Segment(s.type, _placement(s.before), _placement(s.after)) for s in kinematics.segments)
-        return _Chain(segments, "segments")
+        return _Kinematics(tuple(map(_segment, kinematics.segments)), "segments")
     raise origin.error(("kinematics",), "holds no description of the chain")
 
 
-def _urdf_chain(urdf: UrdfDocument, urdf_source: UrdfSource) -> _Chain:
-    """The chain of a URDF."""
-    data, label, path = urdf_source(urdf.file)
-    chain = read_urdf_chain(data, label, urdf.base, urdf.tip)
-    return _Chain(chain.segments, "urdf", chain, path)
+def _segment(document: SegmentDocument) -> Segment:
+    """A segment of plain data."""
+    coupling = document.coupling
+    follows = None if coupling is None else Coupling(coupling.joint, coupling.multiplier, coupling.offset)
+    return Segment(document.type, _placement(document.before), _placement(document.after), follows)
 
 
 def _rows(rows: Rows) -> list[DenavitHartenbergRow]:
@@ -111,37 +154,39 @@ def _placement(document: PlacementDocument) -> Placement:
     return Placement(np.array(document.rotation), np.array(document.translation))
 
 
-def _joints(documents: list[JointDocument] | None, chain: _Chain, origin: DocumentOrigin) -> tuple[Joint, ...]:
-    """Joints in chain order, what the document leaves open filled from the URDF."""
-    count = len(chain.segments)
-    names = chain.urdf.joint_names if chain.urdf else None
-    if documents is None:
-        default = names or tuple(f"joint{number}" for number in range(1, count + 1))
-        documents = [JointDocument(name=name) for name in default]
-    _check_count(origin, ("joints",), len(documents), count, chain.key)
-    for index, (document, name) in enumerate(zip(documents, names or (), strict=False)):
-        if document.name != name:
-            text = f"{shown(document.name)} is joint {shown(name)} in the URDF's chain order; use the URDF's name"
+def _joints(documents: list[JointDocument] | None, chain: _Kinematics, origin: DocumentOrigin) -> tuple[Joint, ...]:
+    """Joints in chain order; the URDF or MJCF fills gaps of the document."""
+    if chain.chain is None:
+        types = chain.joint_types
+        documents = documents or [JointDocument(name=f"joint{number}") for number in range(1, len(types) + 1)]
+        _check_count(origin, ("joints",), len(documents), len(types), chain.key)
+        return tuple(_joint(each, kind, JointLimits()) for each, kind in zip(documents, types, strict=True))
+    names = chain.chain.joint_names
+    for index, document in enumerate(documents or ()):
+        if document.name not in names:
+            known = ", ".join(map(shown, names))
+            text = f"{shown(document.name)} is no moving joint of the chain; its joints are {known}: use one of these"
             raise origin.error(("joints", index, "name"), text)
-    urdf_limits = chain.urdf.limits if chain.urdf else (JointLimits(),) * count
+    stated = {document.name: document for document in documents or ()}
+    rows = zip(names, chain.chain.joint_types, chain.chain.limits, chain.chain.actuators, strict=True)
     return tuple(
-        _joint(document, segment, limits)
-        for document, segment, limits in zip(documents, chain.segments, urdf_limits, strict=True)
+        replace(_joint(stated.get(name, JointDocument(name=name)), kind, limits), actuator=actuator)
+        for name, kind, limits, actuator in rows
     )
 
 
-def _joint(document: JointDocument, segment: Segment, urdf_limits: JointLimits) -> Joint:
-    """One joint; a limit of the robot file goes before the URDF's."""
+def _joint(document: JointDocument, kind: JointType, own: JointLimits) -> Joint:
+    """One joint; a limit of the robot file goes before one of the URDF or MJCF."""
     limits, shape = document.limits, document.friction_shape
-    position = tuple(limits.position) if limits and limits.position else urdf_limits.position
+    position = tuple(limits.position) if limits and limits.position else own.position
     return Joint(
         name=document.name,
-        type=segment.type,
+        type=kind,
         limits=JointLimits(
             position=None if position is None else (position[0], position[1]),
-            velocity=(limits and limits.velocity) or urdf_limits.velocity,
-            acceleration=(limits and limits.acceleration) or urdf_limits.acceleration,
-            torque=(limits and limits.torque) or urdf_limits.torque,
+            velocity=(limits and limits.velocity) or own.velocity,
+            acceleration=(limits and limits.acceleration) or own.acceleration,
+            torque=(limits and limits.torque) or own.torque,
         ),
         gear_ratio=document.gear_ratio,
         torque_constant=1.0 if document.torque_constant is None else document.torque_constant,
@@ -153,19 +198,24 @@ def _joint(document: JointDocument, segment: Segment, urdf_limits: JointLimits) 
 
 
 def _model(
-    document: ModelDocument | None, chain: _Chain, origin: DocumentOrigin, findings: list[Finding]
+    document: ModelDocument | None, kinematics: _Kinematics, origin: DocumentOrigin, findings: list[Finding]
 ) -> tuple[Model, tuple[Repair, ...]]:
-    """The model block, or where it is absent what the URDF says; and which of its links were repaired."""
-    if document is None:
-        return (Model(chain.urdf.links, chain.urdf.friction), chain.urdf.repairs) if chain.urdf else (Model(), ())
-    links, repairs, friction = None, (), None
+    """The model block, or if absent the model of the URDF or MJCF; and its repaired links."""
+    chain, count = kinematics.chain, len(kinematics.joint_types)
+    if document is None or document == ModelDocument():
+        return (Model(chain.links, chain.friction, chain.rotor_inertia), chain.repairs) if chain else (Model(), ())
+    links, repairs, friction, rotors = None, (), None, None
     if document.links is not None:
-        _check_count(origin, ("model", "links"), len(document.links), len(chain.segments), chain.key)
+        segments = len(kinematics.segments)
+        _check_count(origin, ("model", "links"), len(document.links), segments, kinematics.key)
         links, repairs = _links(document.links, origin, findings)
     if document.friction is not None:
-        _check_count(origin, ("model", "friction"), len(document.friction), len(chain.segments), chain.key)
+        _check_count(origin, ("model", "friction"), len(document.friction), count, kinematics.key)
         friction = tuple(FrictionCoefficients(f.stiction, f.stribeck, f.viscous) for f in document.friction)
-    return Model(links, friction), repairs
+    if document.rotor_inertia is not None:
+        _check_count(origin, ("model", "rotor_inertia"), len(document.rotor_inertia), count, kinematics.key)
+        rotors = tuple(document.rotor_inertia)
+    return Model(links, friction, rotors), repairs
 
 
 def _links(

@@ -1,6 +1,7 @@
 """A robot without a file system: from uploaded bytes, to plain data for JSON and back, under one validation."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -8,10 +9,10 @@ from tauscope.errors import RobotFileError
 from tauscope.robot.document import PlainRobotDocument
 from tauscope.robot.document_origin import DocumentOrigin
 from tauscope.robot.messages import nearest, one_line, shown
-from tauscope.robot.robot import Joint, LinkInertia, Model, Placement, Robot
-from tauscope.robot.robot_building import UrdfSource, build_robot
+from tauscope.robot.robot import Joint, LinkInertia, Model, Placement, Robot, Segment
+from tauscope.robot.robot_building import FileSource, SourceFile, build_robot
 from tauscope.robot.robot_file import parse_robot_file
-from tauscope.robot.urdf_xml import LARGEST_URDF
+from tauscope.robot.xml_text import LARGEST_XML, is_xml
 
 
 def robot_from_dict(
@@ -40,43 +41,48 @@ def robot_from_yaml(data: bytes, label: str = "robot", urdf_files: Mapping[str, 
         if the robot file or its URDF is not valid; one line naming line, place and joint
     """
     document, origin = parse_robot_file(data, label)
-    return build_robot(document, origin, _given(origin, urdf_files or {}))
+    files = {Path(label).name: data} if is_xml(data) else urdf_files or {}
+    return build_robot(document, origin, _given(origin, files))
 
 
 def robot_to_dict(robot: Robot) -> dict[str, Any]:
     """Everything that computing with the robot needs, as plain data without files beside it.
 
-    `robot_from_dict` gives the same robot back, but for paths of files, the URDF's link names, findings and repairs.
+    `robot_from_dict` gives the same robot back, but for paths of files, names of links, notes, findings and repairs.
     """
-    segments = [
-        {"type": s.type.value, "before": _placement(s.before), "after": _placement(s.after)} for s in robot.segments
-    ]
+    segments = [_segment(segment) for segment in robot.segments]
     data: dict[str, Any] = {
         "name": robot.name,
         "kinematics": {"segments": segments},
         "gravity": robot.gravity.tolist(),
         "joints": [_joint(joint) for joint in robot.joints],
     }
-    layout = robot.recording
-    recording = {"units": dict(layout.units), "rate_hz": layout.rate_hz} if layout.units else None
+    recording = {key: value for key, value in asdict(robot.recording).items() if value} or None
     return {**data, **_stated({"model": _model(robot.model) or None, "recording": recording})}
 
 
-def _given(origin: DocumentOrigin, urdf_files: Mapping[str, bytes]) -> UrdfSource:
-    """Looks a URDF up among the given files."""
+def _given(origin: DocumentOrigin, files: Mapping[str, bytes]) -> FileSource:
+    """Looks a file up among the given ones."""
 
-    def look_up(file: str) -> tuple[bytes, str, Path | None]:
-        place = ("kinematics", "urdf", "file")
-        if file not in urdf_files:
-            hint = nearest(file, urdf_files) if urdf_files else "no URDF was given"
-            raise origin.error(place, f"the URDF {shown(file)} is not among the given files; {hint}")
-        data = urdf_files[file]
-        if not 0 < len(data) <= LARGEST_URDF:
-            limit = LARGEST_URDF // 1024
-            raise RobotFileError(one_line(f"{file}: a URDF holds 1 byte to {limit} KiB, this one {len(data)} bytes"))
-        return data, file, None
+    def look_up(kind: str, file: str) -> SourceFile:
+        if file not in files:
+            hint = nearest(file, files) if files else "no such file was given"
+            text = f"the file {shown(file)} is not among the given ones; {hint}"
+            raise origin.error(("kinematics", kind, "file"), text)
+        data = files[file]
+        if not 0 < len(data) <= LARGEST_XML:
+            limit = LARGEST_XML // 1024
+            raise RobotFileError(one_line(f"{file}: must hold 1 byte to {limit} KiB, but holds {len(data)} bytes"))
+        return SourceFile(data, file)
 
     return look_up
+
+
+def _segment(segment: Segment) -> dict[str, Any]:
+    """A segment as a mapping."""
+    coupling = None if segment.coupling is None else asdict(segment.coupling)
+    placements = {"before": _placement(segment.before), "after": _placement(segment.after)}
+    return _stated({"type": segment.type.value, **placements, "coupling": coupling})
 
 
 def _placement(placement: Placement) -> dict[str, Any]:
@@ -112,7 +118,8 @@ def _model(model: Model) -> dict[str, Any]:
     friction = None
     if model.friction is not None:
         friction = [{"stiction": f.stiction, "stribeck": f.stribeck, "viscous": f.viscous} for f in model.friction]
-    return _stated({"links": links, "friction": friction})
+    rotors = None if model.rotor_inertia is None else list(model.rotor_inertia)
+    return _stated({"links": links, "friction": friction, "rotor_inertia": rotors})
 
 
 def _link(link: LinkInertia) -> dict[str, Any]:

@@ -1,90 +1,150 @@
 """The chain between two links of a URDF: segments, limits, lumped inertias, friction.
 
 Fixed joints are merged. A link's frame stays the frame of the URDF link that its joint carries, so a segment is
-``origin · R | motion along z | Rᵀ`` where R carries z to the joint's axis. Bodies on fixed joints, also those beside
-the chain, are added to the link that they move with; what moves beside the chain is left out of the model, with a
-finding. Limits that exporters write for "not known" (zero, or beyond 1e9) count as not stated.
+``origin · R | motion along z | Rᵀ`` where R carries z to the joint's axis. Bodies beside the chain are added to the
+link that they move with, those on moving joints where these joints rest (`tauscope.robot.urdf_branches`). Limits that
+exporters write for "not known" (zero, negative, reversed, or beyond 1e9) count as not stated.
 """
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from tauscope.errors import RobotFileError
+from tauscope.result_warning import ResultWarning
+from tauscope.robot.chain import Chain, default_ends_note, rigid_branch_note
 from tauscope.robot.document import MOST_JOINTS
 from tauscope.robot.document_fields import LARGEST_NUMBER
 from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.placement import compose, rotation_of_z_to
-from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Repair, Segment
-from tauscope.robot.urdf_element import Element, children, number, only_child, origin, urdf_error, vector, where
-from tauscope.robot.urdf_inertia import lumped_inertia
+from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
+from tauscope.robot.urdf_branches import MOVING, JointMotions, Master, joint_axis
+from tauscope.robot.urdf_element import Element, number, only_child, origin, urdf_error, where
+from tauscope.robot.urdf_inertia import lumped_inertia, stated_mass
 from tauscope.robot.urdf_xml import UrdfJoint, UrdfTree, parse_urdf
-
-MOVING = frozenset({"revolute", "continuous", "prismatic"})
 
 
 @dataclass(frozen=True, eq=False)
-class UrdfChain:
-    """What a URDF says of the chain between two links, one entry a moving joint.
+class _Body:
+    """A link element, where it sits in the frame of the link that it belongs to, and whether a joint carries it."""
 
-    links : tuple of LinkInertia, or None
-        about the link frames; a link without any `<inertial>` is zero, None where no link has one
-    friction : tuple of FrictionCoefficients, or None
-        from `<dynamics>`; None where no joint has it
-    """
-
-    joint_names: tuple[str, ...]
-    segments: tuple[Segment, ...]
-    limits: tuple[JointLimits, ...]
-    links: tuple[LinkInertia, ...] | None
-    friction: tuple[FrictionCoefficients, ...] | None
-    link_names: tuple[tuple[str, ...], ...]
-    findings: tuple[Finding, ...]
-    repairs: tuple[Repair, ...]
+    element: Element
+    placement: Placement
+    on_branch: bool
 
 
-def read_urdf_chain(data: bytes, label: str, base: str, tip: str) -> UrdfChain:
-    """The chain from link `base` to link `tip`.
+def read_urdf_chain(
+    data: bytes,
+    label: str,
+    base: str | None = None,
+    tip: str | None = None,
+    locked: Mapping[str, float] | None = None,
+) -> Chain:
+    """The chain from link `base` to link `tip`; by default from the root to the deepest leaf.
+
+    Parameters
+    ----------
+    locked : mapping of str to float, or None
+        position of joints that do not move [rad or m]
 
     Raises
     ------
     RobotFileError
         if the URDF is not valid, or no chain of movable joints runs from base to tip
     """
-    tree = parse_urdf(data, label)
-    chain = _path(tree, base, tip)
     findings: list[Finding] = []
-    moving = [joint for joint in chain if joint.type != "fixed"]
-    for joint in moving:
-        _check_movable(tree, joint)
-    bodies = [_bodies(tree, joint, chain, findings) for joint in moving]
-    lumped = [lumped_inertia(label, link, members, findings) for link, members in enumerate(bodies)]
+    tree = parse_urdf(data, label, findings)
+    is_default = base is None or tip is None
+    base, tip = _ends(tree, base, tip, locked or {})
+    path = _path(tree, base, tip)
+    motions = JointMotions(tree, locked or {}, path)
+    motions.remark_on_masters(findings)
+    for joint in path:
+        if joint.type not in MOVING and joint.type != "fixed" and joint.name not in (locked or {}):
+            text = f"type {joint.type} is not supported in the chain; name the link beyond it as base"
+            raise urdf_error(label, joint.element, text)
+    if not motions.moving:
+        text = f"no moving joint lies between base {shown(base)} and tip {shown(tip)}; name the last link as tip"
+        raise RobotFileError(one_line(f"{label}: {text}"))
+    moving = [joint for joint in path if joint.name in motions.moving]
+    branches: list[UrdfJoint] = []
+    bodies = [_bodies(tree, joint, path, motions, branches, findings) for joint in moving]
+    lumped = [
+        lumped_inertia(label, link, [(body.element, body.placement) for body in members], findings)
+        for link, members in enumerate(bodies)
+    ]
     links = [link for link, _ in lumped]
     _remark_on_base(tree, base, findings)
     for joint, link in zip(moving, links, strict=True):
         if link is None and any(links):
             place = one_line(where(label, tree.links[joint.child]))
             findings.append(Finding(Severity.WARNING, place, "has no <inertial>; the model takes it as massless"))
-    frictions = [_friction(tree, joint, findings) for joint in moving]
-    return UrdfChain(
-        joint_names=tuple(joint.name for joint in moving),
-        segments=_segments(tree, chain, findings),
-        limits=tuple(_limits(tree, joint, findings) for joint in moving),
+    names = [joint.name for joint in motions.independent]
+    findings += [_follower(tree, joint, master) for joint in moving if (master := motions.master(joint))]
+    notes = [default_ends_note(label, "urdf", base, tip, names)] if is_default else []
+    return Chain(
+        base=base,
+        tip=tip,
+        joint_names=tuple(names),
+        joint_types=tuple(_joint_type(joint) for joint in motions.independent),
+        segment_names=tuple(joint.name for joint in moving),
+        segments=_segments(tree, path, motions, findings),
+        limits=tuple(_limits(tree, joint, findings) for joint in motions.independent),
         links=tuple(link or LinkInertia.from_vector(np.zeros(10)) for link in links) if any(links) else None,
-        friction=tuple(f or FrictionCoefficients() for f in frictions) if any(frictions) else None,
-        link_names=tuple(tuple(element.get("name") for element, _ in members) for members in bodies),
+        friction=_friction(tree, moving, motions, findings),
+        rotor_inertia=None,
+        link_names=tuple(tuple(body.element.get("name") for body in members) for members in bodies),
+        branches=tuple(_branch(label, members) for members in bodies),
+        actuators=(None,) * len(names),
         findings=tuple(findings),
         repairs=tuple(repair for _, repairs in lumped for repair in repairs),
+        notes=(*notes, *_branch_notes(tree, branches, motions)),
     )
+
+
+def _ends(tree: UrdfTree, base: str | None, tip: str | None, locked: Mapping[str, float]) -> tuple[str, str]:
+    """Base and tip: the root, or the first link below a joint that no arm has, and the leaf with most moving joints."""
+    for role, link in (("base", base), ("tip", tip)):
+        if link is not None and link not in tree.links:
+            hint = nearest(link, tree.links)
+            raise RobotFileError(one_line(f"{tree.label}: the {role} link {shown(link)} is not in the file; {hint}"))
+    if tip is None:
+        leaves = [link for link in tree.links if link not in tree.child_joints]
+        paths = {leaf: _up(tree, leaf, base) for leaf in leaves}
+        reached = {leaf: path for leaf, path in paths.items() if path is not None}
+        if not reached:
+            text = "holds no links" if base is None else f"the base {shown(base)} carries no other link; name another"
+            raise RobotFileError(one_line(f"{tree.label}: {text}"))
+
+        def depth(leaf: str) -> tuple[int, int]:
+            moving = [joint for joint in reached[leaf] if joint.type in MOVING and joint.name not in locked]
+            own = [joint for joint in moving if only_child(tree.label, joint.element, "mimic", []) is None]
+            return len(own), len(reached[leaf])
+
+        tip = max(reached, key=depth)
+    if base is None:
+        base = tip
+        while (joint := tree.parent_joint.get(base)) is not None and joint.type in (*MOVING, "fixed"):
+            base = joint.parent
+    return base, tip
+
+
+def _up(tree: UrdfTree, link: str, base: str | None) -> list[UrdfJoint] | None:
+    """Joints from a link up to the base, or to the last that an arm can have; None where the base is not above it."""
+    path: list[UrdfJoint] = []
+    while link != base and (joint := tree.parent_joint.get(link)) is not None:
+        if base is None and joint.type not in (*MOVING, "fixed"):
+            break
+        path.append(joint)
+        link = joint.parent
+    return path if base is None or (link == base and path) else None
 
 
 def _path(tree: UrdfTree, base: str, tip: str) -> list[UrdfJoint]:
     """Joints from base to tip, base first."""
-    for role, link in (("base", base), ("tip", tip)):
-        if link not in tree.links:
-            hint = nearest(link, tree.links)
-            raise RobotFileError(one_line(f"{tree.label}: the {role} link {shown(link)} is not in the URDF; {hint}"))
     path: list[UrdfJoint] = []
     link = tip
     while link != base:
@@ -96,9 +156,6 @@ def _path(tree: UrdfTree, base: str, tip: str) -> list[UrdfJoint]:
             raise RobotFileError(one_line(f"{tree.label}: {text}"))
         path.append(joint)
         link = joint.parent
-    if not any(joint.type != "fixed" for joint in path):
-        text = f"no moving joint lies between base {shown(base)} and tip {shown(tip)}; name the last link as tip"
-        raise RobotFileError(one_line(f"{tree.label}: {text}"))
     if len(path) > MOST_JOINTS:
         raise RobotFileError(one_line(f"{tree.label}: the chain has {len(path)} joints, more than {MOST_JOINTS}"))
     return path[::-1]
@@ -114,99 +171,134 @@ def _remark_on_base(tree: UrdfTree, base: str, findings: list[Finding]) -> None:
         link = joint.parent
 
 
-def _check_movable(tree: UrdfTree, joint: UrdfJoint) -> None:
-    """Refuse joints that are not one independent coordinate along or about an axis."""
-    if joint.type not in MOVING:
-        text = (
-            f"type {joint.type} is not supported; the chain may hold revolute, continuous, prismatic and fixed joints"
-        )
-        raise urdf_error(tree.label, joint.element, text)
-    if children(joint.element, "mimic"):
-        text = "the joint mimics another; closed and coupled chains are not supported: choose a chain without it"
-        raise urdf_error(tree.label, joint.element, text)
+def _follower(tree: UrdfTree, joint: UrdfJoint, master: Master) -> Finding:
+    """Which joint another one follows."""
+    text = f"follows {shown(master.joint.name)}: {master.multiplier:g} times its position, plus {master.offset:g}"
+    return Finding(Severity.INFO, one_line(where(tree.label, joint.element)), text)
 
 
-def _segments(tree: UrdfTree, chain: list[UrdfJoint], findings: list[Finding]) -> tuple[Segment, ...]:
-    """Segments of the chain, fixed joints merged into the next moving one."""
+def _joint_type(joint: UrdfJoint) -> JointType:
+    """How a joint moves."""
+    return JointType.PRISMATIC if joint.type == "prismatic" else JointType.REVOLUTE
+
+
+def _segments(
+    tree: UrdfTree, path: list[UrdfJoint], motions: JointMotions, findings: list[Finding]
+) -> tuple[Segment, ...]:
+    """Segments of the chain, joints that do not move merged into the next moving one."""
     segments: list[Segment] = []
     pending = Placement()
-    for joint in chain:
+    for joint in path:
         pending = compose(pending, origin(tree.label, joint.element, findings))
-        if joint.type == "fixed":
+        if joint.name not in motions.moving:
+            pending = compose(pending, motions.rigid_motion(joint, findings))
             continue
-        align = Placement(rotation_of_z_to(_axis(tree, joint, findings)))
-        kind = JointType.PRISMATIC if joint.type == "prismatic" else JointType.REVOLUTE
-        segments.append(Segment(kind, compose(pending, align), Placement(align.rotation.T)))
+        align = Placement(rotation_of_z_to(joint_axis(tree, joint, findings)))
+        before, after = compose(pending, align), Placement(align.rotation.T)
+        segments.append(Segment(_joint_type(joint), before, after, motions.coupling(joint)))
         pending = Placement()
     return tuple(segments)
 
 
-def _axis(tree: UrdfTree, joint: UrdfJoint, findings: list[Finding]) -> np.ndarray:
-    """Unit vector of a joint's axis; x where none is given, as URDF defines."""
-    element = only_child(tree.label, joint.element, "axis", findings)
-    axis = vector(tree.label, element, "xyz", (1.0, 0.0, 0.0))
-    length = float(np.linalg.norm(axis))
-    if length < 1e-9:
-        raise urdf_error(tree.label, joint.element, "its axis is zero; give the direction, as xyz='0 0 1'")
-    if abs(length - 1.0) > 1e-3:
-        text = f"its axis has length {length:g}; its direction is used"
-        findings.append(Finding(Severity.INFO, one_line(where(tree.label, joint.element)), text))
-    return axis / length
-
-
 def _bodies(
-    tree: UrdfTree, joint: UrdfJoint, chain: list[UrdfJoint], findings: list[Finding]
-) -> list[tuple[Element, Placement]]:
-    """Link elements that move with a joint's child link, and where they sit in its frame."""
-    bodies: list[tuple[Element, Placement]] = []
-    waiting = [(joint.child, Placement())]
+    tree: UrdfTree,
+    joint: UrdfJoint,
+    path: list[UrdfJoint],
+    motions: JointMotions,
+    branches: list[UrdfJoint],
+    findings: list[Finding],
+) -> list[_Body]:
+    """Bodies that move with a joint's child link; notes moving branches."""
+    bodies: list[_Body] = []
+    waiting = [(joint.child, Placement(), False)]
     while waiting:
-        link, placement = waiting.pop()
-        bodies.append((tree.links[link], placement))
+        link, placement, on_branch = waiting.pop()
+        bodies.append(_Body(tree.links[link], placement, on_branch))
         for below in tree.child_joints.get(link, ()):
-            if below.type == "fixed":
-                # The chain's own fixed joints are read again for the segments: remarks on them are made there.
-                remarks = [] if below in chain else findings
-                waiting.append((below.child, compose(placement, origin(tree.label, below.element, remarks))))
-            elif below not in chain:
-                text = (
-                    f"moves beside the chain; link {shown(below.child)} and what hangs on it are left out of the model"
-                )
-                findings.append(Finding(Severity.WARNING, one_line(where(tree.label, below.element)), text))
+            if below.name in motions.moving:
+                continue
+            # The chain's own joints are read again for the segments: remarks on them are made there.
+            remarks = [] if below in path else findings
+            rest = compose(origin(tree.label, below.element, remarks), motions.rigid_motion(below, remarks))
+            waiting.append((below.child, compose(placement, rest), on_branch or below.type != "fixed"))
+            if below.type != "fixed":
+                branches.append(below)
     return bodies
 
 
+def _branch(label: str, members: list[_Body]) -> LinkInertia:
+    """Bodies of a link on joints beside the chain."""
+    carried = [(body.element, body.placement) for body in members if body.on_branch]
+    return lumped_inertia(label, 0, carried, [])[0] or LinkInertia.from_vector(np.zeros(10))
+
+
+def _branch_notes(tree: UrdfTree, branches: list[UrdfJoint], motions: JointMotions) -> list[ResultWarning]:
+    """The note on joints beside the chain, which count as rigid."""
+    assumed = [joint for joint in branches if not motions.is_locked(joint)]
+    mass = sum(stated_mass(tree, joint.child) for joint in _outermost(tree, assumed))
+    if not mass > 0.0:
+        return []
+    following = [joint.name for joint in assumed if motions.follows_chain(joint)]
+    return [rigid_branch_note(tree.label, [joint.name for joint in assumed], mass, following)]
+
+
+def _outermost(tree: UrdfTree, joints: list[UrdfJoint]) -> list[UrdfJoint]:
+    """Joints that hang on none of the others."""
+    names = {joint.name for joint in joints}
+    return [joint for joint in joints if not any(above.name in names for above in _up(tree, joint.parent, None) or ())]
+
+
 def _limits(tree: UrdfTree, joint: UrdfJoint, findings: list[Finding]) -> JointLimits:
-    """Limits of ``<limit>``; zero and endless values, which exporters write for "not known", count as not stated."""
+    """Limits of ``<limit>``; values that exporters write for "not known" count as not stated."""
     element = only_child(tree.label, joint.element, "limit", findings)
     if element is None:
         return JointLimits()
-    lower, upper = (number(tree.label, element, key, 0.0) for key in ("lower", "upper"))
+    lower, upper = (_limit(tree, element, key) for key in ("lower", "upper"))
     if lower > upper and joint.type != "continuous":
-        text = f"limits reversed: lower {lower:g} is above upper {upper:g}; swap them"
-        raise urdf_error(tree.label, joint.element, text)
+        text = f"limits reversed: lower {lower:g} is above upper {upper:g}; they count as not stated, correct them"
+        findings.append(Finding(Severity.WARNING, one_line(where(tree.label, joint.element)), text))
     stated = joint.type != "continuous" and lower < upper and max(-lower, upper) <= LARGEST_NUMBER
     return JointLimits(
         position=(lower, upper) if stated else None,
-        velocity=_largest(tree, joint, element, "velocity"),
-        torque=_largest(tree, joint, element, "effort"),
+        velocity=_largest(tree, element, "velocity"),
+        torque=_largest(tree, element, "effort"),
     )
 
 
-def _largest(tree: UrdfTree, joint: UrdfJoint, element: Element, key: str) -> float | None:
+def _largest(tree: UrdfTree, element: Element, key: str) -> float | None:
     """The size of a velocity or an effort limit, None where it is not stated."""
-    value = number(tree.label, element, key, 0.0)
-    if value < 0.0:
-        raise urdf_error(tree.label, joint.element, f"its {key} limit {value:g} is negative; give its size")
+    value = _limit(tree, element, key)
     return value if 0.0 < value <= LARGEST_NUMBER else None
 
 
-def _friction(tree: UrdfTree, joint: UrdfJoint, findings: list[Finding]) -> FrictionCoefficients | None:
-    """Friction of ``<dynamics>``: damping is viscous, friction is stiction without a Stribeck part."""
-    element = only_child(tree.label, joint.element, "dynamics", findings)
-    if element is None:
+def _limit(tree: UrdfTree, element: Element, key: str) -> float:
+    """A limit; endless where the file says so, zero where it says nothing."""
+    text = (element.get(key) or "").strip().lower().lstrip("+-")
+    if text in ("inf", "infinity", ".inf"):
+        return math.copysign(math.inf, -1.0 if (element.get(key) or "").strip().startswith("-") else 1.0)
+    return 0.0 if text == "nan" else number(tree.label, element, key, 0.0)
+
+
+def _friction(
+    tree: UrdfTree, moving: list[UrdfJoint], motions: JointMotions, findings: list[Finding]
+) -> tuple[FrictionCoefficients, ...] | None:
+    """Friction of ``<dynamics>``, one a joint: damping is viscous, friction is stiction without a Stribeck part.
+
+    A joint that follows with multiplier m brakes its master with |m| times its dry friction and m² times its damping.
+    """
+    total = {joint.name: np.zeros(2) for joint in motions.independent}
+    stated = False
+    for joint in moving:
+        element = only_child(tree.label, joint.element, "dynamics", findings)
+        if element is None:
+            continue
+        stated = True
+        dry, damping = (number(tree.label, element, key, 0.0) for key in ("friction", "damping"))
+        if max(abs(damping), abs(dry)) > LARGEST_NUMBER:
+            text = f"its <dynamics> is beyond {LARGEST_NUMBER:g}; check the unit (SI)"
+            raise urdf_error(tree.label, joint.element, text)
+        master = motions.master(joint) or Master(joint, 1.0, 0.0)
+        total[master.joint.name] += abs(master.multiplier) * dry, master.multiplier**2 * damping
+    if not stated:
         return None
-    damping, friction = (number(tree.label, element, key, 0.0) for key in ("damping", "friction"))
-    if max(abs(damping), abs(friction)) > LARGEST_NUMBER:
-        raise urdf_error(tree.label, joint.element, f"its <dynamics> is beyond {LARGEST_NUMBER:g}; check the unit (SI)")
-    return FrictionCoefficients(stiction=friction, viscous=damping)
+    return tuple(FrictionCoefficients(stiction=float(dry), viscous=float(damping)) for dry, damping in total.values())

@@ -5,7 +5,6 @@ import re
 from typing import Any
 
 import numpy as np
-from lxml import etree
 from numpy.typing import NDArray
 
 from tauscope.errors import RobotFileError
@@ -17,14 +16,22 @@ from tauscope.robot.robot import Placement
 
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
+EXPAND = "expand the file first: pip install xacro; xacro FILE > arm.urdf"
+"""What to do with a file that xacro has not processed."""
+
 Element = Any
 """lxml's `_Element`, which carries no types."""
+
+
+def local_name(element: Element) -> str:
+    """Name of an element without its namespace; one whose prefix is not declared keeps the prefix."""
+    return element.tag.rpartition("}")[2]
 
 
 def where(label: str, element: Element) -> str:
     """File, line and name of an element."""
     name = element.get("name")
-    kind = etree.QName(element).localname
+    kind = local_name(element)
     return f"{label}:{element.sourceline}: {kind}" + (f" {shown(name)}" if name else "")
 
 
@@ -35,7 +42,7 @@ def urdf_error(label: str, element: Element, text: str) -> RobotFileError:
 
 def children(element: Element, kind: str) -> list[Element]:
     """Child elements of one kind, whatever their namespace."""
-    return [child for child in element if isinstance(child.tag, str) and etree.QName(child).localname == kind]
+    return [child for child in element if isinstance(child.tag, str) and local_name(child) == kind]
 
 
 def only_child(label: str, element: Element, kind: str, findings: list[Finding]) -> Element | None:
@@ -111,6 +118,8 @@ def origin(label: str, element: Element, findings: list[Finding]) -> Placement:
 def _real(label: str, element: Element, key: str, text: str) -> float:
     """A finite number; Python's own extras (1_0, other digits than 0-9) are refused."""
     value = float(text.strip()) if NUMBER.fullmatch(text.strip()) else math.nan
+    if "${" in text or "$(" in text:
+        raise urdf_error(label, element, f"{key}={shown(text)} is an expression of xacro; {EXPAND}")
     if not math.isfinite(value):
         raise urdf_error(label, element, f"{key}={shown(text)} is not a finite number; write it plainly, as 0.125")
     return value

@@ -9,7 +9,8 @@ from tauscope.robot.messages import one_line, shown
 from tauscope.robot.physical import nearest_body, repair_text
 from tauscope.robot.placement import compose
 from tauscope.robot.robot import LinkInertia, Placement, Repair
-from tauscope.robot.urdf_element import Element, bounded_number, only_child, origin, urdf_error, where
+from tauscope.robot.urdf_element import Element, bounded_number, number, only_child, origin, where
+from tauscope.robot.urdf_xml import UrdfTree
 
 ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
@@ -66,13 +67,28 @@ def lumped_inertia(
     return LinkInertia.from_vector(np.sum(vectors, axis=0)) if vectors else None, repairs
 
 
+def stated_mass(tree: UrdfTree, link: str) -> float:
+    """Mass of a link and of everything that hangs on it [kg], as the file states it."""
+    total, waiting = 0.0, [link]
+    while waiting:
+        name = waiting.pop()
+        element = only_child(tree.label, tree.links[name], "inertial", [])
+        mass = None if element is None else only_child(tree.label, element, "mass", [])
+        total += 0.0 if mass is None else number(tree.label, mass, "value", 0.0)
+        waiting += [joint.child for joint in tree.child_joints.get(name, ())]
+    return total
+
+
 def _stated_inertia(label: str, body: Element, element: Element, findings: list[Finding]) -> LinkInertia:
     """An `<inertial>` as it stands, about the centre of mass."""
     parts = {kind: only_child(label, element, kind, findings) for kind in ("mass", "inertia")}
+    place = one_line(f"{where(label, element)} of link {shown(body.get('name'))}")
     for kind, part in parts.items():
         if part is None:
-            raise urdf_error(label, element, f"of link {shown(body.get('name'))} has no <{kind}>; add it")
-    mass = bounded_number(label, parts["mass"], "value")
+            findings.append(Finding(Severity.WARNING, place, f"has no <{kind}>, which counts as zero; add it"))
+    mass = 0.0 if parts["mass"] is None else bounded_number(label, parts["mass"], "value")
+    if parts["inertia"] is None:
+        return LinkInertia(mass, np.zeros(3), np.zeros((3, 3)))
     xx, xy, xz, yy, yz, zz = (bounded_number(label, parts["inertia"], key) for key in ENTRIES)
     return LinkInertia(mass, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 

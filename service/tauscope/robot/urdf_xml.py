@@ -1,19 +1,17 @@
-"""URDF text to links and joints: safe XML, checked names, and a tree without loops."""
+"""URDF text to links and joints: checked names, and a tree without loops."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from lxml import etree
-
-from tauscope.errors import RobotFileError
-from tauscope.robot.bounded_file import decode_utf8
 from tauscope.robot.document_fields import LONGEST_NAME
+from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.messages import nearest, one_line, shown
-from tauscope.robot.urdf_element import Element, children, urdf_error
+from tauscope.robot.urdf_element import EXPAND, Element, children, local_name, urdf_error, where
+from tauscope.robot.xml_text import parse_xml
 
-LARGEST_URDF = 16 * 1024 * 1024
 JOINT_TYPES = frozenset({"revolute", "continuous", "prismatic", "fixed", "floating", "planar"})
-XACRO = frozenset({"http://www.ros.org/wiki/xacro", "http://ros.org/wiki/xacro"})
+XACRO_DEFINITIONS = frozenset({"arg", "macro", "property"})
+"""Elements of xacro that stand for no link or joint."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +35,7 @@ class UrdfTree:
     child_joints: Mapping[str, tuple[UrdfJoint, ...]]
 
 
-def parse_urdf(data: bytes, label: str) -> UrdfTree:
+def parse_urdf(data: bytes, label: str, findings: list[Finding]) -> UrdfTree:
     """Links and joints of URDF text.
 
     Raises
@@ -45,8 +43,9 @@ def parse_urdf(data: bytes, label: str) -> UrdfTree:
     RobotFileError
         if the text is not well-formed, holds a DOCTYPE, or its links and joints are no forest
     """
-    root = _parse_xml(data, label)
-    if etree.QName(root).localname != "robot":
+    root = parse_xml(data, label, findings)
+    _refuse_xacro(root, label, findings)
+    if local_name(root) != "robot":
         raise urdf_error(label, root, "a URDF's root element is <robot>; is it the right file?")
     links: dict[str, Element] = {}
     for element in children(root, "link"):
@@ -59,34 +58,22 @@ def parse_urdf(data: bytes, label: str) -> UrdfTree:
     return _connect(label, links, [_joint(label, element, links) for element in children(root, "joint")])
 
 
-def _parse_xml(data: bytes, label: str) -> Element:
-    """The root element; nothing is fetched, and a DOCTYPE is refused before entities can be expanded."""
-    text = decode_utf8(data, label)
-    doctype = text.find("<!DOCTYPE")
-    if doctype >= 0:
-        line = text.count("\n", 0, doctype) + 1
-        raise RobotFileError(one_line(f"{label}:{line}: a DOCTYPE is not accepted in a URDF; remove it"))
-    parser = etree.XMLParser(
-        encoding="utf-8",
-        resolve_entities=False,
-        no_network=True,
-        load_dtd=False,
-        huge_tree=False,
-        remove_comments=True,
-        remove_pis=True,
-    )
-    try:
-        root = etree.fromstring(text.encode("utf-8"), parser)
-    except etree.XMLSyntaxError as error:
-        raise RobotFileError(one_line(f"{label}:{error.lineno or 1}: not valid XML: {error.msg}")) from None
-    except (ValueError, MemoryError) as error:
-        raise RobotFileError(one_line(f"{label}: not valid XML: {error}")) from error
-    for element in root.iter():
-        if isinstance(element.tag, str) and etree.QName(element).namespace in XACRO:
-            raise urdf_error(
-                label, element, "the file is a xacro; expand it first, with ros2 run xacro xacro FILE > arm.urdf"
-            )
-    return root
+def _refuse_xacro(root: Element, label: str, findings: list[Finding]) -> None:
+    """Refuse what xacro would replace by links and joints; definitions that it left over change nothing."""
+    for element in root:
+        if not isinstance(element.tag, str) or not _is_xacro(element):
+            continue
+        name = local_name(element).rpartition(":")[2]
+        if name not in XACRO_DEFINITIONS:
+            raise urdf_error(label, element, f"the file is a xacro; {EXPAND}")
+        text = "is left over from xacro; it is ignored, as ROS' own parser does"
+        findings.append(Finding(Severity.INFO, one_line(where(label, element)), text))
+
+
+def _is_xacro(element: Element) -> bool:
+    """Whether an element belongs to xacro, by its namespace or by a prefix that is not declared."""
+    namespace, _, name = element.tag.rpartition("}")
+    return namespace.rstrip("/").endswith("/xacro") or name.startswith("xacro:")
 
 
 def _joint(label: str, element: Element, links: Mapping[str, Element]) -> UrdfJoint:

@@ -187,7 +187,15 @@ def _to_drive_joint(driver: Driver, robot: Robot, joint: Joint) -> DriveJoint:
         if robot.source is not None and isinstance(file, str) and file:
             drive[key] = str(robot.source.parent / file)
     constant = None if joint.torque_constant == _UNSTATED_CONSTANT else joint.sign * joint.torque_constant
-    return DriveJoint(joint.name, drive, gear_ratio=joint.gear_ratio or 1.0, torque_per_unit=constant)
+    return DriveJoint(
+        joint.name,
+        drive,
+        gear_ratio=joint.gear_ratio or 1.0,
+        torque_per_unit=constant,
+        torque_limit=joint.limits.torque,
+        velocity_limit=joint.limits.velocity,
+        position_range=joint.limits.position,
+    )
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.recording.journal_rows import journal_row_type
+from tauscope.recording.journal_rows import Phase, journal_row_type
 from tauscope.runtime.guard import Guard, GuardViolationError
 from tauscope.runtime.plan import Plan
 from tauscope.runtime.recorder import Recorder
@@ -16,9 +16,6 @@ from tauscope.runtime.torque_control import TorqueControl
 from tauscope_drivers import ArmState, Backend, ControlMode, Setpoint
 
 Array = NDArray[np.float64]
-
-LATEST_NS = 1_000_000
-"""An answer that comes this much later than the bus takes is no sample: its instant is not known [ns]."""
 
 
 class GuardedArm:
@@ -66,6 +63,8 @@ class Cycles:
         largest distance of arm and target so far [rad or m]
     late : (n,) int64
         readings whose instant is not known
+    kept : int
+        samples of the motion, with an answer of every joint
     """
 
     plan: Plan
@@ -75,6 +74,8 @@ class Cycles:
     stops: Stops
     control: TorqueControl | None
     each_cycle: Callable[["Cycles"], None]
+    latest_ns: int
+    kept: int = field(init=False, default=0)
     worst_following: Array = field(init=False)
     late: NDArray[np.int64] = field(init=False)
 
@@ -91,6 +92,12 @@ class Cycles:
     def played(self) -> float:
         """Part of the plan that was played, 0 to 1."""
         return (self.metronome.index + 1) / self.plan.cycles
+
+    @property
+    def kept_share(self) -> float:
+        """Part of the motion's samples that was kept, 0 to 1."""
+        planned = int(np.count_nonzero(np.asarray(self.plan.phase) == Phase.MOTION))
+        return self.kept / planned if planned else 1.0
 
     @property
     def mode(self) -> ControlMode:
@@ -124,7 +131,7 @@ class Cycles:
         Nor is one that came so late that nobody knows of which instant it tells.
         """
         plan, row = self.plan, self._fields
-        if state.late_ns > LATEST_NS:
+        if state.late_ns > self.latest_ns:
             self.late += state.fresh
             return
         if state.time_ns <= row["time_ns"][0] or not state.fresh.any():
@@ -136,5 +143,6 @@ class Cycles:
         row["reference"][0], row["reference_velocity"][0] = plan.position[cycle], plan.velocity[cycle]
         row["command"][0] = torque if self.control is not None else np.nan
         self.recorder.put(self._row)
+        self.kept += bool(plan.phase[cycle] == Phase.MOTION and state.fresh.all())
         # A sample that was missed is NaN and counts for nothing.
         np.fmax(self.worst_following, np.abs(plan.position[cycle] - state.position), out=self.worst_following)

@@ -17,6 +17,9 @@ from tauscope_drivers import Capabilities, ControlMode, StopPolicy
 DEFAULT_RATE_HZ = 500.0
 """Cycles a second where nothing is stated and the bus allows as many."""
 
+RELEASE = "release"
+"""Stop policy: hold, and let go once the arm stands still."""
+
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 
 
@@ -27,8 +30,10 @@ class RunOptions(StrictModel, strict=False):
     rate_hz: Positive | None = Field(
         default=None, le=10_000, description="cycles a second; null for 500, or what the bus allows where that is less"
     )
-    stop_policy: StopPolicy | None = Field(
-        default=None, description="hold, damp or torque_off; null for what the robot file's drives say, else hold"
+    stop_policy: StopPolicy | Literal["release"] | None = Field(
+        default=None,
+        description="hold, damp, torque_off, or release (hold, then let go once the arm stands still); "
+        "null for what the robot file's drives say, else hold",
     )
     watchdog_s: Positive = Field(
         default=0.1, le=10, description="time without a cycle after which the device stops itself"
@@ -39,10 +44,14 @@ class RunOptions(StrictModel, strict=False):
     following_error: Positive | None = Field(
         default=None, description="allowed distance of arm and target, rad or m; null for 0.2 rad or 0.05 m"
     )
-    stale_misses: int = Field(
-        default=3, ge=1, le=1000, description="readings in a row that a joint may not fail to answer"
+    missed: int = Field(default=3, ge=1, le=1000, description="readings in a row that a joint may not fail to answer")
+    lost_s: Positive = Field(default=0.05, description="time after which a joint that does not answer counts as lost")
+    stale_ms: Positive = Field(
+        default=1.0, le=1000, description="how much later than usual an answer may come and still be a sample"
     )
-    stale_s: Positive = Field(default=0.05, description="time after which a joint that does not answer counts as lost")
+    least_kept: Annotated[FiniteFloat, Field(ge=0.0, le=1.0)] = Field(
+        default=0.98, description="share of the motion's samples that has to be kept, else the run ends as degraded"
+    )
     temperature_c: Positive = Field(default=80.0, description="hottest motor that is allowed")
     feed_forward: bool = Field(
         default=True, description="whether the drives get the torque that the robot's model predicts"
@@ -82,6 +91,8 @@ def chosen_stop_policy(
 ) -> StopPolicy:
     """How the arm is stopped: as the run says, else as the robot file's drives say, else under power where it is.
 
+    An arm that is released is held first.
+
     Parameters
     ----------
     capabilities : Capabilities or None
@@ -92,7 +103,8 @@ def chosen_stop_policy(
     AcquisitionError
         the robot file states no policy, or several; or the device cannot do it by itself
     """
-    policy = options.stop_policy or _stated_policy(joints)
+    wanted = options.stop_policy or _stated_policy(joints)
+    policy = StopPolicy.HOLD if wanted == RELEASE else StopPolicy(wanted)
     if capabilities is not None and policy not in (able := capabilities.policies_in(options.mode)):
         raise AcquisitionError(
             f"stop policy {policy}: this arm's drives cannot do that by themselves in mode {options.mode}; "
@@ -101,16 +113,35 @@ def chosen_stop_policy(
     return policy
 
 
-def _stated_policy(joints: Sequence[Joint]) -> StopPolicy:
-    stated: dict[StopPolicy, str] = {}
+def is_released(options: RunOptions, joints: Sequence[Joint]) -> bool:
+    """Whether the arm is let go once it stands still at the end of its motion.
+
+    Raises
+    ------
+    AcquisitionError
+        it is asked for, and the robot file does not state that the arm is safe without torque
+    """
+    if options.stop_policy not in (None, RELEASE):
+        return False
+    is_stated = _stated_policy(joints) == RELEASE
+    if options.stop_policy == RELEASE and not is_stated:
+        raise AcquisitionError(
+            "stop policy release: the robot file does not state that the arm is safe without torque; state "
+            "drive.stop_policy: release for its joints, or choose hold or torque_off"
+        )
+    return is_stated
+
+
+def _stated_policy(joints: Sequence[Joint]) -> str:
+    stated: dict[str, str] = {}
     for joint in joints:
         value: Any = (joint.drive or {}).get("stop_policy")
         if value is None:
             continue
-        if value not in list(StopPolicy):
-            known = ", ".join(StopPolicy)
+        if value not in (known_policies := [*StopPolicy, RELEASE]):
+            known = ", ".join(known_policies)
             raise AcquisitionError(f"{joint.name}: drive.stop_policy is {str(value)[:60]!r}; choose one of {known}")
-        stated.setdefault(StopPolicy(value), joint.name)
+        stated.setdefault(str(value), joint.name)
     if len(stated) > 1:
         words = " and ".join(f"{policy} ({name})" for policy, name in stated.items())
         raise AcquisitionError(f"the robot file's drives ask for different stop policies, {words}; let them agree")

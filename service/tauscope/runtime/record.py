@@ -117,7 +117,14 @@ class RunRecord(StrictModel):
     stop_policy: str | None = Field(default=None, description="how the arm is stopped")
     ramp_s: float | None = Field(default=None, description="time from the first cycle to the motion's start")
     motion_s: float | None = Field(default=None, description="length of the motion")
+    drives: tuple[str, ...] = Field(
+        default=(), description="what the drives do not have, and what is done in place of it; one line each"
+    )
+    holds: bool | None = Field(
+        default=None, description="whether drives were under power when the run let go of the bus; null where unknown"
+    )
     played: float = Field(default=0.0, description="part of ramp and motion that was played, 0 to 1")
+    kept: float | None = Field(default=None, description="part of the motion's samples that was kept, 0 to 1")
     timing: Timing | None = Field(default=None, description="how well the run kept its time")
     real_time: RealTime | None = Field(default=None, description="what the loop was given of what it asked for")
     worst_following: tuple[float, ...] = Field(

@@ -10,11 +10,12 @@ from tauscope.recording.journal_rows import Phase
 from tauscope.robot.messages import one_line
 from tauscope.runtime.guard import Guard, GuardViolationError
 from tauscope.runtime.loop import Cycles, GuardedArm
-from tauscope.runtime.options import chosen_stop_policy
+from tauscope.runtime.options import RELEASE, chosen_stop_policy, is_released
 from tauscope.runtime.plan import Plan
 from tauscope.runtime.progress import ProgressReporter, end_event, state_event
 from tauscope.runtime.record import JOURNAL_FILE, RunProblem, RunRecord, Transition
 from tauscope.runtime.recorder import Recorder, save_recording
+from tauscope.runtime.release import release_settled
 from tauscope.runtime.states import RunState, StopAskedError, raise_if_requested
 from tauscope.runtime.task import RunTask, Surroundings, journal_header, prepare
 from tauscope.runtime.timing import SIMULATED_TIME, Metronome, real_time
@@ -36,8 +37,11 @@ class Run:
         self._backend: Backend | None = None
         self._recorder: Recorder | None = None
         self._cycles: Cycles | None = None
+        self._is_released = is_released(task.options, task.robot.joints)
+        self._is_played = False
         self._is_stopped = False
         self._unconfirmed: str | None = None
+        self._holds: bool | None = None
         self._progress = ProgressReporter(self._tell)
 
     def execute(self) -> RunRecord:
@@ -70,7 +74,7 @@ class Run:
         with real_time() if connection.is_real_time else nullcontext(SIMULATED_TIME) as permitted:
             self._enter(
                 RunState.ENABLING,
-                stop_policy=self._policy.value,
+                stop_policy=RELEASE if self._is_released else self._policy.value,
                 ramp_s=plan.ramp_s,
                 motion_s=plan.motion_s,
                 real_time=permitted,
@@ -95,14 +99,16 @@ class Run:
             period_s=period_s,
             watchdog_s=options.watchdog_s,
             enabled_ns=now,
-            stale_misses=options.stale_misses,
-            stale_s=options.stale_s,
+            stale_misses=options.missed,
+            stale_s=options.lost_s,
         )
         metronome = Metronome(backend.clock, now + plan.period_ns, plan.period_ns, plan.cycles)
         arm = GuardedArm(backend, guard, state)
-        self._cycles = Cycles(plan, arm, metronome, recorder, stops, control, self._each_cycle)
-        self._enter(RunState.RAMPING)
+        latest_ns = round(options.stale_ms * 1e6)
+        self._cycles = Cycles(plan, arm, metronome, recorder, stops, control, self._each_cycle, latest_ns)
+        self._enter(RunState.RAMPING, drives=backend.capabilities.remarks)
         self._cycles.play()
+        self._is_played = True
 
     def _each_cycle(self, cycles: Cycles) -> None:
         """Follow the phase, and report from time to time."""
@@ -117,8 +123,13 @@ class Run:
         stops, backend = self._around.stops, self._backend
         stops.acknowledge()
         try:
-            if backend is not None and (faults := backend.stop(self._policy).faults):
-                self._unconfirmed = f"while the arm was stopped: {faults[0]}"
+            if backend is not None:
+                state = backend.stop(self._policy)
+                if not state.faults and self._is_played and self._is_released:
+                    state = release_settled(backend, state)
+                self._holds = bool(state.enabled.any())
+                if state.faults:
+                    self._unconfirmed = f"while the arm was stopped: {state.faults[0]}"
         except BaseException as error:
             # Then the device's watchdog stops the arm.
             self._unconfirmed = f"the drives did not confirm the stop ({_reason(error)}): look at the arm"
@@ -145,9 +156,29 @@ class Run:
             problem = RunProblem(code=AcquisitionError.code, detail=self._unconfirmed)
         if problem is not None and end is RunState.FINISHED:
             end = RunState.FAILED
+        if end is RunState.FINISHED and (problem := self._loss()) is not None:
+            end = RunState.DEGRADED
         self._enter(end, problem=problem, recording=recording)
         self._tell(end_event(self.record))
         return self.record
+
+    def _loss(self) -> RunProblem | None:
+        """Why so many samples of a motion that was played are missing; None where there are enough."""
+        cycles, timing, options = self._cycles, self.record.timing, self._task.options
+        if cycles is None or timing is None or cycles.kept_share >= options.least_kept:
+            return None
+        late, stale = int(cycles.late.max()), int(cycles.arm.stale.max())
+        causes = {
+            f"{timing.missed_periods} cycles were left out because the loop was late": timing.missed_periods,
+            f"{stale} readings were not answered": stale,
+            f"{late} answers came more than {options.stale_ms:g} ms later than usual": late,
+        }
+        worst = [cause for cause, count in sorted(causes.items(), key=lambda one: -one[1]) if count]
+        kept = f"{100.0 * cycles.kept_share:.1f} % of the motion's samples were kept"
+        least = f"{100.0 * options.least_kept:g} % are asked for"
+        remedy = "use a quieter machine, a lower rate or a faster adapter, or allow it with --least-kept"
+        detail = f"{', '.join(worst) or 'samples were lost'}: {kept}, {least}; {remedy}"
+        return RunProblem(code=AcquisitionError.code, detail=detail)
 
     def _account(self) -> dict[str, Any]:
         """What the loop leaves behind."""
@@ -156,7 +187,9 @@ class Run:
             return {}
         return {
             "played": cycles.played,
+            "kept": cycles.kept_share,
             "timing": cycles.metronome.timing(cycles.arm.stale + cycles.late),
+            "holds": self._holds,
             "worst_following": tuple(float(value) for value in cycles.worst_following),
         }
 

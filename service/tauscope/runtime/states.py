@@ -7,7 +7,7 @@ from typing import Protocol
 
 
 class RunState(StrEnum):
-    """Where a run stands; the last four are ends."""
+    """Where a run stands; the last five are ends. One that is `degraded` was played and lost many samples."""
 
     CREATED = "created"
     CONNECTING = "connecting"
@@ -16,6 +16,7 @@ class RunState(StrEnum):
     RUNNING = "running"
     STOPPING = "stopping"
     FINISHED = "finished"
+    DEGRADED = "degraded"
     STOPPED = "stopped"
     FAILED = "failed"
     INTERRUPTED = "interrupted"
@@ -34,8 +35,11 @@ TRANSITIONS: Mapping[RunState, frozenset[RunState]] = {
     RunState.ENABLING: frozenset({RunState.RAMPING}) | _LEFT_BEHIND,
     RunState.RAMPING: frozenset({RunState.RUNNING}) | _LEFT_BEHIND,
     RunState.RUNNING: _LEFT_BEHIND,
-    RunState.STOPPING: frozenset({RunState.FINISHED, RunState.STOPPED, RunState.FAILED, RunState.INTERRUPTED}),
+    RunState.STOPPING: frozenset(
+        {RunState.FINISHED, RunState.DEGRADED, RunState.STOPPED, RunState.FAILED, RunState.INTERRUPTED}
+    ),
     RunState.FINISHED: frozenset(),
+    RunState.DEGRADED: frozenset(),
     RunState.STOPPED: frozenset(),
     RunState.FAILED: frozenset(),
     RunState.INTERRUPTED: frozenset(),

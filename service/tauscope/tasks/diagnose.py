@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import cached_property, partial
-from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
@@ -17,11 +16,12 @@ from tauscope.diagnosis import (
     document,
 )
 from tauscope.diagnosis.documents.plots import diagnosis_plots
-from tauscope.diagnosis.extended_model.saved import model_document, read_model
+from tauscope.diagnosis.extended_model.saved import model_document
 from tauscope.diagnosis.next_experiment import PlannedExperiment, planned_experiment
 from tauscope.errors import ExcitationError, IdentificationError
-from tauscope.export.extended_compensation import compensation_code
-from tauscope.export.formats import CODE_FILES, ExportFormat
+from tauscope.export.formats import CODE_FILES, EXPORT_FILES, ExportFormat, make_export
+from tauscope.export.model import Origin, of_diagnosis
+from tauscope.export.model_file import model_file, read_extended_model
 from tauscope.export.simulation_files import improved_robot, scenario_text
 from tauscope.identification import Options
 from tauscope.recording import Recording
@@ -35,16 +35,14 @@ from tauscope.tasks.task import (
     Progress,
     ReadingOptions,
     command_words,
-    effort_kind,
     json_text,
+    model_origin,
     read_recordings,
     record_provenance,
-    recording_sources,
 )
 from tauscope.trajectory import trajectory_json
 from tauscope.trajectory.csv_format import trajectory_csv
 from tauscope.trajectory.files import DEFAULT_RATE_HZ
-from tauscope.version import tauscope_version
 
 
 class DiagnosisOptions(ReadingOptions):
@@ -118,15 +116,15 @@ class Result:
 
     @property
     def outputs(self) -> Outputs:
-        """Documents, improved robot and scenario, code as in `CODE_FILES`, and the motion where one was planned."""
+        """documents, improved robot and scenario, exports, and the motion where one was planned."""
         made = {
             "plots.json": lambda: json_text(diagnosis_plots(self.diagnosis), None),
-            "model.json": lambda: json_text(model_document(self.diagnosis)),
+            "model.json": self._model,
             "scenario.yaml": lambda: scenario_text(self.diagnosis),
             "improved-robot.yaml": self._improved_robot,
             "report.html": self._report,
             "result.json": lambda: json_text(self.document),
-            **{file.output: partial(self._code, kind) for kind, file in CODE_FILES.items()},
+            **{file.output: partial(self._export, kind) for kind, file in {**EXPORT_FILES, **CODE_FILES}.items()},
         }
         if self.planned is not None:
             trajectory = self.planned.trajectory
@@ -146,15 +144,15 @@ class Result:
         target = self.files.target("improved-robot.yaml")
         return improved_robot(self.diagnosis, source, source if target is None else target)
 
-    def _code(self, export_format: ExportFormat) -> str:
-        return compensation_code(
-            self.diagnosis,
-            Path(CODE_FILES[export_format].name).suffix,
-            sources=recording_sources(self.provenance),
-            created=self.provenance.created,
-            version=tauscope_version(),
-            effort_kind=effort_kind(self.recordings),
-        )
+    def _export(self, export_format: ExportFormat) -> bytes:
+        return make_export(export_format, of_diagnosis(self.diagnosis, self._origin))
+
+    def _model(self) -> str:
+        return json_text(model_file(model_document(self.diagnosis), self.diagnosis.robot, self._origin))
+
+    @property
+    def _origin(self) -> Origin:
+        return model_origin(self.diagnosis.robot, self.recordings, self.provenance)
 
     def _report(self) -> str:
         from tauscope.report.diagnosis_report import diagnosis_report
@@ -178,7 +176,7 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
         require_black_box(len(request.held_out))
     progress("read robot and recordings")
     robot = read_robot(files.find("robot", request.robot))
-    saved = None if request.model is None else read_model(files.find("model", request.model), robot)
+    saved = None if request.model is None else read_extended_model(files.find("model", request.model), robot)
     recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)
     held_out = read_recordings(files, "held_out", request.held_out, robot, request.options)
     simulated = read_recordings(files, "simulated", request.simulated, robot, request.options)

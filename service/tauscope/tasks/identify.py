@@ -6,7 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from tauscope.export.formats import EXPORT_FILES, ExportFormat, ExportInput, make_export
+from tauscope.export.formats import EXPORT_FILES, ExportFormat, make_export
+from tauscope.export.model import Origin, of_identification
+from tauscope.export.model_file import identified_document, model_file
 from tauscope.identification import (
     Estimator,
     Identification,
@@ -25,11 +27,10 @@ from tauscope.tasks.task import (
     Progress,
     ReadingOptions,
     command_words,
-    effort_kind,
     json_text,
+    model_origin,
     read_recordings,
     record_provenance,
-    recording_sources,
 )
 
 CutoffFrequency = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -89,9 +90,9 @@ class Result:
 
     @property
     def outputs(self) -> Outputs:
-        """``result.json``, ``plots.json``, ``report.html``, and ``exports/…`` as in `EXPORT_FILES`."""
+        """``result.json``, ``model.json``, ``plots.json``, ``report.html``, and ``exports/…`` as in `EXPORT_FILES`."""
         exports = {file.output: partial(self._export, kind) for kind, file in EXPORT_FILES.items()}
-        documents = {"plots.json": self._plots, "report.html": self._report}
+        documents = {"plots.json": self._plots, "report.html": self._report, "model.json": self._model}
         return Outputs({**documents, "result.json": partial(json_text, self.document), **exports})
 
     @cached_property
@@ -111,14 +112,14 @@ class Result:
         return identification_report(self.identification, self.recordings, self.held_out, self.provenance)
 
     def _export(self, export_format: ExportFormat) -> bytes:
-        given = ExportInput(
-            identification=self.identification,
-            sources=recording_sources(self.provenance),
-            effort_kind=effort_kind(self.recordings),
-            urdf=None if self.robot.urdf is None else self.robot.urdf.read_bytes(),
-            created=self.provenance.created,
-        )
-        return make_export(export_format, given)
+        return make_export(export_format, of_identification(self.identification, self._origin))
+
+    def _model(self) -> str:
+        return json_text(model_file(identified_document(self.identification), self.robot, self._origin))
+
+    @property
+    def _origin(self) -> Origin:
+        return model_origin(self.robot, self.recordings, self.provenance)
 
 
 def perform(request: Request, files: Files, progress: Progress) -> Result:

@@ -33,6 +33,9 @@ class BackendChoice(StrictModel):
         description="what the simulated arm conceals: content of a scenario file; null: nothing",
     )
 
+    keep_settings: bool = Field(
+        default=False, description="whether servos keep in EEPROM what a run changed; false: it is put back"
+    )
     start: tuple[FiniteFloat, ...] | None = Field(
         default=None, max_length=100, description="where the simulated arm stands at first, one number a joint"
     )
@@ -126,6 +129,7 @@ def start(
         "time": backend.time,
         "scenario": request.scenario and str(files.find("scenario", request.scenario).resolve()),
         "start": backend.start and list(backend.start),
+        "keep_settings": backend.keep_settings or None,
         "socket": str(sim_socket) if sim_socket is not None and backend.time == "real" else None,
     }
     options = find_driver(backend.name).option_names

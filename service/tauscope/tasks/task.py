@@ -6,13 +6,16 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
 
-from pydantic import BaseModel, Field, field_validator
+from pydantic import BaseModel, Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from tauscope.errors import RecordingMismatchError
 from tauscope.export.compensation import RecordingSource
-from tauscope.recording import EffortKind, Reading, Recording, open_recording
+from tauscope.export.model import Origin
+from tauscope.recording import EffortKind, Reading, Recording, flow_text, open_recording
 from tauscope.report.provenance import InputFile, Provenance, input_files, versions
-from tauscope.robot import RecordingLayout, Robot, find_fault
+from tauscope.robot import RecordingLayout, Robot, find_column_fault, find_fault, find_separator_fault
+from tauscope.robot.messages import one_line
 from tauscope.strict_model import StrictModel
 
 ROLES = {"recordings": "recording", "held_out": "held out", "simulated": "compared with", "model": "compared with"}
@@ -34,6 +37,19 @@ class ReadingOptions(StrictModel):
     trust_units: bool = Field(
         default=False, description="whether a recording is used that can hardly be in the stated units"
     )
+    columns: str | dict[str, str | int | list[str | int]] | None = Field(
+        default=None,
+        description="where the columns are found, where they have other names: a preset (rtde, libfranka, plotjuggler,"
+        " lerobot, mujoco, isaac), or for t, q, tau, i, qd, … or one joint's, as q3, the file's column, its number from"
+        " 1, one of them a joint, or a name with {0}, {1} or {name} for the joint; null: as the robot file says",
+        examples=[{"t": "timestamp", "q": "actual_q_{0}", "tau": "target_moment_{0}"}],
+    )
+    decimal: str | None = Field(default=None, description="decimal sign of a CSV; null: detected")
+    delimiter: str | None = Field(
+        default=None,
+        description="delimiter of a CSV: comma, semicolon, tab, blank or |; null: detected",
+    )
+    topic: str | None = Field(default=None, description="topic of a log that has several with joint states")
 
     @field_validator("units")
     @classmethod
@@ -44,10 +60,36 @@ class ReadingOptions(StrictModel):
             raise PydanticCustomError("units", "{text}", {"text": fault[1]})
         return units
 
+    @field_validator("columns")
+    @classmethod
+    def _check_columns(cls, columns: Any) -> Any:
+        """A preset that is known, or columns of a recording."""
+        fault = find_column_fault(columns)
+        if fault is not None:
+            raise PydanticCustomError("columns", "{text}", {"text": fault})
+        return columns
+
+    @field_validator("decimal", "delimiter")
+    @classmethod
+    def _check_separator(cls, sign: str | None, info: ValidationInfo) -> str | None:
+        """Signs that can separate."""
+        fault = find_separator_fault(**{"decimal": None, "delimiter": None, str(info.field_name): sign})
+        if fault is not None:
+            raise PydanticCustomError("separator", "{text}", {"text": fault[1]})
+        return sign
+
     @property
     def reading(self) -> Reading:
         """The same for those who read."""
-        return Reading(self.units or {}, self.rate_hz, self.trust_units)
+        return Reading(
+            self.units or {},
+            self.rate_hz,
+            self.trust_units,
+            columns=self.columns,
+            decimal=self.decimal,
+            delimiter=self.delimiter,
+            topic=self.topic,
+        )
 
     @property
     def words(self) -> dict[str, Any]:
@@ -56,6 +98,12 @@ class ReadingOptions(StrictModel):
             "units": ",".join(f"{column}={unit}" for column, unit in (self.units or {}).items()) or None,
             "rate": self.rate_hz,
             "trust_units": self.trust_units or None,
+            "columns": self.columns
+            if self.columns is None or isinstance(self.columns, str)
+            else flow_text(self.columns),
+            "decimal": self.decimal,
+            "delimiter": self.delimiter,
+            "topic": self.topic,
         }
         return {name: value for name, value in words.items() if value is not None}
 
@@ -146,11 +194,20 @@ def read_recordings(
     if role == "simulated":
         robot, reading = replace(robot, recording=RecordingLayout()), Reading(trust_units=options.trust_units)
     paths = [files.find(role, name) for name in names]
-    read = [open_recording(path, robot, reading) for path in paths]
+    read = [_open(path, robot, reading) for path in paths]
     return tuple(
         recording if str(path) == name else replace(recording, name=name)
         for recording, path, name in zip(read, paths, names, strict=True)
     )
+
+
+def _open(path: Path, robot: Robot, reading: Reading) -> Recording:
+    """A recording of a robot; where it has other joints than a chain that nobody chose, the reason names the chain."""
+    try:
+        return open_recording(path, robot, reading)
+    except RecordingMismatchError as error:
+        chosen = [f"{note.text}; {note.remedy}" for note in robot.notes if note.code == "default-chain"]
+        raise RecordingMismatchError(one_line("; ".join([str(error), *chosen]))) from error
 
 
 def record_provenance(
@@ -168,8 +225,7 @@ def record_provenance(
     RecordingError
         where a file cannot be read any more
     """
-    paths = [("robot", Path(robot.source))] if robot.source else []
-    paths += [("urdf", robot.urdf)] if robot.urdf else []
+    paths = list(robot.files)
     paths += [(ROLES[role], files.find(role, name)) for role, names in inputs.items() for name in names]
     hashed = [
         InputFile(role, files.show(Path(file.path)), file.size_bytes, file.sha256)
@@ -179,15 +235,17 @@ def record_provenance(
     return Provenance(tuple(command), tuple(hashed), versions(), datetime.now(UTC))
 
 
-def recording_sources(provenance: Provenance) -> list[RecordingSource]:
-    """The recordings that a model is made from, for its exports."""
-    return [RecordingSource(entry.path, entry.sha256) for entry in provenance.inputs if entry.role == "recording"]
-
-
-def effort_kind(recordings: Sequence[Recording]) -> EffortKind:
-    """Current where any recording holds current."""
+def model_origin(robot: Robot, recordings: Sequence[Recording], provenance: Provenance) -> Origin:
+    """Where a model comes from, for its exports; its effort is current where any recording holds current."""
     holds_current = any(recording.effort_kind is EffortKind.CURRENT for recording in recordings)
-    return EffortKind.CURRENT if holds_current else EffortKind.TORQUE
+    sources = (RecordingSource(entry.path, entry.sha256) for entry in provenance.inputs if entry.role == "recording")
+    return Origin(
+        sources=tuple(sources),
+        effort_kind=EffortKind.CURRENT if holds_current else EffortKind.TORQUE,
+        created=provenance.created,
+        urdf=None if robot.urdf is None else robot.urdf.read_bytes(),
+        is_mjcf=robot.mjcf is not None,
+    )
 
 
 def command_words(verb: str, robot: str, **options: Any) -> tuple[str, ...]:

@@ -5,7 +5,9 @@ Time is passed in, frames go in and come out; what moves is behind `AxisDemand` 
 
 from collections.abc import Iterator
 
+from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile
 from tauscope_sim.canopen_bus.axis import AxisDemand, AxisMeasurement, AxisMode, AxisScale
+from tauscope_sim.canopen_bus.device_sheet import apply_sheet
 from tauscope_sim.canopen_bus.object_dictionary import Abort, AbortError, ObjectDictionary
 from tauscope_sim.canopen_bus.power_state import PowerState, PowerStateMachine
 from tauscope_sim.canopen_bus.process_data import ProcessData
@@ -13,6 +15,7 @@ from tauscope_sim.canopen_bus.sdo_server import answer_request
 
 Frame = tuple[int, bytes]
 
+INTERPOLATED_POSITION = 7
 CYCLIC_POSITION = 8
 CYCLIC_TORQUE = 10
 
@@ -29,16 +32,24 @@ _ABORT_QUICK_STOP = 3
 _ABORT_DISABLE = 2
 _ABORT_FAULT = 1
 _STANDING = 1e-3
+_INTERPOLATE = 0x10
 _EXPONENTS = range(-6, 1)
 
 
 class EmulatedDrive:
     """A drive with its node on the bus."""
 
-    def __init__(self, node_id: int, scale: AxisScale) -> None:
-        """Power up."""
+    def __init__(self, node_id: int, scale: AxisScale, file: DeviceFile | None = None) -> None:
+        """Power up.
+
+        Parameters
+        ----------
+        file : DeviceFile or None
+            whose objects it has; all that a master may need where None
+        """
         self.node_id = node_id
         self.scale = scale
+        self._file = file
         self.power_up()
 
     def power_up(self) -> None:
@@ -46,6 +57,9 @@ class EmulatedDrive:
         self.power = PowerStateMachine()
         self.dictionary = self._dictionary()
         self.process_data = ProcessData(self.dictionary, self.node_id)
+        if self._file is not None:
+            apply_sheet(self.dictionary, self._file)
+        self.power.quick_stop_stays = self.dictionary.get(0x605A) in _QUICK_STOP_STAYS
         self._nmt = _PRE_OPERATIONAL
         self._is_off_bus = False
         self._mode_taken = 0
@@ -98,9 +112,9 @@ class EmulatedDrive:
             return AxisDemand(AxisMode.HOLDING, torque_cap=cap)
         if self.power.state is not PowerState.OPERATION_ENABLED:
             return AxisDemand(AxisMode.RELEASED)
-        if self._mode_taken == CYCLIC_POSITION:
+        if self._mode_taken in (CYCLIC_POSITION, INTERPOLATED_POSITION):
             low, high = (self.dictionary.get(0x607D, end) for end in (1, 2))
-            target = min(max(self.dictionary.get(0x607A), low), high)
+            target = min(max(self._target_count, low), high)
             place = target / self.scale.counts_per_radian
             return AxisDemand(AxisMode.POSITION, position=place, torque_cap=cap, interpolation_s=self._interpolation_s)
         if self._mode_taken == CYCLIC_TORQUE:
@@ -136,6 +150,14 @@ class EmulatedDrive:
             self._report(_BUS_OFF_RECOVERED)
 
     @property
+    def _target_count(self) -> int:
+        """Where the drive is sent; in interpolated mode to where it is, as long as bit 4 does not start it."""
+        if self._mode_taken == CYCLIC_POSITION:
+            return self.dictionary.get(0x607A)
+        starts = self.dictionary.get(0x6040) & _INTERPOLATE
+        return self.dictionary.get(0x60C1, 1) if starts else self.dictionary.get(0x6064)
+
+    @property
     def _watched_node(self) -> int:
         """Node whose heartbeat is watched; -1 for none."""
         word = self.dictionary.get(0x1016, 1)
@@ -144,7 +166,7 @@ class EmulatedDrive:
     @property
     def _interpolation_s(self) -> float:
         """Time from one target to the next; 0 where the drive has no such object and finds it from SYNC."""
-        if (0x60C2, 1) not in self.dictionary.entries:
+        if not self.dictionary.has(0x60C2, 1):
             return 0.0
         return self.dictionary.get(0x60C2, 1) * 10.0 ** self.dictionary.get(0x60C2, 2)
 
@@ -199,7 +221,7 @@ class EmulatedDrive:
         word = self.power.state.value
         if self.power.state not in (PowerState.QUICK_STOP_ACTIVE, PowerState.NOT_READY):
             word |= 0x20 if word & 0x07 else 0
-        follows = self.power.state is PowerState.OPERATION_ENABLED and self._mode_taken in (8, 10)
+        follows = self.power.state is PowerState.OPERATION_ENABLED and self._mode_taken in (7, 8, 10)
         self.dictionary.put(0x6041, word | 0x0200 | (0x1000 if follows else 0))
 
     def _take_controlword(self, word: int) -> None:
@@ -218,7 +240,8 @@ class EmulatedDrive:
         self._last_master_s = None
 
     def _take_mode(self, mode: int) -> None:
-        if mode not in (CYCLIC_POSITION, CYCLIC_TORQUE):
+        known = (INTERPOLATED_POSITION, CYCLIC_POSITION, CYCLIC_TORQUE)
+        if mode not in known or not self.dictionary.get(0x6502) >> (mode - 1) & 1:
             raise AbortError(Abort.VALUE_RANGE)
         self._mode_taken = mode
         self.dictionary.put(0x6061, mode)

@@ -34,13 +34,14 @@ WriteHook = Callable[[int], None]
 
 @dataclass
 class Entry:
-    """One entry."""
+    """One entry; one that is not visible is the drive's own, as if a master had never heard of it."""
 
     bytes: int
     value: int = 0
     signed: bool = False
     writable: bool = True
     hook: WriteHook | None = None
+    is_visible: bool = True
 
 
 @dataclass
@@ -96,6 +97,11 @@ class ObjectDictionary:
         AbortError
             there is no such entry
         """
+        self._visible(index, subindex)
+        return self.encode(index, subindex)
+
+    def encode(self, index: int, subindex: int) -> bytes:
+        """Value of an entry as the drive itself sends it, little end first."""
         entry = self._entry(index, subindex)
         return entry.value.to_bytes(entry.bytes, "little", signed=entry.signed)
 
@@ -107,7 +113,7 @@ class ObjectDictionary:
         AbortError
             there is no such entry, it is not writable, the length is wrong, or the drive refuses the value
         """
-        entry = self._entry(index, subindex)
+        entry = self._visible(index, subindex)
         if not entry.writable:
             raise AbortError(Abort.READ_ONLY)
         if len(data) != entry.bytes:
@@ -117,6 +123,15 @@ class ObjectDictionary:
             entry.hook(value)
         entry.value = value
 
+    def has(self, index: int, subindex: int = 0) -> bool:
+        """Whether a master finds an entry."""
+        return (index, subindex) in self.entries and self.entries[index, subindex].is_visible
+
+    def _visible(self, index: int, subindex: int) -> Entry:
+        if not self.has(index, subindex):
+            raise self._missing(index, subindex)
+        return self.entries[index, subindex]
+
     def _entry(self, index: int, subindex: int) -> Entry:
         try:
             return self.entries[index, subindex]
@@ -125,5 +140,5 @@ class ObjectDictionary:
 
     def _missing(self, index: int, subindex: int) -> AbortError:
         """What a master is told that asks for an entry that does not exist."""
-        known = any(place[0] == index for place in self.entries)
+        known = any(place[0] == index and entry.is_visible for place, entry in self.entries.items())
         return AbortError(Abort.NO_SUBINDEX if known else Abort.NO_OBJECT)

@@ -2,11 +2,13 @@
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from tauscope.robot import read_robot
+from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
 from tauscope_sim.canopen_bus.axis import AxisScale
 from tauscope_sim.canopen_bus.can_socket import CanSocket, SocketLine
 from tauscope_sim.canopen_bus.drive import EmulatedDrive
@@ -79,12 +81,17 @@ class CanOrder:
             block, ratio = joint.drive or {}, joint.gear_ratio or 1.0
             turns = block["counts_per_turn"] * ratio * block.get("direction", 1)
             scale = AxisScale(turns / (2.0 * math.pi), rated, abs(ratio))
-            drives.append(EmulatedDrive(block["node_id"], scale))
+            drives.append(EmulatedDrive(block["node_id"], scale, self._file(block)))
         driven = DrivenArm(drives, robot, scenario, self.start, STEP_S, self.torque_noise)
         # the kernel's virtual bus and a stepped clock take their time by themselves
         bit_rate = math.inf if self.stepped or self._interface is not None else self.bit_rate
         line = SerialLine() if self._interface is None else SocketLine()
         return CanEmulator(drives, driven, now_s, bit_rate, line)
+
+    def _file(self, block: Mapping[str, Any]) -> DeviceFile | None:
+        """The EDS or DCF file of a drive, beside the robot file; None where it names none."""
+        eds = block.get("eds")
+        return None if eds is None else read_device_file(Path(self.robot).parent / eds, block["node_id"])
 
     @property
     def _interface(self) -> str | None:

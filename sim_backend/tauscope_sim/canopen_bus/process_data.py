@@ -88,7 +88,7 @@ class ProcessData:
         if self._dictionary.get(mapping, 0) != 0:
             raise AbortError(Abort.DEVICE_STATE)
         entry = self._dictionary.entries.get((word >> 16, word >> 8 & 0xFF))
-        if entry is None or 8 * entry.bytes != word & 0xFF:
+        if entry is None or not entry.is_visible or 8 * entry.bytes != word & 0xFF:
             raise AbortError(Abort.NOT_MAPPABLE)
 
     def _require_fit(self, mapping: int, count: int) -> None:
@@ -116,4 +116,4 @@ class ProcessData:
 
     def _sample(self, pdo: _Pdo) -> bytes:
         """Payload of a TPDO."""
-        return b"".join(self._dictionary.read(index, subindex) for index, subindex, _ in self._entries(pdo.mapping))
+        return b"".join(self._dictionary.encode(index, subindex) for index, subindex, _ in self._entries(pdo.mapping))

@@ -171,6 +171,9 @@ class EmulatedBus:
     def _write(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         address, data = int.from_bytes(instruction.parameters[:2], "little"), instruction.parameters[2:]
         deliveries: list[Delivery] = []
+        for servo in self._followers(instruction.servo, end_s):
+            if servo.servo != instruction.servo:
+                self._write_quietly(servo, address, data)
         for servo in self._addressed(instruction, end_s):
             level, error = servo.memory.get("Status Return Level"), 0
             try:
@@ -243,9 +246,9 @@ class EmulatedBus:
     def _sync_write(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         address, length = _words(instruction.parameters)
         data = instruction.parameters[4:]
-        present = {servo.servo: servo for servo in self._present(end_s)}
         for start in range(0, len(data) - length, 1 + length):
-            self._write_quietly(present.get(data[start]), address, data[start + 1 : start + 1 + length])
+            for servo in self._followers(data[start], end_s):
+                self._write_quietly(servo, address, data[start + 1 : start + 1 + length])
         return []
 
     def _bulk_read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
@@ -258,18 +261,20 @@ class EmulatedBus:
 
     def _bulk_write(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         data = instruction.parameters
-        present = {servo.servo: servo for servo in self._present(end_s)}
         start = 0
         while start + 5 <= len(data):
             address, length = _words(data[start + 1 : start + 5])
-            self._write_quietly(present.get(data[start]), address, data[start + 5 : start + 5 + length])
+            for servo in self._followers(data[start], end_s):
+                self._write_quietly(servo, address, data[start + 5 : start + 5 + length])
             start += 5 + length
         return []
 
-    def _write_quietly(self, servo: EmulatedServo | None, address: int, data: bytes) -> None:
+    def _followers(self, number: int, now_s: float) -> list[EmulatedServo]:
+        """Servos that carry out what is written to an ID: its own, and those whose Secondary ID it is."""
+        return [servo for servo in self._present(now_s) if number in (servo.servo, servo.secondary)]
+
+    def _write_quietly(self, servo: EmulatedServo, address: int, data: bytes) -> None:
         """A write that nobody answers, refused or not."""
-        if servo is None:
-            return
         try:
             servo.write(address, data)
         except WriteRefusedError:

@@ -114,6 +114,8 @@ class ControlMemory:
             "ID": specification.servo,
             "Baud Rate": BAUD_CODES.index(specification.baud),
             "Baud Rate (Bus)": BAUD_CODES.index(specification.baud),
+            "Secondary ID": 255,
+            "Secondary(Shadow) ID": 255,
             "Return Delay Time": 250,
             "Operating Mode": 3,
             "Protocol Type": 2,
@@ -178,6 +180,8 @@ class ControlMemory:
         """Whether a value is within the range of an item."""
         if name in _SYMMETRIC:
             return abs(value) <= self.get(_SYMMETRIC[name])
+        if name == "Profile Velocity":
+            return 0 <= value <= self.get("Velocity Limit")
         if name == "Goal Position" and self.get("Operating Mode") == 3:
             return self.get("Min Position Limit") <= value <= self.get("Max Position Limit")
         if name == "Goal Position":

@@ -18,6 +18,7 @@ ALERT = 0x80
 
 _WATCHDOG_STEP_S = 0.02
 _LONGEST_WATCHDOG = 127
+_LARGEST_SECONDARY = 252
 _TORQUE_ON_BY_GOAL = 0x08
 _Y_CODES = {OVERHEATING: 4, ENCODER: 13, ELECTRICAL: 7, OVERLOAD: 5}
 _Y_WATCHDOG_CODE = 18
@@ -48,6 +49,12 @@ class EmulatedServo:
     def servo(self) -> int:
         """ID."""
         return self.specification.servo
+
+    @property
+    def secondary(self) -> int | None:
+        """Another ID whose writes it carries out, without an answer; None where it has none."""
+        number = self.memory.get("Secondary(Shadow) ID") or self.memory.get("Secondary ID")
+        return number if 0 < number <= _LARGEST_SECONDARY else None
 
     @property
     def has_torque(self) -> bool:

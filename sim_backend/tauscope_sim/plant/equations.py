@@ -36,7 +36,8 @@ class EquationsOfMotion:
     def __init__(self, robot: Robot, effects: Sequence[PhysicalEffect]) -> None:
         real = reduce(lambda arm, effect: effect.alter(arm), effects, robot)
         count = real.joint_count
-        self._rotors = sum((effect.added_rotor_inertia(real) for effect in effects), np.zeros(count))
+        stated = np.array(real.model.rotor_inertia or (0.0,) * count)
+        self._rotors = sum((effect.added_rotor_inertia(real) for effect in effects), stated)
         transmissions = compliant_transmissions(effects, self._rotors)
         self.coordinates = Coordinates(count, tuple(sorted(transmissions)))
         self._count, self._size = count, self.coordinates.size

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 class RigidBodies:
     """An arm of rigid links at one position and velocity: H(q), h(q, q̇) + c(q), and what a tool carries.
 
+    Where segments follow joints, q_segments = A q + b, and H = Aᵀ H_segments A, h + c = Aᵀ (h + c)_segments.
+
     Parameters
     ----------
     rotor_inertia : (n,) float64
@@ -24,10 +26,15 @@ class RigidBodies:
 
     def __init__(self, robot: Robot, rotor_inertia: Array) -> None:
         self._model = build_model(robot)
-        self._model.dof_armature[:] = rotor_inertia
+        self._ratios = robot.ratios
+        self._offsets = np.array([coupling.offset for coupling in robot.couplings])
+        self._is_coupled = robot.link_count > robot.joint_count
+        self._rotors = np.diag(np.asarray(rotor_inertia, dtype=np.float64))
+        if not self._is_coupled:
+            self._model.dof_armature[:] = rotor_inertia
         self._data = mujoco.MjData(self._model)
         self._scratch = mujoco.MjData(self._model)
-        count = robot.joint_count
+        count = robot.link_count
         self._last_link = list(robot.model.links or ())[-1].to_vector()
         self._carried: dict[int, Array] = {}
         self._position, self._velocity = self._data.qpos, self._data.qvel
@@ -47,20 +54,20 @@ class RigidBodies:
         velocity : (n,) float64
             q̇ [rad/s or m/s]
         """
-        self._position[:] = position
-        self._velocity[:] = velocity
+        self._position[:] = self._ratios @ position + self._offsets if self._is_coupled else position
+        self._velocity[:] = self._ratios @ velocity if self._is_coupled else velocity
         mujoco.mj_fwdPosition(self._model, self._data)
         mujoco.mj_fwdVelocity(self._model, self._data)
 
     @property
     def bias(self) -> Array:
         """h(q, q̇) + c(q), shape (n,): a view that the next `update` overwrites [Nm or N]."""
-        return self._bias
+        return self._ratios.T @ self._bias if self._is_coupled else self._bias
 
     def mass_matrix(self) -> Array:
         """H(q) with the rotors on its diagonal, shape (n, n): overwritten by the next call [kg m² or kg]."""
         mujoco.mj_fullM(self._model, self._data, self._matrix)
-        return self._matrix
+        return self._ratios.T @ self._matrix @ self._ratios + self._rotors if self._is_coupled else self._matrix
 
     def accelerations(self, torque: Array | list[float]) -> Array:
         """Solve H(q) q̈ = τ, shape (n,): a view that the next call overwrites [rad/s² or m/s²].
@@ -70,6 +77,8 @@ class RigidBodies:
         torque : (n,) float64
             τ [Nm or N]
         """
+        if self._is_coupled:
+            return np.asarray(np.linalg.solve(self.mass_matrix(), torque), dtype=np.float64)
         self._right_side[0] = torque
         mujoco.mj_solveM(self._model, self._data, self._solution, self._right_side)
         return self._accelerations
@@ -86,7 +95,7 @@ class RigidBodies:
         point = self._data.xpos[tool] + self._data.xmat[tool].reshape(3, 3) @ offset
         jacobian = np.zeros((3, tool))
         mujoco.mj_jac(self._model, self._data, jacobian, None, point, tool)
-        return jacobian
+        return jacobian @ self._ratios if self._is_coupled else jacobian
 
     def carry(self, carrier: object, payload: Array | None) -> None:
         """Change what the last link carries; it takes the payload over at its own speed, without an impact.

@@ -76,6 +76,8 @@ def test_drives_are_told_the_cycle_and_those_that_need_not_know_it_are_left_alon
 ) -> None:
     bus.drives[1].dictionary.put(0x60C2, -4, 2)
     del bus.drives[2].dictionary.entries[0x60C2, 1]
+    arm.disconnect()
+    arm.connect()
     arm.enable(ControlMode.POSITION, LIMITS, StopPolicy.HOLD, LONG_WATCHDOG_S, 0.004)
     for drive in bus.drives[:2]:
         assert (drive.dictionary.get(0x60C2, 1), drive.dictionary.get(0x60C2, 2)) == (4, -3)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from emulated_can_bus import COUNTS_PER_TURN, GEAR, EmulatedBus
+from emulated_data_sheet import sections, write_file
 from tauscope_drivers import ControlMode, DriveLimits, DriverError
 from tauscope_drivers.canopen.doctor import can_interfaces, examine, scan_bus
 from tauscope_drivers.canopen.dry_run import plan_frames
@@ -30,12 +31,20 @@ JOINTS = [
 ]
 
 
-def test_sound_drives_have_nothing_to_be_mended() -> None:
-    with EmulatedBus() as bus:
+def test_sound_drives_have_nothing_to_be_mended(tmp_path: Path) -> None:
+    path = Path(write_file(tmp_path, sections()))
+    with EmulatedBus([path] * 3) as bus:
         findings = examine(bus.joints())
     assert {finding.severity for finding in findings} == {Severity.GOOD}
     assert sum("a per mille" in finding.detail for finding in findings) == 3
     assert "answered in" in findings[-1].detail
+
+
+def test_without_its_file_a_drive_is_sound_as_far_as_reading_tells() -> None:
+    with EmulatedBus() as bus:
+        doubts = [finding for finding in examine(bus.joints()) if finding.severity is not Severity.GOOD]
+    assert {finding.severity for finding in doubts} == {Severity.WARNING}
+    assert {finding.remedy for finding in doubts} == {"name its file as drive.eds"}
 
 
 def test_a_missing_drive_and_one_in_fault_are_told_with_a_remedy() -> None:
@@ -115,3 +124,24 @@ def test_can_interfaces_of_the_machine(
         (tmp_path / name / "flags").write_text(f"{flags}\n")
     monkeypatch.setattr("tauscope_drivers.canopen.doctor._NETWORK", tmp_path)
     assert can_interfaces() == [Finding(severity, "can7", words, remedy)]
+
+
+def test_a_rated_torque_in_another_unit_is_told() -> None:
+    with EmulatedBus([None]) as bus:
+        bus.drives[0].dictionary.put(0x6076, 512_871)
+        (joint,) = bus.joints()
+        findings = examine([replace(joint, torque_limit=20.0)])
+    (doubt,) = [finding for finding in findings if "rated torque" in finding.detail]
+    assert doubt.severity is Severity.WARNING
+    assert "is taken in µNm, 0.512871 Nm" in doubt.detail
+    assert doubt.remedy == "state drive.rated_torque_nm to settle it"
+
+
+def test_limits_are_checked_all_at_once() -> None:
+    with EmulatedBus([None]) as bus:
+        bus.drives[0].dictionary.put(0x6072, 0)
+        (joint,) = bus.joints()
+        findings = examine([replace(joint, position_range=(1.0, 2.0))])
+    failures = [finding.detail for finding in findings if finding.severity is Severity.FAILURE]
+    assert ["stands at 0.3, outside its limits 1 to 2" in failures[0], len(failures)] == [True, 2]
+    assert failures[1] == "Max torque (0x6072:00) leaves no torque"

@@ -8,9 +8,6 @@ from hypothesis import strategies as st
 
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.process_data import (
-    MOTION_PDO,
-    STATE_PDO,
-    TARGET_PDOS,
     PdoLayout,
     decode_pdo,
     encode_pdo,
@@ -18,13 +15,13 @@ from tauscope_drivers.canopen.process_data import (
 )
 from tauscope_drivers.canopen.units import DriveUnits
 
+STATE_PDO = PdoLayout((objects.STATUSWORD, objects.TORQUE_ACTUAL, objects.POSITION_ACTUAL))
+MOTION_PDO = PdoLayout((objects.VELOCITY_ACTUAL, objects.ERROR_CODE))
 UNITS = DriveUnits(2.0 * math.pi / (65536 * 50), zero_count=1000, torque_per_permille=0.025)
 
 
 def test_the_bytes_of_a_target_frame() -> None:
-    from tauscope_drivers.backend import ControlMode
-
-    layout = TARGET_PDOS[ControlMode.POSITION]
+    layout = PdoLayout((objects.CONTROLWORD, objects.TARGET_POSITION))
     payload = encode_pdo(layout, {objects.CONTROLWORD: 0x000F, objects.TARGET_POSITION: -2})
     assert payload == bytes.fromhex("0F 00 FE FF FF FF")
     assert mapping_entries(layout.objects) == [0x60400010, 0x607A0020]

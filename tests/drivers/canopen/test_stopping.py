@@ -9,7 +9,7 @@ from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import DriveObject
 from tauscope_drivers.canopen.observation import arm_faults
-from tauscope_drivers.canopen.process_data import MOTION_PDO, STATE_PDO
+from tauscope_drivers.canopen.pdo_plan import MEASURED, MEASURED_WHERE_THERE
 from tauscope_drivers.canopen.session import Session
 from tauscope_drivers.canopen.state_machine import Goal
 from tauscope_drivers.canopen.stopping import PROMPT_CYCLES, dropped_faults, has_stopped, stop_one_by_one, stop_promptly
@@ -25,7 +25,7 @@ class Dictionary:
     """A drive's object dictionary, or the lack of one."""
 
     def __init__(self, statusword: int, failure: DriverErrorKind | None = None) -> None:
-        self.values = dict.fromkeys((*STATE_PDO.objects, *MOTION_PDO.objects), 0) | {objects.STATUSWORD: statusword}
+        self.values = dict.fromkeys((*MEASURED, *MEASURED_WHERE_THERE), 0) | {objects.STATUSWORD: statusword}
         self.written: list[tuple[DriveObject, int]] = []
         self._failure = failure
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType, IndexType, Writer
 from starlette.testclient import TestClient
 
 from server.conftest import RECORDINGS
@@ -43,16 +43,25 @@ def test_a_parquet_bomb(client: TestClient) -> None:
 
 
 @pytest.mark.usefixtures("small_bounds")
-def test_an_mcap_bomb(client: TestClient) -> None:
+@pytest.mark.parametrize(
+    ("kind", "index", "words"),
+    [
+        ("sensor_msgs/msg/JointState", IndexType.ALL, "times its size"),
+        ("sensor_msgs/msg/JointState", IndexType.NONE, "times its size"),
+        ("X", IndexType.NONE, "times its size"),
+        ("X", IndexType.ALL, "it holds the topics /x"),  # nothing is unpacked
+    ],
+)
+def test_an_mcap_bomb(client: TestClient, kind: str, index: IndexType, words: str) -> None:
     file = io.BytesIO()
-    writer = Writer(file, compression=CompressionType.ZSTD)
+    writer = Writer(file, compression=CompressionType.ZSTD, index_types=index)
     writer.start()
-    channel = writer.register_channel("/x", "json", writer.register_schema("X", "jsonschema", b"{}"))
+    channel = writer.register_channel("/x", "json", writer.register_schema(kind, "jsonschema", b"{}"))
     for number in range(30):
         writer.add_message(channel, number, b"0" * 2**20, number)
     writer.finish()
     assert len(file.getvalue()) < 30 * 2**20 / inflation.LARGEST_RATIO
-    assert "times its size" in report(client, "bomb.mcap", file.getvalue())
+    assert words in report(client, "bomb.mcap", file.getvalue())
 
 
 def test_what_packs_well_and_is_small_is_no_bomb() -> None:

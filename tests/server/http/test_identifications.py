@@ -37,6 +37,21 @@ def form(request: dict[str, Any]) -> dict[str, str]:
     return {"request": json.dumps(request)}
 
 
+def test_columns_of_another_tool(client: TestClient, files: Files) -> None:
+    name, content = files[1][1]
+    header, _, rows = content.partition(b"\n")
+    foreign = header.replace(b"tau", b"effort_").replace(b"t,", b"clock;", 1).replace(b",", b";")
+    files[1] = ("recordings", (name, foreign + b"\n" + rows.replace(b",", b";").replace(b".", b",")))
+    columns = {"t": "clock", "tau": "effort_{1}"}
+    sent = {"options": {"cutoff_hz": None, "columns": columns, "decimal": ",", "delimiter": "semicolon"}}
+    accepted = client.post(IDENTIFICATIONS, files=files, data=form(sent))
+    assert accepted.status_code == 202, accepted.text
+    assert client.get(accepted.headers["location"]).json()["state"] == "succeeded"
+    for wrong in ({"columns": "rdte"}, {"columns": {"x": "a"}}, {"decimal": "'"}):
+        refused = client.post(IDENTIFICATIONS, files=files, data=form({"options": wrong}))
+        assert_problem(refused, "invalid-request", 422)
+
+
 @pytest.mark.usefixtures("drawn_figures")
 def test_uploaded_files_all_the_way(client: TestClient, files: Files, paper_recordings: tuple[bytes, bytes]) -> None:
     files.append(("held_out", ("test.csv", paper_recordings[1])))
@@ -48,7 +63,8 @@ def test_uploaded_files_all_the_way(client: TestClient, files: Files, paper_reco
     status = client.get(here).json()
     assert status["state"] == "succeeded"
     assert status["robot"] == "paper-arm"
-    read_as = {"units": None, "rate_hz": None, "trust_units": False}
+    layout = dict.fromkeys(("units", "rate_hz", "columns", "decimal", "delimiter", "topic"))
+    read_as = {**layout, "trust_units": False}
     assert status["options"] == {"estimator": "wls", "cutoff_hz": None, "rotor_inertia": True, "prior": True, **read_as}
     assert [(entry["name"], entry["origin"]) for entry in status["recordings"]] == [("train.csv", "uploaded")]
     assert status["created"] <= status["started"] <= status["ended"]

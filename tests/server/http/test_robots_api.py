@@ -15,6 +15,8 @@ URDF = (
     b'<child link="tool"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
 )
 URDF_ROBOT = b"name: arm\nkinematics: {urdf: {file: arm.urdf, base: base, tip: tool}}\n"
+MJCF = b"""<mujoco><worldbody><body name="a"><joint name="one" axis="0 1 0"/><geom size=".1" pos=".2 0 0"/></body>
+</worldbody></mujoco>"""
 
 
 @pytest.fixture
@@ -50,6 +52,35 @@ def test_a_urdf_comes_as_a_part_of_its_own(client: TestClient) -> None:
     assert "'arm.urdf' was not sent" in problem["detail"]
 
 
+def test_a_urdf_or_mjcf_comes_by_itself(client: TestClient) -> None:
+    report = client.post(CHECK, files={"robot": ("arm.urdf", URDF)}).json()
+    assert report["joints"][0]["limits"]["position"] == [-1.0, 1.0]
+    assert any("deepest leaf" in finding["text"] for finding in report["findings"])
+    report = client.post(CHECK, files={"robot": ("arm.xml", MJCF)}).json()
+    assert [joint["name"] for joint in report["joints"]] == ["one"]
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        '<include file="/etc/passwd"/>',
+        '<asset><mesh file="../../mesh.stl"/></asset>',
+        '<asset><texture name="t" type="cube" fileright="/etc/passwd"/></asset>',
+        '<asset><model file="other.xml"/></asset>',
+        '<compiler meshdir="/"/>',
+        '<extension><plugin plugin="mujoco.sdf.torus"/></extension>',
+    ],
+)
+def test_an_mjcf_opens_no_file_of_the_server(client: TestClient, part: str) -> None:
+    text = MJCF.replace(b"<worldbody>", part.encode() + b"<worldbody>")
+    for files in (
+        {"robot": ("arm.xml", text)},
+        {"robot": ("arm.yaml", b"name: a\nkinematics: {mjcf: {file: arm.xml}}\n"), "urdf": ("arm.xml", text)},
+    ):
+        problem = assert_problem(client.post(CHECK, files=files), "robot-file", 422)
+        assert "was not sent" in problem["detail"]
+
+
 def test_an_impossible_body_is_a_finding(client: TestClient, tmp_path: Path) -> None:
     link = {"mass": -1.0, "first_moment": [0, 0, 0], "inertia": dict.fromkeys(("xx", "yy", "zz", "xy", "xz", "yz"), 0)}
     robot = {"name": "r", "kinematics": {"dh": [{"theta": 0, "d": 0, "a": 1, "alpha": 0}]}, "model": {"links": [link]}}
@@ -70,7 +101,8 @@ def test_an_impossible_body_is_a_finding(client: TestClient, tmp_path: Path) -> 
         (b"name: r\nname: s\n", "arm.yaml:2"),
         (b"\xff\xfe\x00", "arm.yaml:1: byte 0xff"),
         (b"[" * 5000, "arm.yaml"),
-        (b"<robot/>", "arm.yaml: is XML"),
+        (b"<robot/>", "arm.yaml: holds no links"),
+        (b"<html/>", "arm.yaml:1: its root element is <html>"),
         (b"- 1\n", "arm.yaml"),
         (b"a: &a [x, x]\nb: &b [*a, *a]\nc: &c [*b, *b]\nd: [*c, *c]\nname: r\n", "arm.yaml"),
     ],

@@ -62,7 +62,7 @@ def test_a_run_from_its_beginning_to_its_recording(arm: TestClient, controls: Ha
     run = begin(arm, mode="torque", rate_hz=250.0, stop_policy="damp")
     assert run["options"]["mode"] == "torque"
     assert (run["options"]["rate_hz"], run["options"]["stop_policy"]) == (250.0, "damp")
-    assert run["backend"] == {"name": "sim", "time": "virtual", "scenario": None, "start": None}
+    assert run["backend"] == {"name": "sim", "time": "virtual", "scenario": None, "keep_settings": False, "start": None}
     control = controls.next()
     control.go(RunState.RUNNING)
     control.progress(40.0)

@@ -158,6 +158,8 @@ class DescribedObject:
 
     value : bytes or None
         the same as it is transferred, little end first; None where it is not of its type
+    default : int or None
+        value as delivered; None where the file states none, or no whole number
     """
 
     name: str
@@ -168,6 +170,7 @@ class DescribedObject:
     is_mappable: bool
     value_text: str | None = None
     value: bytes | None = None
+    default: int | None = None
 
     @property
     def type_name(self) -> str:
@@ -259,6 +262,7 @@ def _described(variable: ODVariable) -> DescribedObject:
         is_mappable=variable.pdo_mappable,
         value_text=None if text is None else _printable(text),
         value=None if text is None else _transferred(variable, text),
+        default=variable.default if isinstance(variable.default, int) else None,
     )
 
 

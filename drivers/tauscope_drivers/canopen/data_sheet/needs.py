@@ -5,46 +5,58 @@ from typing import Protocol
 
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
-from tauscope_drivers.canopen.data_sheet.device_file import TYPE_NAMES, DataSheetError, DeviceFile
+from tauscope_drivers.canopen.data_sheet.device_file import TYPE_NAMES, DataSheetError, DescribedObject, DeviceFile
+from tauscope_drivers.canopen.drive_modes import TARGETS, select_modes
 from tauscope_drivers.canopen.objects import DriveObject
-from tauscope_drivers.canopen.process_data import (
-    MOTION_PDO,
-    STATE_PDO,
-    TARGET_PDOS,
-    PdoParameters,
-    received_parameters,
-    sent_parameters,
+from tauscope_drivers.canopen.optional_objects import SUBSTITUTES, WRITTEN
+from tauscope_drivers.canopen.pdo_plan import (
+    MEASURED,
+    MEASURED_WHERE_THERE,
+    PDO_COUNT,
+    PdoSlot,
+    PdoSlots,
+    decode_mapping,
+    plan_pdos,
 )
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 
-_READ = (objects.DEVICE_TYPE, objects.SUPPORTED_MODES)
-_WRITTEN = (
-    *(objects.MODE_OF_OPERATION, objects.QUICK_STOP_OPTION, objects.ABORT_CONNECTION, objects.FAULT_REACTION_OPTION),
-    *(objects.LARGEST_TORQUE, objects.LOWEST_POSITION, objects.HIGHEST_POSITION),
-    *(objects.CONSUMER_HEARTBEAT, objects.PRODUCER_HEARTBEAT),
-)
-_WRITTEN_WHERE_THERE = (objects.INTERPOLATION_VALUE, objects.INTERPOLATION_EXPONENT)
+_READ = (objects.DEVICE_TYPE, objects.SUPPORTED_MODES, objects.MODE_DISPLAY)
+_WRITTEN = (objects.CONTROLWORD, objects.MODE_OF_OPERATION)
+
+
+def present_objects(file: DeviceFile) -> frozenset[DriveObject]:
+    """Optional objects that a drive has as the driver uses them, by its file."""
+    return frozenset(entry for entry in SUBSTITUTES if _is_there(file, entry))
+
+
+def find_flaws(file: DeviceFile, *, reads_rated_torque: bool) -> list[str]:
+    """Everything for which the driver cannot use a drive, each as a clause that names the object; empty if none."""
+    flaws = [flaw for entry in _READ if (flaw := _flaw(file, entry))]
+    flaws += [flaw for entry in _WRITTEN if (flaw := _flaw(file, entry, is_written=True))]
+    if flaw := _flaw(file, objects.CONSUMER_HEARTBEAT, is_written=True):
+        flaws.append(f"{flaw}: the drive would not notice that the host is gone")
+    flaws += [flaw for entry in SUBSTITUTES if _find(file, entry) and (flaw := _flaw(file, entry))]
+    flaws += [flaw for entry in MEASURED if (flaw := _flaw(file, entry, is_mapped=True))]
+    flaws += _target_flaws(file, ControlMode.POSITION)
+    if flaws and reads_rated_torque and not states_rated_torque(file):
+        flaws.append(f"{objects.RATED_TORQUE} is missing: give drive.rated_torque_nm")
+    return flaws
+
+
+def states_rated_torque(file: DeviceFile) -> bool:
+    """Whether a drive states its rated torque; else a run needs it from the robot file."""
+    return _flaw(file, objects.RATED_TORQUE) is None
 
 
 def require_needed(file: DeviceFile, *, reads_rated_torque: bool) -> None:
-    """Refuse a drive without an object that the driver needs of every drive, or with one of another kind.
+    """Refuse a drive that the driver cannot use.
 
     Raises
     ------
     DataSheetError
-        names the object
+        names every flaw
     """
-    for entry in (*_READ, *((objects.RATED_TORQUE,) if reads_rated_torque else ())):
-        _require(file, entry)
-    for entry in (*_WRITTEN, *(entry for entry in _WRITTEN_WHERE_THERE if _place(entry) in file.objects)):
-        _require(file, entry, is_written=True)
-    for entry in (*STATE_PDO.objects, *MOTION_PDO.objects):
-        _require(file, entry, is_mapped=True)
-    for entry in _pdo_places():
-        _require(file, entry, is_written=True)
-    require_target(file, ControlMode.POSITION)
-    if _place(objects.TARGET_TORQUE) in file.objects:
-        require_target(file, ControlMode.TORQUE)
+    _refuse(find_flaws(file, reads_rated_torque=reads_rated_torque))
 
 
 def require_target(file: DeviceFile, mode: ControlMode) -> None:
@@ -55,39 +67,93 @@ def require_target(file: DeviceFile, mode: ControlMode) -> None:
     DataSheetError
         names the object
     """
-    for entry in TARGET_PDOS[mode].objects:
-        _require(file, entry, is_mapped=True, is_written=True)
+    _refuse(_target_flaws(file, mode))
 
 
-def _pdo_places() -> Iterator[DriveObject]:
-    """Where the drive keeps what its PDOs are; targets of both modes have the same."""
-
-    def places(parameters: PdoParameters) -> Iterator[DriveObject]:
-        yield from (parameters.identifier, parameters.kind, parameters.count, *parameters.entries)
-
-    yield from places(received_parameters(TARGET_PDOS[ControlMode.POSITION]))
-    for number, layout in enumerate((STATE_PDO, MOTION_PDO)):
-        yield from places(sent_parameters(number, layout))
+def pdo_slots(file: DeviceFile) -> PdoSlots:
+    """The PDOs of a drive, and which of them can be mapped."""
+    received = (_slot(file, number, 0x1400 + number, 0x1600 + number) for number in range(PDO_COUNT))
+    sent = (_slot(file, number, 0x1800 + number, 0x1A00 + number) for number in range(PDO_COUNT))
+    return PdoSlots(tuple(slot for slot in received if slot), tuple(slot for slot in sent if slot))
 
 
-def _require(file: DeviceFile, entry: DriveObject, *, is_mapped: bool = False, is_written: bool = False) -> None:
-    """Refuse an object that is not there, or not as the driver needs it."""
-    described, flaw = file.objects.get(_place(entry)), None
-    wanted = f"{'INTEGER' if entry.signed else 'UNSIGNED'}{entry.bits}"
+def _target_flaws(file: DeviceFile, mode: ControlMode) -> list[str]:
+    """Why a drive takes no targets of a mode, and gives no measurements meanwhile."""
+    described = _find(file, objects.SUPPORTED_MODES)
+    stated = None if described is None else described.default
+    number = select_modes(stated).get(mode) if stated else next(iter(TARGETS[mode]))
+    if number is None:
+        return [f"{objects.SUPPORTED_MODES} states no cyclic synchronous {mode} mode"]
+    target = TARGETS[mode][number]
+    if flaw := _flaw(file, target, is_mapped=True, is_written=True):
+        return [flaw]
+    if mode is ControlMode.TORQUE and not _find(file, objects.VELOCITY_ACTUAL):
+        return [f"{objects.VELOCITY_ACTUAL} is missing, by which a runaway is noticed"]
+    optional = (entry for entry in MEASURED_WHERE_THERE if _is_mappable(file, entry))
+    missing = plan_pdos(pdo_slots(file), target, optional).missing
+    return [f"{entry} is in none of its PDOs, and their mapping cannot be written" for entry in missing]
+
+
+def _slot(file: DeviceFile, number: int, communication: int, mapping: int) -> PdoSlot | None:
+    """A PDO as the file describes it; None where it has none of this number."""
+    count = file.objects.get((mapping, 0))
+    if (communication, 1) not in file.objects or count is None:
+        return None
+    entries = list(_entries(file, mapping))
+    if "w" in count.access and entries and all("w" in entry.access for entry in entries):
+        return PdoSlot(number, entries=len(entries))
+    words = [entry.default or 0 for entry in entries[: count.default or 0]]
+    return PdoSlot(number, decode_mapping(words) or ())
+
+
+def _entries(file: DeviceFile, mapping: int) -> Iterator[DescribedObject]:
+    """Entries of a mapping parameter, in their order."""
+    subindex = 1
+    while (entry := file.objects.get((mapping, subindex))) is not None:
+        yield entry
+        subindex += 1
+
+
+def _is_there(file: DeviceFile, entry: DriveObject) -> bool:
+    """Whether an optional object is there, and can be written where the driver writes it."""
+    if entry in MEASURED_WHERE_THERE:
+        return _is_mappable(file, entry)
+    return _flaw(file, entry, is_written=entry in WRITTEN) is None
+
+
+def _is_mappable(file: DeviceFile, entry: DriveObject) -> bool:
+    return _flaw(file, entry, is_mapped=True) is None
+
+
+def _flaw(file: DeviceFile, entry: DriveObject, *, is_mapped: bool = False, is_written: bool = False) -> str | None:
+    """Why an object is not usable: it is missing, or not as the driver needs it."""
+    described = _find(file, entry)
+    # values that an unsigned object takes here fit the signed one of its size
+    wanted = ("INTEGER",) if entry.signed else ("UNSIGNED", "INTEGER")
     if described is None:
-        flaw = "is missing"
-    elif TYPE_NAMES.get(described.data_type) != wanted:
-        flaw = f"is {described.type_name}, not {wanted}"
-    elif is_mapped and not described.is_mappable:
-        flaw = "cannot be mapped to a PDO (PDOMapping)"
-    elif is_written and "w" not in described.access:
-        flaw = f"cannot be written (AccessType {described.access[:20]!a})"
-    if flaw is not None:
-        raise DataSheetError(f"{entry} {flaw}, and the driver needs it; check that it is the file of this drive")
+        return f"{entry} is missing"
+    if TYPE_NAMES.get(described.data_type) not in [f"{kind}{entry.bits}" for kind in wanted]:
+        return f"{entry} is {described.type_name}, not {wanted[0]}{entry.bits}"
+    if is_mapped and not described.is_mappable and not _is_mapped_always(file, entry):
+        return f"{entry} cannot be mapped to a PDO (PDOMapping)"
+    if is_written and "w" not in described.access:
+        return f"{entry} cannot be written (AccessType {described.access[:20]!a})"
+    return None
 
 
-def _place(entry: DriveObject) -> tuple[int, int]:
-    return entry.index, entry.subindex
+def _is_mapped_always(file: DeviceFile, entry: DriveObject) -> bool:
+    """Whether a PDO of fixed mapping holds it, whatever its PDOMapping states."""
+    slots = pdo_slots(file)
+    return any(slot.fixed is not None and entry in slot.fixed for slot in (*slots.received, *slots.sent))
+
+
+def _find(file: DeviceFile, entry: DriveObject) -> DescribedObject | None:
+    return file.objects.get((entry.index, entry.subindex))
+
+
+def _refuse(flaws: list[str]) -> None:
+    if flaws:
+        raise DataSheetError(f"{'; '.join(flaws)}; check that it is the file of this drive, or use another drive")
 
 
 class OptionalReader(Protocol):

@@ -21,6 +21,8 @@ from tauscope.diagnosis.against.wrong_values import attribute
 from tauscope.diagnosis.findings.diagnosed import Diagnosis, ParameterDifference
 from tauscope.diagnosis.findings.finding import Finding, FitSizes
 from tauscope.diagnosis.findings.plain import with_plain_terms
+from tauscope.diagnosis.model.term import Place
+from tauscope.effects.rotor_inertia import RotorInertia
 from tauscope.errors import IdentificationError
 from tauscope.identification import Options
 from tauscope.recording.recording import Array, Recording
@@ -71,7 +73,24 @@ def against_model(diagnosis: Diagnosis) -> Diagnosis:
         raise IdentificationError(
             f"{robot.source or robot.name}: has no model block to compare with: add one, or leave --against out"
         )
-    return compared(diagnosis, _stated(diagnosis), "model")
+    rotors = _stated_rotors(diagnosis)
+    missing = tuple(finding for finding in diagnosis.findings if finding.place not in rotors)
+    found = compared(beside(diagnosis, missing) if rotors else diagnosis, _stated(diagnosis), "model")
+    wrong = [each for each in rotors.values() if is_wrong(each, CLEAR)]
+    return replace(found, differences=ordered([*found.differences, *wrong]))
+
+
+def _stated_rotors(diagnosis: Diagnosis) -> dict[Place, ParameterDifference]:
+    """Rotors that were found, and that the robot file states: they are not missing, though they may be wrong."""
+    stated = diagnosis.robot.model.rotor_inertia or ()
+    rotors = {}
+    for finding in diagnosis.findings:
+        effect, joint = finding.place
+        if effect == RotorInertia.id and joint is not None and joint < len(stated) and stated[joint] > 0.0:
+            name = f"{RotorInertia.id} {diagnosis.robot.joints[joint].name}"
+            real, std = float(finding.terms[0].coefficients[0]), float(np.sqrt(finding.covariances[0][0, 0]))
+            rotors[finding.place] = ParameterDifference(name, stated[joint], real, std)
+    return rotors
 
 
 def against_simulation(diagnosis: Diagnosis, simulated: Sequence[Recording], options: Options) -> Diagnosis:
@@ -170,10 +189,10 @@ def compared(diagnosis: Diagnosis, given: Given, kind: Literal["model", "simulat
 
 def _attribution(diagnosis: Diagnosis, given: Given, real: Array, covariance: Array) -> Attribution:
     """The surplus of the base parameters, to be explained by links."""
-    base, joints = diagnosis.selection.fit.model.structure.base, diagnosis.robot.joint_count
+    base, links = diagnosis.selection.fit.model.structure.base, diagnosis.robot.link_count
     stated = np.array([given.values[name] for name in base.expressions])
     same = np.diag((NEGLIGIBLE * np.maximum(np.abs(real), np.abs(stated))) ** 2)
-    prior = diagnosis.identification.posterior.prior.root[: 10 * joints, : 10 * joints]
+    prior = diagnosis.identification.posterior.prior.root[: 10 * links, : 10 * links]
     believed = np.asarray(np.linalg.inv(prior.T @ prior), dtype=np.float64)
     return Attribution(base, real - stated, covariance + same, given.links, believed)
 

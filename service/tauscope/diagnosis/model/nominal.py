@@ -37,7 +37,7 @@ def nominal_model(identification: Identification) -> ExtendedModel:
     return ExtendedModel(
         structure=structure.with_terms(tuple(replace(terms, rotor=False) for terms in structure.terms)),
         parameters=_without_rotors(identification, identification.free_parameters),
-        links=identification.consistent.parameters[: 10 * identification.robot.joint_count],
+        links=identification.consistent.parameters[: 10 * identification.robot.link_count],
         constants=tuple(constants),
         stated=tuple(stated),
     )

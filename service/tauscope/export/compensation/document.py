@@ -2,7 +2,7 @@
 
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -15,7 +15,7 @@ from tauscope.robot import JointType
 SCHEMA = "tauscope.compensation/1"
 
 
-def to_document(model: CompensationModel) -> dict[str, Any]:
+def to_document(model: CompensationModel, effects: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
     """The model as mappings, lists, strings and numbers, the same for JSON and YAML.
 
     Coefficients stand three times: as joint torque, in mA and in ‰ of rated torque; the last two are None where the
@@ -29,15 +29,16 @@ def to_document(model: CompensationModel) -> dict[str, Any]:
         "recordings": [{"name": source.name, "sha256": source.sha256} for source in model.recordings],
         "equation": EQUATION,
         "joints": [_joint(number, joint) for number, joint in enumerate(model.joints, start=1)],
+        **({"effects": [dict(each) for each in effects]} if effects else {}),
     }
 
 
-def to_json(model: CompensationModel) -> str:
+def to_json(model: CompensationModel, effects: Sequence[Mapping[str, Any]] = ()) -> str:
     """The model as JSON text; every number reads back as the same float64."""
-    return json.dumps(to_document(model), indent=2, allow_nan=False) + "\n"
+    return json.dumps(to_document(model, effects), indent=2, allow_nan=False) + "\n"
 
 
-def to_yaml(model: CompensationModel) -> str:
+def to_yaml(model: CompensationModel, effects: Sequence[Mapping[str, Any]] = ()) -> str:
     """The model as YAML text; YAML 1.1 and 1.2 readers see the same strings and float64 numbers."""
     yaml = YAML(typ="safe", pure=True)
     yaml.Representer = _PlainRepresenter
@@ -45,7 +46,7 @@ def to_yaml(model: CompensationModel) -> str:
     yaml.sort_base_mapping_type_on_output = False  # pyright: ignore[reportAttributeAccessIssue]
     yaml.width = 4096
     stream = io.StringIO()
-    yaml.dump(_with_quoted_text(to_document(model)), stream)
+    yaml.dump(_with_quoted_text(to_document(model, effects)), stream)
     return stream.getvalue()
 
 

@@ -100,7 +100,7 @@ def plausible_prior(robot: Robot, factor: Array, target: Array, friction: Fricti
     target : (r,) float64
         z
     """
-    count = robot.joint_count
+    count = robot.link_count
     lengths = link_lengths(robot)
     friction_scale = _friction_scale(factor[:, 10 * count :], target)
     if friction is not None:
@@ -187,7 +187,7 @@ def link_lengths(robot: Robot) -> Array:
     (n,) float64
         lengths [m], positive
     """
-    spans = np.array([np.linalg.norm(np.subtract(*_joint_positions(robot, j))) for j in range(robot.joint_count)])
+    spans = np.array([np.linalg.norm(np.subtract(*_joint_positions(robot, j))) for j in range(robot.link_count)])
     apart = spans[spans > 0.0]
     smallest = float(apart.mean()) if apart.size else 0.0
     return np.maximum(spans, max(smallest, _SMALLEST_LENGTH))
@@ -197,7 +197,7 @@ def _joint_positions(robot: Robot, index: int) -> tuple[Array, Array]:
     """Where a link's own joint and the next one are, in the link frame [m]; the last link ends at its frame."""
     after = robot.segments[index].after
     own = -after.rotation.T @ after.translation
-    following = robot.segments[index + 1].before.translation if index + 1 < robot.joint_count else np.zeros(3)
+    following = robot.segments[index + 1].before.translation if index + 1 < robot.link_count else np.zeros(3)
     return own, following
 
 

@@ -26,6 +26,9 @@ class BackendRequest(StrictModel):
     scenario: dict[str, Any] | None = Field(
         default=None, description="what the simulated arm conceals: content of a scenario file; null: nothing"
     )
+    keep_settings: bool = Field(
+        default=False, description="whether servos keep in EEPROM what a run changed; false: it is put back"
+    )
     start: tuple[FiniteFloat, ...] | None = Field(
         default=None,
         max_length=100,
@@ -52,6 +55,7 @@ def chosen_backend(settings: Settings, request: BackendRequest, robot: Robot) ->
         time=request.time or settings.sim_time,
         scenario=request.scenario,
         start=request.start,
+        keep_settings=request.keep_settings,
     )
 
 

@@ -125,6 +125,13 @@ class RunAnswer(AnswerModel):
     stop_policy: str | None = Field(default=None, description="how the arm is stopped")
     ramp_s: float | None = Field(default=None, description="time from the first cycle to the motion's start")
     motion_s: float | None = Field(default=None, description="length of the motion")
+    holds: bool | None = Field(
+        default=None, description="whether the arm was under power when the run ended; null where unknown"
+    )
+    drives: tuple[str, ...] = Field(
+        default=(), description="what the drives do not have or what was changed in them; one line each"
+    )
+    kept: float | None = Field(default=None, description="part of the motion's samples that was kept, 0 to 1")
     timing: Timing | None = Field(default=None, description="rate, jitter, missed and stale samples")
     real_time: RealTime | None = Field(default=None, description="what the control loop was given of what it asked for")
     worst_following: tuple[float, ...] = Field(
@@ -218,6 +225,9 @@ def describe(services: Services, identifier: str, root: str) -> RunAnswer:
         stop_policy=record.stop_policy,
         ramp_s=record.ramp_s,
         motion_s=record.motion_s,
+        holds=record.holds,
+        drives=record.drives,
+        kept=record.kept,
         timing=record.timing,
         real_time=record.real_time,
         worst_following=record.worst_following,

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 
 from emulated_data_sheet import GAIN, LABEL, OFFSET, Sections, sections, text_of, write_file
 from tauscope_drivers import ControlMode
+from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen.block_check import check_blocks
 from tauscope_drivers.canopen.configuration import (
     BusConfiguration,
     DriveJoint,
@@ -18,7 +20,11 @@ from tauscope_drivers.canopen.configuration import (
     require_targets,
 )
 from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, DeviceFile, read_device_file
+from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects
+from tauscope_drivers.canopen.optional_objects import describe_absent
+from tauscope_drivers.canopen.pdo_plan import MEASURED_WHERE_THERE, plan_pdos
 from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.inspection import Severity
 
 WHOLE = text_of(sections(VendorNumber="0x3A1", ProductNumber="", RevisionNumber="0x20005"))
 
@@ -59,24 +65,98 @@ def test_no_file_is_needed() -> None:
     assert configured(None).nodes[0].device_file is None
 
 
-@pytest.mark.parametrize(
-    "section",
-    [
-        *("1000", "1016", "1016sub1", "1017", "1400sub1", "1400sub2", "1600sub0", "1600sub2", "1801sub1", "1A00sub3"),
-        *("6007", "603F", "6040", "6041", "605A", "605E", "6060", "6064", "606C", "6072", "6076", "6077", "607A"),
-        *("607D", "607Dsub2", "6502"),
-    ],
-)
+NEEDED = ("1000", "1016", "1016sub1", "6040", "6041", "6060", "6061", "6064", "6077", "607A", "6502")
+OPTIONAL = ("1017", "6007", "603F", "605A", "605E", "606C", "6072", "607D", "60C2")
+
+
+def remove(content: Sections, *sections: str) -> None:
+    for name in [name for name in content if name.startswith(sections)]:
+        del content[name]
+
+
+@pytest.mark.parametrize("section", NEEDED)
 def test_a_missing_object_is_named(tmp_path: Path, section: str) -> None:
     content = sections()
-    for name in [name for name in content if name == section or name.startswith(section + "sub")]:
-        del content[name]
+    remove(content, section)
     path = write_file(tmp_path, content)
-    index, _, subindex = section.partition("sub")
-    named = f"(0x{index}:0{subindex or '1' if index in ('1016', '607D') else subindex or '0'}) is missing"
+    index = section[:4]
     message = refusal(path)
     assert repr(path) in message
-    assert named in message
+    assert f"(0x{index}:0{'1' if index == '1016' else '0'}) is missing" in message
+
+
+def test_all_flaws_are_named_at_once(tmp_path: Path) -> None:
+    content = sections()
+    remove(content, *NEEDED)
+    remove(content, "6076")
+    content["6072"]["DataType"] = "0x20"
+    message = refusal(write_file(tmp_path, content))
+    assert message.count(" is missing") == len(NEEDED)
+    assert "Motor rated torque (0x6076:00) is missing: give drive.rated_torque_nm" in message
+    assert "Max torque (0x6072:00) is DOMAIN" in message
+
+
+@pytest.mark.parametrize("section", OPTIONAL)
+def test_an_optional_object_may_be_absent(tmp_path: Path, section: str) -> None:
+    content = sections()
+    remove(content, section)
+    file = configured(write_file(tmp_path, content)).nodes[0].device_file
+    assert file is not None
+    lines = describe_absent(present_objects(file))
+    assert len(lines) == 1
+    assert f"(0x{section}:" in lines[0]
+
+
+@pytest.mark.parametrize(("stated", "doubts"), [({}, 1), ({"rated_torque_nm": 0.4}, 0)])
+def test_a_rated_torque_that_nobody_states_is_told(tmp_path: Path, stated: dict[str, float], doubts: int) -> None:
+    content = sections()
+    remove(content, "6076")
+    bus = {"interface": "virtual", "channel": "none", "node_id": 5, "counts_per_turn": 4096}
+    findings = check_blocks([DriveJoint("elbow", {**bus, "eds": write_file(tmp_path, content), **stated})])
+    told = [one for one in findings if one.remedy == "state drive.rated_torque_nm"]
+    assert len(told) == doubts
+    assert all(one.severity is not Severity.FAILURE for one in findings)
+
+
+def test_one_that_is_read_only_counts_as_absent(tmp_path: Path) -> None:
+    content = sections()
+    content["605A"]["AccessType"] = "ro"
+    file = configured(write_file(tmp_path, content)).nodes[0].device_file
+    assert file is not None
+    assert objects.QUICK_STOP_OPTION not in present_objects(file)
+
+
+def fix_mapping(content: Sections, mapping: str, *entries: int) -> None:
+    """Make a PDO's mapping constant."""
+    for name in [name for name in content if name.startswith(f"{mapping}sub")]:
+        content[name]["AccessType"] = "const"
+    content[f"{mapping}sub0"]["DefaultValue"] = str(len(entries))
+    for subindex, entry in enumerate(entries, 1):
+        content[f"{mapping}sub{subindex}"]["DefaultValue"] = hex(entry)
+
+
+def test_pdos_of_fixed_mapping_are_used_as_they_are(tmp_path: Path) -> None:
+    content = sections()
+    fix_mapping(content, "1600", 0x60400010)
+    fix_mapping(content, "1602", 0x60400010, 0x607A0020)
+    fix_mapping(content, "1A01", 0x60410010, 0x60640020)
+    file = configured(write_file(tmp_path, content)).nodes[0].device_file
+    assert file is not None
+    plan = plan_pdos(pdo_slots(file), objects.TARGET_POSITION, MEASURED_WHERE_THERE)
+    assert plan.missing == ()
+    assert [(pdo.number, pdo.is_fixed) for pdo in plan.received] == [(2, True)]
+    assert [(pdo.number, pdo.is_fixed) for pdo in plan.sent] == [(0, False), (1, True)]
+    assert plan.sent[0].layout.objects == (objects.TORQUE_ACTUAL, objects.VELOCITY_ACTUAL, objects.ERROR_CODE)
+
+
+def test_fixed_mappings_without_a_needed_object_are_refused(tmp_path: Path) -> None:
+    content = sections()
+    for number in range(4):
+        fix_mapping(content, f"160{number}", 0x60400010)
+        fix_mapping(content, f"1A0{number}", 0x60410010, 0x60640020)
+    message = refusal(write_file(tmp_path, content))
+    for entry in ("Target position (0x607A:00)", "Torque actual value (0x6077:00)"):
+        assert f"{entry} is in none of its PDOs, and their mapping cannot be written" in message
 
 
 @pytest.mark.parametrize(
@@ -84,12 +164,11 @@ def test_a_missing_object_is_named(tmp_path: Path, section: str) -> None:
     [
         ("607A", {"PDOMapping": "0"}, "Target position (0x607A:00) cannot be mapped to a PDO"),
         ("6041", {"PDOMapping": ""}, "Statusword (0x6041:00) cannot be mapped"),
-        ("6071", {"PDOMapping": "0"}, "Target torque (0x6071:00) cannot be mapped"),
         ("6064", {"DataType": "0x0003"}, "Position actual value (0x6064:00) is INTEGER16, not INTEGER32"),
         ("6077", {"DataType": "0x0006"}, "Torque actual value (0x6077:00) is UNSIGNED16, not INTEGER16"),
         ("6072", {"DataType": "0x20"}, "Max torque (0x6072:00) is DOMAIN, not UNSIGNED16"),
         ("60C2sub1", {"DataType": "0x0006"}, "Interpolation time period, value (0x60C2:01) is UNSIGNED16"),
-        ("1600sub1", {"AccessType": "ro"}, "PDO entry (0x1600:01) cannot be written (AccessType 'ro')"),
+        ("6060", {"AccessType": "ro"}, "Modes of operation (0x6060:00) cannot be written (AccessType 'ro')"),
         ("6040", {"DataType": "word"}, "DataType in [6040] is 'word', which is no number"),
         ("6064", {"ParameterName": ""}, "is no whole EDS or DCF file"),
         ("DeviceInfo", {"VendorNumber": "many"}, "VendorNumber in [DeviceInfo] is 'many'"),
@@ -142,8 +221,13 @@ def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
 def test_a_drive_without_what_nobody_reads_is_taken(tmp_path: Path) -> None:
     """Its rated torque where the robot file states it, the cycle, and targets of torque until they are asked for."""
     content = sections()
-    for name in ("6076", "6071", "60C2", "60C2sub0", "60C2sub1", "60C2sub2"):
+    for name in ("6076", "60C2", "60C2sub0", "60C2sub1", "60C2sub2"):
         del content[name]
+    content["6071"]["PDOMapping"] = "0"
+    configuration = configured(write_file(tmp_path, content), rated_torque_nm=0.4)
+    with pytest.raises(DriverError, match=re.escape("Target torque (0x6071:00) cannot be mapped")):
+        require_targets(configuration, ControlMode.TORQUE)
+    del content["6071"]
     configuration = configured(write_file(tmp_path, content), rated_torque_nm=0.4)
     require_targets(configuration, ControlMode.POSITION)
     with pytest.raises(DriverError, match=re.escape("drive.eds: Target torque (0x6071:00) is missing")) as caught:

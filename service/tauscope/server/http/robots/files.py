@@ -10,11 +10,15 @@ from tauscope.robot import Robot, RobotReport, check_robot, read_robot
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.messages import one_line, shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
-from tauscope.robot.urdf_xml import LARGEST_URDF
+from tauscope.robot.urdf_element import local_name
+from tauscope.robot.xml_text import LARGEST_XML, is_xml, parse_xml
 from tauscope.robot.yaml_text import read_yaml
 from tauscope.server.http.documents import to_json_text
 from tauscope.server.http.form import PartRule
 from tauscope.server.queue.record import without_folders
+
+FOLDERS = frozenset({"assetdir", "meshdir", "texturedir"})
+"""Attributes of an MJCF that name a folder."""
 
 INLINE_NAME = "robot.json"
 """File name of a robot that came as JSON; YAML readers read JSON."""
@@ -24,7 +28,7 @@ def robot_part_rules(folder: Path) -> dict[str, PartRule]:
     """Parts of a form that bring a robot."""
     return {
         "robot": PartRule(LARGEST_ROBOT_FILE, folder, default_name="robot.yaml"),
-        "urdf": PartRule(LARGEST_URDF, folder),
+        "urdf": PartRule(LARGEST_XML, folder),
     }
 
 
@@ -52,7 +56,7 @@ def read_received_robot(folder: Path, file_name: str) -> Robot:
         if it is not valid, or names a file that was not sent with it
     """
     try:
-        _confine_urdf(folder, file_name)
+        _confine_files(folder, file_name)
         return read_robot(folder / file_name)
     except RobotFileError as error:
         raise type(error)(_in_user_terms(str(error), folder)) from None
@@ -67,7 +71,7 @@ def check_received_robot(folder: Path, file_name: str) -> RobotReport:
         if it cannot be read at all, or names a file that was not sent with it
     """
     try:
-        _confine_urdf(folder, file_name)
+        _confine_files(folder, file_name)
         report = check_robot(folder / file_name)
     except RobotFileError as error:
         raise type(error)(_in_user_terms(str(error), folder)) from None
@@ -75,15 +79,38 @@ def check_received_robot(folder: Path, file_name: str) -> RobotReport:
     return replace(report, source=file_name, findings=tuple(findings))
 
 
-def _confine_urdf(folder: Path, file_name: str) -> None:
+def _confine_files(folder: Path, file_name: str) -> None:
     """Refuse a robot file that names a file that did not come with it: no path of the server is opened for a client."""
-    path = folder / file_name
-    data = read_yaml(decode_utf8(read_bounded(path, LARGEST_ROBOT_FILE), file_name), file_name).data
-    for key in ("kinematics", "urdf", "file"):
-        data = data.get(key) if isinstance(data, dict) else None
-    if isinstance(data, str) and data not in {entry.name for entry in folder.iterdir()} - {file_name}:
-        hint = "send that file as part urdf, and write its bare name into the robot file"
-        raise RobotFileError(one_line(f"{file_name}: kinematics.urdf.file: {shown(data)} was not sent; {hint}"))
+    data = read_bounded(folder / file_name, LARGEST_ROBOT_FILE)
+    if is_xml(data):
+        _confine_xml(data, file_name)
+        return
+    sent = {entry.name for entry in folder.iterdir()} - {file_name}
+    content = read_yaml(decode_utf8(data, file_name), file_name).data
+    kinematics = content.get("kinematics") if isinstance(content, dict) else None
+    for kind in ("urdf", "mjcf"):
+        named = kinematics.get(kind) if isinstance(kinematics, dict) else None
+        file = named.get("file") if isinstance(named, dict) else None
+        if not isinstance(file, str):
+            continue
+        if file not in sent:
+            hint = "send that file as part urdf, and write its bare name into the robot file"
+            raise RobotFileError(one_line(f"{file_name}: kinematics.{kind}.file: {shown(file)} was not sent; {hint}"))
+        _confine_xml(read_bounded(folder / file, LARGEST_XML), file)
+
+
+def _confine_xml(data: bytes, label: str) -> None:
+    """Refuse an MJCF that names other files, folders or plugins: MuJoCo would open them."""
+    root = parse_xml(data, label, [])
+    if local_name(root) != "mujoco":
+        return
+    for element in root.iter():
+        kind = local_name(element)
+        names = [name for name in element.attrib if name.startswith("file") or name in FOLDERS]
+        if names or kind in ("extension", "plugin"):
+            hint = "send one MJCF without included files and meshes: MuJoCo saves it so (mj_saveLastXML)"
+            text = f"<{kind}> names a file that was not sent; {hint}"
+            raise RobotFileError(one_line(f"{label}:{element.sourceline}: {text}"))
 
 
 def _in_user_terms(text: str, folder: Path) -> str:

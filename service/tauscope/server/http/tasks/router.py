@@ -13,7 +13,7 @@ from tauscope.errors import ExportError, NotFoundError
 from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
-from tauscope.robot.urdf_xml import LARGEST_URDF
+from tauscope.robot.xml_text import LARGEST_XML
 from tauscope.server.http.leases.router import LeaseToken
 from tauscope.server.http.openapi import Examples
 from tauscope.server.http.robots.files import check_received_robot
@@ -316,5 +316,5 @@ def _lease_header(_lease: LeaseToken = None) -> None:
 def _read(path: FilePath) -> RobotFileAnswer:
     """A text file, as far as such a file may be long."""
     with path.open("rb") as file:
-        content = file.read(max(LARGEST_ROBOT_FILE, LARGEST_URDF))
+        content = file.read(max(LARGEST_ROBOT_FILE, LARGEST_XML))
     return RobotFileAnswer(name=path.name, content=content.decode("utf-8", errors="replace"))

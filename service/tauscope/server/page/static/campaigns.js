@@ -13,7 +13,7 @@ import { language, t } from "./words.js";
 const STEPS = { design: t`Design the motion`, run: t`Run it`, "held-out design": t`Design a second one`, "held-out run": t`Run that`, identify: t`Identify`, diagnose: t`Diagnose` };
 const ENDS = ["succeeded", "failed", "cancelled", "interrupted", "damaged"];
 const ROBOT_OF = /^(campaigns|runs|identifications|diagnoses)\/[\w-]+$/; // where the robot of a new campaign may be taken from
-const RUN_ENDS = ["finished", "stopped", "failed", "interrupted", "damaged", "waiting"];
+const RUN_ENDS = ["finished", "degraded", "stopped", "failed", "interrupted", "damaged", "waiting"];
 
 export async function showCampaigns(root, { signal }) {
   const { campaigns } = await getJson("campaigns?limit=200", signal);

@@ -108,7 +108,7 @@ export function table(caption, columns, rows, words = 1) {
 
 /** A state as a word with a mark of its own shape, for those who tell no colours apart. */
 export function state(name) {
-  const marks = { succeeded: "●", finished: "●", failed: "✕", damaged: "✕", interrupted: "✕", cancelled: "■", stopped: "■" };
+  const marks = { succeeded: "●", finished: "●", degraded: "✕", failed: "✕", damaged: "✕", interrupted: "✕", cancelled: "■", stopped: "■" };
   const kind = ["succeeded", "finished"].includes(name) ? "good" : marks[name] ? "bad" : "live";
   return h("span", { class: `state ${kind}` }, h("span", { "aria-hidden": "true" }, marks[name] ?? "◐"), ` ${named(name)}`);
 }

@@ -5,7 +5,7 @@ import { t } from "./words.js";
 
 const STORE = "tauscope-leases";
 const TTL_S = 10;
-const ENDS = ["succeeded", "failed", "cancelled", "finished", "stopped", "interrupted", "damaged"];
+const ENDS = ["succeeded", "failed", "cancelled", "finished", "degraded", "stopped", "interrupted", "damaged"];
 
 let held = JSON.parse(sessionStorage.getItem(STORE) ?? "[]"); // a reload of the page does not stop the arm
 let worker = null;

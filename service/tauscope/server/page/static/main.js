@@ -72,7 +72,7 @@ async function pulse() {
   try {
     const [runs, campaigns] = await Promise.all([getJson("runs?limit=8", quick), getJson("campaigns?limit=8", quick)]);
     live = {
-      runs: runs.runs.filter((run) => !["finished", "stopped", "failed", "interrupted", "damaged"].includes(run.state)),
+      runs: runs.runs.filter((run) => !["finished", "degraded", "stopped", "failed", "interrupted", "damaged"].includes(run.state)),
       campaigns: campaigns.campaigns.filter((each) => ["queued", "waiting", "running"].includes(each.state)),
     };
     connection(true);

@@ -7,7 +7,7 @@ import { items } from "./lists.js";
 import { named, t } from "./words.js";
 
 const KINDS = { run: "runs", identification: "identifications", diagnosis: "diagnoses", campaign: "campaigns" };
-const STANDS_STILL = ["created", "finished", "stopped", "failed", "interrupted", "damaged"];
+const STANDS_STILL = ["created", "finished", "degraded", "stopped", "failed", "interrupted", "damaged"];
 const LATELY = 12;
 
 export async function showRobots(root, { signal }) {

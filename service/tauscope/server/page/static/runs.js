@@ -7,7 +7,7 @@ import { jobList } from "./lists.js";
 import { group, jointStyle, plot } from "./plots.js";
 import { named, t } from "./words.js";
 
-const ENDS = ["finished", "stopped", "failed", "interrupted", "damaged"];
+const ENDS = ["finished", "degraded", "stopped", "failed", "interrupted", "damaged"];
 const KEPT = 1500;
 const NEAR = 0.15;
 
@@ -38,6 +38,7 @@ function finished(run, arm) {
   const timing = run.timing;
   const sent = h("span", { class: "hint", role: "status", text: t` harmless: it has ended` });
   return [
+    run.holds && run.backend?.name !== "sim" ? h("p", { role: "alert", text: t`The arm is under power where it stopped. Support it, then let go of it with: tauscope release` }) : null,
     timing ? figures([
       [t`Rate`, `${number(timing.achieved_rate_hz, 4)} Hz`, t`of ${number(timing.rate_hz, 4)} Hz`],
       [t`Lateness, 99 %`, `${number(timing.lateness_us.p99, 3)} µs`, t`at most ${number(timing.lateness_us.max, 3)} µs`],

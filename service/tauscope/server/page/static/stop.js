@@ -6,7 +6,7 @@ import { t } from "./words.js";
 const ATTEMPTS = 60;
 const AGAIN_MS = 500;
 const PATIENCE_MS = 3000;
-const OVER = ["finished", "stopped", "failed", "interrupted", "damaged", "succeeded", "cancelled"];
+const OVER = ["finished", "degraded", "stopped", "failed", "interrupted", "damaged", "succeeded", "cancelled"];
 
 /** Ask once; refusals are answers, a lost connection is none. */
 async function asked(path) {

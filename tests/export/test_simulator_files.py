@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from export.exported import friction, mjcf_of
 from tauscope.errors import ExportError
-from tauscope.export import JointModel, joint_models, patch_urdf, to_mjcf
+from tauscope.export import JointModel, patch_urdf
 from tauscope.export.compensation import JointFriction
 from tauscope.robot import Joint, JointLimits, JointType, LinkInertia, Placement, Robot, Segment, read_urdf_chain
 
@@ -67,14 +68,12 @@ def ellipsoid(rng: np.random.Generator) -> LinkInertia:
     return LinkInertia(mass, mass * centre, mass * (np.trace(spread) * np.eye(3) - spread))
 
 
-def friction(rng: np.random.Generator) -> JointFriction:
-    """A joint with everything that a simulator's format cannot hold."""
-    return JointFriction(float(rng.uniform(1, 2)), -0.3, float(rng.uniform(0.1, 1)), 0.05, 500.0, 10.0)
+BRANCHES = dict(zip(("shoulder", "elbow"), read_urdf_chain(URDF.encode(), "", "base", "tool").branches, strict=True))
 
 
 def models(seed: int = 0) -> dict[str, JointModel]:
     rng = np.random.default_rng(seed)
-    return {name: JointModel(ellipsoid(rng), friction(rng), 0.01) for name in ("shoulder", "elbow")}
+    return {name: JointModel(ellipsoid(rng), friction(rng), 0.01, BRANCHES[name]) for name in ("shoulder", "elbow")}
 
 
 def link_of(model: JointModel) -> LinkInertia:
@@ -210,7 +209,7 @@ def test_notes_say_what_a_urdf_cannot_hold_and_what_was_merged():
     ):
         assert any(word in note for note in patched.notes), word
         assert word in text
-    assert any("jaw moves on joint finger, which was not identified" in note for note in patched.notes)
+    assert any("jaw moves on joint finger beside the chain" in note for note in patched.notes)
 
 
 def test_masses_in_mujoco_are_the_identified_ones_and_no_shape_adds_any():
@@ -220,7 +219,7 @@ def test_masses_in_mujoco_are_the_identified_ones_and_no_shape_adds_any():
     model = mujoco.MjModel.from_xml_string(patch_urdf(source.encode(), written).data.decode())
     masses = dict(zip([model.body(k).name for k in range(model.nbody)], model.body_mass, strict=True))
     assert masses["upper"] == pytest.approx(link_of(written["shoulder"]).mass, rel=1e-12)
-    assert masses["fore"] == pytest.approx(link_of(written["elbow"]).mass, rel=1e-12)
+    assert masses["fore"] + masses["jaw"] == pytest.approx(link_of(written["elbow"]).mass, rel=1e-12)
     assert masses["jaw"] == pytest.approx(0.05)
     shoulder = friction_of(written["shoulder"])
     assert model.dof_damping[0] == shoulder.viscous
@@ -233,7 +232,7 @@ def test_pinocchio_reads_the_same_inertias():
     model = pin.buildModelFromXML(patch_urdf(URDF.encode(), written).data.decode())
     for name in ("shoulder", "elbow"):
         inertia = model.inertias[model.getJointId(name)]
-        link = link_of(written[name])
+        link = LinkInertia.from_vector(link_of(written[name]).to_vector() - BRANCHES[name].to_vector())
         assert inertia.mass == pytest.approx(link.mass, rel=1e-14)
         np.testing.assert_allclose(inertia.mass * inertia.lever, link.first_moment, atol=1e-14)
         np.testing.assert_allclose(inertia.matrix()[3:, 3:], link.inertia, atol=1e-14)
@@ -367,7 +366,7 @@ def test_mujoco_computes_the_torque_of_the_exported_arm(count: int):
     robot = random_arm(rng, count)
     links = [ellipsoid(rng) for _ in range(count)]
     pin, reference = pinocchio_model(robot, links)
-    exported = to_mjcf(robot, joint_models(robot, links, [friction(rng) for _ in range(count)]))
+    exported = mjcf_of(robot, links, [friction(rng) for _ in range(count)])
     model = mujoco.MjModel.from_xml_string(exported.text)
     model.dof_damping[:] = 0.0
     model.opt.disableflags = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
@@ -385,7 +384,7 @@ def test_mjcf_holds_friction_limits_armature_and_says_what_it_cannot():
     rng = np.random.default_rng(8)
     robot = random_arm(rng, 3)
     frictions = [friction(rng), JointFriction(1.0, 0.5, 0.2, 0.0, 80.0, 5.0), JointFriction(0.0, 0.0, 0.0, 0.0, 80.0)]
-    exported = to_mjcf(robot, joint_models(robot, [ellipsoid(rng) for _ in range(3)], frictions, [0.02, None, 0.0]))
+    exported = mjcf_of(robot, [ellipsoid(rng) for _ in range(3)], frictions, [0.02, None, 0.0])
     model = mujoco.MjModel.from_xml_string(exported.text)
     np.testing.assert_allclose(model.dof_frictionloss, [f.stiction + f.stribeck for f in frictions], rtol=1e-15)
     np.testing.assert_array_equal(model.dof_damping, [f.viscous for f in frictions])
@@ -402,7 +401,7 @@ def test_mjcf_holds_friction_limits_armature_and_says_what_it_cannot():
 def test_friction_that_would_drive_a_joint_is_written_as_zero_and_said():
     rng = np.random.default_rng(9)
     robot = random_arm(rng, 1)
-    exported = to_mjcf(robot, joint_models(robot, [ellipsoid(rng)], [JointFriction(-0.5, 0.0, -0.1, 0.0, 80.0)]))
+    exported = mjcf_of(robot, [ellipsoid(rng)], [JointFriction(-0.5, 0.0, -0.1, 0.0, 80.0)])
     assert 'damping="0.0" frictionloss="0.0"' in exported.text
     assert any("viscous = -0.1 would drive the joint" in note for note in exported.notes)
     assert any("stiction + stribeck = -0.5 would drive" in note for note in exported.notes)
@@ -414,16 +413,14 @@ def test_hostile_names_in_mjcf(name: str):
     rng = np.random.default_rng(10)
     robot = random_arm(rng, 1)
     robot = Robot(name, (Joint(name),), robot.segments)
-    text = to_mjcf(robot, joint_models(robot, [ellipsoid(rng)], [friction(rng)])).text
+    text = mjcf_of(robot, [ellipsoid(rng)], [friction(rng)]).text
     model = mujoco.MjModel.from_xml_string(text)
     assert model.joint(0).name == name.replace("\x07", "\ufffd")
     assert model.nbody == 2
 
 
-def test_mjcf_needs_every_link():
+def test_rotor_that_no_motor_has_is_refused():
     rng = np.random.default_rng(11)
-    robot = random_arm(rng, 2)
-    with pytest.raises(ExportError, match="joint 'joint2' has no link to write"):
-        to_mjcf(robot, {"joint1": JointModel(ellipsoid(rng))})
+    robot = random_arm(rng, 1)
     with pytest.raises(ExportError, match="rotor inertia -1 must be 0 or more"):
-        to_mjcf(robot, {"joint1": JointModel(ellipsoid(rng), rotor_inertia=-1.0)})
+        mjcf_of(robot, [ellipsoid(rng)], [friction(rng)], [-1.0])

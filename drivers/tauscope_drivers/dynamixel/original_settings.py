@@ -1,0 +1,79 @@
+"""Settings that servos had in EEPROM before a run changed them: kept on disk until they are put back.
+
+A run that holds the arm ends with servos under torque, whose EEPROM is locked: another process puts the settings back.
+"""
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+CHANGED = ("Drive Mode", "Return Delay Time", "Operating Mode")
+"""Items in EEPROM that the driver changes, in the order in which they are put back: a mode resets others."""
+
+FOLDER = "TAUSCOPE_STATE"
+"""Environment variable that names the folder, in place of ``~/.local/state/tauscope``."""
+
+
+class OriginalSettings:
+    """The settings of one servo on one port."""
+
+    def __init__(self, port: str, servo: int) -> None:
+        """Read what is kept; nothing is kept where the file is missing or damaged."""
+        name = f"{os.path.realpath(port).strip('/').replace('/', '-')}-{servo}.json"
+        self._path = _find_folder() / "servos" / name
+        self._before: dict[str, int] = {}
+        self._after: dict[str, int] = {}
+        self._load()
+
+    @property
+    def before(self) -> Mapping[str, int]:
+        """Value of each changed item before the first change."""
+        return dict(self._before)
+
+    def check(self, present: Mapping[str, int]) -> None:
+        """Forget everything where an item is not as it was left: it is another servo, or somebody else set it."""
+        if any(present.get(name) != value for name, value in self._after.items()):
+            self.forget()
+
+    def remember(self, name: str, before: int, after: int) -> None:
+        """Keep a change; a disk that does not take it loses it, and the run goes on."""
+        self._before.setdefault(name, before)
+        self._after[name] = after
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._path.write_text(json.dumps({"before": self._before, "after": self._after}), encoding="utf-8")
+        except OSError:
+            return
+
+    def forget(self) -> None:
+        """They are put back, or nobody's."""
+        self._before, self._after = {}, {}
+        try:
+            self._path.unlink(missing_ok=True)
+        except OSError:
+            return
+
+    def _load(self) -> None:
+        try:
+            content = json.loads(self._path.read_text(encoding="utf-8"))
+            before, after = (
+                {name: int(value) for name, value in content[kind].items() if name in CHANGED}
+                for kind in ("before", "after")
+            )
+        except (OSError, ValueError, TypeError, KeyError, AttributeError):
+            return
+        if before.keys() == after.keys():
+            self._before, self._after = before, after
+
+
+def _find_folder() -> Path:
+    """Where it is kept; an account without a home has the folder for temporary files."""
+    # systemd names the folder of a service, which has no other
+    if named := os.environ.get(FOLDER) or os.environ.get("STATE_DIRECTORY"):
+        return Path(named.partition(":")[0])
+    try:
+        return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "tauscope"
+    except RuntimeError:
+        return Path(tempfile.gettempdir()) / "tauscope"

@@ -1,0 +1,141 @@
+"""Actuators of an MJCF: torque motors, position servos with gains, or DC motors, one a joint."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from tauscope.dynamics import mass_matrix
+from tauscope.errors import ExportError
+from tauscope.export.mjcf_findings import numbers
+from tauscope.robot import Joint, LinkInertia, Robot
+
+BANDWIDTH_RAD_S = 2.0 * np.pi * 5.0
+"""Bandwidth of gains that nothing states [rad/s]: 5 Hz, the reach of a small servo's position loop."""
+
+
+class ActuatorKind(StrEnum):
+    """Actuators of an exported arm."""
+
+    MOTOR = "motor"
+    POSITION = "position"
+    DCMOTOR = "dcmotor"
+
+
+@dataclass(frozen=True)
+class ActuatorChoice:
+    """Which actuators are written, and gains that go before those of the user's own MJCF.
+
+    kp : tuple of float
+        one for all joints or one a joint [Nm/rad or N/m]; empty where not given
+    kv : tuple of float
+        likewise [Nm s/rad or N s/m]
+    """
+
+    kind: ActuatorKind = ActuatorKind.MOTOR
+    kp: tuple[float, ...] = ()
+    kv: tuple[float, ...] = ()
+
+
+def actuator_elements(
+    robot: Robot,
+    links: Sequence[LinkInertia],
+    rotors: Sequence[float],
+    names: Sequence[str],
+    choice: ActuatorChoice,
+) -> tuple[list[str], list[str]]:
+    """Actuator elements, one a joint, and notes on gains that are chosen rather than known.
+
+    Parameters
+    ----------
+    names : sequence of str
+        names of the joints as quoted attribute values
+    rotors : sequence of float
+        reflected rotor inertias, one a joint [kg m² or kg]
+
+    Raises
+    ------
+    ExportError
+        if the number of gains is not one, nor that of the joints
+    """
+    if choice.kind is ActuatorKind.MOTOR:
+        return [_motor(joint, name) for joint, name in zip(robot.joints, names, strict=True)], []
+    gains, notes = joint_gains(robot, links, rotors, choice)
+    write = _position if choice.kind is ActuatorKind.POSITION else _dc_motor
+    elements = [write(joint, name, *pair) for joint, name, pair in zip(robot.joints, names, gains, strict=True)]
+    if choice.kind is ActuatorKind.DCMOTOR:
+        notes.append(
+            "dcmotor: gear 1, all in joint units; inputs are position, velocity and torque. The torque constant is that"
+            " of the robot file, else 1; the resistance, 1 Ohm, is not identified and has no effect without Vmax."
+        )
+    return elements, notes
+
+
+def joint_gains(
+    robot: Robot, links: Sequence[LinkInertia], rotors: Sequence[float], choice: ActuatorChoice
+) -> tuple[list[tuple[float, float]], list[str]]:
+    """Gains kp and kv of each joint: as given, as in the user's MJCF, or for a bandwidth; and notes on the last.
+
+    Parameters
+    ----------
+    rotors : sequence of float
+        reflected rotor inertias, one a joint [kg m² or kg]
+
+    Raises
+    ------
+    ExportError
+        if the number of gains is not one, nor that of the joints
+    """
+    count, notes = robot.joint_count, []
+    for option, values in (("kp", choice.kp), ("kv", choice.kv)):
+        if len(values) not in (0, 1, count):
+            raise ExportError(f"{option} has {len(values)} values; give one, or one for each of {count} joints")
+    parameters = np.concatenate([link.to_vector() for link in links])
+    inertia = np.diag(mass_matrix(robot, parameters, np.zeros((1, count)))[0]) + np.array(rotors)
+    gains: list[tuple[float, float]] = []
+    for joint, described in enumerate(robot.joints):
+        stated = described.actuator
+        kp = _given(choice.kp, joint)
+        kv = _given(choice.kv, joint)
+        if kp is None and stated is not None and stated.kind == "position":
+            kp, kv = stated.kp, stated.kv if kv is None else kv
+        if kp is None:
+            kp = float(inertia[joint]) * BANDWIDTH_RAD_S**2
+            notes.append(
+                f"{described.name}: kp is not identified; it is chosen for 5 Hz at q = 0. Write the gain of your drive,"
+                " or give it to tauscope export."
+            )
+        gains.append((kp, 2.0 * float(np.sqrt(kp * inertia[joint])) if kv is None else kv))
+    return gains, notes
+
+
+def _given(values: tuple[float, ...], joint: int) -> float | None:
+    """A gain that is given for all joints or for this one."""
+    return None if not values else values[0] if len(values) == 1 else values[joint]
+
+
+def _motor(joint: Joint, name: str) -> str:
+    """A torque motor, limited where the robot file states a limit."""
+    limit = joint.limits.torque
+    both = "" if limit is None else f' ctrlrange="{numbers(-limit, limit)}" forcerange="{numbers(-limit, limit)}"'
+    return f"<motor name={name} joint={name}{both}/>"
+
+
+def _position(joint: Joint, name: str, kp: float, kv: float) -> str:
+    """A position servo: kp (ctrl - q) - kv q̇."""
+    reach, limit = joint.limits.position, joint.limits.torque
+    control = "" if reach is None else f' ctrlrange="{numbers(*reach)}"'
+    force = "" if limit is None else f' forcerange="{numbers(-limit, limit)}"'
+    return f'<position name={name} joint={name} kp="{numbers(kp)}" kv="{numbers(kv)}"{control}{force}/>'
+
+
+def _dc_motor(joint: Joint, name: str, kp: float, kv: float) -> str:
+    """A DC motor with an on-board controller: kp (ctrl₁ - q) + kv (ctrl₂ - q̇) + ctrl₃."""
+    constant = abs(joint.torque_constant) if joint.has_torque_constant else 1.0
+    limit = joint.limits.torque
+    saturation = "" if limit is None else f' saturation="{numbers(limit, 0.0, 0.0)}"'
+    return (
+        f'<dcmotor name={name} joint={name} motorconst="{numbers(constant, 0.0)}" resistance="1.0" '
+        f'input="pos vel ff" controller="{numbers(kp, 0.0, kv, 0.0, 0.0, 0.0)}"{saturation}/>'
+    )

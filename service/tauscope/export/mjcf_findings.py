@@ -1,0 +1,196 @@
+"""Findings of a diagnosis in the terms of MuJoCo, and the reason where it has none.
+
+τ of a finding is torque of the drive; the joint in MuJoCo feels -τ. Cogging and bristles are passive
+``dcmotor`` elements, which MuJoCo has from version 3.8 on; all else loads in any version.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import atan2, hypot
+
+import numpy as np
+
+from tauscope.effects.base_tilt import tilt_directions
+from tauscope.effects.carried_body import unit_body
+from tauscope.effects.friction_coupling import FrictionCoupling
+from tauscope.effects.kinematic_error import displaced
+from tauscope.export.compensation.model import JointFriction
+from tauscope.export.model import ExportModel, FoundEffect
+from tauscope.robot import LinkInertia, Robot
+
+IN_THE_MODEL = frozenset({"coulomb_friction", "viscous_friction", "torque_offset", "rotor_inertia"})
+"""Effects that the joints' own friction and armature hold."""
+
+NEWER = "needs MuJoCo 3.8 or later"
+
+
+@dataclass
+class JointExtras:
+    """Attributes that findings add to the elements of one joint.
+
+    dry_friction : float
+        taken off frictionloss, since bristles have it [Nm or N]
+    passive : list of str
+        attributes of passive dcmotor elements
+    """
+
+    attributes: dict[str, str] = field(default_factory=dict)
+    damping: tuple[float, float] = (0.0, 0.0)
+    dry_friction: float = 0.0
+    passive: list[str] = field(default_factory=list)
+    has_offset: bool = False
+
+
+@dataclass
+class Additions:
+    """Changes that findings make to a file."""
+
+    robot: Robot
+    links: list[LinkInertia]
+    friction: tuple[JointFriction, ...]
+    joints: list[JointExtras]
+    tendons: list[tuple[float, float, Mapping[int, float]]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def numbers(*values: float | np.float64) -> str:
+    """Numbers that read back as the same float64; no negative zero."""
+    return " ".join(repr(float(value) + 0.0) for value in values)
+
+
+def add_findings(model: ExportModel, *, without: Collection[str] = ()) -> Additions:
+    """Everything that MuJoCo can hold of a model's findings, and a note on each of the others.
+
+    Parameters
+    ----------
+    without : collection of str
+        ids of effects that are left out, since they change more than joints and bodies
+    """
+    extras = [JointExtras() for _ in model.robot.joints]
+    added = Additions(model.robot, list(model.links), model.friction, extras)
+    names = [joint.name for joint in model.robot.joints]
+    for found in model.effects:
+        if found.effect.id in IN_THE_MODEL:
+            continue
+        write = WRITERS.get(found.effect.id)
+        if found.effect.id in without:
+            reason = "it changes the frame of a body, which stays as it was"
+        else:
+            reason = "MJCF has no such element" if write is None else write(added, found)
+        label = found.effect.name(names)
+        if reason is None:
+            added.notes.append(f"{label} ({found.effect.equation}) is included.")
+        else:
+            added.notes.append(f"{label} is not included: {reason}. {_values(found)}")
+    return added
+
+
+def _values(found: FoundEffect) -> str:
+    """Equation and values of a finding, for those who add it themselves."""
+    named = [*zip(found.effect.coefficients, found.coefficients, strict=True)]
+    shaped = [*zip(found.effect.shapes, found.shape, strict=True)]
+    values = ", ".join(f"{each.name} = {float(value):.6g}" for each, value in (*named, *shaped))
+    return f"{found.effect.equation}; {values}."
+
+
+def _spring(added: Additions, found: FoundEffect) -> str | None:
+    """Stiffness k, its rest where the fitted constant is zero, too."""
+    stiffness, joint = float(found.coefficients[0]), found.effect.joint or 0
+    if stiffness <= 0.0:
+        return "MuJoCo refuses a negative stiffness"
+    rest = -added.friction[joint].offset / stiffness
+    added.joints[joint].attributes |= {"stiffness": numbers(stiffness), "springref": numbers(rest)}
+    added.joints[joint].has_offset = True
+    return None
+
+
+def _power_of_speed(added: Additions, found: FoundEffect) -> str | None:
+    """Damping of second or third order, the two that MuJoCo has."""
+    amplitude, power, joint = float(found.coefficients[0]), float(found.shape[0]), found.effect.joint or 0
+    square, cube = added.joints[joint].damping
+    if abs(power - 2.0) < 0.05:
+        added.joints[joint].damping = (square + amplitude, cube)
+    elif abs(power - 3.0) < 0.05:
+        added.joints[joint].damping = (square, cube + amplitude)
+    else:
+        return f"MuJoCo has damping of second and third order, not of order {power:.3g}"
+    return None
+
+
+def _cogging(added: Additions, found: FoundEffect) -> str | None:
+    """-a sin(kq + φ) on the joint."""
+    sine, cosine = (float(value) for value in found.coefficients)
+    wave = numbers(-hypot(sine, cosine), float(found.shape[0]), atan2(cosine, sine))
+    added.joints[found.effect.joint or 0].passive.append(f'cogging="{wave}"')
+    return None
+
+
+def _bristles(added: Additions, found: FoundEffect) -> str | None:
+    """LuGre bristles without a Stribeck effect, which are Dahl's: σ₀ = F / x_s; frictionloss holds the rest."""
+    force, length, joint = float(found.coefficients[0]), float(found.shape[0]), found.effect.joint or 0
+    if force <= 0.0:
+        return "friction that falls after a reversal is no bristle"
+    added.joints[joint].passive.append(f'lugre="{numbers(force / length, 0.0, force, force, 1.0)}"')
+    added.joints[joint].dry_friction += force
+    return None
+
+
+def _payload(added: Additions, found: FoundEffect) -> str | None:
+    """A point mass in the last link."""
+    body = float(found.coefficients[0]) * unit_body(found.shape)
+    added.links[-1] = LinkInertia.from_vector(added.links[-1].to_vector() + body)
+    return None
+
+
+def _tilt(added: Additions, found: FoundEffect) -> str | None:
+    """Gravity in the direction that was found."""
+    gravity = added.robot.gravity
+    strength, across = float(np.linalg.norm(gravity)), tilt_directions(gravity)
+    turned = gravity + strength * sum(float(a) * e for a, e in zip(found.coefficients, across, strict=True))
+    added.robot = replace(added.robot, gravity=turned)
+    return None
+
+
+def _displacement(added: Additions, found: FoundEffect) -> str | None:
+    """A link's frame where it was found."""
+    link, axis = (int(each) - 1 for each in found.shape)
+    added.robot = displaced(added.robot, link, float(found.coefficients[0]) * np.eye(3)[axis])
+    return None
+
+
+def _coupling(added: Additions, found: FoundEffect) -> str | None:
+    """A fixed tendon over both joints."""
+    effect = found.effect
+    if not isinstance(effect, FrictionCoupling):
+        return "its form is not known"
+    dry, damping = (float(value) for value in found.coefficients)
+    if dry < 0.0 or damping < 0.0:
+        return "friction that drives is not written"
+    added.tendons.append((dry, damping, {effect.joint or 0: 1.0, effect.partner: float(effect.sign)}))
+    return None
+
+
+WRITERS: Mapping[str, Callable[[Additions, FoundEffect], str | None]] = {
+    "joint_spring": _spring,
+    "nonlinear_viscous": _power_of_speed,
+    "cogging": _cogging,
+    "presliding_hysteresis": _bristles,
+    "payload": _payload,
+    "base_tilt": _tilt,
+    "kinematic_error": _displacement,
+    "friction_coupling": _coupling,
+}
+"""Functions that write an effect into a file, or return the reason against it."""
+
+
+def effects_in(model: ExportModel, included: Sequence[str], why: str) -> list[str]:
+    """Notes on the findings that a format does not hold.
+
+    Parameters
+    ----------
+    included : sequence of str
+        ids of the effects that it holds
+    """
+    names = [joint.name for joint in model.robot.joints]
+    left = [found for found in model.effects if found.effect.id not in (*included, *IN_THE_MODEL)]
+    return [f"{found.effect.name(names)} is not included: {why}. {_values(found)}" for found in left]

@@ -1,0 +1,168 @@
+"""The input of every export: an identified model, and the findings of a diagnosis if there was one."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.diagnosis import Diagnosis
+from tauscope.diagnosis.extended_model.consistent_links import consistent_links
+from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.model.torque_scale import on_the_arm
+from tauscope.effects import Effect
+from tauscope.export.compensation import (
+    CompensationModel,
+    JointCompensation,
+    JointFriction,
+    RecordingSource,
+    drive_units,
+)
+from tauscope.export.joint_model import JointModel, joint_models
+from tauscope.identification import Identification
+from tauscope.recording import EffortKind
+from tauscope.robot import LinkInertia, Robot
+from tauscope.version import tauscope_version
+
+
+@dataclass(frozen=True, eq=False)
+class FoundEffect:
+    """An effect with its values, in the arm's own torque.
+
+    coefficients : (c,) float64
+        linear coefficients
+    shape : (k,) float64
+        shape parameters
+    """
+
+    effect: Effect
+    coefficients: NDArray[np.float64]
+    shape: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a model came from.
+
+    is_mjcf : bool
+        whether the links' frames are bodies of an MJCF
+    """
+
+    sources: tuple[RecordingSource, ...]
+    effort_kind: EffortKind
+    created: datetime
+    urdf: bytes | None = None
+    is_mjcf: bool = False
+    version: str = field(default_factory=tauscope_version)
+
+
+@dataclass(frozen=True, eq=False)
+class ExportModel:
+    """Bodies that can exist, friction for simulators and for controllers, and findings.
+
+    links : tuple of LinkInertia
+        one a segment
+    friction, delivered_friction : tuple of JointFriction
+        one a joint: beside these bodies, and as delivered
+    rotor_inertia : tuple of float or None
+        one a joint [kg m² or kg]
+    """
+
+    robot: Robot
+    links: tuple[LinkInertia, ...]
+    friction: tuple[JointFriction, ...]
+    delivered_friction: tuple[JointFriction, ...]
+    rotor_inertia: tuple[float | None, ...]
+    effects: tuple[FoundEffect, ...]
+    origin: Origin
+
+    @property
+    def joint_models(self) -> dict[str, JointModel]:
+        """Links, friction and rotors by the labels of the segments, for simulators."""
+        return joint_models(self.robot, self.links, self.friction, self.rotor_inertia)
+
+    @property
+    def compensation(self) -> CompensationModel:
+        """Friction as delivered, for controllers.
+
+        Raises
+        ------
+        ExportError
+            if a coefficient is not usable, or the drive's units contradict each other
+        """
+        joints = tuple(
+            JointCompensation(joint.name, joint.type, friction, drive_units(joint, self.origin.effort_kind))
+            for joint, friction in zip(self.robot.joints, self.delivered_friction, strict=True)
+        )
+        origin = self.origin
+        return CompensationModel(self.robot.name, joints, origin.created, origin.sources, origin.version)
+
+
+def of_identification(identification: Identification, origin: Origin) -> ExportModel:
+    """The model that an identification delivers; simulators get the friction that fits its bodies."""
+    parameters = identification.consistent_parameters
+    rotors = [
+        _coefficient(identification, parameters, joint, "rotor_inertia")
+        for joint in range(identification.robot.joint_count)
+    ]
+    return ExportModel(
+        robot=identification.robot,
+        links=tuple(identification.consistent.links),
+        friction=_frictions(identification, parameters),
+        delivered_friction=_frictions(identification, identification.parameters),
+        rotor_inertia=tuple(rotors),
+        effects=(),
+        origin=origin,
+    )
+
+
+def of_diagnosis(diagnosis: Diagnosis, origin: Origin) -> ExportModel:
+    """The final model of a diagnosis, findings included."""
+    return of_extended_model(diagnosis.selection.fit.model, consistent_links(diagnosis), origin)
+
+
+def of_extended_model(model: ExtendedModel, links: Sequence[LinkInertia], origin: Origin) -> ExportModel:
+    """An extended model beside bodies that can exist."""
+    robot, structure = model.structure.robot, model.structure
+    frictions: list[JointFriction] = []
+    for joint, terms in enumerate(structure.terms):
+        places = {name: structure.coefficient(joint, name) for name in ("stiction", "stribeck", "viscous", "offset")}
+        values = {name: 0.0 if at is None else float(model.parameters[at]) for name, at in places.items()}
+        frictions.append(JointFriction(**values, k_v=float(terms.k_v), delta=_float(terms.delta)))
+    found = tuple(FoundEffect(t.effect, on_the_arm(model, t).coefficients, t.shape) for t in model.terms)
+    rotors: list[float | None] = [None] * robot.joint_count
+    for each in found:
+        if each.effect.id == "rotor_inertia" and each.effect.joint is not None:
+            rotors[each.effect.joint] = max(0.0, float(each.coefficients[0]))
+    return ExportModel(
+        robot=robot,
+        links=tuple(links),
+        friction=tuple(frictions),
+        delivered_friction=tuple(frictions),
+        rotor_inertia=tuple(rotors),
+        effects=found,
+        origin=origin,
+    )
+
+
+def _frictions(identification: Identification, parameters: NDArray[np.float64]) -> tuple[JointFriction, ...]:
+    """Friction of each joint; terms that the model lacks are zero."""
+    frictions = []
+    for joint, shape in enumerate(identification.shapes):
+        names = ("stiction", "stribeck", "viscous", "offset")
+        values = {name: _coefficient(identification, parameters, joint, name) or 0.0 for name in names}
+        frictions.append(JointFriction(**values, k_v=shape.k_v, delta=shape.delta))
+    return tuple(frictions)
+
+
+def _coefficient(
+    identification: Identification, parameters: NDArray[np.float64], joint: int, name: str
+) -> float | None:
+    """One coefficient of a joint; None where the model lacks it."""
+    column = identification.structure.coefficient(joint, name)
+    return None if column is None else float(parameters[column])
+
+
+def _float(value: float | None) -> float | None:
+    return None if value is None else float(value)

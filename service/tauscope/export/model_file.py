@@ -1,0 +1,182 @@
+"""A model with everything that exports need, as a file: schema tauscope.model/1 with the block ``arm``."""
+
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field, ValidationError
+
+from tauscope.diagnosis.extended_model.saved import (
+    LARGEST_FILE,
+    EffectEntry,
+    JointFrictionEntry,
+    ModelDocument,
+    NamedValue,
+    restored,
+)
+from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.effects.rotor_inertia import RotorInertia
+from tauscope.errors import ExportError, IdentificationError, RobotFileError
+from tauscope.export.compensation import RecordingSource
+from tauscope.export.model import ExportModel, Origin, of_extended_model
+from tauscope.identification import Identification
+from tauscope.recording import EffortKind
+from tauscope.robot import Actuator, LinkInertia, Robot, robot_from_dict, robot_to_dict
+from tauscope.robot.bounded_file import decode_utf8, read_bounded
+from tauscope.robot.messages import one_line
+from tauscope.strict_model import ResultModel
+
+
+class ArmEntry(ResultModel):
+    """The arm that a model is of, without files beside it."""
+
+    robot: dict[str, Any] = Field(description="as robot_to_dict writes it")
+    segments: list[str] = Field(description="joints of the URDF or MJCF, one a segment")
+    branches: list[list[float]] = Field(description="bodies on joints beside the chain: ten standard parameters a link")
+    actuators: list[list[Any] | None] = Field(description="kind, kp and kv of each joint's actuator in the user's MJCF")
+    urdf: str | None = Field(description="the URDF, one character a byte; null where there is none")
+    is_mjcf: bool = Field(description="whether the links' frames are bodies of an MJCF")
+    effort: str = Field(description="torque or current")
+    recordings: list[list[str]] = Field(description="name and sha256 of the recordings that the model is made from")
+    created: str = Field(description="when, ISO 8601")
+    version: str = Field(description="of Tauscope")
+
+
+class ModelFile(ModelDocument):
+    """An extended model and its arm."""
+
+    arm: ArmEntry | None = Field(default=None, description="null in files of older versions")
+
+
+def model_file(document: ModelDocument, robot: Robot, origin: Origin) -> ModelFile:
+    """A model's document with its arm."""
+    arm = ArmEntry(
+        robot=robot_to_dict(robot),
+        segments=list(robot.segment_names),
+        branches=[[float(value) for value in link.to_vector()] for link in robot.branches],
+        actuators=[
+            None if each.actuator is None else [each.actuator.kind, each.actuator.kp, each.actuator.kv]
+            for each in robot.joints
+        ],
+        urdf=None if origin.urdf is None else origin.urdf.decode("latin-1"),
+        is_mjcf=origin.is_mjcf,
+        effort=origin.effort_kind.value,
+        recordings=[[source.name, source.sha256] for source in origin.sources],
+        created=origin.created.isoformat(),
+        version=origin.version,
+    )
+    return ModelFile.model_construct(**{name: getattr(document, name) for name in ModelDocument.model_fields}, arm=arm)
+
+
+def identified_document(result: Identification) -> ModelDocument:
+    """The delivered model of an identification, without findings."""
+    structure, names = result.structure, [joint.name for joint in result.robot.joints]
+    values = dict(zip(structure.names, map(float, result.consistent_parameters), strict=True))
+    nominal = [place for place, name in enumerate(structure.names) if not name.startswith("rotor_inertia ")]
+    return ModelDocument(
+        robot=result.robot.name,
+        joints=names,
+        base_parameters=[NamedValue(name=name, value=values[name]) for name in structure.base.expressions],
+        links=[[float(value) for value in link.to_vector()] for link in result.consistent.links],
+        friction=[
+            JointFrictionEntry(
+                joint=name,
+                stiction=values.get(f"stiction {name}", 0.0),
+                stribeck=values.get(f"stribeck {name}"),
+                viscous=values.get(f"viscous {name}", 0.0),
+                offset=values.get(f"offset {name}", 0.0),
+                k_v=float(terms.k_v),
+                delta=None if terms.delta is None else float(terms.delta),
+            )
+            for name, terms in zip(names, structure.terms, strict=True)
+        ],
+        effects=[
+            EffectEntry(
+                effect=RotorInertia.id,
+                form=RotorInertia.__name__,
+                joint=name,
+                equation=RotorInertia.equation,
+                settings={},
+                shapes=[],
+                bounds=[],
+                coefficients=[NamedValue(name="I_a", value=values[f"rotor_inertia {name}"])],
+            )
+            for name in names
+            if f"rotor_inertia {name}" in values
+        ],
+        covariance=np.asarray(result.covariance)[np.ix_(nominal, nominal)].tolist(),
+    )
+
+
+def read_model_file(path: Path) -> ModelFile:
+    """The document of a file.
+
+    Raises
+    ------
+    IdentificationError
+        naming the file and the key
+    """
+    text = decode_utf8(read_bounded(path, LARGEST_FILE), str(path))
+    try:
+        return ModelFile.model_validate_json(text)
+    except ValidationError as error:
+        fault = error.errors(include_url=False, include_context=False)[0]
+        key = ".".join(str(part) for part in fault["loc"]) or "the document"
+        hint = "give a file that identify or diagnose wrote with --model"
+        raise IdentificationError(one_line(f"{path}: {key}: {fault['msg']}; {hint}")) from None
+
+
+def read_extended_model(path: Path, robot: Robot) -> ExtendedModel:
+    """The extended model of a file, for an arm that is at hand.
+
+    Raises
+    ------
+    IdentificationError
+        naming the file and the key, or where it belongs to another arm
+    """
+    try:
+        return restored(read_model_file(path), robot)
+    except IdentificationError as error:
+        text = str(error)
+        raise IdentificationError(text if text.startswith(str(path)) else one_line(f"{path}: {text}")) from None
+
+
+def read_export_model(path: Path) -> ExportModel:
+    """The model of a file as exports need it.
+
+    Raises
+    ------
+    ExportError
+        where the file has no arm
+    IdentificationError
+        naming the file and the key
+    """
+    document = read_model_file(path)
+    arm = document.arm
+    if arm is None:
+        text = "the file has no block arm: it was written by an older version; write it again with --model"
+        raise ExportError(one_line(f"{path}: {text}"))
+    try:
+        robot = _robot(arm)
+        model = restored(document, robot)
+        created = datetime.fromisoformat(arm.created)
+        sources = tuple(RecordingSource(name, digest) for name, digest in arm.recordings)
+        effort = EffortKind(arm.effort)
+    except (IdentificationError, RobotFileError, ValueError, TypeError) as error:
+        raise IdentificationError(one_line(f"{path}: {error}")) from None
+    urdf = None if arm.urdf is None else arm.urdf.encode("latin-1", errors="replace")
+    links = [LinkInertia.from_vector(np.array(link)) for link in document.links]
+    return of_extended_model(model, links, Origin(sources, effort, created, urdf, arm.is_mjcf, arm.version))
+
+
+def _robot(arm: ArmEntry) -> Robot:
+    """The robot of the block."""
+    robot = robot_from_dict(arm.robot, "arm.robot")
+    actuators = [
+        None if each is None else Actuator(str(each[0]), float(each[1]), float(each[2])) for each in arm.actuators
+    ]
+    joints = tuple(replace(joint, actuator=each) for joint, each in zip(robot.joints, actuators, strict=True))
+    branches = tuple(LinkInertia.from_vector(np.array(link)) for link in arm.branches)
+    return replace(robot, joints=joints, segment_names=tuple(arm.segments), branches=branches)

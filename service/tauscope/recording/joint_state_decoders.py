@@ -1,0 +1,129 @@
+"""Messages that hold joint states, by type and encoding: ROS 2, ROS 1, ros2_control and Foxglove."""
+
+import struct
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from pydantic_core import from_json
+
+from tauscope.recording.joint_state import CdrCursor, JointState, decode_cdr, decode_json, json_stamp
+from tauscope.recording.protobuf import decode_foxglove_protobuf
+from tauscope.recording.samples import Array
+
+Decoder = Callable[[bytes], JointState]
+"""One message to a joint state; raises ValueError where it is none."""
+
+JOINT_STATE_TYPES = ("sensor_msgs/msg/JointState", "sensor_msgs/JointState")
+
+_EFFORTS = ("effort", "torque", "current")
+"""Interfaces of ros2_control that serve as effort, the first that a joint has."""
+
+
+def find_decoder(type_name: str, encoding: str, schema: bytes) -> Decoder | None:
+    """The decoder of a topic's messages, None where they are no joint states.
+
+    Parameters
+    ----------
+    schema : bytes
+        of the type, empty where the log has none
+    """
+    if (type_name, encoding) == ("foxglove.JointStates", "protobuf"):
+        return decode_foxglove_protobuf(schema)
+    return _DECODERS.get((type_name, encoding))
+
+
+def decode_ros1(message: bytes) -> JointState:
+    """Decode sensor_msgs/JointState of ROS 1: no alignment, strings without a closing NUL.
+
+    Raises
+    ------
+    ValueError
+        it is no JointState
+    """
+    try:
+        _, seconds, nanoseconds, length = struct.unpack_from("<IIII", message)
+        at = 16 + length
+        (count,) = struct.unpack_from("<I", message, at)
+        at += 4
+        names = []
+        for _ in range(min(count, len(message))):
+            (length,) = struct.unpack_from("<I", message, at)
+            names.append(message[at + 4 : at + 4 + length].decode("utf-8"))
+            at += 4 + length
+        arrays = []
+        for _ in range(3):
+            (count,) = struct.unpack_from("<I", message, at)
+            arrays.append(np.frombuffer(message, "<f8", count, at + 4).astype(np.float64))
+            at += 4 + 8 * count
+    except struct.error as error:
+        raise ValueError("the message ends early") from error
+    if at != len(message):
+        raise ValueError("the message is longer than a JointState")
+    return JointState(seconds * 10**9 + nanoseconds, tuple(names), *arrays)
+
+
+def decode_dynamic(message: bytes) -> JointState:
+    """Decode control_msgs/msg/DynamicJointState: per joint, names and values of its interfaces.
+
+    Raises
+    ------
+    ValueError
+        it is no DynamicJointState
+    """
+    cursor = CdrCursor(message)
+    stamp = cursor.stamp()
+    cursor.string()  # frame_id
+    names = tuple(cursor.string() for _ in range(cursor.length()))
+    values: list[Mapping[str, float]] = []
+    for _ in range(cursor.length()):
+        interfaces = [cursor.string() for _ in range(cursor.length())]
+        numbers = cursor.numbers()
+        if len(interfaces) != len(numbers):
+            raise ValueError("interface names and values differ in number")
+        values.append(dict(zip(interfaces, numbers.tolist(), strict=True)))
+    cursor.finish()
+    if len(values) != len(names):
+        raise ValueError("joint names and interface values differ in number")
+    effort = next((name for name in _EFFORTS if any(name in joint for joint in values)), "effort")
+    return JointState(stamp, names, *(_gather(values, field) for field in ("position", "velocity", effort)))
+
+
+def decode_foxglove_json(message: bytes) -> JointState:
+    """Decode foxglove.JointStates in JSON.
+
+    Raises
+    ------
+    ValueError
+        it is no JointStates
+    """
+    content = from_json(message)
+    joints = content.get("joints") if isinstance(content, dict) else None
+    if not isinstance(joints, list) or not all(isinstance(joint, dict) for joint in joints):
+        raise ValueError("field joints is not a list of joints")
+    names = [joint.get("name") for joint in joints]
+    if not all(isinstance(name, str) for name in names):
+        raise ValueError("a joint has no name")
+    fields = ("position", "velocity", "effort")
+    known = [{field: joint[field] for field in fields if _is_number(joint.get(field))} for joint in joints]
+    return JointState(json_stamp(content.get("timestamp")), tuple(names), *(_gather(known, field) for field in fields))
+
+
+def _is_number(value: object) -> bool:
+    """Whether a field of JSON holds a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _gather(joints: Sequence[Mapping[str, float]], field: str) -> Array:
+    """One number a joint, NaN where it has none; empty where no joint has one."""
+    if not any(field in joint for joint in joints):
+        return np.empty(0)
+    return np.array([joint.get(field, np.nan) for joint in joints], dtype=np.float64)
+
+
+_DECODERS: Mapping[tuple[str, str], Decoder] = {
+    **{(name, "cdr"): decode_cdr for name in JOINT_STATE_TYPES},
+    **{(name, "json"): decode_json for name in (*JOINT_STATE_TYPES, "JointState")},
+    **{(name, "ros1"): decode_ros1 for name in JOINT_STATE_TYPES},
+    ("control_msgs/msg/DynamicJointState", "cdr"): decode_dynamic,
+    ("foxglove.JointStates", "json"): decode_foxglove_json,
+}

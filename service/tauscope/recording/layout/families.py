@@ -1,0 +1,135 @@
+"""Families of columns: names that differ in a joint's number or in its name alone."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from tauscope.recording.layout.roles import is_joint_name
+
+FROM_ZERO, FROM_ONE, BY_NAME = "{0}", "{1}", "{name}"
+"""Placeholders of a template: the joint's number from 0, its number from 1, its name."""
+
+PLACEHOLDERS = (FROM_ZERO, FROM_ONE, BY_NAME)
+
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+")
+_JOINT = re.compile(r"\[[^\[\]]*\{(?:0|1|name)\}[^\[\]]*\]|\{(?:0|1|name)\}")
+_SEGMENT = re.compile(r"[^/.\[\]:]+")
+_NUMBER = re.compile(r"[0-9]+")
+
+
+@dataclass(frozen=True)
+class Family:
+    """Columns of one quantity, one a joint.
+
+    template : str
+        name of the columns with a placeholder for the joint
+    columns : tuple of str
+        columns in the order of the joints: by number, of the robot, or of the file
+    is_regular : bool
+        whether the template gives the columns; zeros in front of a number it does not
+    is_guessed : bool
+        whether the joints' names are any part of the columns' names
+    """
+
+    template: str
+    columns: tuple[str, ...]
+    is_regular: bool = True
+    is_guessed: bool = False
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Words of the template in lower case, without its placeholder and the brackets around it."""
+        return words_of(_JOINT.sub(" ", self.template))
+
+
+def words_of(text: str) -> tuple[str, ...]:
+    """Words of a column's name, in lower case: at separators, at digits and where a capital begins one."""
+    return tuple(word.lower() for word in _WORD.findall(text))
+
+
+def find_families(header: Sequence[str], joint_names: Sequence[str] | None) -> list[Family]:
+    """Families of a header: named by the robot's joints, numbered, or named by any word; one joint has no number."""
+    named = _named_by(header, joint_names or ())
+    has_one = joint_names is None or len(joint_names) == 1
+    single = [Family(name, (name,), is_guessed=True) for name in header if has_one and not _NUMBER.search(name)]
+    return [*named, *_numbered(header), *([] if named else _named_by_segments(header)), *single]
+
+
+def fill_template(template: str, index: int, name: str | None) -> str:
+    """The column of a joint.
+
+    Parameters
+    ----------
+    index : int
+        counted from 0
+    """
+    filled = template.replace(FROM_ZERO, str(index)).replace(FROM_ONE, str(index + 1))
+    return filled if name is None else filled.replace(BY_NAME, name)
+
+
+def names_in(header: Sequence[str], template: str) -> list[str]:
+    """Joint names that a header has in place of a template's placeholder, in the order of the header."""
+    before, _, after = template.partition(BY_NAME)
+    pattern = re.compile(re.escape(before) + "(.+)" + re.escape(after))
+    return [match[1] for match in map(pattern.fullmatch, header) if match]
+
+
+def _numbered(header: Sequence[str]) -> list[Family]:
+    """Families in which a number runs from 0 or from 1 without a gap."""
+    groups: dict[tuple[str, str], dict[int, str]] = {}
+    for name in header:
+        for match in _NUMBER.finditer(name):
+            groups.setdefault((name[: match.start()], name[match.end() :]), {})[int(match[0])] = name
+    found = []
+    for (before, after), columns in groups.items():
+        first = 0 if 0 in columns else 1
+        if set(columns) == set(range(first, first + len(columns))):
+            template = before + (FROM_ZERO if first == 0 else FROM_ONE) + after
+            names = tuple(columns[number] for number in sorted(columns))
+            is_regular = all(fill_template(template, k, None) == name for k, name in enumerate(names))
+            found.append(Family(template, names, is_regular))
+    return found
+
+
+def _named_by(header: Sequence[str], joint_names: Sequence[str]) -> list[Family]:
+    """Families that name every joint of the robot."""
+    patterns = {
+        name: re.compile(f"(?<![A-Za-z0-9]){re.escape(name)}(?![A-Za-z0-9])")
+        for name in sorted(joint_names, key=len, reverse=True)
+    }
+    groups: dict[str, dict[str, str]] = {}
+    for column in header:
+        for name, pattern in patterns.items():
+            match = pattern.search(column)
+            if match:
+                groups.setdefault(column[: match.start()] + BY_NAME + column[match.end() :], {})[name] = column
+                break
+    return [
+        Family(template, tuple(columns[name] for name in joint_names))
+        for template, columns in groups.items()
+        if len(columns) == len(joint_names)
+    ]
+
+
+def _named_by_segments(header: Sequence[str]) -> list[Family]:
+    """Families in which one segment is the joint: ``/states/elbow/position``, ``effort[elbow]``, ``elbow_pos``."""
+    groups: dict[str, dict[str, str]] = {}
+    for column in header:
+        for template, name in _segments(column):
+            groups.setdefault(template, {})[name] = column
+    return [Family(template, tuple(c.values()), is_guessed=True) for template, c in groups.items() if _is_named(c)]
+
+
+def _segments(column: str) -> list[tuple[str, str]]:
+    """The column with a placeholder for each part that may be a joint's name, and that part."""
+    spans = [match.span() for match in _SEGMENT.finditer(column)][-2:]
+    spans = spans if len(spans) > 1 else []
+    first, last = column.find("_"), column.rfind("_")
+    if first > 0 and last < len(column) - 1 and not spans:
+        spans = [(0, last), (first + 1, len(column))]
+    return [(column[:start] + BY_NAME + column[stop:], column[start:stop]) for start, stop in spans]
+
+
+def _is_named(columns: Mapping[str, str]) -> bool:
+    """Whether keys are names rather than numbers or quantities."""
+    return not any(key.isdecimal() or not is_joint_name(words_of(key)) for key in columns)

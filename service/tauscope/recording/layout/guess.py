@@ -1,0 +1,156 @@
+"""The mapping that a file's header suggests: by a preset, or by the words of its columns."""
+
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+
+from tauscope.recording.layout.families import Family, find_families, words_of
+from tauscope.recording.layout.presets import PRESET_OF, Preset
+from tauscope.recording.layout.roles import role_of, time_rank, time_unit, unit_of
+from tauscope.robot.recording_layout import RecordingLayout, Source
+
+_COMMON_JOINT_COUNTS = (6, 7)
+_PLAIN = re.compile(r"(?!(?:y|n|yes|no|on|off|true|false|null)$)[A-Za-z_][A-Za-z0-9_./-]*", re.IGNORECASE)
+_OPTIONAL = ("qd", "qdd", "qref", "taucmd", "temp", "qlink")
+
+Ranking = Callable[[Sequence[str]], tuple[str, int] | None]
+"""The group that words of a column mean, and how far they are from the first choice."""
+
+
+def guess_layout(
+    header: Sequence[str],
+    joint_names: Sequence[str] | None = None,
+    *,
+    preset: str | None = None,
+    prefers_torque: bool = False,
+) -> RecordingLayout | None:
+    """The layout of a header; None where positions, efforts or the time are not among its columns.
+
+    Parameters
+    ----------
+    joint_names : sequence of str or None
+        of the robot
+    preset : str or None
+        tool that wrote the file; None for any
+    prefers_torque : bool
+        whether commanded torques go before currents, because no torque constant is known
+    """
+    found = guess_parts(header, joint_names, preset=preset, prefers_torque=prefers_torque)
+    columns = found.columns if isinstance(found.columns, Mapping) else {}
+    return found if {"t", "q"} <= set(columns) and {"tau", "i"} & set(columns) else None
+
+
+def guess_parts(
+    header: Sequence[str],
+    joint_names: Sequence[str] | None = None,
+    *,
+    preset: str | None = None,
+    prefers_torque: bool = False,
+) -> RecordingLayout:
+    """As much of a header's layout as its columns suggest; arguments as of `guess_layout`."""
+    if is_numbered(header) and preset is not None:
+        return RecordingLayout(columns={})
+    if is_numbered(header):
+        return _guess_by_place(len(header), None if joint_names is None else len(joint_names))
+    rank = role_of if preset is None else _preset_ranking(PRESET_OF[preset])
+    families = [(family, found) for family in find_families(header, joint_names) if (found := rank(family.words))]
+    time = _find_time(header, None if preset is None else PRESET_OF[preset].columns["t"])
+    count = None if joint_names is None else len(joint_names)
+    q = _choose(families, "q", count)
+    count = count or (len(q.columns) if q else None)
+    order = ("tau", "taucmd", "i") if prefers_torque else ("tau", "i", "taucmd")
+    if joint_names is None:  # then nothing says which of more columns are the joints'
+        families = [(family, found) for family, found in families if len(family.columns) == count]
+    effort = next((role for role in order if _choose(families, role, count)), "tau")
+    groups = {"q": q, "i" if effort == "i" else "tau": _choose(families, effort, count)}
+    groups |= {group: _choose(families, group, count) for group in _OPTIONAL if group != effort}
+    columns: dict[str, Source] = {} if time is None else {"t": time}
+    columns |= {group: _source(family, count) for group, family in groups.items() if family is not None}
+    units = {
+        "t": None if time is None else time_unit(words_of(time)),
+        "q": None if q is None else unit_of(q.template),
+        "tau": _unit(groups.get("i")),
+    }
+    return RecordingLayout({column: unit for column, unit in units.items() if unit}, columns=columns)
+
+
+def layout_text(layout: RecordingLayout) -> str:
+    """A layout as one line of YAML, as a robot file and ``--columns`` take it."""
+    fields = {"columns": layout.columns, "units": layout.units or None, "rate_hz": layout.rate_hz}
+    fields |= {"decimal": layout.decimal, "delimiter": layout.delimiter, "topic": layout.topic}
+    return f"recording: {flow_text({key: value for key, value in fields.items() if value is not None})}"
+
+
+def flow_text(value: object) -> str:
+    """A value in YAML's flow style, which takes quoted text as JSON does."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key}: {flow_text(entry)}" for key, entry in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(flow_text, value)) + "]"
+    return value if isinstance(value, str) and _PLAIN.fullmatch(value) else json.dumps(value, ensure_ascii=False)
+
+
+def is_numbered(header: Sequence[str]) -> bool:
+    """Whether columns have numbers from 1 for want of names."""
+    return list(header) == [str(number) for number in range(1, len(header) + 1)]
+
+
+def _guess_by_place(width: int, joint_count: int | None) -> RecordingLayout:
+    """Time, positions, perhaps velocities, and efforts, side by side."""
+    counts = [joint_count] if joint_count else [*_COMMON_JOINT_COUNTS, (width - 1) // 2]
+    for n in counts:
+        for groups in (("q", "tau"), ("q", "qd", "tau")):
+            if n > 0 and width == len(groups) * n + 1:
+                places = {group: [2 + k * n + j for j in range(n)] for k, group in enumerate(groups)}
+                return RecordingLayout(columns={"t": 1, **places})
+    return RecordingLayout(columns={})
+
+
+def _preset_ranking(preset: Preset) -> Ranking:
+    """Ranks words by the ends that a preset names."""
+    ends = [(f"_{end}", group, rank) for group, all_ in preset.columns.items() for rank, end in enumerate(all_)]
+
+    def rank(words: Sequence[str]) -> tuple[str, int] | None:
+        name = "_" + "_".join(words)
+        return next(((group, rank) for end, group, rank in ends if name.endswith(end) and group != "t"), None)
+
+    return rank
+
+
+def _find_time(header: Sequence[str], known: Sequence[str] | None) -> str | None:
+    """The column with the time; a preset's own names go before any other."""
+    ranked = []
+    for column in header:
+        words = words_of(column)
+        name = "_".join(words)
+        rank = time_rank(words)
+        if known is not None and name in known:
+            rank = known.index(name) - len(known)
+        if rank is not None:
+            ranked.append((rank, len(column), column))
+    return min(ranked)[2] if ranked else None
+
+
+def _choose(families: Sequence[tuple[Family, tuple[str, int]]], role: str, count: int | None) -> Family | None:
+    """The family of a role: with a column for each joint, of the first rank, with the shortest name."""
+    fit = [
+        (family, rank) for family, (found, rank) in families if found == role and len(family.columns) >= (count or 1)
+    ]
+
+    def unfitness(entry: tuple[Family, int]) -> tuple[object, ...]:
+        family, rank = entry
+        size = -len(family.columns) if count is None else len(family.columns) != count
+        return size, rank, family.is_guessed, len(family.template)
+
+    return min(fit, key=unfitness, default=(None, 0))[0]
+
+
+def _source(family: Family, count: int | None) -> Source:
+    """The family as a template, or as the columns of the first joints where it has more than the robot."""
+    is_whole = family.is_regular and count in (None, len(family.columns))
+    return family.template if is_whole else list(family.columns[:count])
+
+
+def _unit(current: Family | None) -> str | None:
+    """The unit of currents, where their name states one."""
+    return None if current is None else unit_of(current.template)

@@ -1,0 +1,86 @@
+"""Layouts that other tools write, by the words of their columns; the first that a file has is taken."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Preset:
+    """How one tool names its columns.
+
+    columns : mapping of str to tuple of str
+        by group of CONTRACT.md, ends of the columns' names without the joint, their words joined by ``_``
+    units : mapping of str to str
+        as in a robot file
+    """
+
+    columns: Mapping[str, tuple[str, ...]]
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+PRESET_OF: Mapping[str, Preset] = {
+    "rtde": Preset(
+        {
+            "t": ("timestamp",),
+            "q": ("actual_q",),
+            "qd": ("actual_qd",),
+            "qref": ("target_q",),
+            "tau": ("actual_current_as_torque",),
+            "i": ("actual_current",),
+            "taucmd": ("target_moment",),
+            "temp": ("joint_temperatures",),
+        }
+    ),
+    "libfranka": Preset(
+        {
+            "t": ("time", "timestamp", "t"),
+            "q": ("q",),
+            "qd": ("dq",),
+            "qref": ("q_d",),
+            "tau": ("tau_j",),
+            "taucmd": ("tau_j_d",),
+        }
+    ),
+    "plotjuggler": Preset(
+        {
+            "t": ("time", "timestamp"),
+            "q": ("position",),
+            "qd": ("velocity",),
+            "tau": ("effort", "torque"),
+            "i": ("current",),
+        }
+    ),
+    "lerobot": Preset(
+        {
+            "t": ("timestamp",),
+            "q": ("observation_state",),
+            "qref": ("action",),
+            "tau": ("observation_effort", "observation_torque"),
+            "i": ("observation_current", "observation_load"),
+        },
+        {"q": "deg"},
+    ),
+    "mujoco": Preset(
+        {
+            "t": ("time", "t"),
+            "q": ("qpos",),
+            "qd": ("qvel",),
+            "qdd": ("qacc",),
+            "tau": ("qfrc_actuator", "actuator_force"),
+            "taucmd": ("ctrl",),
+        }
+    ),
+    "isaac": Preset(
+        {
+            "t": ("time", "sim_time", "timestamp", "t"),
+            "q": ("joint_pos", "joint_position", "joint_positions", "dof_pos"),
+            "qd": ("joint_vel", "joint_velocity", "joint_velocities", "dof_vel"),
+            "qref": ("joint_pos_target", "joint_position_target", "joint_position_targets"),
+            "tau": (
+                *("applied_torque", "applied_torques", "joint_effort", "joint_efforts", "measured_joint_efforts"),
+                *("joint_torque", "joint_torques", "dof_force", "computed_torque"),
+            ),
+        }
+    ),
+}
+"""By the names of `tauscope.robot.recording_layout.PRESETS`."""

@@ -1,0 +1,184 @@
+"""A header's columns under the names of CONTRACT.md, as a mapping or a preset says."""
+
+import difflib
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from tauscope.errors import RecordingError, RecordingMismatchError
+from tauscope.recording.layout.families import BY_NAME, PLACEHOLDERS, fill_template, names_in
+from tauscope.recording.layout.guess import guess_layout, guess_parts, layout_text
+from tauscope.recording.layout.presets import PRESET_OF
+from tauscope.recording.units import Reading
+from tauscope.recording.words import listed, printable
+from tauscope.robot.recording_layout import RecordingLayout, Source
+
+_TARGET = re.compile(r"([a-z]+)([0-9]*)")
+NANOSECONDS = "t nanoseconds"
+"""Name of the column with the nanoseconds of each second."""
+
+_EFFORTS = ("tau", "i")
+
+
+def rename_columns(header: Sequence[str], reading: Reading, file: str) -> list[str]:
+    """The header with the names of CONTRACT.md.
+
+    Raises
+    ------
+    RecordingError
+        the file has no column of a name that the mapping states
+    RecordingMismatchError
+        it names other joints than the robot, or numbers more of them
+    """
+    columns = reading.columns
+    if columns is None:
+        return list(header)
+    if isinstance(columns, str):
+        columns = _preset_columns(header, columns, reading, file)
+    target_of = _Mapping(header, reading, file).expand(columns)
+    taken, whole = set(target_of.values()), {target for target in columns if not _split(target)[1]}
+    efforts = {_group(target) for target in columns} & {*_EFFORTS}
+    others = {*_EFFORTS} - efforts if efforts else set()
+
+    def is_replaced(name: str) -> bool:
+        return name in taken or _group(name) in whole | others
+
+    # A column that the mapping leaves out keeps its name, unless the mapping has another in its place.
+    return [target_of.get(index, f"{name} " if is_replaced(name) else name) for index, name in enumerate(header)]
+
+
+def _preset_columns(header: Sequence[str], preset: str, reading: Reading, file: str) -> Mapping[str, Source]:
+    """The mapping of a preset for this header."""
+    layout = guess_layout(header, reading.joint_names, preset=preset, prefers_torque=reading.prefers_torque)
+    _require_as_many(header, preset, layout, reading, file)
+    if layout is None:
+        parts = guess_parts(header, reading.joint_names, preset=preset).columns or {}
+        known = PRESET_OF[preset].columns
+        lacks, names = ("time", known["t"]) if "t" not in parts else ("position", known["q"])
+        if "t" in parts and "q" in parts:
+            lacks, names = "effort", [name for group in ("tau", "i", "taucmd") for name in known.get(group, ())]
+        raise RecordingError(
+            f"{file}: no column holds the {lacks}, which {preset} calls {' or '.join(names)}; the columns are "
+            f"{listed(header)}; record it, or name the columns by --columns FILE.yaml"
+        )
+    assert isinstance(layout.columns, Mapping)  # noqa: S101 - a guess always is one
+    return layout.columns
+
+
+def _require_as_many(
+    header: Sequence[str], preset: str, layout: RecordingLayout | None, reading: Reading, file: str
+) -> None:
+    """Refuse a preset's columns of other joints, or of more or fewer, than the robot has."""
+    found = None if reading.joint_names is None else guess_layout(header, None, preset=preset)
+    if found is None or reading.joint_names is None or not isinstance(found.columns, Mapping):
+        return
+    if layout is None:
+        _Mapping(header, reading, file).expand(found.columns)  # names the joints that differ
+    unnamed = replace(reading, joint_names=None)
+    targets = _Mapping(header, unnamed, file).expand(found.columns).values()
+    count, wanted = sum(_group(target) == "q" for target in targets), len(reading.joint_names)
+    is_by_name = layout is not None and isinstance(layout.columns, Mapping) and BY_NAME in str(layout.columns["q"])
+    if count != wanted and not is_by_name:
+        hint = "give the robot file and the recording of the same arm"
+        if layout is not None:
+            hint = f"if the first {wanted} are the robot's, give --columns FILE.yaml: {layout_text(layout)}"
+        raise RecordingMismatchError(f"{file}: the columns are of {count} joints, the robot has {wanted}; {hint}")
+
+
+class _Mapping:
+    """Turns a mapping for all joints into one for each column."""
+
+    def __init__(self, header: Sequence[str], reading: Reading, file: str) -> None:
+        self._header, self._file, self._known = header, file, set(header)
+        self._robot = reading.joint_names
+        self._names: Sequence[str] | None = reading.joint_names
+
+    def expand(self, columns: Mapping[str, Source]) -> dict[int, str]:
+        """Column of CONTRACT.md by the index of the file's."""
+        target_of: dict[int, str] = {}
+        for target, source in columns.items():
+            group, number = _split(target)
+            is_one = number or group in ("t", "period")
+            sources = [source] if isinstance(source, str | int) and is_one else self._group(group, source)
+            for joint, name in enumerate(sources):
+                index = self._find(name, target)
+                wanted = target if is_one else f"{group}{joint + 1}"
+                wanted = NANOSECONDS if target == "t" and joint else wanted
+                if index in target_of:
+                    raise RecordingError(
+                        f"{self._file}: column {printable(str(name))} is mapped to {target_of[index]} and {wanted};"
+                        " keep one"
+                    )
+                target_of[index] = wanted
+        return target_of
+
+    def _find(self, source: Source, target: str) -> int:
+        """Index of a column, by its name, or by its number from 1 where no column has that name."""
+        name = str(source)
+        if name in self._known:
+            return self._header.index(name)
+        if isinstance(source, int) and 0 < source <= len(self._header):
+            return source - 1
+        raise RecordingError(f"{self._file}: columns: {target}: {self._absence(name)}")
+
+    def _group(self, group: str, source: Source) -> Sequence[str | int]:
+        """One column a joint."""
+        if not isinstance(source, str | int):
+            return source
+        template = str(source)
+        if not any(placeholder in template for placeholder in PLACEHOLDERS):
+            if template in self._known:
+                return [template]
+            element = next(
+                (f"{template}[{joint}]" for joint in ("{0}", BY_NAME) if self._fits(f"{template}[{joint}]")), ""
+            )
+            template = element or template
+        if BY_NAME in template:
+            return self._by_name(template)
+        if not any(placeholder in template for placeholder in PLACEHOLDERS):
+            return [template]
+        found = []
+        while (name := fill_template(template, len(found), None)) in self._known:
+            found.append(name)
+        wanted = None if self._robot is None else len(self._robot)
+        if wanted is not None and len(found) > wanted and group in ("q", *_EFFORTS):
+            raise RecordingMismatchError(
+                f"{self._file}: columns: {group}: {printable(template)} numbers {len(found)} joints, the robot has "
+                f"{wanted}; list the columns of its joints, as in [{listed(found[:wanted])}]"
+            )
+        return found or [fill_template(template, 0, None)]
+
+    def _by_name(self, template: str) -> Sequence[str]:
+        """One column a joint of the robot; of the file, in its order, where no robot is known."""
+        found = names_in(self._header, template)
+        if self._names is None:
+            self._names = found
+        missing = [name for name in self._names if name not in found]
+        if not found or missing:
+            raise RecordingMismatchError(
+                f"{self._file}: {printable(template)} names {len(found)} joints ({listed(found)}), the robot has "
+                f"{len(self._names)} ({listed(self._names)}); name the robot's joints as the recording does, or list "
+                "the columns in the order of the robot's joints"
+            )
+        return [fill_template(template, 0, name) for name in self._names]
+
+    def _fits(self, template: str) -> bool:
+        """Whether a list column of this name was unfolded."""
+        return bool(names_in(self._header, template.replace("{0}", BY_NAME)))
+
+    def _absence(self, name: str) -> str:
+        """A column that is not there, and those that are."""
+        near = difflib.get_close_matches(name, self._header, 1)
+        hint = f"did you mean {printable(near[0])}?" if near else f"the columns are {listed(self._header)}"
+        return f"no column is named {printable(name)}; {hint}"
+
+
+def _split(target: str) -> tuple[str, str]:
+    """Group and number of a column of CONTRACT.md."""
+    match = _TARGET.fullmatch(target)
+    return (match[1], match[2]) if match else (target, "")
+
+
+def _group(name: str) -> str:
+    """Group of a column, itself where it is not one of CONTRACT.md."""
+    return _split(name)[0]

@@ -1,0 +1,90 @@
+"""The chain between two links of a URDF or MJCF, and notes on how it was chosen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.result_warning import ResultWarning
+from tauscope.robot.finding import Finding
+from tauscope.robot.messages import one_line, shown
+from tauscope.robot.robot import Actuator, FrictionCoefficients, JointLimits, JointType, LinkInertia, Repair, Segment
+
+MOST_NAMES = 4
+"""Names that a note lists."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Joints, segments and bodies from the base to the tip.
+
+    segment_names : tuple of str
+        the file's joint of each segment
+    segments : tuple of Segment
+        one a joint, and one for each joint that follows another
+    links : tuple of LinkInertia, or None
+        one a segment, about the link frame; zero for a link without inertia, None where no link has one
+    friction : tuple of FrictionCoefficients, or None
+        one a joint; None where no joint states it
+    rotor_inertia : tuple of float, or None
+        one a joint [kg m² or kg]; None where no joint states it
+    link_names : tuple of tuple of str
+        links of the file that make up each link
+    branches : tuple of LinkInertia
+        the part of each link that an export leaves where the file has it
+    actuators : tuple of Actuator or None
+        one a joint; None where the file has none
+    gravity : (3,) float64, or None
+        in the base frame [m/s²]; None where the file states none
+    """
+
+    base: str
+    tip: str
+    joint_names: tuple[str, ...]
+    joint_types: tuple[JointType, ...]
+    segment_names: tuple[str, ...]
+    segments: tuple[Segment, ...]
+    limits: tuple[JointLimits, ...]
+    links: tuple[LinkInertia, ...] | None
+    friction: tuple[FrictionCoefficients, ...] | None
+    rotor_inertia: tuple[float, ...] | None
+    link_names: tuple[tuple[str, ...], ...]
+    branches: tuple[LinkInertia, ...]
+    actuators: tuple[Actuator | None, ...]
+    findings: tuple[Finding, ...]
+    repairs: tuple[Repair, ...]
+    notes: tuple[ResultWarning, ...] = ()
+    gravity: NDArray[np.float64] | None = None
+
+
+def default_ends_note(label: str, kind: str, base: str, tip: str, joints: Sequence[str]) -> ResultWarning:
+    """Where the chain runs in a file for which the user names no base or no tip."""
+    listed = ", ".join(map(shown, joints))
+    text = f"{label}: the chain runs from {shown(base)} to the deepest leaf {shown(tip)}; its joints are {listed}"
+    file = Path(label).name
+    remedy = (
+        f"where another is meant, write a robot file with kinematics: {{{kind}: {{file: {file}, base: …, tip: …}}}}"
+    )
+    return ResultWarning(code="default-chain", joint=None, text=one_line(text), remedy=one_line(remedy))
+
+
+def rigid_branch_note(label: str, joints: Sequence[str], mass: float, following: Sequence[str] = ()) -> ResultWarning:
+    """Which joints beside the chain count as rigid, and what they carry.
+
+    Parameters
+    ----------
+    mass : float
+        of all bodies that these joints move [kg]
+    following : sequence of str
+        those of them that would follow a joint of the chain
+    """
+    more = f" and {len(joints) - MOST_NAMES} more" if len(joints) > MOST_NAMES else ""
+    names = ", ".join(map(shown, joints[:MOST_NAMES])) + more
+    verbs = ("moves", "counts") if len(joints) == 1 else ("move", "count")
+    text = f"{label}: joint {names} {verbs[0]} beside the chain and {verbs[1]} as rigid, with {mass:.4g} kg"
+    if following:
+        text += f"; the motion of {', '.join(map(shown, following[:MOST_NAMES]))} with the chain is left out"
+    remedy = f"state its position in the robot file where it is not zero, as in locked: {{{joints[0]}: 0.02}}"
+    return ResultWarning(code="rigid-branch", joint=None, text=one_line(text), remedy=one_line(remedy))

@@ -1,0 +1,425 @@
+"""The chain between two bodies of an MJCF, as MuJoCo compiles it.
+
+Includes, defaults, classes, frames and inertias from shapes are MuJoCo's own work; what is read here is the compiled
+model. Link frames are MuJoCo's body frames. A hinge or slide is ``before · motion along z | after`` with the joint's
+anchor and axis between the two placements; a body with several joints has a massless link for each but the last.
+Bodies without a joint, and bodies on joints that rest, belong to the link that carries them.
+"""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's extension modules come without type stubs)
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tauscope.errors import RobotFileError
+from tauscope.robot.chain import Chain, ResultWarning, default_ends_note, rigid_branch_note
+from tauscope.robot.document import MOST_JOINTS
+from tauscope.robot.finding import Finding, Severity
+from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.placement import compose, rotation_of_z_to
+from tauscope.robot.robot import (
+    Actuator,
+    Coupling,
+    FrictionCoefficients,
+    JointLimits,
+    JointType,
+    LinkInertia,
+    Placement,
+    Segment,
+)
+from tauscope.robot.urdf_inertia import inertia_about_frame
+from tauscope_sim.mjcf_compiler import compile_model
+
+Array = NDArray[np.float64]
+
+HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+OF_JOINT = int(mujoco.mjtTrn.mjTRN_JOINT)
+
+
+def read_chain(
+    data: bytes, label: str, path: Path | None, base: str | None, tip: str | None, locked: Mapping[str, float]
+) -> Chain:
+    """The chain from body `base` to body `tip`; by default from the root to the deepest body.
+
+    Parameters
+    ----------
+    path : Path or None
+        where the file lies, for the files that it names; None for text without files beside it
+    locked : mapping of str to float
+        position of joints that do not move [rad or m]
+
+    Raises
+    ------
+    RobotFileError
+        if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip
+    """
+    return _Reader(compile_model(data, label, path), label, locked).chain(base, tip)
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """A joint of the compiled model by its index, and what it follows: (index, multiplier, offset) or nothing."""
+
+    index: int
+    name: str
+    kind: int
+    body: int
+    master: tuple[int, float, float] | None
+
+
+class _Reader:
+    """Reads chains from a compiled model."""
+
+    def __init__(self, model: mujoco.MjModel, label: str, locked: Mapping[str, float]) -> None:
+        self._model, self._label, self._locked = model, label, locked
+        self._data = mujoco.MjData(model)
+        mujoco.mj_forward(model, self._data)
+        self._findings: list[Finding] = []
+        self._body_names = [model.body(index).name or f"body {index}" for index in range(model.nbody)]
+        masters = dict(self._masters())
+        self._joints = [
+            _Joint(
+                index,
+                model.joint(index).name or f"{self._body_names[model.jnt_bodyid[index]]}_joint",
+                int(model.jnt_type[index]),
+                int(model.jnt_bodyid[index]),
+                masters.get(index),
+            )
+            for index in range(model.njnt)
+        ]
+        self._by_name = {joint.name: joint for joint in self._joints}
+        for name in locked:
+            if name not in self._by_name:
+                text = f"locked: joint {shown(name)} is not in the file; {nearest(name, self._by_name)}"
+                raise self._error(text)
+
+    def chain(self, base: str | None, tip: str | None) -> Chain:
+        """Read the chain between two bodies."""
+        model = self._model
+        first, last = self._ends(base, tip)
+        bodies = self._path(first, last)
+        path = [joint for body in bodies for joint in self._joints_of(body)]
+        free = [joint for joint in path if joint.name not in self._locked]
+        for joint in free:
+            if joint.kind not in (HINGE, SLIDE):
+                text = f"joint {shown(joint.name)} is a ball or free joint; name the body beyond it as base"
+                raise self._error(text)
+        indices = {joint.index for joint in free if joint.master is None}
+        moving = [joint for joint in free if (joint.master or (joint.index,))[0] in indices]
+        if not moving:
+            names = f"base {shown(self._body_names[first])} and tip {shown(self._body_names[last])}"
+            raise self._error(f"no hinge or slide lies between {names}; name the last body as tip")
+        own = list(dict.fromkeys((joint.master or (joint.index,))[0] for joint in moving))
+        independent = [self._joints[index] for index in own]
+        segments, members = self._segments(bodies, moving, own)
+        links = tuple(self._link(body, placed) for body, placed in members)
+        names = tuple(joint.name for joint in independent)
+        notes = [self._branches(members, moving)]
+        if base is None or tip is None:
+            ends = self._body_names[first], self._body_names[last]
+            notes.insert(0, default_ends_note(self._label, "mjcf", *ends, names))
+        self._remark_on_the_rest()
+        dofs = [int(model.jnt_dofadr[joint.index]) for joint in independent]
+        rotors = np.array([model.dof_armature[dof] for dof in dofs]) + self._motor_armature(own)
+        return Chain(
+            base=self._body_names[first],
+            tip=self._body_names[last],
+            joint_names=names,
+            segment_names=tuple(joint.name for joint in moving),
+            joint_types=tuple(_joint_type(joint) for joint in independent),
+            segments=segments,
+            limits=tuple(self._limits(joint) for joint in independent),
+            links=links if any(link.mass for link in links) else None,
+            friction=self._friction(moving, own),
+            rotor_inertia=tuple(float(value) for value in rotors) if rotors.any() else None,
+            link_names=tuple(tuple(self._body_names[each] for each, _, _ in placed) for _, placed in members),
+            branches=tuple(self._link(body, [each for each in placed if each[0] != body]) for body, placed in members),
+            actuators=tuple(self._actuator(joint) for joint in independent),
+            findings=tuple(self._findings),
+            repairs=(),
+            notes=tuple(note for note in notes if note is not None),
+            gravity=self._gravity(first),
+        )
+
+    def _error(self, text: str) -> RobotFileError:
+        return RobotFileError(one_line(f"{self._label}: {text}"))
+
+    def _remark(self, severity: Severity, joint: _Joint, text: str) -> None:
+        self._findings.append(Finding(severity, one_line(f"{self._label}: joint {shown(joint.name)}"), text))
+
+    def _gravity(self, base: int) -> Array:
+        """Gravity in the base's frame, (3,) [m/s²]."""
+        if self._model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
+            return np.zeros(3)
+        return self._data.xmat[base].reshape(3, 3).T @ self._model.opt.gravity
+
+    def _remark_on_the_rest(self) -> None:
+        """Say which forces of the file the model leaves out."""
+        model, left = self._model, []
+        if model.opt.density or model.opt.viscosity:
+            left.append("drag of the medium (option density, viscosity)")
+        if any(model.tendon_stiffness) or np.any(model.tendon_damping) or any(model.tendon_frictionloss):
+            left.append("stiffness, damping and friction of tendons")
+        if np.any(model.body_gravcomp):
+            left.append("gravity compensation (gravcomp)")
+        self._findings += [Finding(Severity.WARNING, self._label, f"the model leaves out {each}") for each in left]
+
+    def _masters(self) -> Iterable[tuple[int, tuple[int, float, float]]]:
+        """Joints tied to another by an equality that is linear: q₁ - q₁⁰ = c₀ + c₁ (q₂ - q₂⁰)."""
+        model = self._model
+        for index in np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)):
+            first, second = int(model.eq_obj1id[index]), int(model.eq_obj2id[index])
+            offset, ratio, *higher = (float(value) for value in model.eq_data[index][:5])
+            if second < 0 or any(higher) or not ratio or not model.eq_active0[index]:
+                continue
+            rest = [float(model.qpos0[model.jnt_qposadr[joint]]) for joint in (first, second)]
+            yield first, (second, ratio, rest[0] + offset - ratio * rest[1])
+
+    def _ends(self, base: str | None, tip: str | None) -> tuple[int, int]:
+        """Bodies of base and tip: the world, or the first one below a free joint, and the body with most joints."""
+        found: dict[str, int] = {}
+        for role, name in (("base", base), ("tip", tip)):
+            if name is None:
+                continue
+            if name not in self._body_names:
+                hint = nearest(name, self._body_names)
+                raise self._error(f"the {role} body {shown(name)} is not in the file; {hint}")
+            found[role] = self._body_names.index(name)
+        if "tip" not in found:
+
+            def depth(body: int) -> tuple[int, int]:
+                above = self._above(body, found.get("base"))
+                joints = [joint for each in above for joint in self._joints_of(each)]
+                own = [joint for joint in joints if joint.master is None and joint.name not in self._locked]
+                return len([joint for joint in own if joint.kind in (HINGE, SLIDE)]), len(above)
+
+            parents = set(map(int, self._model.body_parentid[1:]))
+            found["tip"] = max((body for body in range(self._model.nbody) if body not in parents), key=depth, default=0)
+        if "base" not in found:
+            above = self._above(found["tip"], None)
+            found["base"] = int(self._model.body_parentid[above[0]]) if above else found["tip"]
+            first = above[0] if above else 0
+            if any(joint.kind not in (HINGE, SLIDE) for joint in self._joints_of(first)):
+                found["base"] = first
+        return found["base"], found["tip"]
+
+    def _above(self, body: int, base: int | None) -> list[int]:
+        """Bodies from below the base, or from the last one on a free or ball joint, to a body; the upper first."""
+        chain: list[int] = []
+        while body and body != base:
+            chain.append(body)
+            if base is None and any(joint.kind not in (HINGE, SLIDE) for joint in self._joints_of(body)):
+                break
+            body = int(self._model.body_parentid[body])
+        return chain[::-1] if base is None or body == base else []
+
+    def _path(self, base: int, tip: int) -> list[int]:
+        """Bodies from below the base to the tip."""
+        path, body = [], tip
+        while body != base:
+            if not body:
+                names = shown(self._body_names[tip]), shown(self._body_names[base])
+                raise self._error(f"the tip {names[0]} does not hang on the base {names[1]}; name bodies of one chain")
+            path.append(body)
+            body = int(self._model.body_parentid[body])
+        if len(path) > MOST_JOINTS:
+            raise self._error(f"the chain has {len(path)} bodies, more than {MOST_JOINTS}")
+        return path[::-1]
+
+    def _joints_of(self, body: int) -> list[_Joint]:
+        first, count = int(self._model.body_jntadr[body]), int(self._model.body_jntnum[body])
+        return self._joints[first : first + count] if count else []
+
+    def _segments(
+        self, path: list[int], moving: list[_Joint], own: list[int]
+    ) -> tuple[tuple[Segment, ...], list[tuple[int, list[tuple[int, Placement, bool]]]]]:
+        """Segments, and for each the body whose frame its link has, with the bodies that belong to it."""
+        segments: list[Segment] = []
+        members: list[tuple[int, list[tuple[int, Placement, bool]]]] = []
+        pending, met = Placement(), set[int]()
+        for body in path:
+            pending = compose(pending, self._placement(body))
+            joints = self._joints_of(body)
+            for joint in joints:
+                if joint not in moving:
+                    pending = compose(pending, self._rigid_motion(joint))
+                    continue
+                anchor = Placement(translation=np.array(self._model.jnt_pos[joint.index]))
+                align = Placement(rotation_of_z_to(np.array(self._model.jnt_axis[joint.index])))
+                rest = float(self._model.qpos0[self._model.jnt_qposadr[joint.index]])
+                turned = _motion(joint.kind, -rest)
+                before = compose(compose(pending, anchor), compose(align, turned))
+                after = compose(Placement(align.rotation.T), Placement(translation=-anchor.translation))
+                master, ratio, offset = joint.master or (joint.index, 1.0, 0.0)
+                is_next = master not in met and (ratio, offset) == (1.0, 0.0)
+                coupling = None if is_next else Coupling(own.index(master), ratio, offset)
+                met.add(master)
+                segments.append(Segment(_joint_type(joint), before, after, coupling))
+                members.append((body, []))
+                pending = Placement()
+            if members and members[-1][0] == body:
+                members[-1] = (body, list(self._carried(body, moving)))
+        return tuple(segments), members
+
+    def _carried(self, body: int, moving: list[_Joint]) -> Iterable[tuple[int, Placement, bool]]:
+        """Bodies that move with a body, where each is in its frame, and whether a joint that rests carries it."""
+        stops = {joint.body for joint in moving}
+        waiting = [(body, Placement(), False)]
+        while waiting:
+            each, placement, on_joint = waiting.pop()
+            yield each, placement, on_joint
+            for below in map(int, np.flatnonzero(self._model.body_parentid == each)):
+                if below in stops or not below:
+                    continue
+                joints = self._joints_of(below)
+                at = compose(placement, self._placement(below))
+                for joint in joints:
+                    at = compose(at, self._rigid_motion(joint))
+                waiting.append((below, at, on_joint or bool(joints)))
+
+    def _placement(self, body: int) -> Placement:
+        """A body's frame in its parent's, joints at their reference."""
+        return Placement(_rotation(self._model.body_quat[body]), np.array(self._model.body_pos[body]))
+
+    def _rigid_position(self, joint: _Joint) -> float:
+        """Position of a joint that rests: locked, following a joint that rests, or at its reference [rad or m]."""
+        rest = float(self._model.qpos0[self._model.jnt_qposadr[joint.index]])
+        if joint.name in self._locked:
+            return self._locked[joint.name]
+        if joint.master is None or self._joints[joint.master[0]].name not in self._locked:
+            return rest
+        master, ratio, offset = joint.master
+        return ratio * self._locked[self._joints[master].name] + offset
+
+    def _rigid_motion(self, joint: _Joint) -> Placement:
+        """Displacement of a joint that rests, from its reference."""
+        if joint.kind not in (HINGE, SLIDE):
+            return Placement()
+        rest = float(self._model.qpos0[self._model.jnt_qposadr[joint.index]])
+        anchor = np.array(self._model.jnt_pos[joint.index])
+        align = rotation_of_z_to(np.array(self._model.jnt_axis[joint.index]))
+        motion = _motion(joint.kind, self._rigid_position(joint) - rest)
+        turned = compose(compose(Placement(align, anchor), motion), Placement(align.T))
+        return compose(turned, Placement(translation=-anchor))
+
+    def _link(self, body: int, members: Iterable[tuple[int, Placement, bool]]) -> LinkInertia:
+        """Bodies of one link about its frame."""
+        model, total = self._model, np.zeros(10)
+        for each, placement, _ in members:
+            centre = Placement(_rotation(model.body_iquat[each]), np.array(model.body_ipos[each]))
+            inertia = np.diag(model.body_inertia[each])
+            link = inertia_about_frame(float(model.body_mass[each]), compose(placement, centre), inertia)
+            total += link.to_vector()
+        return LinkInertia.from_vector(total)
+
+    def _branches(
+        self, members: list[tuple[int, list[tuple[int, Placement, bool]]]], moving: list[_Joint]
+    ) -> ResultWarning | None:
+        """The note on joints beside the chain, which count as rigid."""
+        names, following, mass = [], [], 0.0
+        chain = {joint.index for joint in moving}
+        for _, placed in members:
+            for body, _, on_joint in placed:
+                joints = [] if not on_joint else [each for each in self._joints_of(body) if each not in moving]
+                masters = {joint.name: joint.master and self._joints[joint.master[0]].name for joint in joints}
+                free = [name for name, master in masters.items() if not {name, master} & set(self._locked)]
+                names += free
+                following += [name for name in free if (own := self._by_name[name].master) and own[0] in chain]
+                mass += float(self._model.body_mass[body]) if on_joint else 0.0
+        return rigid_branch_note(self._label, names, mass, following) if names and mass > 0.0 else None
+
+    def _limits(self, joint: _Joint) -> JointLimits:
+        """Range, and the largest torque that the joint or its actuators state."""
+        model, index = self._model, joint.index
+        low, high = (float(value) for value in model.jnt_range[index])
+        torques = [abs(float(value)) for value in model.jnt_actfrcrange[index] if model.jnt_actfrclimited[index]]
+        for actuator in self._actuators_of(joint):
+            gear = abs(float(model.actuator_gear[actuator, 0]))
+            if model.actuator_forcelimited[actuator]:
+                torques.append(gear * float(np.max(np.abs(model.actuator_forcerange[actuator]))))
+            elif self._is_motor(actuator) and model.actuator_ctrllimited[actuator]:
+                gain = abs(float(model.actuator_gainprm[actuator, 0]))
+                torques.append(gear * gain * float(np.max(np.abs(model.actuator_ctrlrange[actuator]))))
+        torque = min((value for value in torques if 0.0 < value < np.inf), default=None)
+        stated = bool(model.jnt_limited[index]) and low < high
+        return JointLimits(position=(low, high) if stated else None, torque=torque)
+
+    def _friction(self, moving: list[_Joint], own: list[int]) -> tuple[FrictionCoefficients, ...] | None:
+        """Stiction from frictionloss, viscous from damping; a joint that follows with ratio m adds |m| and m² times."""
+        model, total = self._model, {index: np.zeros(2) for index in own}
+        for joint in moving:
+            dof = int(model.jnt_dofadr[joint.index])
+            index, ratio, _ = joint.master or (joint.index, 1.0, 0.0)
+            damping = float(model.dof_damping[dof])
+            for actuator in self._actuators_of(joint):
+                damping += float(model.actuator_damping[actuator]) * float(model.actuator_gear[actuator, 0]) ** 2
+            total[index] += abs(ratio) * float(model.dof_frictionloss[dof]), ratio**2 * damping
+            if model.jnt_stiffness[joint.index]:
+                text = f"has stiffness {float(model.jnt_stiffness[joint.index]):g}, which the model leaves out"
+                self._remark(Severity.WARNING, joint, text)
+            if np.any(model.dof_dampingpoly[dof]):
+                self._remark(Severity.WARNING, joint, "has polynomial damping; the model takes its linear part")
+        if not any(values.any() for values in total.values()):
+            return None
+        return tuple(FrictionCoefficients(stiction=float(d), viscous=float(v)) for d, v in total.values())
+
+    def _motor_armature(self, own: list[int]) -> Array:
+        """Inertia that the actuators add to their joints, n gear² [kg m² or kg]."""
+        model, total = self._model, np.zeros(len(own))
+        for place, index in enumerate(own):
+            for actuator in self._actuators_of(self._joints[index]):
+                total[place] += float(model.actuator_armature[actuator]) * float(model.actuator_gear[actuator, 0]) ** 2
+        return total
+
+    def _actuators_of(self, joint: _Joint) -> list[int]:
+        model = self._model
+        return [
+            index
+            for index in range(model.nu)
+            if model.actuator_trntype[index] == OF_JOINT and model.actuator_trnid[index, 0] == joint.index
+        ]
+
+    def _is_motor(self, actuator: int) -> bool:
+        return self._model.actuator_biastype[actuator] == int(mujoco.mjtBias.mjBIAS_NONE)
+
+    def _actuator(self, joint: _Joint) -> Actuator | None:
+        """Gains of a joint's actuator in joint units; of several the first that holds the position."""
+        model, found = self._model, None
+        for index in self._actuators_of(joint):
+            gear = float(model.actuator_gear[index, 0])
+            affine = model.actuator_biastype[index] == int(mujoco.mjtBias.mjBIAS_AFFINE)
+            if not affine:
+                found = found or Actuator("motor", 0.0, 0.0)
+                continue
+            kp, kv = -float(model.actuator_biasprm[index, 1]), -float(model.actuator_biasprm[index, 2])
+            kp, kv = kp * gear * gear + 0.0, kv * gear * gear + 0.0  # no negative zero
+            actuator = Actuator("position" if kp else "velocity", kp, kv)
+            if found is None or found.kind != "position":
+                found = actuator
+        if found is not None and found.kind != "motor":
+            text = f"a {found.kind} actuator drives it, kp {found.kp:g}, kv {found.kv:g} in joint units"
+            self._remark(Severity.INFO, joint, text)
+        return found
+
+
+def _joint_type(joint: _Joint) -> JointType:
+    return JointType.PRISMATIC if joint.kind == SLIDE else JointType.REVOLUTE
+
+
+def _rotation(quaternion: Array) -> Array:
+    """Rotation matrix of a quaternion (w, x, y, z), (3, 3)."""
+    return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+
+
+def _motion(kind: int, position: float) -> Placement:
+    """Turn about z, or slide along it."""
+    if kind == SLIDE:
+        return Placement(translation=np.array([0.0, 0.0, position]))
+    return Placement(_rotation(np.array([np.cos(position / 2), 0.0, 0.0, np.sin(position / 2)])))
