@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, FiniteFloat, ValidationError
+from pydantic import AliasChoices, Field, FiniteFloat, ValidationError
 
 from tauscope.errors import AcquisitionError
 from tauscope.files import write_atomically
@@ -44,8 +44,19 @@ class RunOptions(StrictModel, strict=False):
     following_error: Positive | None = Field(
         default=None, description="allowed distance of arm and target, rad or m; null for 0.2 rad or 0.05 m"
     )
-    missed: int = Field(default=3, ge=1, le=1000, description="readings in a row that a joint may not fail to answer")
-    lost_s: Positive = Field(default=0.05, description="time after which a joint that does not answer counts as lost")
+    # The second names are those of earlier versions, which stored runs have.
+    missed: int = Field(
+        default=3,
+        ge=1,
+        le=1000,
+        validation_alias=AliasChoices("missed", "stale_misses"),
+        description="readings in a row that a joint may not fail to answer",
+    )
+    lost_s: Positive = Field(
+        default=0.05,
+        validation_alias=AliasChoices("lost_s", "stale_s"),
+        description="time after which a joint that does not answer counts as lost",
+    )
     stale_ms: Positive = Field(
         default=1.0, le=1000, description="how much later than usual an answer may come and still be a sample"
     )
