@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauscope.diagnosis.findings.conclude import EQUIVALENT, FORMULA_ERROR, _equivalent
+from tauscope.diagnosis.findings.finding import EQUIVALENT, FORMULA_ERROR
 from tauscope.diagnosis.model.term import Place, Term
 from tauscope.diagnosis.search.search import Rival, Search, Step, Weighed
 from tauscope.effects import Effect
@@ -61,7 +61,7 @@ def test_odds_beyond_any_number_stay_probabilities() -> None:
 def test_what_the_data_hardly_tell_from_a_finding_is_an_alternative(log_odds: float, behind: float) -> None:
     """No formula is exact: of stronger effects a larger difference says nothing."""
     margin = EQUIVALENT + FORMULA_ERROR * log_odds
-    found = _equivalent(weighed(log_odds, log_odds - behind))
+    found = equivalent(log_odds, weighed(log_odds, log_odds - behind).rivals)
     if abs(behind - margin) > 1e-6:
         assert bool(found) is (behind < margin)
 
