@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauscope.diagnosis.findings.finding import EQUIVALENT, FORMULA_ERROR
+from tauscope.diagnosis.findings.finding import EQUIVALENT, FORMULA_ERROR, equivalent
 from tauscope.diagnosis.model.term import Place, Term
 from tauscope.diagnosis.search.search import Rival, Search, Step, Weighed
 from tauscope.effects import Effect

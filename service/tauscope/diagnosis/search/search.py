@@ -103,6 +103,10 @@ class Weighed:
         """Log odds of the best rival against it."""
         return self.rivals[0].log_odds - self.log_odds if self.rivals else -np.inf
 
+    def refuse(self, rival: Place) -> "Weighed":
+        """The same without a rival that held-out motion refuses."""
+        return replace(self, rivals=tuple(each for each in self.rivals if each.term.place != rival))
+
     @property
     def probability(self) -> float:
         """Share of all visited models that contain it (Madigan & Raftery 1994)."""
@@ -155,14 +159,16 @@ class Search:
     def _exchange(self, at: Hypothesis) -> tuple[Hypothesis, tuple[Weighed, ...]]:
         """Each effect weighed beside all others, and a more probable one in its place where there is one."""
         weighed = {own: self._weigh(at, places) for own, places in _groups(at.model).items()}
-        for _ in range(MOST_EXCHANGES):
+        exchanges = 0
+        while exchanges < MOST_EXCHANGES:
             own = max(weighed, key=lambda each: weighed[each].lead, default=None)
             if own is None or weighed[own].lead <= 0.0 or len(weighed[own].places) > 1:
                 break
-            other = self._try_rival(weighed[own])
+            other, rival = self._try_rival(weighed[own]), weighed[own].rivals[0].term.place
             if other is None:
-                weighed[own] = replace(weighed[own], rivals=weighed[own].rivals[1:])
+                weighed = {each: weighed[each].refuse(rival) for each in weighed}
                 continue
+            exchanges += 1
             at, new = other, other.model.terms[-1].place
             kept = {each: weighed[each] for each in weighed if each not in (own, new)}
             places = _groups(at.model)
