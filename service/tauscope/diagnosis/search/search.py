@@ -268,7 +268,8 @@ class Search:
         if isinstance(proposal.term.effect, TimeLocalEffect):
             log_odds = min(log_odds, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
         log_odds += 0.0 if change is None else change.log_odds()
-        confirmed = log_odds > NAMED and (change is None or _agrees(change, proposal.term.effect, touched))
+        confirmed = log_odds > NAMED and _is_possible(found.model)
+        confirmed &= change is None or _agrees(change, proposal.term.effect, touched)
         covariance = found.posterior.covariance
         trained = self._log_odds(proposal)
         return Step(proposal, log_odds, rivals, change, confirmed, at.model, found.model, covariance, trained), found
@@ -346,6 +347,12 @@ class Search:
         return replace(at, linear=reduced, scales=scales).log_evidence - at.log_evidence - self._prior_odds(effect, 0.0)
 
 
+def _is_possible(model: ExtendedModel) -> bool:
+    """Whether every coefficient is within the bounds of its law."""
+    pairs = ((term, term.effect.joint) for term in model.terms)
+    return all(term.is_possible(None if joint is None else model.structure.terms[joint].k_v) for term, joint in pairs)
+
+
 def _agrees(change: HeldOutChange, effect: Effect, touched: Sequence[int]) -> bool:
     """Whether held-out motion shows an effect; a window in time is of its own recording, and has only to do no harm."""
     return change.harm <= 0.0 and (isinstance(effect, TimeLocalEffect) or change.log_odds(touched) > 0.0)
@@ -360,7 +367,12 @@ class _Wanted:
 
     def __call__(self, effect: Effect) -> bool:
         place = effect.id, effect.joint
-        return place not in self.refused and (effect.repeats or place not in self.present)
+        return place not in self.refused and (effect.repeats or not self._is_present(effect))
+
+    def _is_present(self, effect: Effect) -> bool:
+        """Whether it is there at its joint, or at the whole arm: an effect of all joints and one of each are alike."""
+        joints = {joint for name, joint in self.present if name == effect.id}
+        return bool(joints) if effect.joint is None else bool(joints & {None, effect.joint})
 
 
 def _groups(model: ExtendedModel) -> dict[Place, tuple[int, ...]]:
