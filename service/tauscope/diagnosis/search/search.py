@@ -331,11 +331,18 @@ class Search:
         while True:
             places = range(first, len(at.model.terms) - 1)
             gains = side_by_side(lambda place, at=at: self._gain_without(at, place), places)
-            if not gains or max(gains) <= CATALOGUED:
+            pairs = sorted(zip(gains, places, strict=True), reverse=True)
+            others = (self._leave_out(at, place, gain) for gain, place in pairs if gain > CATALOGUED)
+            other = next((each for each in others if each is not None), None)
+            if other is None:
                 return at
-            place = places[int(np.argmax(gains))]
-            touched = at.model.terms[place].effect.touched(len(at.scales))
-            at = self.laboratory.settle(self.laboratory.without_term(at, place), touched)
+            at = other
+
+    def _leave_out(self, at: Hypothesis, place: int, gain: float) -> Hypothesis | None:
+        """The hypothesis without an effect; None where held-out motion asks for it."""
+        without = self._settle_without(at, place)
+        gain += 0.0 if self.held_out is None else self.held_out.change(at, without).log_odds()
+        return without if gain > CATALOGUED else None
 
     def _gain_without(self, at: Hypothesis, place: int) -> float:
         """Log posterior odds that an effect is not there."""
