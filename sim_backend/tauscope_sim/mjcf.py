@@ -265,10 +265,10 @@ class _Reader:
                 members.append((body, []))
                 pending = Placement()
             if members and members[-1][0] == body:
-                members[-1] = (body, list(self._carried(body, moving)))
+                members[-1] = (body, list(self._find_carried(body, moving)))
         return tuple(segments), members
 
-    def _carried(self, body: int, moving: list[_Joint]) -> Iterable[tuple[int, Placement, bool]]:
+    def _find_carried(self, body: int, moving: list[_Joint]) -> Iterable[tuple[int, Placement, bool]]:
         """Bodies that move with a body, where each is in its frame, and whether a joint that rests carries it."""
         stops = {joint.body for joint in moving}
         waiting = [(body, Placement(), False)]

@@ -1,6 +1,5 @@
 """Chains of MJCF against MuJoCo's own inverse dynamics of the whole file, to 1e-9."""
 
-from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import mujoco
@@ -11,7 +10,7 @@ from hypothesis import strategies as st
 
 from tauscope.dynamics import inverse_dynamics
 from tauscope.errors import MissingExtraError, RobotFileError
-from tauscope.robot import Actuator, Robot, Severity, read_robot
+from tauscope.robot import Actuator, Robot, Severity, mjcf, read_robot
 
 # pyright: reportAttributeAccessIssue=false
 
@@ -237,11 +236,12 @@ def test_mesh_that_gives_a_mass_must_be_there(tmp_path: Path) -> None:
 
 
 def test_extra_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def load(self: EntryPoint) -> None:
-        raise ModuleNotFoundError("No module named 'mujoco'", name="mujoco")
+    class Entry:
+        def load(self) -> None:
+            raise ModuleNotFoundError("No module named 'mujoco'", name="mujoco")
 
     path = write_robot(tmp_path, ARM)
-    monkeypatch.setattr(EntryPoint, "load", load)
+    monkeypatch.setattr(mjcf, "entry_points", lambda group: [Entry()])
     with pytest.raises(MissingExtraError, match=r"arm\.xml: reading an MJCF needs the sim extra: pip install"):
         read_robot(path)
 

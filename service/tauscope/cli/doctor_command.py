@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from tauscope.cli.driver_choice import check_bus
+from tauscope.cli.driver_choice import BusOption
 
 RobotFile = Annotated[
     Path | None,
@@ -22,14 +22,7 @@ RobotFile = Annotated[
 def doctor(
     robot: RobotFile = None,
     *,
-    backend: Annotated[
-        str | None,
-        typer.Option(
-            parser=check_bus,
-            metavar="[{buses}]",
-            help="Field bus; the one that the robot file's drives speak of by default.",
-        ),
-    ] = None,
+    backend: BusOption = None,
 ) -> None:
     """Look at adapters and drives, and say what keeps an arm from running well, each with its remedy.
 

@@ -1,6 +1,7 @@
 """Options whose choices are the registered drivers: a command reads them when it is called or asked for its help."""
 
 from collections.abc import Collection
+from typing import Annotated
 
 import typer
 from typer.core import TyperArgument, TyperCommand, TyperOption
@@ -80,3 +81,14 @@ def _check(name: str, known: Collection[str]) -> str:
     if name not in known:
         raise typer.BadParameter(f"{name!r} is not one of {', '.join(map(repr, known))}.")
     return name
+
+
+BusOption = Annotated[
+    str | None,
+    typer.Option(
+        parser=check_bus,
+        metavar="[{buses}]",
+        help="Field bus; the one that the robot file's drives speak of by default.",
+    ),
+]
+"""Which bus, where a robot file's drives do not say it."""

@@ -5,20 +5,13 @@ from typing import Annotated
 import typer
 
 from tauscope.cli.arguments import RobotFile
-from tauscope.cli.driver_choice import check_bus
+from tauscope.cli.driver_choice import BusOption
 
 
 def release(
     robot: RobotFile,
     *,
-    backend: Annotated[
-        str | None,
-        typer.Option(
-            parser=check_bus,
-            metavar="[{buses}]",
-            help="Field bus; the one that the robot file's drives speak of by default.",
-        ),
-    ] = None,
+    backend: BusOption = None,
     supported: Annotated[
         bool, typer.Option("--supported", help="State that the arm is supported; else you are asked.")
     ] = False,

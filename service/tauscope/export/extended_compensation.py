@@ -66,7 +66,7 @@ def _expression(found: FoundEffect, model: ExportModel) -> str:
     return found.effect.torque_code(found.coefficients.tolist(), found.shape.tolist(), k_v)
 
 
-def _by_joint(model: ExportModel) -> list[tuple[int, list[str]]]:
+def _group_by_joint(model: ExportModel) -> list[tuple[int, list[str]]]:
     """Expressions of every joint that has any, joints counted from 1."""
     found: dict[int, list[str]] = {}
     for each in model.effects:
@@ -82,7 +82,7 @@ def _python(name: str, model: ExportModel) -> str:
     lines += [f"    # Not in this code: {each}" for each in _left_out(model)]
     lines += ["    from math import atan, copysign, cos, exp, fabs, pow, sin", ""]
     lines += ["    fmax = max", "    q, v = position, velocity", "    torque = 0.0"]
-    for joint, expressions in _by_joint(model):
+    for joint, expressions in _group_by_joint(model):
         lines.append(f"    if joint == {joint}:")
         lines += [f"        torque += {expression}" for expression in expressions]
     return "\n".join([*lines, "    return torque", ""])
@@ -94,7 +94,7 @@ def _c(name: str, model: ExportModel) -> str:
     lines.append("/* Torque in Nm (force in N) of what was found beside friction; load: rigid-body torque. */")
     lines.append(f"static inline double {name}_effect_torque(int joint, double q, double v, double load)")
     lines += ["{", "    double torque = 0.0;", "    (void)q;", "    (void)v;", "    (void)load;"]
-    for joint, expressions in _by_joint(model):
+    for joint, expressions in _group_by_joint(model):
         lines.append(f"    if (joint == {joint}) {{")
         lines += [f"        torque += {expression};" for expression in expressions]
         lines.append("    }")

@@ -104,7 +104,7 @@ def _spring(added: Additions, found: FoundEffect) -> str | None:
     return None
 
 
-def _power_of_speed(added: Additions, found: FoundEffect) -> str | None:
+def _add_power_of_speed(added: Additions, found: FoundEffect) -> str | None:
     """Damping of second or third order, the two that MuJoCo has."""
     amplitude, power, joint = float(found.coefficients[0]), float(found.shape[0]), found.effect.joint or 0
     square, cube = added.joints[joint].damping
@@ -172,7 +172,7 @@ def _coupling(added: Additions, found: FoundEffect) -> str | None:
 
 WRITERS: Mapping[str, Callable[[Additions, FoundEffect], str | None]] = {
     "joint_spring": _spring,
-    "nonlinear_viscous": _power_of_speed,
+    "nonlinear_viscous": _add_power_of_speed,
     "cogging": _cogging,
     "presliding_hysteresis": _bristles,
     "payload": _payload,

@@ -104,7 +104,7 @@ def _write_inertial(text: XmlText, body: Element, inertia: CentredInertia) -> No
 def _joint_attributes(root: Element, label: str, model: JointModel, extras: JointExtras) -> dict[str, str]:
     """Attributes of a joint that the model determines; a joint that follows has its part in its master's."""
     attributes = dict(extras.attributes) | {"damping": "0.0", "frictionloss": "0.0"}
-    if "springref" in attributes and _in_degrees(root):
+    if "springref" in attributes and _uses_degrees(root):
         attributes["springref"] = numbers(degrees(float(attributes["springref"])))
     if model.friction is not None:
         dry, damping = dry_friction_and_damping(label, model.friction)
@@ -114,7 +114,7 @@ def _joint_attributes(root: Element, label: str, model: JointModel, extras: Join
     return attributes | {"armature": numbers(model.rotor_inertia or 0.0)}
 
 
-def _in_degrees(root: Element) -> bool:
+def _uses_degrees(root: Element) -> bool:
     """Whether angles of the file are in degrees, MuJoCo's default."""
     return not any(compiler.attributes.get("angle") == "radian" for compiler in root.named("compiler"))
 

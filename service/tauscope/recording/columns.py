@@ -122,7 +122,19 @@ def _note_command(header: Sequence[str], renamed: Sequence[str]) -> tuple[Result
     return (ResultWarning(code="commanded-effort", text=text, remedy=remedy),)
 
 
-def choose_reading(header: Sequence[str], reading: Reading, file: str) -> Reading:
+def find_layout(header: Sequence[str], reading: Reading, file: str) -> tuple[Reading, ColumnLayout]:
+    """How a file is read, and which of its columns is which.
+
+    Raises
+    ------
+    RecordingError
+        as `map_columns`
+    """
+    reading = _choose_reading(header, reading, file)
+    return reading, map_columns(header, reading, file)
+
+
+def _choose_reading(header: Sequence[str], reading: Reading, file: str) -> Reading:
     """The reading of a file: in SI where Tauscope made it, and the robot file describes those of another tool."""
     if not (reading.is_usual and _is_ours(header)):
         return reading

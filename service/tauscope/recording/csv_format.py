@@ -10,7 +10,7 @@ import numpy as np
 
 from tauscope.errors import RecordingError
 from tauscope.recording.clocks import SplitClock
-from tauscope.recording.columns import ColumnLayout, choose_reading, map_columns, require_joint_count
+from tauscope.recording.columns import ColumnLayout, find_layout, require_joint_count
 from tauscope.recording.csv_dialect import BLANK, Dialect, find_delimiter, find_first_row
 from tauscope.recording.csv_numbers import Clock, is_number, parse_number, parse_quickly, shown
 from tauscope.recording.intake import RowIntake
@@ -124,8 +124,7 @@ class _Chunk:
 def _read_header(file: BinaryIO, name: str, reading: Reading) -> _Header:
     """Read the names of the columns and find those that are wanted."""
     found = _read_names(file, name, reading)
-    reading = choose_reading(found.names, reading, name)
-    layout = map_columns(found.names, reading, name)
+    reading, layout = find_layout(found.names, reading, name)
     at, number, line = file.tell(), found.line, b"\n"
     while line and _is_empty(line):
         line, number = file.readline(_LONGEST_LINE_BYTES), number + 1

@@ -85,7 +85,7 @@ def read_by_index(file: BinaryIO, size: int, sink: MessageSink) -> bool:
             return False
         handlers = {number: find_handler(sink, each, summary.schemas) for number, each in summary.channels.items()}
         wanted = {number for number, handler in handlers.items() if handler is not None}
-        parts = [_find_messages(file, size, chunk, wanted) for chunk in _in_order(summary.chunks)]
+        parts = [_find_messages(file, size, chunk, wanted) for chunk in _sort_chunks(summary.chunks)]
     except UNREADABLE:
         return False
     counts = summary.statistics.channel_message_counts if summary.statistics else {}
@@ -134,7 +134,7 @@ def _read_summary(file: BinaryIO, size: int) -> _Summary | None:
     return summary if is_whole and is_named else None
 
 
-def _in_order(chunks: Sequence[ChunkIndex]) -> Sequence[ChunkIndex]:
+def _sort_chunks(chunks: Sequence[ChunkIndex]) -> Sequence[ChunkIndex]:
     """Chunks in the order of the file."""
     return sorted(chunks, key=lambda chunk: chunk.chunk_start_offset)
 

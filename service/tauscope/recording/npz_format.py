@@ -8,7 +8,7 @@ import numpy as np
 
 from tauscope.errors import RecordingError
 from tauscope.recording.clocks import SplitClock
-from tauscope.recording.columns import choose_reading, map_columns, require_joint_count
+from tauscope.recording.columns import find_layout, require_joint_count
 from tauscope.recording.inflation import require_plausible_inflation
 from tauscope.recording.intake import RowIntake
 from tauscope.recording.recording import Array, Recording
@@ -44,8 +44,7 @@ def read_npz(
     """
     columns = _read_columns(path, name)
     header = list(columns)
-    reading = choose_reading(header, reading, name)
-    layout = map_columns(header, reading, name)
+    reading, layout = find_layout(header, reading, name)
     require_joint_count(layout.joint_count, joint_count, name)
     block = np.column_stack([columns[header[index]] for index in layout.source])
     if layout.nanoseconds is not None:

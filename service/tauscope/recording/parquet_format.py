@@ -11,7 +11,7 @@ import numpy as np
 
 from tauscope.errors import RecordingError
 from tauscope.recording.clocks import EpisodeClock, SplitClock
-from tauscope.recording.columns import ColumnLayout, choose_reading, map_columns, require_joint_count
+from tauscope.recording.columns import ColumnLayout, find_layout, require_joint_count
 from tauscope.recording.inflation import require_plausible_inflation
 from tauscope.recording.intake import RowIntake
 from tauscope.recording.parquet_columns import FileColumn, take_column, unfold_columns
@@ -55,8 +55,7 @@ def read_parquet(
         file = arrow.parquet.ParquetFile(stream, page_checksum_verification=True)
         found = unfold_columns(arrow, file, path, name)
         header = list(found)
-        reading = choose_reading(header, reading, name)
-        layout = map_columns(header, reading, name)
+        reading, layout = find_layout(header, reading, name)
         require_joint_count(layout.joint_count, joint_count, name)
         wanted = [found[header[index]] for index in layout.source]
         nanoseconds = None if layout.nanoseconds is None else found[header[layout.nanoseconds]]

@@ -11,7 +11,7 @@ from server.conftest import RECORDINGS
 from server.http.problem_check import assert_problem
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.plots import DiagnosisPlots
-from tauscope.diagnosis.extended_model.saved import ModelDocument
+from tauscope.export.model_file import ModelFile
 from tauscope.robot import read_robot
 from tauscope.trajectory import parse_trajectory_json
 from tauscope_sim.examples import example_robot
@@ -52,7 +52,7 @@ def test_uploaded_files_all_the_way(client: TestClient, files: Files, tmp_path: 
     plots = DiagnosisPlots.model_validate_json(client.get(status["links"]["plots"]).content)
     assert {curve.joint for curve in plots.curves} == set(found.joints)
     assert all(len(each.edges) == len(each.before) + 1 for each in plots.histograms)
-    model = ModelDocument.model_validate_json(client.get(status["links"]["model"]).content)
+    model = ModelFile.model_validate_json(client.get(status["links"]["model"]).content)
     assert len(model.friction) == 3
     text = client.get(status["links"]["next_trajectory"]).text
     planned = parse_trajectory_json(text, "planned", read_robot(example_robot("paper_arm")))

@@ -52,7 +52,7 @@ def find_families(header: Sequence[str], joint_names: Sequence[str] | None) -> l
     named = _named_by(header, joint_names or ())
     has_one = joint_names is None or len(joint_names) == 1
     single = [Family(name, (name,), is_guessed=True) for name in header if has_one and not _NUMBER.search(name)]
-    return [*named, *_numbered(header), *([] if named else _named_by_segments(header)), *single]
+    return [*named, *_find_numbered(header), *([] if named else _named_by_segments(header)), *single]
 
 
 def fill_template(template: str, index: int, name: str | None) -> str:
@@ -74,7 +74,7 @@ def names_in(header: Sequence[str], template: str) -> list[str]:
     return [match[1] for match in map(pattern.fullmatch, header) if match]
 
 
-def _numbered(header: Sequence[str]) -> list[Family]:
+def _find_numbered(header: Sequence[str]) -> list[Family]:
     """Families in which a number runs from 0 or from 1 without a gap."""
     groups: dict[tuple[str, str], dict[int, str]] = {}
     for name in header:

@@ -134,7 +134,7 @@ class _Mapping:
             )
             template = element or template
         if BY_NAME in template:
-            return self._by_name(template)
+            return self._match_by_name(template)
         if not any(placeholder in template for placeholder in PLACEHOLDERS):
             return [template]
         found = []
@@ -148,7 +148,7 @@ class _Mapping:
             )
         return found or [fill_template(template, 0, None)]
 
-    def _by_name(self, template: str) -> Sequence[str]:
+    def _match_by_name(self, template: str) -> Sequence[str]:
         """One column a joint of the robot; of the file, in its order, where no robot is known."""
         found = names_in(self._header, template)
         if self._names is None:

@@ -7,8 +7,9 @@ from pydantic import Field, model_validator
 
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.plots import DiagnosisPlots
-from tauscope.diagnosis.extended_model.saved import LARGEST_FILE, ModelDocument
+from tauscope.diagnosis.extended_model.saved import LARGEST_FILE
 from tauscope.errors import IdentificationError
+from tauscope.export.model_file import ModelFile
 from tauscope.server.http.documents import to_json_text
 from tauscope.server.http.identifications import Names, require_listed_once
 from tauscope.server.http.openapi import binary_part, binary_parts
@@ -210,7 +211,7 @@ DIAGNOSES = QueuedTask(
             MODEL_FILE,
             "Fetch the model with all findings",
             "The extended model.",
-            {"model": ModelDocument, "description": "the same document as `tauscope diagnose --model`"},
+            {"model": ModelFile, "description": "the same document as `tauscope diagnose --model`"},
         ),
         text_document(
             "scenario",
