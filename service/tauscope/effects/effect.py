@@ -126,6 +126,7 @@ class Effect(ABC):
     no_scenario: ClassVar[str] = ""
     rank: ClassVar[int] = 0
     is_variant: ClassVar[bool] = False
+    refines: ClassVar[frozenset[str]] = frozenset()
     is_expected: ClassVar[bool] = False
     has_constant: ClassVar[bool] = False
     coefficients: ClassVar[tuple[Coefficient, ...]]

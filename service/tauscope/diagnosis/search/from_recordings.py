@@ -82,8 +82,9 @@ def search(
         others = [Conditioner.survey(recording, robot) for recording in held_out]
         unseen = Observations.prepare(others, robot, base, cutoff, model.steepness).apart()
     confirming = None if unseen is None else HeldOut(unseen.with_noise(white_noise(unseen, model)))
-    near, far = Proposer(laboratory, effects), Proposer(laboratory, [*effects, *farther_effects(setting)])
-    found = Search(laboratory, near, confirming).run(nominal)
+    farther = tuple(farther_effects(setting))
+    near, far = Proposer(laboratory, effects), Proposer(laboratory, [*effects, *farther])
+    found = Search(laboratory, near, confirming, farther).run(nominal)
     named = any(not term.effect.is_expected for term in found.hypothesis.model.terms)
     if not named and is_left(found.hypothesis, white, pure_error=repeated is not None):
         progress("look farther")

@@ -129,7 +129,7 @@ class Proposer:
         own = found.posterior.mean[found.model.term_places()[-1]]
         term = replace(term, coefficients=own[: len(size)])
         k_v = None if effect.joint is None else at.model.structure.terms[effect.joint].k_v
-        if not (term.is_possible(k_v) and effect.is_consistent(term.coefficients, shape)):
+        if not term.is_possible(k_v):
             return None
         rows = self.rows.observations
         if isinstance(effect, Deflection) and is_position_noise(effect, shape, at.model, rows, signals):

@@ -137,6 +137,7 @@ class Search:
     laboratory: Laboratory
     proposer: Proposer
     held_out: HeldOut | None
+    farther: Sequence[Effect] = ()
 
     def run(self, nominal: Hypothesis, before: Found | None = None) -> Found:
         """Add what makes the data most probable and held-out motion no worse, to what was found before."""
@@ -153,8 +154,29 @@ class Search:
             at = self._without_superfluous(found, len(nominal.model.terms))
             refused |= _places(found) - _places(at)
         at = self._without_harm(at, nominal)
-        at, weighed = self._exchange(at)
+        at, weighed = self._exchange(self._refine(at, len(nominal.model.terms)))
         return Found(nominal, at, tuple(steps), weighed)
+
+    def _refine(self, at: Hypothesis, first: int) -> Hypothesis:
+        """Farther forms in the place of effects that they refine, where they are more probable."""
+        for effect in self.farther:
+            places = [term.place for term in at.model.terms]
+            refined = [place for place in places[first:] if place[0] in effect.refines and place[1] == effect.joint]
+            if refined:
+                at = self._refine_by(effect, places.index(refined[0]), at, first)
+        return at
+
+    def _refine_by(self, effect: Effect, place: int, at: Hypothesis, first: int) -> Hypothesis:
+        """One of them in the place of a term, and of all others that it makes superfluous."""
+        touched, without = effect.touched(len(at.scales)), self._settle_without(at, place)
+        for proposal in Proposer(self.laboratory, [effect]).propose(without, lambda _: True):
+            found = self._settle(self._add(without, proposal), touched)
+            found = self._without_superfluous(found, first)
+            gained = self.laboratory.under(found, at.dependence, touched).log_evidence - at.log_evidence
+            gained += 0.0 if self.held_out is None else self.held_out.change(at, found).log_odds()
+            if gained > 0.0 and _is_possible(found.model):
+                return found
+        return at
 
     def _exchange(self, at: Hypothesis) -> tuple[Hypothesis, tuple[Weighed, ...]]:
         """Each effect weighed beside all others, and a more probable one in its place where there is one."""
@@ -355,9 +377,13 @@ class Search:
 
 
 def _is_possible(model: ExtendedModel) -> bool:
-    """Whether every coefficient is within the bounds of its law."""
+    """Whether every coefficient is within the bounds of its law, and agrees with its shape."""
     pairs = ((term, term.effect.joint) for term in model.terms)
-    return all(term.is_possible(None if joint is None else model.structure.terms[joint].k_v) for term, joint in pairs)
+    return all(
+        term.is_possible(None if joint is None else model.structure.terms[joint].k_v)
+        and term.effect.is_consistent(term.coefficients, term.shape)
+        for term, joint in pairs
+    )
 
 
 def _agrees(change: HeldOutChange, effect: Effect, touched: Sequence[int]) -> bool:
