@@ -119,7 +119,7 @@ class Proposer:
         is_open = any(effect.is_free(each) for each in range(len(effect.shapes)))
         shape, size = on_grid.shapes[place], on_grid.sizes[place]
         if is_open:
-            shape, size = self.zoom(effect, shape, size, at, signals)
+            shape, size = self._zoom_in_each_form(on_grid, at, signals)
         found = self._extend(effect, shape, size, at)
         if is_open:
             beside = self.laboratory.paint(at, found)
@@ -141,6 +141,16 @@ class Proposer:
         before = self.laboratory.tune(self.laboratory.under(at, found.dependence, joints), joints)
         factor = found.log_evidence - before.log_evidence + averaged + sized
         return Proposal(term, size, factor, alone.log_evidence, unnamed_log_odds(at), found)
+
+    def _zoom_in_each_form(self, on_grid: Scored, at: Hypothesis, signals: Sequence[Signals]) -> tuple[Array, Array]:
+        """The most probable shape of all values that no step changes: each has an optimum of its own."""
+        effect, scorer = on_grid.effect, Scorer(self.rows, at)
+        found = []
+        for place in on_grid.best_of_each_form():
+            shape, size = self.zoom(effect, on_grid.shapes[place], on_grid.sizes[place], at, signals)
+            columns = self.columns(effect, shape[None], signals, at.dependence)
+            found.append((float(scorer.score(effect, shape[None], columns)[0].log_factors[0]), shape, size))
+        return max(found, key=lambda each: each[0])[1:]
 
     def _extend(self, effect: Effect, shape: Array, size: Array, at: Hypothesis) -> Hypothesis:
         """A hypothesis with an effect of a given shape, under scales of highest evidence."""

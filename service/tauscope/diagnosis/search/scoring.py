@@ -17,7 +17,7 @@ from tauscope.diagnosis.evidence.linear_model import Posterior
 from tauscope.diagnosis.evidence.rows import EvidenceRows
 from tauscope.diagnosis.evidence.scales import Scales
 from tauscope.diagnosis.search.hypothesis import Hypothesis
-from tauscope.effects import Effect
+from tauscope.effects import Effect, TimeLocalEffect
 from tauscope.recording.recording import Array
 
 SIZES = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
@@ -47,6 +47,17 @@ class Scored:
     def best(self) -> int:
         """Place of the most probable shape."""
         return int(np.argmax(self.log_factors))
+
+    def best_of_each_form(self) -> list[int]:
+        """Places of the most probable shape for each set of values that no step changes; the best where none is."""
+        effect = self.effect
+        fixed = [place for place in range(len(effect.shapes)) if not effect.is_free(place)]
+        if not fixed or isinstance(effect, TimeLocalEffect):
+            return [self.best]
+        _, forms = np.unique(self.shapes[:, fixed], axis=0, return_inverse=True)
+        places = (np.flatnonzero(forms == form) for form in np.unique(forms))
+        best = (int(own[np.argmax(self.log_factors[own])]) for own in places)
+        return [place for place in best if np.isfinite(self.log_factors[place])]
 
     @property
     def log_evidence(self) -> float:
