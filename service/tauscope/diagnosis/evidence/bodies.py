@@ -20,6 +20,9 @@ from tauscope.recording.recording import Array
 WITHIN = 0.9
 """Part of the way to the nearest body without volume that one step may take."""
 
+THINNEST = 1e-6
+"""Least part of the believed body's moments that a body keeps along every axis: with its square double numbers work."""
+
 ROUNDING = 1e-10
 """Added to the diagonal of a correlation matrix: what rounding takes off it."""
 
@@ -138,7 +141,7 @@ class BodyPrior:
         """
         share = 1.0
         for own in _each(links):
-            root = cholesky(pseudo_inertia(links[own]), lower=True)
+            root = cholesky(pseudo_inertia(links[own] - THINNEST * self.mean[own]), lower=True)
             half = solve_triangular(root, pseudo_inertia(step[own]), lower=True)
             least = float(np.linalg.eigvalsh(solve_triangular(root, half.T, lower=True))[0])
             share = min(share, -WITHIN / least) if least < 0.0 else share

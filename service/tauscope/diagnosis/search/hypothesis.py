@@ -44,6 +44,9 @@ ALIKE = 0.5
 NEAR = 3
 """Steps to parameters by which proposals are ranked."""
 
+BODY_STEPS = 20
+"""Steps of the bodies within one of those, at most: a volume a million times too small doubles as often."""
+
 STEPS = 8
 """Most steps to the most probable parameters."""
 
@@ -241,16 +244,35 @@ class Laboratory:
 
     def _nearer(self, at: Hypothesis) -> Hypothesis | None:
         """The model after a step under which data and parameters are more probable; None where there is none."""
-        step = _limit(at)
-        base = len(at.bodies.mean)
-        links = at.bodies.links(at.model.parameters[:base] + step[:base]) - at.model.links
-        whole = self.prior.bodies.share(at.model.links, links)
+        step, links = self._step(at)
         for part in HALVINGS:
-            moved = replace(stepped(at.model, part * whole * step), links=at.model.links + part * whole * links)
+            moved = replace(stepped(at.model, part * step), links=at.model.links + part * links)
             found = self.at(moved, at.sizes, at.scales, at.dependence, owned=True)
             if found.misfit < at.misfit:
                 return found
         return None
+
+    def _step(self, at: Hypothesis) -> tuple[Array, Array]:
+        """The most probable step of parameters and links while columns stay as they are.
+
+        A body that is nearly without volume cannot tell how far away the most probable one is: Newton's steps double
+        its volume at best. So the prior is expanded anew on the way.
+        """
+        base, prior = len(at.bodies.mean), self.prior.bodies
+        step, start, links = np.zeros(at.model.size), at.model.parameters[:base], at.model.links
+        for _ in range(BODY_STEPS):
+            wanted = _limit(at)
+            farther = at.bodies.links(start + wanted[:base]) - links
+            share = prior.share(links, farther)
+            moved = share * (wanted - step)
+            step, links = step + moved, links + share * farther
+            bodies = prior.about(links)
+            if share == 1.0 and float(moved[:base] @ bodies.precision @ moved[:base]) < PROGRESS:
+                break
+            mean, precision = at.linear.mean.copy(), at.linear.precision.copy()
+            mean[:base], precision[:base, :base] = bodies.mean - start, bodies.precision
+            at = replace(at, bodies=bodies, linear=replace(at.linear, mean=mean, precision=precision))
+        return step, links - at.model.links
 
     def with_term(self, at: Hypothesis, term: Term, size: Array) -> Hypothesis:
         """A model with one effect more, as it is.

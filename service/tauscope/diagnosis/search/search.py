@@ -144,18 +144,30 @@ class Search:
         at, steps, refused = nominal, list[Step](), set[Place]()
         if before is not None:
             at, steps = before.hypothesis, list(before.steps)
-        while len(at.model.terms) - len(nominal.model.terms) < MOST_EFFECTS:
+        first, exchanges = len(nominal.model.terms), 0
+        while True:
+            at, tried = self._grow(at, first, refused)
+            steps += tried
+            at = self._refine(self._without_harm(at, nominal), first)
+            at, weighed, exchanged = self._exchange(at, MOST_EXCHANGES - exchanges)
+            if not exchanged:
+                return Found(nominal, at, tuple(steps), weighed)
+            exchanges += exchanged
+            at = self._without_superfluous(at, first)
+
+    def _grow(self, at: Hypothesis, first: int, refused: set[Place]) -> tuple[Hypothesis, list[Step]]:
+        """One more effect, and without those that it makes superfluous, until nothing helps."""
+        steps: list[Step] = []
+        while len(at.model.terms) - first < MOST_EFFECTS:
             proposals = self.proposer.propose(at, _Wanted(_places(at), refused))
             tried, found = self._best(at, proposals)
             refused.update(step.proposal.place for step in tried if not step.is_confirmed)
             steps += tried
             if found is None:
                 break
-            at = self._without_superfluous(found, len(nominal.model.terms))
+            at = self._without_superfluous(found, first)
             refused |= _places(found) - _places(at)
-        at = self._without_harm(at, nominal)
-        at, weighed = self._exchange(self._refine(at, len(nominal.model.terms)))
-        return Found(nominal, at, tuple(steps), weighed)
+        return at, steps
 
     def _refine(self, at: Hypothesis, first: int) -> Hypothesis:
         """Farther forms in the place of effects that they refine, where they are more probable."""
@@ -178,25 +190,31 @@ class Search:
                 return found
         return at
 
-    def _exchange(self, at: Hypothesis) -> tuple[Hypothesis, tuple[Weighed, ...]]:
+    def _exchange(self, at: Hypothesis, most: int) -> tuple[Hypothesis, tuple[Weighed, ...], int]:
         """Each effect weighed beside all others, and a more probable one in its place where there is one."""
         weighed = {own: self._weigh(at, places) for own, places in _groups(at.model).items()}
-        exchanges = 0
-        while exchanges < MOST_EXCHANGES:
-            own = max(weighed, key=lambda each: weighed[each].lead, default=None)
-            if own is None or weighed[own].lead <= 0.0 or len(weighed[own].places) > 1:
+        exchanges, stale = 0, set[Place]()
+        while weighed:
+            own: Place | None = max(weighed, key=lambda each: weighed[each].lead)
+            if weighed[own].lead <= 0.0 or len(weighed[own].places) > 1 or exchanges >= most:
+                own = next(iter(stale), None)
+            if own is None:
                 break
+            if own in stale:
+                stale.remove(own)
+                weighed[own] = self._weigh(at, _groups(at.model)[own])
+                continue
             other, rival = self._try_rival(weighed[own]), weighed[own].rivals[0].term.place
             if other is None:
                 weighed = {each: weighed[each].refuse(rival) for each in weighed}
                 continue
             exchanges += 1
             at, new = other, other.model.terms[-1].place
-            kept = {each: weighed[each] for each in weighed if each not in (own, new)}
-            places = _groups(at.model)
-            weighed = {each: replace(kept[each], places=places[each]) for each in kept}
-            weighed[new] = self._weigh(at, places[new])
-        return at, tuple(each for each in weighed.values() if each.log_odds > self._least(at, each))
+            groups = _groups(at.model)
+            stale = set(groups) - {new}
+            weighed = {each: weighed[each] for each in stale} | {new: self._weigh(at, groups[new])}
+        found = tuple(each for each in weighed.values() if each.log_odds > self._least(at, each))
+        return at, found, exchanges
 
     def _least(self, at: Hypothesis, weighed: Weighed) -> float:
         """Log odds from which an effect is a finding: one that every arm has must stand out."""
