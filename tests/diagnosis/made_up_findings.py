@@ -9,6 +9,7 @@ import numpy as np
 from effects.piece_of_motion import context
 from tauscope.diagnosis import Diagnosis, Finding
 from tauscope.diagnosis.findings.finding import FitSizes
+from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit
 from tauscope.diagnosis.model.term import Term
 from tauscope.effects import Effect
 
@@ -70,5 +71,6 @@ def words_of(*findings: Finding) -> Diagnosis:
         "fitter": SimpleNamespace(observations=observations),
         "selection": SimpleNamespace(fit=SimpleNamespace(model=model)),
         "findings": findings,
+        "misfit_after": LackOfFit(np.ones(JOINTS), np.ones(JOINTS), np.zeros(JOINTS), np.ones(JOINTS)),
     }
     return cast("Diagnosis", SimpleNamespace(**parts))

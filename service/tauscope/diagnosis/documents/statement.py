@@ -1,12 +1,12 @@
 """A finding in words: the physics and its size first, then numbers, doubts, held-out motion, and what to do."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
-from tauscope.diagnosis.findings.finding import Finding
+from tauscope.diagnosis.findings.finding import FORMULA_ERROR, Finding
 from tauscope.effects import Effect, Quantity, TimeLocalEffect
 from tauscope.number_text import ABSENT, chance, significant, with_uncertainty
 
@@ -65,6 +65,7 @@ def state_finding(
     of_first = quantities[: len(quantities) // len(finding.terms)]
     sentences = [numbers_text(of_first)]
     sentences += [_sentence(_held_out(finding, names, tentative=tentative))]
+    sentences += _doubts(finding, diagnosis, names)
     if not tentative:
         sentences.append(_sentence(effect.advice(found)) if finding.probability >= LIKELY else UNLIKELY)
     claim = _claim(finding, found, diagnosis, names)
@@ -109,6 +110,21 @@ def _noun(rival: Effect, own: Effect, names: Sequence[str]) -> str:
     """A rival's name, with its place where that is another."""
     words = rival.id.replace("_", " ")
     return words if rival.joint == own.joint else f"{words} {rival.place(names) or 'of the whole arm'}"
+
+
+def _doubts(finding: Finding, diagnosis: Diagnosis, names: Sequence[str]) -> Iterator[str]:
+    """Why it may be something else, beside its rivals."""
+    joints = finding.terms[0].effect.touched(len(names))
+    others = (each for each in diagnosis.findings if each.place != finding.place)
+    beside = [each for each in others if not set(joints).isdisjoint(each.terms[0].effect.touched(len(names)))]
+    larger = max(beside, key=lambda each: each.gain, default=None)
+    if larger is not None and finding.gain < FORMULA_ERROR * larger.gain:
+        law = larger.terms[0].effect
+        where = " ".join(filter(None, (law.id.replace("_", " "), law.place(names))))
+        yield f"It is small: the formula of {where} may cause it"
+    left = diagnosis.misfit_after
+    if any(left.significant[joint] and left.excess[joint] > finding.gain for joint in joints):
+        yield "Low confidence: unmodelled physics may be causing this"
 
 
 def _held_out(finding: Finding, names: Sequence[str], *, tentative: bool) -> str:

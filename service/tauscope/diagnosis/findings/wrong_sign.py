@@ -7,6 +7,7 @@ import numpy as np
 
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.findings.finding import Finding, in_order
+from tauscope.diagnosis.findings.location import locate
 from tauscope.diagnosis.model.extended import with_terms
 from tauscope.diagnosis.model.term import Term
 from tauscope.effects.torque_gain_error import TorqueGainError
@@ -44,9 +45,17 @@ def with_wrong_signs(diagnosis: Diagnosis, joints: Sequence[int]) -> Diagnosis:
                 in_model=False,
             )
         )
-    nominal = diagnosis.selection.nominal.model
-    before = diagnosis.sizes(with_terms(nominal, [*nominal.terms, *terms]))
-    return replace(diagnosis, findings=in_order([*diagnosis.findings, *found]), before=before)
+    nominal = diagnosis.selection.nominal
+    stated = with_terms(nominal.model, [*nominal.model.terms, *terms])
+    left = diagnosis.misfit_after.significant
+    places = locate(replace(nominal, model=stated), diagnosis.selection.fit, diagnosis.fitter.observations, left)
+    gains = {joint: found[0 if whole else number].gain for number, joint in enumerate(joints)}
+    mismatch = tuple(
+        replace(place, explained=own.explained + gains[place.joint]) if place.joint in gains else own
+        for own, place in zip(diagnosis.mismatch, places, strict=True)
+    )
+    findings, before = in_order([*diagnosis.findings, *found]), diagnosis.sizes(stated)
+    return replace(diagnosis, findings=findings, before=before, mismatch=mismatch)
 
 
 def _energy(diagnosis: Diagnosis, term: Term) -> float:

@@ -28,7 +28,7 @@ MOST_EFFECTS = 12
 """Effects that are added at most."""
 
 NAMED = 3.0
-"""Log odds from which an effect is named: nineteen in twenty."""
+"""Log odds from which an effect is named, and those of its joints' held-out motion alone: nineteen in twenty."""
 
 CATALOGUED = 3.0
 """Log odds before the data that torque which is left out has a name: one in twenty laws is in no catalogue."""
@@ -406,7 +406,7 @@ def _is_possible(model: ExtendedModel) -> bool:
 
 def _agrees(change: HeldOutChange, effect: Effect, touched: Sequence[int]) -> bool:
     """Whether held-out motion shows an effect; a window in time is of its own recording, and has only to do no harm."""
-    return change.harm <= 0.0 and (isinstance(effect, TimeLocalEffect) or change.log_odds(touched) > 0.0)
+    return change.harm <= 0.0 and (isinstance(effect, TimeLocalEffect) or change.log_odds(touched) > NAMED)
 
 
 @dataclass(frozen=True)
