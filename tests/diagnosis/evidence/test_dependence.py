@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter, sosfiltfilt, sosfreqz
 
 from tauscope.diagnosis.evidence.dependence import ORDER, RIDGE, Succession
 
@@ -55,7 +55,16 @@ def test_rows_that_alternate_count_as_no_more_than_they_are() -> None:
 
 def test_a_constant_torque_has_a_limit() -> None:
     """Σ a = p / (p + r), and 1 - Σ a γ = (p + 1) r / p, to first order in r: κ = p (p + 1) / r."""
-    assert unbroken(10_000).dependence(np.ones(10_000)) == pytest.approx(ORDER * (ORDER + 1) / RIDGE, rel=0.1)
+    assert unbroken(200_000).dependence(np.ones(200_000)) == pytest.approx(ORDER * (ORDER + 1) / RIDGE, rel=0.1)
+
+
+@pytest.mark.parametrize("band", [0.4, 0.6, 0.75])
+def test_white_noise_behind_a_low_pass_counts_by_its_bandwidth(band: float) -> None:
+    """κ = π / ∫ |H|² dω: what is slower than the filter is as uncertain as if there were none."""
+    low_pass = butter(6, band, output="sos")
+    rows = sosfiltfilt(low_pass, np.random.default_rng(4).standard_normal(ROWS))
+    gain = np.abs(sosfreqz(low_pass, 4096)[1]) ** 4
+    assert unbroken(ROWS).dependence(np.asarray(rows)) == pytest.approx(1.0 / gain.mean(), rel=0.2)
 
 
 def test_rows_that_are_nothing_count_as_one_each() -> None:

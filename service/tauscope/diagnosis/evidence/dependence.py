@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from tauscope.recording.recording import Array
 
-ORDER = 3
-"""Predecessors that a row may resemble."""
+ORDER = 8
+"""Predecessors that a row may resemble: with three, the edge of a low pass doubles κ of white noise behind it."""
 
 RIDGE = 0.01
 """Part of the rows' power that is added to the autocovariance at lag 0, so that κ stays finite."""
