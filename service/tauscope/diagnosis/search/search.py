@@ -71,11 +71,14 @@ class Rival:
 
     log_odds : float
         posterior, against neither
+    absent : int or None
+        parameter of the nominal model in whose place it is
     """
 
     term: Term
     model: ExtendedModel
     log_odds: float
+    absent: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
