@@ -69,13 +69,25 @@ def record_motion(recording: Recording) -> RecordedMotion:
     return RecordedMotion(recording.name, time, position, velocity, samples.time, samples.position)
 
 
+def loop_damping(loops: Sequence[Actuator]) -> Array:
+    """Torque per velocity of each loop, (n,) [Nm s/rad or N s/m]."""
+    return np.array([loop.damping for loop in loops])
+
+
 class LoopDrive:
     """Position or velocity loops on recorded commands."""
 
     is_closed = True
 
-    def __init__(self, loops: Sequence[Actuator], recording: Recording, time: Array) -> None:
-        """Put the commands, supplies and gains on the steps."""
+    def __init__(self, loops: Sequence[Actuator], recording: Recording, time: Array, *, is_damped: bool) -> None:
+        """Put the commands, supplies and gains on the steps.
+
+        Parameters
+        ----------
+        is_damped : bool
+            whether torque includes the loops' damping; where not, the plant has it
+        """
+        self._damped = 1.0 if is_damped else 0.0
         samples = recording.samples()
         reference = samples.reference if samples.reference is not None else samples.effort
         self._loops = tuple(loops)
@@ -101,7 +113,7 @@ class LoopDrive:
             measured = position[joint] if loop.kind == "position" else velocity[joint]
             out[joint] = loop.torque(
                 float(self._command[step, joint] - measured),
-                float(velocity[joint]),
+                self._damped * float(velocity[joint]),
                 None if self._voltage is None else float(self._voltage[step, joint]),
                 None if self._gain is None else float(self._gain[step, joint]),
                 None if self._temperature is None else float(self._temperature[step, joint]),

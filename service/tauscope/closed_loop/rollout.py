@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauscope.actuation import estimate_delays, is_open, require_loops
-from tauscope.closed_loop.drive import Drive, LoopDrive, RecordedMotion, TorqueDrive, record_motion
+from tauscope.closed_loop.drive import Drive, LoopDrive, RecordedMotion, TorqueDrive, loop_damping, record_motion
 from tauscope.closed_loop.measure import lag, reversal_error, rms_error, worst_error
 from tauscope.closed_loop.model import RolloutModel, rollout_model, stated_model
 from tauscope.closed_loop.plant import STEP_S, make_plant
@@ -96,7 +96,10 @@ def roll_out(
     models = _models(robot, exports)
     known = exports[-1].robot if exports else None
     robot, is_closed = _complete_loops(robot, recordings, known)
-    plants = [make_plant(model.mjcf, model.joints) for model in models]
+    loops = [joint.actuator for joint in robot.joints if joint.actuator is not None] if is_closed else []
+    # MuJoCo integrates an actuator's damping implicitly; a servo computes it of the velocity that it has measured.
+    damping = loop_damping(loops) if loops and robot.mjcf is not None else np.zeros(robot.joint_count)
+    plants = [make_plant(model.mjcf, model.joints, damping) for model in models]
     traces = []
     for recording in recordings:
         progress(f"simulate {recording.name}")
@@ -202,7 +205,7 @@ def _drive(
     """Loops where commands are there, else recorded torque."""
     if is_closed:
         loops = [joint.actuator for joint in robot.joints if joint.actuator is not None]
-        return LoopDrive(loops, recording, motion.time)
+        return LoopDrive(loops, recording, motion.time, is_damped=robot.mjcf is None)
     return TorqueDrive(robot, recording, motion, model.inertia)
 
 
