@@ -33,6 +33,8 @@ from tauscope.server.http.recordings.router import router as recordings
 from tauscope.server.http.repeated_requests import IdempotentRequests
 from tauscope.server.http.robots.models import RobotCheckRequest
 from tauscope.server.http.robots.router import router as robots
+from tauscope.server.http.rollouts import RolloutRequest
+from tauscope.server.http.rollouts import router as rollouts
 from tauscope.server.http.runs import RunRequest
 from tauscope.server.http.runs import router as runs
 from tauscope.server.http.schedules import ScheduleRequest
@@ -56,6 +58,7 @@ VERBS = (
     recordings,
     identifications,
     diagnoses,
+    rollouts,
     robots,
     items,
     history,
@@ -68,6 +71,7 @@ VERBS = (
 REQUESTS = (
     IdentificationRequest,
     DiagnosisRequest,
+    RolloutRequest,
     ExcitationRequest,
     RunRequest,
     CampaignRequest,

@@ -39,6 +39,7 @@ from tauscope.server.queue.executors import WorkerPool, open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
 from tauscope.server.queue.identification import run_identification
 from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.queue.rollout import run_rollout
 from tauscope.server.schedules.repeater import Repeater
 from tauscope.server.schedules.repository import ScheduleRepository
 from tauscope.server.schedules.scheduler import Scheduler, new_boot
@@ -57,6 +58,7 @@ class Services:
     recordings: RecordingStore
     identifications: JobKind
     diagnoses: JobKind
+    rollouts: JobKind
     excitations: JobKind
     jobs: JobQueue
     runs: RunManager
@@ -166,7 +168,7 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
     items, metrics, heartbeat = item_stores(settings.data_folder), Metrics(), Heartbeat()
     recordings = RecordingStore(settings.recordings_folder)
     recordings.tidy()
-    identifications, diagnoses, excitations = kinds = _kinds(settings, items)
+    identifications, diagnoses, excitations, rollouts = kinds = _kinds(settings, items)
     pool = executor or open_executor(settings.workers)
     timed, most = TimedExecutor(pool, metrics.job_seconds), settings.max_waiting
     if isinstance(pool, ClusterExecutor):  # it comes and goes, and so do its workers
@@ -190,6 +192,7 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
         recordings=recordings,
         identifications=identifications,
         diagnoses=diagnoses,
+        rollouts=rollouts,
         excitations=excitations,
         jobs=jobs,
         runs=runs,
@@ -208,13 +211,14 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
     )
 
 
-def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind, JobKind, JobKind]:
-    """Identifications, diagnoses and designed motions."""
+def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind, JobKind, JobKind, JobKind]:
+    """Identifications, diagnoses, designed motions and rollouts."""
     where = {"server_recordings": settings.recordings_folder}
     return (
         JobKind(items["identification"], partial(run_identification, **where)),
         JobKind(items["diagnosis"], partial(run_diagnosis, **where)),
         JobKind(items["excitation"], run_excitation),
+        JobKind(items["rollout"], partial(run_rollout, **where)),
     )
 
 
@@ -228,6 +232,7 @@ def _retention(services: Services) -> list[Callable[[], object]]:
     removers: dict[str, Callable[[str], object]] = {
         "identification": partial(jobs.cancel_or_remove, services.identifications),
         "diagnosis": partial(jobs.cancel_or_remove, services.diagnoses),
+        "rollout": partial(jobs.cancel_or_remove, services.rollouts),
         "excitation": partial(jobs.cancel_or_remove, services.excitations),
         "run": services.runs.remove,
         "campaign": services.campaigns.remove,
