@@ -91,11 +91,11 @@ class LoopDrive:
         samples = recording.samples()
         reference = samples.reference if samples.reference is not None else samples.effort
         self._loops = tuple(loops)
-        self._command = np.empty((len(time), len(self._loops)))
+        self.command = np.empty((len(time), len(self._loops)))
         for joint, loop in enumerate(self._loops):
             command = shift_command(samples.time, reference[:, joint], loop.delay or 0.0, loop.rate_hz, time)
-            self._command[:, joint] = command if loop.kind == "position" else np.gradient(command, STEP_S)
-        self._voltage, self._gain, self._temperature = (
+            self.command[:, joint] = command if loop.kind == "position" else np.gradient(command, STEP_S)
+        self.voltage, self.gain, self.temperature = (
             None if values is None else np.stack([_onto(samples.time, column, time) for column in values.T], axis=1)
             for values in (samples.voltage, samples.gain, samples.temperature)
         )
@@ -112,11 +112,11 @@ class LoopDrive:
         for joint, loop in enumerate(self._loops):
             measured = position[joint] if loop.kind == "position" else velocity[joint]
             out[joint] = loop.torque(
-                float(self._command[step, joint] - measured),
+                float(self.command[step, joint] - measured),
                 self._damped * float(velocity[joint]),
-                None if self._voltage is None else float(self._voltage[step, joint]),
-                None if self._gain is None else float(self._gain[step, joint]),
-                None if self._temperature is None else float(self._temperature[step, joint]),
+                None if self.voltage is None else float(self.voltage[step, joint]),
+                None if self.gain is None else float(self.gain[step, joint]),
+                None if self.temperature is None else float(self.temperature[step, joint]),
             )
         return out
 

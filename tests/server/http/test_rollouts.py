@@ -78,6 +78,23 @@ def test_the_model_of_an_identification_is_rolled_out(
     assert_problem(client.get(status["links"]["self"]), "not-found", 404)
 
 
+def test_a_refinement_needs_commands_and_never_judges_itself(
+    client: TestClient,
+    robot: Files,
+    judge: Files,
+    paper_recordings: tuple[bytes, bytes],
+    identification: dict[str, Any],
+) -> None:
+    train = ("refine", ("train.csv", paper_recordings[0]))
+    ended = follow(client, [*robot, *judge, train], {"model": identification["id"]})
+    assert [entry["name"] for entry in ended["refine"]] == ["train.csv"]
+    assert ended["problem"]["code"] == "recording-mismatch"
+    assert "a refinement needs commands" in ended["problem"]["detail"]
+    same = ("refine", ("train.csv", judge[0][1][1]))
+    answer = client.post(ROLLOUTS, files=[*robot, *judge, same], data=form({"model": identification["id"]}))
+    assert "never judges itself" in assert_problem(answer, "invalid-request", 422)["detail"]
+
+
 def test_a_model_comes_once_and_is_there(client: TestClient, robot: Files, judge: Files) -> None:
     saved = ("model", ("model.json", b"{}"))
     nowhere = form({"model": "20261103T101502Z-1f2e3d4c"})
@@ -88,11 +105,6 @@ def test_a_model_comes_once_and_is_there(client: TestClient, robot: Files, judge
     assert ended["problem"]["detail"].startswith("model.json: ")
 
 
-def test_without_a_model_it_says_how_to_get_one(client: TestClient, robot: Files, judge: Files) -> None:
+def test_without_a_model_that_of_the_robot_file_is_judged(client: TestClient, robot: Files, judge: Files) -> None:
     ended = follow(client, [*robot, *judge], {})
-    if ended["state"] == "failed":
-        assert ended["problem"]["code"] == "recording-mismatch"
-        assert "--model" in ended["problem"]["detail"]
-    else:  # the robot file states a model
-        result = client.get(ended["links"]["result"]).json()
-        assert [entry["model"] for entry in result["summary"]] == ["stated"]
+    assert [each["model"] for each in client.get(ended["links"]["result"]).json()["summary"]] == ["stated"]

@@ -25,7 +25,7 @@ from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 
 DAMAGED = "damaged"
-_ROLES = ("recordings", "held_out", "simulated")
+_ROLES = ("recordings", "held_out", "simulated", "refine")
 _LIVING = {"state.json", "events.jsonl", "progress", "cancel", "run.json", "stop", "control.log"}
 """Files that may still change when an item has ended, or that say nothing of its result."""
 

@@ -31,6 +31,11 @@ class RolloutRequest(RobotRequest):
         description="names of recordings with commands, or with torque: files of this form, or on the server; null: all"
         " files sent as part `recordings`",
     )
+    refine: Names | None = Field(
+        default=None,
+        description="names of recordings with commands by which the model is refined; null: all files sent as part"
+        " `refine`",
+    )
     model: str | dict[str, Any] | None = Field(
         default=None,
         description="model to roll out without and with its findings: a model document, or the identifier of an"
@@ -41,7 +46,7 @@ class RolloutRequest(RobotRequest):
     @model_validator(mode="after")
     def _check_once(self) -> Self:
         """A recording counts once."""
-        require_listed_once(self.recordings)
+        require_listed_once(self.recordings, self.refine)
         return self
 
 
@@ -67,6 +72,7 @@ class RolloutAnswer(JobAnswer):
 
     robot: str | None = Field(default=None, description="name of the robot")
     recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what is rolled out")
+    refine: tuple[OrderedRecording, ...] = Field(default=(), description="what the model is refined by")
     options: ReadingOptions | None = Field(default=None, description="how the recordings are read")
     links: RolloutLinksAnswer = Field(description="where to go on")
 
@@ -110,6 +116,7 @@ ROLLOUTS = QueuedTask(
     " it has ended.",
     parts={
         "recordings": binary_parts("recordings with commands, or with torque"),
+        "refine": binary_parts("recordings with commands by which the model is refined"),
         "model": binary_part("a model that identify or diagnose saved"),
     },
     further=rolled_out_model,

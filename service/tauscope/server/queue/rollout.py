@@ -19,6 +19,7 @@ class RolloutOrder(TaskOrder):
         default="tauscope.rollout-order/1", description="name and version of this form"
     )
     recordings: tuple[OrderedRecording, ...] = Field(description="what is rolled out")
+    refine: tuple[OrderedRecording, ...] = Field(default=(), description="what the model is refined by")
     model: str | None = Field(default=None, description="name of the model, in the folder `against`")
     options: ReadingOptions = Field(default=ReadingOptions(), description="how the recordings are read")
 
@@ -28,6 +29,7 @@ class RolloutOrder(TaskOrder):
         return rollout.Request(
             robot=self.robot_file,
             recordings=tuple(entry.name for entry in self.recordings),
+            refine=tuple(entry.name for entry in self.refine),
             model=self.model,
             options=self.options,
         )
@@ -38,7 +40,7 @@ class RolloutWorkspace(TaskWorkspace[RolloutOrder]):
 
     order_type = RolloutOrder
     noun = "rollout"
-    roles = ("recordings",)
+    roles = ("recordings", "refine")
     outputs: ClassVar[Mapping[str, str | None]] = {"report.html": None, "result.json": "tauscope.rollout/1"}
 
     def prepare(self) -> None:
