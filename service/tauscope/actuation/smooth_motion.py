@@ -82,7 +82,7 @@ class SmoothMotion:
         """
         speed = np.abs(self.velocity[:, joint])
         reach = 2 * int(0.5 * self.rate / self.band) + 1
-        moving = binary_erosion(speed > REST * speed.max(), np.ones(reach), border_value=1)
+        moving = binary_erosion(speed > REST * speed.max(), [True] * reach, border_value=1)
         moving[: int(LONGEST_S * self.rate) + 1] = False
         return moving
 

@@ -20,9 +20,9 @@ and a friction that takes more than half of any further load would make the two 
 class LoadFriction:
     """Coefficients of all joints.
 
-    driving : (n,) float64 or (n, B) float64
+    driving : (n,) float64 or (n, 1, V) float64
         μ_d [1/Nm or 1/N]
-    braking : (n,) float64 or (n, B) float64
+    braking : (n,) float64 or (n, 1, V) float64
         μ_b [1]
     """
 
@@ -30,14 +30,19 @@ class LoadFriction:
     braking: Array
 
     def level(self, load: Array, direction: Array) -> Array:
-        """Level of dry friction of the same shape [Nm or N].
+        """Level of dry friction.
 
         Parameters
         ----------
-        load : float64
+        load : (n,) float64 or (n, S, V) float64
             torque of the rigid body [Nm or N]
-        direction : float64
+        direction : (n,) float64 or (n, S, V) float64
             sign of the motion
+
+        Returns
+        -------
+        (n,) float64 or (n, S, V) float64
+            [Nm or N]
         """
         size = np.abs(load)
         return np.where(direction * load > 0.0, self.driving * size, self.braking) * size

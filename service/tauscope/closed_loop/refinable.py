@@ -103,11 +103,30 @@ class RefinableModel:
         return [loss] if self._is_warmed else []
 
     def clip(self, values: Array) -> Array:
-        """Parameters (..., P) within their bounds."""
+        """Parameters within their bounds.
+
+        Parameters
+        ----------
+        values : (..., P) float64
+
+        Returns
+        -------
+        (..., P) float64
+        """
         return np.maximum(values, [term.least for term in self.terms])
 
     def errors(self, values: Array) -> Array:
-        """Position errors of parameters (V, P), (K, n, S, V) [rad or m]."""
+        """Position errors on the segments.
+
+        Parameters
+        ----------
+        values : (V, P) float64
+
+        Returns
+        -------
+        (K, n, S, V) float64
+            [rad or m]
+        """
         found = simulate_segments(self._model.robot, self._loops, self.segments, self._variants(values))
         return found - self.segments.position[..., None]
 
@@ -133,7 +152,12 @@ class RefinableModel:
         )
 
     def model_of(self, values: Array) -> tuple[ExportModel, LoadFriction, tuple[Actuator, ...]]:
-        """The model of parameters (P,), its friction by load, and its loops."""
+        """The model of parameters, its friction by load, and its loops.
+
+        Parameters
+        ----------
+        values : (P,) float64
+        """
         found = self._variants(values[None])
         friction = tuple(
             replace(law, stiction=float(stiction), viscous=float(viscous), offset=float(offset))
