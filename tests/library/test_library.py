@@ -37,7 +37,7 @@ def motion() -> ExcitationResult:
     from tauscope_sim.examples import example_robot
 
     options = {"slow_reversals": False, "closing_period": False}
-    return tauscope.design_excitation(example_robot("paper_arm"), period_s=2.0, harmonics=2, periods=2, **options)
+    return tauscope.design_excitation(example_robot("paper_arm"), period_s=5.0, harmonics=3, periods=2, **options)
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from tauscope.server.http.tasks.answers import JobAnswer, require_document
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import HTML, JobDocument, text_document
 from tauscope.server.http.tasks.submission import Received, RobotRequest
-from tauscope.server.models import AnswerModel
+from tauscope.server.models import AnswerModel, PageAnswer
 from tauscope.server.queue.rollout import RolloutWorkspace
 from tauscope.server.queue.task_job import SAVED_MODEL, OrderedRecording
 from tauscope.tasks.task import ReadingOptions
@@ -77,7 +77,7 @@ class RolloutAnswer(JobAnswer):
     links: RolloutLinksAnswer = Field(description="where to go on")
 
 
-class RolloutListAnswer(AnswerModel):
+class RolloutListAnswer(PageAnswer):
     """Rollouts that are kept."""
 
     rollouts: list[RolloutAnswer] = Field(description="the newest first")

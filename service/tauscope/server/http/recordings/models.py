@@ -6,7 +6,7 @@ from pydantic import Field
 
 from tauscope.recording import EffortKind
 from tauscope.server.http.robots.models import FindingAnswer
-from tauscope.server.models import AnswerModel, Measured
+from tauscope.server.models import AnswerModel, Measured, PageAnswer
 
 
 class RecordingAnswer(AnswerModel):
@@ -19,8 +19,8 @@ class RecordingAnswer(AnswerModel):
     is_damaged: bool = Field(description="whether it was sent or recorded, and its bytes are not those any more")
 
 
-class RecordingListAnswer(AnswerModel):
-    """All recordings on the server."""
+class RecordingListAnswer(PageAnswer):
+    """Recordings on the server."""
 
     recordings: list[RecordingAnswer] = Field(description="by name")
 

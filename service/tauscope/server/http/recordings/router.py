@@ -1,7 +1,5 @@
 """Routes about recordings."""
 
-import asyncio
-from concurrent.futures import BrokenExecutor
 from typing import Annotated
 from urllib.parse import quote
 
@@ -10,10 +8,13 @@ from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.server.http.documents import file_answer, media_type, refuse_media_type
+from tauscope.server.http.evidence import require_no_evidence
 from tauscope.server.http.form import FORM, PartRule, receive_form
 from tauscope.server.http.openapi import binary_part, form_body
+from tauscope.server.http.reading import READING
 from tauscope.server.http.recordings.models import RecordingAnswer, RecordingListAnswer, RecordingReportAnswer
 from tauscope.server.http.services import ServicesDep
+from tauscope.server.http.tasks.routes import After
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.kept_recordings import check_kept_recording, read_kept_samples
 from tauscope.server.store.recordings import StoredRecording
@@ -23,6 +24,8 @@ router = APIRouter(prefix="/recordings", tags=["recordings"], responses=problem_
 Name = Annotated[str, Path(description="name of the recording", examples=["log-2026-11-03.csv"])]
 JointCount = Annotated[int | None, Query(gt=0, le=1000, description="joints that the recording must have")]
 MostSamples = Annotated[int, Query(ge=2, le=1_000_000, description="samples to return, about")]
+
+RecordingLimit = Annotated[int, Query(ge=1, le=10_000, description="most entries of the list")]
 
 _BODY = form_body({"file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database")}, required=["file"])
 
@@ -57,9 +60,11 @@ async def keep_recording(request: Request, response: Response, services: Service
 
 
 @router.get("", summary="List the recordings on the server")
-def list_recordings(services: ServicesDep) -> RecordingListAnswer:
+def list_recordings(services: ServicesDep, limit: RecordingLimit = 1000, after: After = None) -> RecordingListAnswer:
     """Sent ones, and those that the operator put into the folder."""
-    return RecordingListAnswer(recordings=[_answer(entry) for entry in services.recordings.entries()])
+    entries = [entry for entry in services.recordings.entries() if after is None or entry.name > after]
+    page = [_answer(entry) for entry in entries[:limit]]
+    return RecordingListAnswer(recordings=page, next=page[-1].name if len(entries) > limit else None)
 
 
 @router.get("/{name}", summary="Look a recording up", responses=problem_responses("not-found"))
@@ -71,18 +76,14 @@ def get_recording(name: Name, services: ServicesDep) -> RecordingAnswer:
 @router.get(
     "/{name}/report",
     summary="Check a recording",
-    responses=problem_responses("not-found", "recording", "recording-mismatch", "worker-lost"),
+    responses=problem_responses("not-found", "recording", "recording-mismatch", *READING),
 )
 async def report_on_recording(
-    name: Name, services: ServicesDep, joint_count: JointCount = None
+    request: Request, name: Name, services: ServicesDep, joint_count: JointCount = None
 ) -> RecordingReportAnswer:
     """What it holds, and what to look at before trusting it."""
     path = await run_in_threadpool(services.recordings.path, name)
-    try:
-        report = await asyncio.wrap_future(services.checks.submit(check_kept_recording, path, joint_count))
-    except BrokenExecutor:
-        text = f"{name}: the process that looked into it ended unexpectedly; is the file damaged, or far too large?"
-        raise ProblemError("worker-lost", text) from None
+    report = await services.reading.call(request, check_kept_recording, path, joint_count)
     return RecordingReportAnswer.model_validate(report)
 
 
@@ -92,21 +93,17 @@ async def report_on_recording(
     response_class=Response,
     responses={
         200: {"content": {"application/octet-stream": {}}, "description": "columns of 32-bit floats behind a header"},
-        **problem_responses("not-found", "recording", "worker-lost"),
+        **problem_responses("not-found", "recording", *READING),
     },
 )
-async def get_samples(name: Name, services: ServicesDep, most: MostSamples = 100_000) -> Response:
+async def get_samples(request: Request, name: Name, services: ServicesDep, most: MostSamples = 100_000) -> Response:
     """Time, positions and torques; of more samples than asked for, those that keep every column's look.
 
     Length of the header (4 bytes, little-endian), the header (JSON: `columns`, `joint_count`, `effort`, `samples`,
     `shown`), then each column as little-endian 32-bit floats; time counts from the first sample.
     """
     path = await run_in_threadpool(services.recordings.path, name)
-    try:
-        content = await asyncio.wrap_future(services.checks.submit(read_kept_samples, path, most))
-    except BrokenExecutor:
-        text = f"{name}: the process that read it ended unexpectedly; is the file damaged, or far too large?"
-        raise ProblemError("worker-lost", text) from None
+    content = await services.reading.call(request, read_kept_samples, path, most)
     return Response(content, media_type="application/octet-stream")
 
 
@@ -124,9 +121,16 @@ def get_content(name: Name, services: ServicesDep) -> FileResponse:
     return file_answer(services.recordings.path(name), name)
 
 
-@router.delete("/{name}", status_code=204, summary="Remove a recording", responses=problem_responses("not-found"))
+@router.delete(
+    "/{name}",
+    status_code=204,
+    summary="Remove a recording",
+    responses=problem_responses("not-found", "in-use", "store"),
+)
 def remove_recording(name: Name, services: ServicesDep) -> None:
-    """Identifications that wait for it will fail."""
+    """Identifications that wait for it will fail; one that a model in use rests on stays."""
+    services.recordings.path(name)
+    require_no_evidence(services, name)
     services.recordings.remove(name)
 
 
