@@ -136,3 +136,21 @@ def test_a_recording_without_a_segment_is_named() -> None:
 
 def _loops(robot: Robot) -> tuple[Actuator, ...]:
     return tuple(joint.actuator for joint in robot.joints if joint.actuator is not None)
+
+
+def test_recordings_with_and_without_a_gain_go_together() -> None:
+    robot = _robot()
+    plain = _record(_model(robot), None, 1.0, 1)
+    samples = plain.samples()
+    other = Recording.from_arrays(
+        "gain",
+        samples.time,
+        samples.position,
+        samples.effort,
+        effort_kind=EffortKind.COMMAND,
+        gain=np.full_like(samples.position, 2.0 * KP),
+    )
+    segments = Segments.of([plain, other], _loops(robot))
+    assert np.unique(segments.gain).tolist() == [KP, 2.0 * KP]
+    assert segments.mean_temperature is None
+    assert segments.warmth is None

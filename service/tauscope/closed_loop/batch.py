@@ -86,7 +86,7 @@ def _drive(
     torque = np.empty_like(position)
     for joint, loop in enumerate(loops):
         channels = (segments.voltage, segments.gain, segments.temperature)
-        known = [None if values is None else values[step, joint][:, None] for values in channels]
+        known = [values[step, joint][:, None] for values in channels]
         measured = position[joint] if loop.kind == "position" else velocity[joint]
         error = segments.command[step, joint][:, None] - measured
         made = np.asarray(loop.torque(error, 0.0, *known))

@@ -7,6 +7,7 @@ import numpy as np
 from tauscope.closed_loop.batch import Variants, simulate_segments
 from tauscope.closed_loop.load_friction import LoadFriction
 from tauscope.closed_loop.segments import Segments
+from tauscope.closed_loop.simulate import LOST
 from tauscope.dynamics import mass_matrix
 from tauscope.export.model import ExportModel
 from tauscope.recording.recording import Array
@@ -127,8 +128,9 @@ class RefinableModel:
         (K, n, S, V) float64
             [rad or m]
         """
-        found = simulate_segments(self._model.robot, self._loops, self.segments, self._variants(values))
-        return found - self.segments.position[..., None]
+        with np.errstate(all="ignore"):  # models that no arm can have may fly off
+            found = simulate_segments(self._model.robot, self._loops, self.segments, self._variants(values))
+        return np.nan_to_num(np.clip(found - self.segments.position[..., None], -LOST, LOST), nan=LOST)
 
     def _variants(self, values: Array) -> Variants:
         """Models of parameters (V, P)."""

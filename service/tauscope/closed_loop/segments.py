@@ -35,16 +35,16 @@ class Segments:
         q̇ at the first step [rad/s or m/s]
     command : (K, n, S) float64
         of the loops
-    voltage, gain, temperature : (K, n, S) float64 or None
-        of the loops, where recorded [V, register or Nm/rad, °C]
+    voltage, gain, temperature : (K, n, S) float64
+        of the loops; temperature is NaN where it was not recorded [V, register or Nm/rad, °C]
     """
 
     position: Array
     begin: Array
     command: Array
-    voltage: Array | None
-    gain: Array | None
-    temperature: Array | None
+    voltage: Array
+    gain: Array
+    temperature: Array
 
     @property
     def count(self) -> int:
@@ -54,16 +54,13 @@ class Segments:
     @cached_property
     def mean_temperature(self) -> float | None:
         """Mean over all joints [°C]; None where none was recorded."""
-        if self.temperature is None or not np.isfinite(self.temperature).any():
-            return None
-        return float(np.nanmean(self.temperature))
+        return float(np.nanmean(self.temperature)) if np.isfinite(self.temperature).any() else None
 
     @cached_property
     def warmth(self) -> Array | None:
         """Temperature above its mean, (K, n, S) [K]; None where none was recorded."""
-        if self.temperature is None or self.mean_temperature is None:
-            return None
-        return np.nan_to_num(self.temperature - self.mean_temperature)
+        mean = self.mean_temperature
+        return None if mean is None else np.nan_to_num(self.temperature - mean)
 
     @staticmethod
     def of(recordings: Sequence[Recording], loops: Sequence[Actuator]) -> "Segments":
@@ -75,31 +72,28 @@ class Segments:
             no recording is long enough
         """
         steps = round(SEGMENT_S / plant.STEP_S)
-        groups: dict[str, list[Array | None]] = {name: [] for name in ("q", "qd", "command", "volt", "gain", "temp")}
+        pieces: list[tuple[Array, ...]] = []
         for recording in recordings:
             motion = record_motion(recording)
             drive = LoopDrive(loops, recording, motion.time, is_damped=True)
-            known = np.stack([np.isfinite(column) for column in motion.measured.T], axis=1).all(axis=1)
+            # A recording without a channel has the stated value, so that recordings may differ.
+            stated = [[loop.supply_voltage or 0.0, loop.kp, np.nan] for loop in loops]
+            channels = [
+                np.broadcast_to(values, motion.position.shape) if own is None else own
+                for own, values in zip((drive.voltage, drive.gain, drive.temperature), np.array(stated).T, strict=True)
+            ]
+            known = np.isfinite(motion.measured).all(axis=1)
             whole = np.interp(motion.time, motion.rows, known.astype(float)) == 1.0
             for start in range(0, len(motion.time) - steps + 1, steps):
                 piece = slice(start, start + steps, STRIDE)
-                if not whole[piece].all():
-                    continue
-                groups["q"].append(motion.position[piece])
-                groups["qd"].append(motion.velocity[start])
-                groups["command"].append(drive.command[piece])
-                for name, values in (("volt", drive.voltage), ("gain", drive.gain), ("temp", drive.temperature)):
-                    groups[name].append(None if values is None else values[piece])
-        total = len(groups["q"])
-        chosen = np.unique(np.linspace(0, total - 1, min(total, MOST_SEGMENTS)).round().astype(int)) if total else []
-
-        def stack(name: str) -> Array | None:
-            values = [groups[name][place] for place in chosen]
-            parts = [each for each in values if each is not None]
-            return np.stack(parts, axis=-1) if parts and len(parts) == len(values) else None
-
-        position, begin, command = stack("q"), stack("qd"), stack("command")
-        if position is None or begin is None or command is None:
+                if whole[piece].all():
+                    rows = (motion.position, drive.command, *channels)
+                    pieces.append((motion.velocity[start], *(values[piece] for values in rows)))
+        if not pieces:
             hint = f"record {SEGMENT_S:g} s or more without gaps"
             raise RecordingError(f"{recordings[0].name}: no piece of {SEGMENT_S:g} s to refine by; {hint}")
-        return Segments(position, begin, command, stack("volt"), stack("gain"), stack("temp"))
+        chosen = np.unique(np.linspace(0, len(pieces) - 1, min(len(pieces), MOST_SEGMENTS)).round().astype(int))
+        begin, position, *others = (
+            np.stack(group, axis=-1) for group in zip(*(pieces[place] for place in chosen), strict=True)
+        )
+        return Segments(position, begin, *others)
