@@ -389,6 +389,7 @@ export const NAMES = {
   "run": "Lauf",
   "identification": "Identifikation",
   "diagnosis": "Diagnose",
+  "rollout": "Nachsimulation",
   "campaign": "Kampagne",
   "arm": "Arm",
   "simulated": "simuliert",
