@@ -123,10 +123,10 @@ def test_springy_teeth_hold_it_whatever_it_weighs_on_its_way(
     ("form", "crossed", "moved", "is_play"),
     [
         (Backlash, [1.3e-3, 10.0], 1e-3, True),
-        (Backlash, [2.0e-3, 10.0], 1e-3, False),
-        (SpringyTeeth, [1e-3, 10.0, 1e-4, 8.0], 0.5e-3, False),
+        (Backlash, [2.1e-3, 10.0], 1e-3, False),
+        (SpringyTeeth, [1e-3, 10.0, 1e-4, 8.0], 0.45e-3, False),
         (SpringyTeeth, [1e-3, 10.0, 1e-4, 8.0], 0.7e-3, True),
-        (SpringyTeeth, [1e-3, 10.0, 1e-4, 8.0], 1.7e-3, False),
+        (SpringyTeeth, [1e-3, 10.0, 1e-4, 8.0], 2.1e-3, False),
     ],
 )
 def test_bounces_that_come_at_other_instants_take_some_of_the_gap_and_not_most(

@@ -153,9 +153,14 @@ class Proposer:
         return max(found, key=lambda each: each[0])[1:]
 
     def _extend(self, effect: Effect, shape: Array, size: Array, at: Hypothesis) -> Hypothesis:
-        """A hypothesis with an effect of a given shape, under scales of highest evidence."""
+        """A hypothesis with an effect of a given shape, under scales of highest evidence.
+
+        These are looked for as if rows were independent: under the noise and the dependence of a hypothesis that lacks
+        the effect, it would stay smaller than it is, and leave both as they are.
+        """
         joints = effect.touched(len(at.scales))
         added = self.laboratory.with_term(at, Term(effect, shape, np.zeros(len(size))), size)
+        added = self.laboratory.under(added, [1.0] * len(at.scales), joints)
         return self.laboratory.weigh(self.laboratory.tune(added, joints), joints)
 
     def zoom(
