@@ -19,7 +19,7 @@ from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.kept_recordings import check_kept_recording, read_kept_samples
 from tauscope.server.store.recordings import StoredRecording
 
-router = APIRouter(prefix="/recordings", tags=["recordings"], responses=problem_responses("invalid-request"))
+router = APIRouter(prefix="/recordings", tags=["recordings"])
 
 Name = Annotated[str, Path(description="name of the recording", examples=["log-2026-11-03.csv"])]
 JointCount = Annotated[int | None, Query(gt=0, le=1000, description="joints that the recording must have")]

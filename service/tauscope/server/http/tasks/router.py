@@ -134,7 +134,7 @@ class Resource:
 def make_router(resource: Resource) -> APIRouter:
     """The routes that every resource has; those that end something are added by its kind."""
     plural, noun, singular = resource.plural, resource.noun, resource.singular
-    router = APIRouter(prefix=f"/{plural}", tags=[plural], responses=problem_responses("invalid-request"))
+    router = APIRouter(prefix=f"/{plural}", tags=[plural])
     request_model, answer_model, list_model = resource.models
 
     @router.post(
