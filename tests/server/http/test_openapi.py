@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -96,18 +95,6 @@ def test_every_body_is_strict_and_has_an_example(document: dict[str, Any]) -> No
     for name, schema in document["components"]["schemas"].items():
         if schema.get("type") == "object":
             assert schema["additionalProperties"] is False, name
-
-
-def test_no_alternative_has_an_object_for_a_default(document: dict[str, Any]) -> None:
-    """openapi-python-client leaves out an operation whose body has one, and says so in a warning only."""
-
-    def find(node: Any) -> Iterator[Any]:
-        if isinstance(node, dict):
-            yield from [node] if "anyOf" in node and isinstance(node.get("default"), dict) else []
-        for each in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
-            yield from find(each)
-
-    assert list(find(document["components"]["schemas"])) == []
 
 
 def test_the_examples_are_accepted(client: TestClient, document: dict[str, Any], tmp_path: Path) -> None:

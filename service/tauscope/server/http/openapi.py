@@ -45,15 +45,30 @@ def form_body(
     return {"multipart/form-data": {"schema": schema, **({"encoding": dict(encoding)} if encoding else {})}}
 
 
+_BYTES = "application/octet-stream"
+_FILE = {"type": "string", "format": "binary", "contentMediaType": _BYTES}
+"""A file in a form: OpenAPI 3.1 says so by its media type, generators of clients look for the format of 3.0."""
+
+
 def binary_part(description: str) -> dict[str, Any]:
     """The schema of a file in a form."""
-    return {"type": "string", "contentMediaType": "application/octet-stream", "description": description}
+    return {**_FILE, "description": description}
 
 
 def binary_parts(description: str) -> dict[str, Any]:
     """The schema of several files in a form."""
-    item = {"type": "string", "contentMediaType": "application/octet-stream"}
-    return {"type": "array", "items": item, "description": description}
+    return {"type": "array", "items": _FILE, "description": description}
+
+
+def file_contents(*media_types: str) -> dict[str, Any]:
+    """The content of an answer that is a file of one of several types.
+
+    Generators of clients read by the first type: bytes where there is one, else text.
+    """
+    ranks = {_BYTES: 0, "application/json": 2}
+    ordered = sorted(media_types, key=lambda each: (ranks.get(each, 0 if each.startswith("text/") else 1), each))
+    schemas = {_BYTES: {"type": "string", "format": "binary"}, "application/json": {}}
+    return {media_type: {"schema": schemas.get(media_type, {"type": "string"})} for media_type in ordered}
 
 
 def model_reference(model: type[BaseModel]) -> dict[str, str]:
