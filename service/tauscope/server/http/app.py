@@ -45,7 +45,7 @@ from tauscope.server.http.tasks.events import EVENT_MODELS
 from tauscope.server.page.router import router as page
 from tauscope.server.problems import Problem
 
-API_VERSION = "1.18.0"
+API_VERSION = "1.20.0"
 """Of the interface, not of the package; a change of tests/server/http/openapi.json goes with a change here."""
 
 PREFIX = "/api/v1"

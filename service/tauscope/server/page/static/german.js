@@ -267,6 +267,7 @@ export const SENTENCES = {
   "Position": "Position",
   "rad or m": "rad oder m",
   "Current or drive units": "Strom oder Antriebseinheiten",
+  "Commanded position": "Sollposition",
   "Nm or N": "Nm oder N",
   "drive units": "Antriebseinheiten",
   "{0} of {1} samples are shown: those that keep every curve's peaks.": "{0} von {1} Abtastwerten werden gezeigt: jene, die alle Spitzen jeder Kurve erhalten.",

@@ -42,7 +42,7 @@ export async function showRecording(root, { id, signal }) {
     cautions(report.findings),
     zoomButtons(together),
     make(t`Position`, "q", t`rad or m`).element,
-    make(samples.effort === "tau" ? t`Torque` : t`Current or drive units`, samples.effort, samples.effort === "tau" ? t`Nm or N` : t`drive units`).element,
+    make(...{ tau: [t`Torque`, "tau", t`Nm or N`], i: [t`Current or drive units`, "i", t`drive units`], qref: [t`Commanded position`, "qref", t`rad or m`] }[samples.effort]).element,
     samples.shown < samples.samples ? h("p", { class: "note", text: t`${samples.shown} of ${samples.samples} samples are shown: those that keep every curve's peaks.` }) : null,
     section("channels", t`Channels`, table(t`Channels`, [t`joint`, t`position from`, t`to`, t`effort from`, t`to`], report.joints.map((each, place) =>
       [`${place + 1}`, ...each.position.map((v) => number(v, 4)), ...each.effort.map((v) => number(v, 4))]))));
