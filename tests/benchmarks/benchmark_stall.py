@@ -79,7 +79,7 @@ def time_stops(client: httpx2.Client, recordings: list[bytes], reader_count: int
     with ExitStack() as stack:
         for beside in ("nothing", "a YAML flood", "uploads", "a diagnosis", f"{reader_count} readers"):
             if beside.endswith("readers"):
-                stack.enter_context(readers(base, f"{API}/recordings", reader_count))
+                stack.enter_context(readers(base, f"{API}/runs", reader_count))
             elif beside != "nothing":
                 stack.enter_context(load(base, beside, recordings))
             time.sleep(0.0 if beside == "nothing" else 3.0)  # everything has begun

@@ -7,6 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from reliability.costly_archives import (
+    write_bag_bombs,
+    write_document_bombs,
+    write_indexed_bombs,
+    write_mjcf_bombs,
+    write_npz_bombs,
+)
 from reliability.costly_inputs import (
     mix,
     write_csv_bombs,
@@ -20,6 +27,7 @@ from reliability.costly_inputs import (
 from server.queue.paper_files import PAPER_ROBOT
 from tauscope.errors import TauscopeError
 from tauscope.robot import check_robot, read_robot
+from tauscope.server.http.robots.files import check_received_robot
 from tauscope.server.queue.kept_recordings import check_kept_recording
 from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.trajectory import read_trajectory
@@ -40,6 +48,8 @@ def measure(kind: str, path: Path) -> tuple[float, int, str]:
     try:
         if kind == "robot":
             check_robot(path)
+        elif kind == "received robot":
+            check_received_robot(path.parent, path.name)
         elif kind == "trajectory":
             read_trajectory(path, read_robot(PAPER_ROBOT))
         else:
@@ -57,10 +67,22 @@ def read_memory(name: str) -> int:
 
 
 @pytest.fixture(scope="module")
-def pool() -> Iterator[WorkerPool]:
+def pool(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WorkerPool]:
     with WorkerPool(1, deadline_s=60.0) as pool:
+        folder = tmp_path_factory.mktemp("warm")
         for kind, name in (("robot", "x.yaml"), ("recording", "x.csv"), ("recording", "x.mcap"), ("robot", "x.urdf")):
             pool.submit(measure, kind, Path(name)).result()  # what it imports counts to no file
+        for kind, name, content in (
+            ("recording", "x.npz", dict(write_npz_bombs())["many.npz"]),
+            ("recording", "x.bag", b"#ROSBAG V2.0\n"),
+            (
+                "received robot",
+                "x.xml",
+                b"<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>",
+            ),
+        ):
+            (folder / name).write_bytes(content)
+            pool.submit(measure, kind, folder / name).result()
         yield pool
 
 
@@ -77,8 +99,15 @@ def list_bombs() -> Iterator[tuple[str, str, bytes]]:
         yield "trajectory", f"{name}.{'csv' if name == 'csv' else 'json'}", text.encode()
     for name, content in write_mcap_bombs():
         yield "recording", f"{name}.mcap", content
+    for name, content in (*write_indexed_bombs(), *write_bag_bombs(), *write_npz_bombs()):
+        yield "recording", name, content
+    for name, text in write_mjcf_bombs():
+        yield "received robot", name, text.encode()
+    for name, text in write_document_bombs():
+        yield "trajectory", name, text.encode()
 
 
+@pytest.mark.slow
 def test_no_small_file_is_costly(pool: WorkerPool, tmp_path: Path) -> None:
     found: list[str] = []
     files = [

@@ -238,8 +238,9 @@ def _joint_count(joints: dict[str, list[int]], effort_kind: EffortKind, header: 
         )
     joint_count = max(joints["q"][-1], joints[effort][-1])
     for prefix in ("q", effort):
+        present = set(joints[prefix])
         for joint in range(1, joint_count + 1):
-            if joint not in joints[prefix]:
+            if joint not in present:
                 other = f"q{joint_count}" if joint_count in joints["q"] else f"{effort}{joint_count}"
                 raise RecordingError(f"{file}: column {prefix}{joint} is missing: the file has columns up to {other}")
     return joint_count

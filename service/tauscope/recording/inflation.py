@@ -10,7 +10,13 @@ LARGEST_RATIO = 100
 so, and its text to a twentieth."""
 
 
-def require_plausible_inflation(packed_bytes: int, unpacked_bytes: int, name: str) -> None:
+HELD_BYTES = 2**25
+"""Unpacked size that is never refused of data that are held in memory."""
+
+
+def require_plausible_inflation(
+    packed_bytes: int, unpacked_bytes: int, name: str, accepted_bytes: int | None = None
+) -> None:
     """Refuse a file that unpacks to more than `LARGEST_RATIO` times its size, beyond a size that does no harm.
 
     Raises
@@ -18,7 +24,8 @@ def require_plausible_inflation(packed_bytes: int, unpacked_bytes: int, name: st
     RecordingError
         if it does
     """
-    if unpacked_bytes > max(ALWAYS_ACCEPTED_BYTES, LARGEST_RATIO * packed_bytes):
+    accepted_bytes = ALWAYS_ACCEPTED_BYTES if accepted_bytes is None else accepted_bytes
+    if unpacked_bytes > max(accepted_bytes, LARGEST_RATIO * packed_bytes):
         ratio = unpacked_bytes // max(packed_bytes, 1)
         hint = "no recording packs so well; record it again, or save it uncompressed"
         raise RecordingError(f"{name}: unpacks to {unpacked_bytes} bytes, {ratio} times its size; {hint}")

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from tauscope.errors import RecordingError
 from tauscope.recording.columns import table_columns
+from tauscope.recording.inflation import HELD_BYTES, require_plausible_inflation
 from tauscope.recording.intake import RowIntake
 from tauscope.recording.joint_state import JointState, JointStateLayout, JointStates, decode_cdr
 from tauscope.recording.joint_state_decoders import Decoder
-from tauscope.recording.message_compression import decompress_message
+from tauscope.recording.message_compression import LARGEST_MESSAGE_BYTES, decompress_message
 from tauscope.recording.other_publishers import OtherPublishers
 from tauscope.recording.recording import EffortKind, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
@@ -21,6 +22,7 @@ from tauscope.recording.words import listed, reason
 from tauscope.result_warning import ResultWarning
 
 _MESSAGES_AT_ONCE = 4096
+_BYTES_AT_ONCE = 2**24
 
 LONGEST_FROM_ZERO_NS = 10**12
 """A stamp of zero beside stamps above this is none [ns]; simulated time may begin at zero."""
@@ -39,6 +41,8 @@ class Choice:
         joints that the recording must have; None where any number is welcome
     spool_above_bytes : int
         size above which the rows go to a temporary file [bytes]
+    packed_bytes : int or None
+        size of the log, by which its messages are plausible [bytes]; None where any are
     """
 
     file: str
@@ -46,6 +50,7 @@ class Choice:
     joint_names: tuple[str, ...] | None = None
     spool_above_bytes: int = SPOOL_ABOVE_BYTES
     reading: Reading = SI
+    packed_bytes: int | None = None
 
 
 class JointStateTopic:
@@ -60,6 +65,7 @@ class JointStateTopic:
         self._choice = choice
         self._layouts: dict[int, JointStateLayout] = {}
         self._pending: list[tuple[int, bytes]] = []
+        self._pending_bytes = self._unpacked_bytes = 0
         self._rows: _Rows | None = None
         self._others = OtherPublishers()
         self._wanted = choice.joint_names
@@ -73,14 +79,20 @@ class JointStateTopic:
             when it was logged [ns]
         """
         self.messages += 1
-        if self.fault is None:
-            self._pending.append((log_time, message))
-            if len(self._pending) >= _MESSAGES_AT_ONCE:
-                self.flush()
+        if self.fault is not None:
+            return
+        if len(message) > LARGEST_MESSAGE_BYTES:
+            text = f"topic {self.topic}, message {self.messages}: is larger than any joint state ({len(message)} bytes)"
+            self.fault = RecordingError(f"{self._choice.file}: {text}; choose another topic with --topic")
+            return
+        self._pending.append((log_time, message))
+        self._pending_bytes += len(message)
+        if len(self._pending) >= _MESSAGES_AT_ONCE or self._pending_bytes >= _BYTES_AT_ONCE:
+            self.flush()
 
     def flush(self) -> None:
         """Decode what was taken and not yet decoded."""
-        pending, self._pending = self._pending, []
+        pending, self._pending, self._pending_bytes = self._pending, [], 0
         if not pending or self.fault is not None:
             return
         first = self.messages - len(pending) + 1
@@ -89,6 +101,10 @@ class JointStateTopic:
             messages = [
                 self._decode_one(decompress_message, message, first + row) for row, (_, message) in enumerate(pending)
             ]
+            self._unpacked_bytes += sum(map(len, messages))
+            if self._choice.packed_bytes is not None:
+                name = f"{self._choice.file}: topic {self.topic}"
+                require_plausible_inflation(self._choice.packed_bytes, self._unpacked_bytes, name, HELD_BYTES)
             batches = sorted(self._decode(messages, first), key=lambda batch: batch[0][0])
             own = [(rows, self._arrange(states)) for rows, states in batches if self._is_own(states, first + rows[0])]
             if own:

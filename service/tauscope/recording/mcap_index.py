@@ -155,6 +155,8 @@ def _find_messages(file: BinaryIO, size: int, chunk: ChunkIndex, wanted: set[int
         if number != channel or entries != len(body) - 6:
             raise ValueError("an index of messages that does not fill its record")
         offsets += [offset for _, offset in _INDEX_ENTRY.iter_unpack(body[6:])]
+    if len(set(offsets)) < len(offsets):
+        raise ValueError("an index of messages lists one twice")
     return _Part(chunk, tuple(sorted(offsets)))
 
 

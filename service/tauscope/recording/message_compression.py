@@ -10,7 +10,9 @@ from tauscope.recording.inflation import require_plausible_inflation
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 """First bytes of a zstd frame; a CDR message begins with a zero byte, JSON with a bracket."""
 
-_LARGEST_MESSAGE_BYTES = 2**17  # a thousand joints: a batch of bombs still fits into memory
+LARGEST_MESSAGE_BYTES = 2**17
+"""Of a message with the states of a thousand joints."""
+
 _COPY_BYTES = 2**20
 
 
@@ -25,9 +27,9 @@ def decompress_message(message: bytes) -> bytes:
     if not message.startswith(ZSTD_MAGIC):
         return message
     try:
-        if zstandard.frame_content_size(message) > _LARGEST_MESSAGE_BYTES:
+        if zstandard.frame_content_size(message) > LARGEST_MESSAGE_BYTES:
             raise ValueError("the compressed message is larger than any joint state")
-        return zstandard.ZstdDecompressor().decompress(message, max_output_size=_LARGEST_MESSAGE_BYTES)
+        return zstandard.ZstdDecompressor().decompress(message, max_output_size=LARGEST_MESSAGE_BYTES)
     except zstandard.ZstdError as error:
         raise ValueError(f"the compressed message is damaged: {error}") from error
 

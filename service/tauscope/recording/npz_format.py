@@ -1,6 +1,8 @@
 """Recordings as NumPy archives, ``np.savez``: one array a column, or one with a row a sample and a column a joint."""
 
+import tokenize
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +11,7 @@ import numpy as np
 from tauscope.errors import RecordingError
 from tauscope.recording.clocks import SplitClock
 from tauscope.recording.columns import find_layout, require_joint_count
-from tauscope.recording.inflation import require_plausible_inflation
+from tauscope.recording.inflation import HELD_BYTES, require_plausible_inflation
 from tauscope.recording.intake import RowIntake
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
@@ -19,6 +21,20 @@ from tauscope.recording.words import listed, reason
 ZIP_MAGIC = b"PK\x03\x04"
 
 _ROWS_AT_ONCE = 2**16
+_MOST_COLUMNS = 10_000
+_UNREADABLE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    ValueError,
+    OSError,
+    EOFError,
+    NotImplementedError,
+    MemoryError,
+    KeyError,
+    RecursionError,
+    tokenize.TokenError,
+)
+"""Errors that damaged archives raise; NumPy reads the header of an array as Python."""
 
 
 def read_npz(
@@ -72,12 +88,13 @@ def _read_columns(path: Path, name: str) -> dict[str, Array]:
     """Columns of the arrays with as many rows as most of them."""
     try:
         with zipfile.ZipFile(path) as archive:
-            require_plausible_inflation(path.stat().st_size, sum(entry.file_size for entry in archive.infolist()), name)
+            unpacked_bytes = sum(entry.file_size for entry in archive.infolist())
+            require_plausible_inflation(path.stat().st_size, unpacked_bytes, name, HELD_BYTES)
             if not all(entry.endswith(".npy") for entry in archive.namelist()):
                 raise zipfile.BadZipFile("it is a zip archive or a spreadsheet; unpack it, or export the sheet as CSV")
         with np.load(path, allow_pickle=False) as content:
             arrays: dict[str, Any] = {key: content[key] for key in content.files}
-    except (zipfile.BadZipFile, ValueError, OSError, EOFError, NotImplementedError, MemoryError, KeyError) as error:
+    except _UNREADABLE as error:
         if isinstance(error, RecordingError):
             raise
         if path.suffix.lower() != ".npz":
@@ -85,6 +102,7 @@ def _read_columns(path: Path, name: str) -> dict[str, Array]:
             raise RecordingError(f"{name}: is a zip archive or a spreadsheet; {hint}") from error
         raise RecordingError(f"{name}: not a readable NumPy archive ({reason(error)})") from error
     tables = {key: array for key, array in arrays.items() if array.dtype.kind in "fiu" and array.ndim in (1, 2)}
+    tables = {key: array for key, array in tables.items() if array[:1].size <= _MOST_COLUMNS}
     lengths = [len(array) for array in tables.values()]
     if not lengths:
         raise RecordingError(f"{name}: no array holds a row a sample; the arrays are {listed(list(arrays))}")

@@ -60,7 +60,8 @@ def read_recording(
     if joint_count is None and names is not None:
         joint_count = len(names)
     try:
-        recording = _read(path, name, joint_count, Choice(name, joint_count, names, reading=reading))
+        choice = Choice(name, joint_count, names, reading=reading, packed_bytes=_count_bytes(path))
+        recording = _read(path, name, joint_count, choice)
     except OSError as error:
         raise RecordingError(f"{name}: {_reason(error)}") from error
     require_joint_count(recording.joint_count, joint_count, name)
@@ -104,6 +105,11 @@ def first_bytes(path: Path, name: str) -> bytes:
         raise RecordingError(f"{name}: not a regular file; save the data to a file first")
     with path.open("rb") as file:
         return file.read(_MAGIC_BYTES)
+
+
+def _count_bytes(path: Path) -> int:
+    """Size of a file, or of the files of a folder [bytes]."""
+    return sum(file.stat().st_size for file in path.iterdir()) if path.is_dir() else path.stat().st_size
 
 
 def _read(path: Path, name: str, joint_count: int | None, choice: Choice) -> Recording:

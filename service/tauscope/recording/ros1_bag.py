@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 import lz4.frame
 
 from tauscope.errors import RecordingError
-from tauscope.recording.inflation import require_plausible_inflation
+from tauscope.recording.inflation import HELD_BYTES, LARGEST_RATIO, require_plausible_inflation
 from tauscope.recording.joint_state_log import JointStateLog
 from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.recording import Recording
@@ -86,7 +86,7 @@ def _require_plausible_chunks(path: Path, name: str) -> None:
             (stated,) = struct.unpack("<I", header[b"size"])
             unpacked += stated
             require_plausible_inflation(size, unpacked, name)
-            if stated > _LARGEST_CHUNK_BYTES:
+            if stated > min(_LARGEST_CHUNK_BYTES, max(HELD_BYTES, LARGEST_RATIO * length)):
                 raise ValueError("implausible chunk size")
             at = file.tell()
             kind = header.get(b"compression", b"none")

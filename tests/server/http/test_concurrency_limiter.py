@@ -141,3 +141,24 @@ def test_readers_that_are_stuck_let_others_in_after_a_while() -> None:
         await asyncio.gather(*(ask("GET", "/other") for _ in range(3)))
 
     play(scene, slot_timeout_s=0.0)
+
+
+def test_readers_that_wait_when_the_service_ends_are_let_go() -> None:
+    work, statuses, closing = Work(), [], []
+
+    async def note(message: Message) -> None:
+        statuses.append(message.get("status"))
+
+    async def run() -> None:
+        slots = ConcurrencyLimiter(work, readers=1, slot_timeout_s=NEVER_S, is_closing=lambda: bool(closing))
+        scopes = [{"type": "http", "method": "GET", "path": f"/slow/{number}"} for number in range(200)]
+        readers = [asyncio.create_task(slots(scope, receive, note)) for scope in scopes]
+        await settle()
+        closing.append(True)
+        work.may_begin.set()
+        work.may_end.set()
+        await asyncio.gather(*readers)
+
+    asyncio.run(run())
+    assert work.entered == ["/slow/0"]
+    assert (statuses.count(200), statuses.count(503)) == (1, 199)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 from scipy.optimize import minimize
 
-from tauscope.diagnosis.evidence.moments import Index, JointMoments
+from tauscope.diagnosis.evidence.moments import Index, JointMoments, factor
 from tauscope.diagnosis.evidence.scales import Scales
 from tauscope.recording.recording import Array
 
@@ -26,9 +26,6 @@ SETTLED = 0.02
 
 CERTAIN = 1e6
 """Factor by which a parameter that is held is believed more precisely."""
-
-ROUNDING = 1e-12
-"""Added to the diagonal of a correlation matrix: what rounding takes off it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,13 +208,13 @@ class LinearModel:
 
     def _solve(self, total: "_Sum") -> Posterior:
         scale = np.sqrt(np.diag(total.matrix))
-        factor = _root(total.matrix, scale)
+        root = factor(total.matrix, scale)
         right = total.right / scale
-        mean = cho_solve((factor, True), right)
+        mean = cho_solve((root, True), right)
         believed = np.sqrt(np.diag(self.precision))
-        gained = np.log(np.diag(_root(self.precision, believed)) * believed) - np.log(np.diag(factor) * scale)
+        gained = np.log(np.diag(factor(self.precision, believed)) * believed) - np.log(np.diag(root) * scale)
         value = 0.5 * (float(right @ mean) - total.energy - total.determinant) + float(gained.sum())
-        return Posterior(mean / scale, factor, scale, value)
+        return Posterior(mean / scale, root, scale, value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,12 +225,6 @@ class _Sum:
     right: Array
     energy: float
     determinant: float
-
-
-def _root(matrix: Array, scale: Array) -> Array:
-    """Lower Cholesky factor of a matrix whose rows are divided by their scale."""
-    correlation = matrix / np.outer(scale, scale) + ROUNDING * np.eye(len(scale))
-    return np.asarray(np.linalg.cholesky(correlation), dtype=np.float64)
 
 
 def _starts(scales: Scales) -> Iterator[Array]:

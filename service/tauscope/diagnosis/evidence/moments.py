@@ -11,6 +11,23 @@ from tauscope.recording.recording import Array
 
 Index = NDArray[np.intp]
 
+ROUNDING = 1e-12
+"""Added to the diagonal of a correlation matrix: what rounding takes off it."""
+
+
+def factor(matrix: Array, scale: Array) -> Array:
+    """Lower Cholesky factor of a matrix whose rows are divided by their scale, (p, p).
+
+    Parameters
+    ----------
+    matrix : (p, p) float64
+        positive definite but for rounding
+    scale : (p,) float64
+        root of its diagonal
+    """
+    correlation = matrix / np.outer(scale, scale) + ROUNDING * np.eye(len(scale))
+    return np.asarray(np.linalg.cholesky(correlation), dtype=np.float64)
+
 
 @dataclass(frozen=True, eq=False)
 class Weighted:
@@ -161,7 +178,8 @@ class JointMoments:
         visible = self.visible
         amplitudes = scales.amplitudes(self.groups)
         inner = amplitudes[:, None] * whole[visible:, visible:] * amplitudes
-        root = np.linalg.cholesky(np.eye(len(amplitudes)) + inner)
+        scale = np.sqrt(1.0 + np.diag(inner))
+        root = scale[:, None] * factor(np.eye(len(scale)) + inner, scale)
         outer = amplitudes[:, None] * whole[visible:, :visible]
         half = solve_triangular(root, outer, lower=True)
         return np.asarray(half, dtype=np.float64), np.asarray(root, dtype=np.float64)

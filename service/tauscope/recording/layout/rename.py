@@ -89,7 +89,8 @@ class _Mapping:
     """Turns a mapping for all joints into one for each column."""
 
     def __init__(self, header: Sequence[str], reading: Reading, file: str) -> None:
-        self._header, self._file, self._known = header, file, set(header)
+        self._header, self._file = header, file
+        self._known = {name: len(header) - 1 - place for place, name in enumerate(reversed(header))}  # the first one
         self._robot = reading.joint_names
         self._names: Sequence[str] | None = reading.joint_names
 
@@ -116,7 +117,7 @@ class _Mapping:
         """Index of a column, by its name, or by its number from 1 where no column has that name."""
         name = str(source)
         if name in self._known:
-            return self._header.index(name)
+            return self._known[name]
         if isinstance(source, int) and 0 < source <= len(self._header):
             return source - 1
         raise RecordingError(f"{self._file}: columns: {target}: {self._absence(name)}")

@@ -96,6 +96,9 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
             async with services.heartbeat.keep_beating(), notify_systemd():
                 yield
 
+    def is_closing() -> bool:
+        return app.state.services.closing.is_set()
+
     app = FastAPI(
         title="Tauscope",
         summary="Finds a robot arm's true dynamics from its own motion.",
@@ -121,7 +124,7 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
     app.add_middleware(Gate)
     app.add_middleware(BodyLimit, limit=settings.max_upload_bytes)
     app.add_middleware(OriginCheck, answers_for=settings.answers_for)
-    app.add_middleware(ConcurrencyLimiter)
+    app.add_middleware(ConcurrencyLimiter, is_closing=is_closing)
     app.add_middleware(RequestLog)
     app.add_middleware(ResponseProtection)
     return app

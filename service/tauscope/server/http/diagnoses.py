@@ -118,7 +118,7 @@ class DiagnosisListAnswer(PageAnswer):
     diagnoses: list[DiagnosisAnswer] = Field(description="the newest first")
 
 
-YAML = "application/yaml"
+YAML = "text/yaml"  # an alias of application/yaml (RFC 9512), which generators of clients do not read
 
 
 def compared_model(received: Received[DiagnosisRequest], services: Services, workspace: Any) -> dict[str, str | None]:

@@ -8,6 +8,7 @@ from fastapi.responses import StreamingResponse
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
+from tauscope.server.http.openapi import file_contents
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.server.http.services import ServicesDep
@@ -101,7 +102,7 @@ router = EXCITATIONS.router()
     summary="Fetch the trajectory",
     response_class=Response,
     responses={
-        200: {"content": {"application/json": {}, "text/csv": {}}, "description": "the file"},
+        200: {"content": file_contents("application/json", "text/csv"), "description": "the file"},
         **problem_responses("not-found", *ENDINGS, "excitation", "internal", *READING),
     },
 )

@@ -197,7 +197,7 @@ def trend_answer(robot: str, models: Sequence[tuple[ModelEntry, IdentificationDo
     return TrendAnswer(robot=robot, parameters=parameters)
 
 
-router = APIRouter(tags=["models"], responses=problem_responses("invalid-request", "store"))
+router = APIRouter(tags=["models"], responses=problem_responses("store"))
 
 RobotName = Annotated[str, Query(alias="robot", min_length=1, max_length=1000, description="name of the robot")]
 AnyRobot = Annotated[

@@ -53,7 +53,7 @@ class RobotListAnswer(AnswerModel):
     robots: list[KnownRobotAnswer] = Field(description="by name")
 
 
-router = APIRouter(tags=["items"], responses=problem_responses("invalid-request", "store"))
+router = APIRouter(tags=["items"], responses=problem_responses("store"))
 
 Kind = Annotated[
     Literal["excitation", "run", "identification", "diagnosis", "rollout", "campaign"] | None,

@@ -12,9 +12,10 @@ from pydantic.json_schema import models_json_schema
 
 from tauscope.server.auth.audited_requests import is_audited
 from tauscope.server.auth.scopes import find_needed_scope, is_stop
+from tauscope.server.http.openapi_sharing import merge_problems, share_parts
 from tauscope.server.http.repeated_requests import HEADER as ONCE
 from tauscope.server.http.repeated_requests import LONGEST_KEY, is_repeatable
-from tauscope.server.problems import MEDIA_TYPE, problem_responses
+from tauscope.server.problems import problem_responses
 
 _REFERENCE = "#/components/schemas/{model}"
 
@@ -44,15 +45,30 @@ def form_body(
     return {"multipart/form-data": {"schema": schema, **({"encoding": dict(encoding)} if encoding else {})}}
 
 
+_BYTES = "application/octet-stream"
+_FILE = {"type": "string", "format": "binary", "contentMediaType": _BYTES}
+"""A file in a form: OpenAPI 3.1 says so by its media type, generators of clients look for the format of 3.0."""
+
+
 def binary_part(description: str) -> dict[str, Any]:
     """The schema of a file in a form."""
-    return {"type": "string", "contentMediaType": "application/octet-stream", "description": description}
+    return {**_FILE, "description": description}
 
 
 def binary_parts(description: str) -> dict[str, Any]:
     """The schema of several files in a form."""
-    item = {"type": "string", "contentMediaType": "application/octet-stream"}
-    return {"type": "array", "items": item, "description": description}
+    return {"type": "array", "items": _FILE, "description": description}
+
+
+def file_contents(*media_types: str) -> dict[str, Any]:
+    """The content of an answer that is a file of one of several types.
+
+    Generators of clients read by the first type: bytes where there is one, else text.
+    """
+    ranks = {_BYTES: 0, "application/json": 2}
+    ordered = sorted(media_types, key=lambda each: (ranks.get(each, 0 if each.startswith("text/") else 1), each))
+    schemas = {_BYTES: {"type": "string", "format": "binary"}, "application/json": {}}
+    return {media_type: {"schema": schemas.get(media_type, {"type": "string"})} for media_type in ordered}
 
 
 def model_reference(model: type[BaseModel]) -> dict[str, str]:
@@ -88,39 +104,14 @@ def _document(app: FastAPI, models: Sequence[type[BaseModel]]) -> dict[str, Any]
     components = document.setdefault("components", {}).setdefault("schemas", {})
     components.update(definitions.get("$defs", {}))
     _add_common_answers(document)
-    # The framework's own form of validation errors is never sent.
     for unused in ("HTTPValidationError", "ValidationError"):
         components.pop(unused, None)
     document["components"]["schemas"] = dict(sorted(components.items()))
-    _share_problems(document)
+    share_parts(document)
     return document
 
 
-def _share_problems(document: dict[str, Any]) -> None:
-    """Put each problem's example, and each set of problems, into the document once."""
-    examples: dict[str, Any] = {}
-    shared: dict[str, Any] = {}
-    for operations in document["paths"].values():
-        for operation in operations.values():
-            for status, answer in operation["responses"].items():
-                problems = answer.get("content", {}).get(MEDIA_TYPE, {}).get("examples")
-                if problems is None:
-                    continue
-                examples |= problems
-                name = f"problem-{status}-{'-or-'.join(sorted(problems))}"
-                references = {code: {"$ref": f"#/components/examples/{code}"} for code in problems}
-                shared[name] = {
-                    **answer,
-                    "content": {MEDIA_TYPE: {**answer["content"][MEDIA_TYPE], "examples": references}},
-                }
-                operation["responses"][status] = {"$ref": f"#/components/responses/{name}"}
-    document["components"] |= {"examples": dict(sorted(examples.items())), "responses": dict(sorted(shared.items()))}
-
-
-_COMMON = ("bad-request", "host", "origin", "unauthorized", "forbidden", "rate-limited", "internal")
-"""Problems that any request to the interface may meet, before its route or in it."""
-
-_REPEATED = ("invalid-request", "not-repeatable", "key-reused")
+_REPEATED = ("not-repeatable", "key-reused")
 """Further problems of a request that comes with the header `ONCE`."""
 
 _ONCE_PARAMETER = {
@@ -134,7 +125,7 @@ _ONCE_PARAMETER = {
 
 
 def _add_common_answers(document: dict[str, Any]) -> None:
-    """Say of every operation that a key may be asked for, whether it is done once, and what may come of any request."""
+    """Say of every operation that a key may be asked for, whether it is done once, and the problems of both."""
     document["components"]["securitySchemes"] = {
         "key": {
             "type": "http",
@@ -149,22 +140,14 @@ def _add_common_answers(document: dict[str, Any]) -> None:
                 continue
             operation["security"] = [{"key": []}, {}]
             operation["x-tauscope-scope"] = scope.value
-            met: list[str] = list(_COMMON)
+            if "HTTPValidationError" in str(operation["responses"].get("422")):
+                del operation["responses"]["422"]  # the framework's own form is never sent
+            met: list[str] = []
             if is_audited(method.upper(), path) and not is_stop(method.upper(), path):
                 met.append("storage-full")  # of the audit log, if of nothing else
             if method == "post" and is_repeatable(path):
                 operation.setdefault("parameters", []).append(_ONCE_PARAMETER)
                 met += _REPEATED
             for status, answer in problem_responses(*met).items():
-                _merge_answer(operation["responses"], str(status), answer)
+                merge_problems(operation["responses"], str(status), answer)
             operation["responses"] = dict(sorted(operation["responses"].items()))
-
-
-def _merge_answer(responses: dict[str, Any], status: str, answer: dict[str, Any]) -> None:
-    """Add what a status may mean to what it means already."""
-    present = responses.setdefault(status, answer)
-    if present is not answer:
-        examples = present["content"][MEDIA_TYPE]["examples"]
-        new = {code: value for code, value in answer["content"][MEDIA_TYPE]["examples"].items() if code not in examples}
-        examples.update(new)
-        present["description"] = "; ".join([present["description"], *(value["summary"] for value in new.values())])

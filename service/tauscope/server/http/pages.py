@@ -137,10 +137,10 @@ def _operations(document: dict[str, Any]) -> list[dict[str, Any]]:
             "path": path,
             "summary": operation.get("summary", ""),
             "description": operation.get("description", ""),
-            "parameters": operation.get("parameters", []),
+            "parameters": [resolve_reference(document, each) for each in operation.get("parameters", [])],
             "bodies": _bodies(document, operation.get("requestBody", {}).get("content", {})),
             "statuses": [
-                (status, HTTPStatus(int(status)).phrase, resolve_reference(document, answer)["description"])
+                (status, _name_status(status), resolve_reference(document, answer)["description"])
                 for status, answer in sorted(operation["responses"].items())
             ],
         }
@@ -148,6 +148,11 @@ def _operations(document: dict[str, Any]) -> list[dict[str, Any]]:
         for method, operation in operations.items()
         if method in _METHODS
     ]
+
+
+def _name_status(status: str) -> str:
+    """A status in words."""
+    return HTTPStatus(int(status)).phrase if status.isdecimal() else "of any request"
 
 
 def _bodies(document: dict[str, Any], content: dict[str, Any]) -> list[dict[str, Any]]:

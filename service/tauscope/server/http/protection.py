@@ -249,9 +249,16 @@ class ConcurrencyLimiter:
     A slot is free again when the answer begins: a stream of events keeps no other request waiting.
     """
 
-    def __init__(self, app: ASGIApp, readers: int = READERS, slot_timeout_s: float = SLOT_TIMEOUT_S) -> None:
+    def __init__(
+        self,
+        app: ASGIApp,
+        readers: int = READERS,
+        slot_timeout_s: float = SLOT_TIMEOUT_S,
+        is_closing: Callable[[], bool] = lambda: False,
+    ) -> None:
         """Admit `readers` at a time; one that is stuck keeps its slot for `slot_timeout_s` [s]."""
         self.app = app
+        self._is_closing = is_closing
         self._slots, self._probes = asyncio.Semaphore(readers), asyncio.Semaphore(1)
         self._slot_timeout_s = slot_timeout_s
 
@@ -261,6 +268,11 @@ class ConcurrencyLimiter:
             return await self.app(scope, receive, send)
         slots = self._probes if scope["path"] in _PROBES else self._slots
         await slots.acquire()
+        if slots is self._slots and self._is_closing():  # hundreds that wait would hold up the end
+            slots.release()
+            text = "the service is ending; ask again when it has started"
+            problem = make_problem("not-ready", text, scope["path"])
+            return await problem_answer(problem, {"Retry-After": "5"})(scope, receive, send)
         slot = _Slot(slots, self._slot_timeout_s)
 
         async def send_and_free_slot(message: Message) -> None:

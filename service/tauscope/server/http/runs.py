@@ -28,7 +28,7 @@ from tauscope.server.http.documents import file_answer, to_json_text
 from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.form import PartRule
 from tauscope.server.http.leases.router import permit_of
-from tauscope.server.http.openapi import binary_part
+from tauscope.server.http.openapi import binary_part, file_contents
 from tauscope.server.http.robots.files import read_received_robot
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.server.http.services import Services, ServicesDep
@@ -456,7 +456,7 @@ add_stopping(
     summary="Fetch the recording of a run",
     response_class=FileResponse,
     responses={
-        200: {"content": {"application/octet-stream": {}, "text/csv": {}}, "description": "the file"},
+        200: {"content": file_contents("application/octet-stream", "text/csv"), "description": "the file"},
         **problem_responses("not-found", "not-finished"),
     },
 )

@@ -98,7 +98,7 @@ class FiringListAnswer(AnswerModel):
     firings: list[FiringAnswer] = Field(description="the newest first")
 
 
-router = APIRouter(prefix="/schedules", tags=["schedules"], responses=problem_responses("invalid-request", "store"))
+router = APIRouter(prefix="/schedules", tags=["schedules"], responses=problem_responses("store"))
 
 Name = Annotated[
     str, Path(pattern="^[a-z0-9][a-z0-9-]{0,62}$", description="of the schedule", examples=["cell3-nightly"])

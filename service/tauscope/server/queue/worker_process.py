@@ -10,10 +10,14 @@ from multiprocessing import parent_process
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
+NICENESS = 10
+"""Of a worker, so that the service answers a stop on a machine whose processors are all at work."""
+
 
 def serve_connection(connection: Connection, memory_bytes: int | None) -> None:
     """Call functions until the other side is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the service's to handle
+    os.nice(NICENESS)
     threading.Thread(target=_end_with_service, daemon=True).start()
     if memory_bytes is not None:
         resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, memory_bytes))

@@ -82,7 +82,8 @@ def test_every_post_is_done_once_or_needs_not_to_be() -> None:
     document = json.loads(COMMITTED.read_text(encoding="utf-8"))
     assert set(posts()) == set(REQUESTS) | set(NOT_NEEDED)
     for path, operation in posts().items():
-        headers = [each["name"] for each in operation.get("parameters", ()) if each["in"] == "header"]
+        parameters = [resolve_reference(document, each) for each in operation.get("parameters", ())]
+        headers = [each["name"] for each in parameters if each["in"] == "header"]
         assert ("Idempotency-Key" in headers) is is_repeatable(path) is (path in REQUESTS), path
         if path in REQUESTS:
             for status, code in (("409", "not-repeatable"), ("422", "key-reused"), ("507", "storage-full")):

@@ -14,6 +14,7 @@ from fastapi import FastAPI
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
+from server.http.contract.documented import require_documented
 from server.http.contract.running import running
 from server.http.motions import ROBOT, move_document
 from server.queue.controls import finish_at_once
@@ -69,6 +70,7 @@ def check(case: Any, answer: Any) -> None:
 
     wanted = [checks.status_code_conformance, checks.content_type_conformance, checks.response_schema_conformance]
     case.validate_response(answer, checks=[not_a_server_error, *wanted, checks.unsupported_method])
+    require_documented(case.method, case.path, answer.status_code, answer.content)
 
 
 def load(address: str) -> Any:

@@ -54,7 +54,7 @@ def permit_of(request: Request, services: Services, device: str) -> Permit:
     return services.leases.permit(device, request.headers.get(LEASE_TOKEN), find_owner(request), is_needed=is_needed)
 
 
-router = APIRouter(prefix="/leases", tags=["leases"], responses=problem_responses("invalid-request"))
+router = APIRouter(prefix="/leases", tags=["leases"])
 stop_router = APIRouter(tags=["runs"])
 
 Identifier = Annotated[str, Path(description="identifier of the lease", examples=["lease-7"])]

@@ -10,7 +10,7 @@ from starlette.concurrency import run_in_threadpool
 from tauscope.server.http.documents import file_answer, media_type, refuse_media_type
 from tauscope.server.http.evidence import require_no_evidence
 from tauscope.server.http.form import FORM, PartRule, receive_form
-from tauscope.server.http.openapi import binary_part, form_body
+from tauscope.server.http.openapi import binary_part, file_contents, form_body
 from tauscope.server.http.reading import READING
 from tauscope.server.http.recordings.models import RecordingAnswer, RecordingListAnswer, RecordingReportAnswer
 from tauscope.server.http.services import ServicesDep
@@ -19,7 +19,7 @@ from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.kept_recordings import check_kept_recording, read_kept_samples
 from tauscope.server.store.recordings import StoredRecording
 
-router = APIRouter(prefix="/recordings", tags=["recordings"], responses=problem_responses("invalid-request"))
+router = APIRouter(prefix="/recordings", tags=["recordings"])
 
 Name = Annotated[str, Path(description="name of the recording", examples=["log-2026-11-03.csv"])]
 JointCount = Annotated[int | None, Query(gt=0, le=1000, description="joints that the recording must have")]
@@ -92,7 +92,10 @@ async def report_on_recording(
     summary="Fetch samples of a recording for a plot",
     response_class=Response,
     responses={
-        200: {"content": {"application/octet-stream": {}}, "description": "columns of 32-bit floats behind a header"},
+        200: {
+            "content": file_contents("application/octet-stream"),
+            "description": "columns of 32-bit floats behind a header",
+        },
         **problem_responses("not-found", "recording", *READING),
     },
 )
@@ -112,7 +115,7 @@ async def get_samples(request: Request, name: Name, services: ServicesDep, most:
     summary="Fetch a recording",
     response_class=FileResponse,
     responses={
-        200: {"content": {"application/octet-stream": {}, "text/csv": {}}, "description": "the file"},
+        200: {"content": file_contents("application/octet-stream", "text/csv"), "description": "the file"},
         **problem_responses("not-found"),
     },
 )

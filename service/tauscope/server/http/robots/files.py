@@ -1,5 +1,6 @@
 """Robot files that a request brings: kept in a folder of their own, and never leading out of it."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +20,9 @@ from tauscope.server.queue.record import without_folders
 
 FOLDERS = frozenset({"assetdir", "meshdir", "texturedir"})
 """Attributes of an MJCF that name a folder."""
+
+_MOST_BODIES = 1000
+_MOST_CELLS = 2**24  # a texture of 4096 by 4096
 
 INLINE_NAME = "robot.json"
 """File name of a robot that came as JSON; YAML readers read JSON."""
@@ -111,6 +115,32 @@ def _confine_xml(data: bytes, label: str) -> None:
             hint = "send one MJCF without included files and meshes: MuJoCo saves it so (mj_saveLastXML)"
             text = f"<{kind}> names a file that was not sent; {hint}"
             raise RobotFileError(one_line(f"{label}:{element.sourceline}: {text}"))
+    _require_modest(root, label)
+
+
+def _require_modest(root: Any, label: str) -> None:
+    """Refuse an MJCF that has MuJoCo generate far more than it says.
+
+    Raises
+    ------
+    RobotFileError
+        naming the element
+    """
+    bodies = float(sum(local_name(element) == "body" for element in root.iter()))
+    for element in root.iter():
+        sizes = [_multiply(element.get(name, "")) for name in ("width", "height", "nrow", "ncol")]
+        bodies *= _multiply(element.get("count", ""))
+        if bodies > _MOST_BODIES or math.prod(sizes) > _MOST_CELLS:
+            text = f"<{local_name(element)}> generates more than {_MOST_BODIES} bodies or {_MOST_CELLS} cells"
+            raise RobotFileError(one_line(f"{label}:{element.sourceline}: {text}; leave it out: no joint needs it"))
+
+
+def _multiply(text: str) -> float:
+    """The product of the numbers of an attribute; 1 where it has none."""
+    try:
+        return math.prod(max(1.0, float(word)) for word in text.split())
+    except ValueError:
+        return 1.0  # MuJoCo says better what is wrong
 
 
 def _in_user_terms(text: str, folder: Path) -> str:

@@ -34,7 +34,7 @@ _BODY = {
     "/check",
     summary="Check a robot file",
     response_model=RobotReportAnswer,
-    responses=problem_responses("bad-request", "media-type", "robot-file", "invalid-request", *READING),
+    responses=problem_responses("bad-request", "media-type", "robot-file", *READING),
     openapi_extra={"requestBody": {"required": True, "content": _BODY}},
 )
 async def check_robot_file(request: Request, services: ServicesDep) -> RobotReportAnswer:

@@ -17,7 +17,7 @@ from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
 from tauscope.server.http.evidence import require_no_model
 from tauscope.server.http.leases.router import LeaseToken
-from tauscope.server.http.openapi import Examples
+from tauscope.server.http.openapi import Examples, file_contents
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robots.files import check_received_robot
 from tauscope.server.http.robots.models import RobotReportAnswer
@@ -74,8 +74,7 @@ class JobDocument:
 
 def text_document(name: str, output: str, media_type: str, summary: str, words: str, same: str) -> JobDocument:
     """A document that is no JSON; `same` is the option that writes the same file."""
-    content = {media_type: {"schema": {"type": "string"}}}
-    answer = {"content": content, "description": f"the same {same}"}
+    answer = {"content": file_contents(media_type), "description": f"the same {same}"}
     missing = None if media_type == HTML else f"no {name} is kept here; hand it in again"
     return JobDocument(name, output, summary, words, answer, media_type, missing)
 
@@ -134,7 +133,7 @@ class Resource:
 def make_router(resource: Resource) -> APIRouter:
     """The routes that every resource has; those that end something are added by its kind."""
     plural, noun, singular = resource.plural, resource.noun, resource.singular
-    router = APIRouter(prefix=f"/{plural}", tags=[plural], responses=problem_responses("invalid-request"))
+    router = APIRouter(prefix=f"/{plural}", tags=[plural])
     request_model, answer_model, list_model = resource.models
 
     @router.post(
@@ -291,9 +290,7 @@ def add_export_route(
     words: str,
 ) -> None:
     """Give a resource the route ``/{identifier}/exports/{format}``."""
-    content: dict[str, Any] = {
-        media_type: {"schema": {"type": "string"}} for media_type in sorted({f.media_type for f in formats.values()})
-    }
+    content = file_contents(*{file.media_type for file in formats.values()})
     schema = {"enum": [kind.value for kind in formats]}
 
     @router.get(
