@@ -1,7 +1,6 @@
 // The kinematic chain as a drawing that turns: joints along their axes, links between them, in any pose.
 
-import { h, s } from "./dom.js";
-import { named, t } from "./words.js";
+import { h, named, s } from "./dom.js";
 
 const multiply = (a, b) => Array.from({ length: 16 }, (_, k) => {
   const row = k >> 2;
@@ -42,7 +41,7 @@ export function armDrawing(report) {
   let azimuth = 0.7;
   let q = joints.map(() => 0);
   const svg = s("svg", { viewBox: "0 0 400 320", class: "arm", role: "img", tabindex: "0",
-    "aria-label": t`Kinematic chain of ${report.name}: ${joints.length} joints. Arrow keys turn it.` });
+    "aria-label": `Kinematic chain of ${report.name}: ${joints.length} joints. Arrow keys turn it.` });
 
   const reach = Math.max(0.1, joints.reduce((sum, joint) =>
     sum + Math.hypot(joint.before[3], joint.before[7], joint.before[11]) + Math.hypot(joint.after[3], joint.after[7], joint.after[11]), 0));

@@ -2,7 +2,6 @@
 
 import { getJson } from "./api.js";
 import { h, moment, render, state } from "./dom.js";
-import { t } from "./words.js";
 
 /** A list of links. */
 export function items(entries, empty) {
@@ -19,6 +18,6 @@ export function jobList(kind, heading, lead, detail) {
     const found = (await getJson(`${kind}?limit=200`, signal))[kind];
     render(root, h("h1", { text: heading }), h("p", { class: "lead", text: lead }), items(found.map((each) => ({
       href: `#/${kind}/${each.id}`, name: each.robot ?? each.id, detail: detail(each), state: each.state, when: moment(each.created),
-    })), t`Nothing yet.`));
+    })), "Nothing yet."));
   };
 }

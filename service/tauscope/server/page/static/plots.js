@@ -1,7 +1,6 @@
 // Plots over uPlot: many samples thinned to what a screen shows, zoomed by mouse, keys or buttons, in step with each other.
 
 import { h } from "./dom.js";
-import { t } from "./words.js";
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const alive = new Set();
@@ -62,7 +61,7 @@ export function thinned(time, columns, from, to, buckets) {
  *         series: [{ label, values, colour, width, dash, points: in place of a line, marks: on the line }] }
  */
 export function plot(spec) {
-  const holder = h("div", { class: `canvas ${spec.tall ? "tall" : ""}`, tabindex: "0", role: "group", "aria-label": t`${spec.label}. Arrow keys move, plus and minus zoom, zero shows everything.` });
+  const holder = h("div", { class: `canvas ${spec.tall ? "tall" : ""}`, tabindex: "0", role: "group", "aria-label": `${spec.label}. Arrow keys move, plus and minus zoom, zero shows everything.` });
   const legend = h("div", { class: "legend" });
   const box = h("figure", { class: "plot" }, h("figcaption", {}, h("span", { text: spec.label }), legend), holder);
   const time = spec.x;
@@ -183,7 +182,7 @@ export function plot(spec) {
     } }, swatch, each.label);
     legend.append(button);
   });
-  if (spec.noise) legend.append(h("span", { class: "key" }, h("span", { class: "swatch band", "aria-hidden": "true" }), t`± 2 σ of the noise`));
+  if (spec.noise) legend.append(h("span", { class: "key" }, h("span", { class: "swatch band", "aria-hidden": "true" }), "± 2 σ of the noise"));
   requestAnimationFrame(() => { if (holder.isConnected && window.uPlot && time.length > 1) begin(); });
   return api;
 }
@@ -196,11 +195,11 @@ export function zoomButtons(group) {
     const middle = (min + max) / 2;
     any().zoom(middle - (factor * (max - min)) / 2, middle + (factor * (max - min)) / 2);
   };
-  return h("div", { class: "zoom", role: "group", "aria-label": t`Zoom` },
-    h("button", { type: "button", class: "quiet", onclick: by(0.5), "aria-label": t`Zoom in`, text: "+" }),
-    h("button", { type: "button", class: "quiet", onclick: by(2), "aria-label": t`Zoom out`, text: "−" }),
-    h("button", { type: "button", class: "quiet", onclick: () => any().full(), text: t`All` }),
-    h("span", { class: "hint", text: t`Drag to zoom, double-click for everything.` }));
+  return h("div", { class: "zoom", role: "group", "aria-label": "Zoom" },
+    h("button", { type: "button", class: "quiet", onclick: by(0.5), "aria-label": "Zoom in", text: "+" }),
+    h("button", { type: "button", class: "quiet", onclick: by(2), "aria-label": "Zoom out", text: "−" }),
+    h("button", { type: "button", class: "quiet", onclick: () => any().full(), text: "All" }),
+    h("span", { class: "hint", text: "Drag to zoom, double-click for everything." }));
 }
 
 let groups = 0;

@@ -4,7 +4,6 @@ import { download, getJson, getSamples, post } from "./api.js";
 import { bytes, cautions, explained, figures, h, moment, number, render, section, table } from "./dom.js";
 import { items } from "./lists.js";
 import { group, jointStyle, plot, zoomButtons } from "./plots.js";
-import { t } from "./words.js";
 
 export async function showRecordings(root, { signal, show }) {
   const { recordings } = await getJson("recordings", signal);
@@ -12,38 +11,38 @@ export async function showRecordings(root, { signal, show }) {
   const input = h("input", { type: "file", id: "upload", accept: ".csv,.parquet,.mcap,.db3", onchange: async () => {
     const form = new FormData();
     form.append("file", input.files[0]);
-    said.textContent = t`Sending …`;
+    said.textContent = "Sending …";
     try {
       await post("recordings", form);
       show();
     } catch (error) { render(said, explained(error)); }
   } });
   const newest = [...recordings].sort((a, b) => b.modified.localeCompare(a.modified));
-  render(root, h("h1", { text: t`Recordings` }), h("p", { class: "lead", text: t`CSV, Parquet or MCAP; each one continuous motion.` }),
-    h("form", { class: "sheet" }, h("label", { for: "upload" }, t`Keep a recording on the server`, input)), said,
-    items(newest.map((each) => ({ href: `#/recordings/${encodeURIComponent(each.name)}`, name: each.name, middle: bytes(each.size), when: moment(each.modified) })), t`Nothing yet.`));
+  render(root, h("h1", { text: "Recordings" }), h("p", { class: "lead", text: "CSV, Parquet or MCAP; each one continuous motion." }),
+    h("form", { class: "sheet" }, h("label", { for: "upload" }, "Keep a recording on the server", input)), said,
+    items(newest.map((each) => ({ href: `#/recordings/${encodeURIComponent(each.name)}`, name: each.name, middle: bytes(each.size), when: moment(each.modified) })), "Nothing yet."));
 }
 
 export async function showRecording(root, { id, signal }) {
   const path = `recordings/${encodeURIComponent(id)}`;
-  const head = [h("p", { class: "eyebrow", text: t`Recording` }), h("h1", { text: id }),
-    h("div", { class: "row" }, h("button", { type: "button", onclick: () => download(`${path}/content`, id), text: t`Download` }))];
+  const head = [h("p", { class: "eyebrow", text: "Recording" }), h("h1", { text: id }),
+    h("div", { class: "row" }, h("button", { type: "button", onclick: () => download(`${path}/content`, id), text: "Download" }))];
   render(root, ...head, h("div", { class: "placeholder", "aria-busy": "true" }));
   const [report, samples] = await Promise.all([getJson(`${path}/report`, signal), getSamples(id, signal)]);
   const together = group();
   const time = samples.columns.t;
   const joints = Array.from({ length: samples.joint_count }, (_, place) => place + 1);
-  const make = (label, prefix, unit) => plot({ label, x: time, xLabel: t`time [s]`, yLabel: unit, group: together, tall: true,
+  const make = (label, prefix, unit) => plot({ label, x: time, xLabel: "time [s]", yLabel: unit, group: together, tall: true,
     series: joints.map((joint) => ({ label: `${prefix}${joint}`, values: samples.columns[`${prefix}${joint}`], ...jointStyle(joint - 1) })) });
   render(root, ...head,
-    figures([[t`Samples`, `${report.samples}`, `${number(report.duration_s, 4)} s`], [t`Rate`, `${number(report.rate_hz, 4)} Hz`, t`${report.gaps.count} gaps`],
-      [t`Periods`, report.periods ? `${report.periods.count}` : "–", report.periods ? t`repeated motion` : t`none marked`],
-      [t`Missed`, `${Object.values(report.missed).reduce((sum, each) => sum + each, 0)}`, t`values`]]),
+    figures([["Samples", `${report.samples}`, `${number(report.duration_s, 4)} s`], ["Rate", `${number(report.rate_hz, 4)} Hz`, `${report.gaps.count} gaps`],
+      ["Periods", report.periods ? `${report.periods.count}` : "–", report.periods ? "repeated motion" : "none marked"],
+      ["Missed", `${Object.values(report.missed).reduce((sum, each) => sum + each, 0)}`, "values"]]),
     cautions(report.findings),
     zoomButtons(together),
-    make(t`Position`, "q", t`rad or m`).element,
-    make(samples.effort === "tau" ? t`Torque` : t`Current or drive units`, samples.effort, samples.effort === "tau" ? t`Nm or N` : t`drive units`).element,
-    samples.shown < samples.samples ? h("p", { class: "note", text: t`${samples.shown} of ${samples.samples} samples are shown: those that keep every curve's peaks.` }) : null,
-    section("channels", t`Channels`, table(t`Channels`, [t`joint`, t`position from`, t`to`, t`effort from`, t`to`], report.joints.map((each, place) =>
+    make("Position", "q", "rad or m").element,
+    make(samples.effort === "tau" ? "Torque" : "Current or drive units", samples.effort, samples.effort === "tau" ? "Nm or N" : "drive units").element,
+    samples.shown < samples.samples ? h("p", { class: "note", text: `${samples.shown} of ${samples.samples} samples are shown: those that keep every curve's peaks.` }) : null,
+    section("channels", "Channels", table("Channels", ["joint", "position from", "to", "effort from", "to"], report.joints.map((each, place) =>
       [`${place + 1}`, ...each.position.map((v) => number(v, 4)), ...each.effort.map((v) => number(v, 4))]))));
 }
