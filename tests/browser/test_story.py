@@ -39,7 +39,7 @@ def test_from_a_robot_file_to_the_report_in_hand(
 
 def begin_a_campaign(visit: Visit, tmp_path: Path) -> None:
     page = visit.page
-    visit.go("/")
+    visit.go("/campaigns")
     expect(page.get_by_text("No campaign yet")).to_be_visible()
     page.get_by_role("link", name="New campaign").click()
     page.get_by_label("Robot file").set_input_files(PAPER_ROBOT)
@@ -142,7 +142,7 @@ def test_every_screen_holds_it_without_a_sideways_scroll(
 
 def test_it_is_worked_by_keyboard_alone(visit: Visit, address: dict[str, str]) -> None:
     page = visit.page
-    visit.go("/")
+    visit.go("/campaigns")
     expect(page.get_by_role("link", name="New campaign")).to_be_visible()
     page.keyboard.press("Tab")
     expect(page.get_by_role("link", name="Skip to the content")).to_be_focused()

@@ -44,6 +44,11 @@ def table_columns(joint_count: int, effort_kind: EffortKind, groups: Sequence[st
     return (*names, "period") if "period" in groups else tuple(names)
 
 
+def is_column(name: str) -> bool:
+    """Whether a name is one of CONTRACT.md's."""
+    return name in ("t", "period") or _JOINT_COLUMN.fullmatch(name) is not None
+
+
 def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLayout:
     """Find the columns of CONTRACT.md in a file's header, as its mapping, its preset or their own names say.
 

@@ -29,6 +29,7 @@ from tauscope.server.http.leases.router import stop_router
 from tauscope.server.http.openapi import install_openapi
 from tauscope.server.http.problem_handlers import install_problem_handlers
 from tauscope.server.http.protection import BodyLimit, ConcurrencyLimiter, OriginCheck, RequestLog, ResponseProtection
+from tauscope.server.http.recordings.models import ReadingRequest
 from tauscope.server.http.recordings.router import router as recordings
 from tauscope.server.http.repeated_requests import IdempotentRequests
 from tauscope.server.http.robots.models import RobotCheckRequest
@@ -72,6 +73,7 @@ REQUESTS = (
     RunRequest,
     CampaignRequest,
     RobotCheckRequest,
+    ReadingRequest,
     LeaseRequest,
     ReasonRequest,
     ModelPolicy,

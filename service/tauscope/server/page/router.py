@@ -13,6 +13,7 @@ from fastapi import APIRouter, Request, Response
 from tauscope.errors import NotFoundError
 from tauscope.robot.messages import one_line, shown
 from tauscope.runtime.drivers import driver_names, find_driver
+from tauscope.server.page.example import example_files
 
 router = APIRouter(include_in_schema=False)
 
@@ -65,6 +66,15 @@ def _answer(request: Request, name: str) -> Response:
     if request.headers.get("if-none-match") == asset.tag:
         return Response(status_code=304, headers=headers)
     return Response(asset.content, media_type=asset.media_type, headers=headers)
+
+
+@router.get("/example/{name}")
+def show_example(name: str) -> Response:
+    """A file of the example, for the page to fetch."""
+    content = example_files().get(name)
+    if content is None:
+        raise NotFoundError(one_line(f"the example has no file {shown(name)}; it has {', '.join(example_files())}"))
+    return Response(content, media_type="application/octet-stream", headers=HEADERS)
 
 
 @cache

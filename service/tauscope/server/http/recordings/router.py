@@ -1,21 +1,28 @@
 """Routes about recordings."""
 
 import asyncio
-from concurrent.futures import BrokenExecutor
-from typing import Annotated
+from concurrent.futures import BrokenExecutor, Future
+from typing import Annotated, TypeVar
 from urllib.parse import quote
 
 from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.server.http.documents import file_answer, media_type, refuse_media_type
+from tauscope.server.http.documents import JSON, file_answer, media_type, parse_document, refuse_media_type
 from tauscope.server.http.form import FORM, PartRule, receive_form
-from tauscope.server.http.openapi import binary_part, form_body
-from tauscope.server.http.recordings.models import RecordingAnswer, RecordingListAnswer, RecordingReportAnswer
+from tauscope.server.http.openapi import binary_part, form_body, model_reference
+from tauscope.server.http.recordings.models import (
+    ReadingRequest,
+    RecordingAnswer,
+    RecordingListAnswer,
+    RecordingReportAnswer,
+    UnderstandingAnswer,
+)
+from tauscope.server.http.robots.files import read_received_robot, robot_part_rules
 from tauscope.server.http.services import ServicesDep
 from tauscope.server.problems import ProblemError, problem_responses
-from tauscope.server.queue.kept_recordings import check_kept_recording, read_kept_samples
+from tauscope.server.queue.kept_recordings import check_kept_recording, read_kept_samples, understand_recording
 from tauscope.server.store.recordings import StoredRecording
 
 router = APIRouter(prefix="/recordings", tags=["recordings"], responses=problem_responses("invalid-request"))
@@ -24,7 +31,20 @@ Name = Annotated[str, Path(description="name of the recording", examples=["log-2
 JointCount = Annotated[int | None, Query(gt=0, le=1000, description="joints that the recording must have")]
 MostSamples = Annotated[int, Query(ge=2, le=1_000_000, description="samples to return, about")]
 
+Made = TypeVar("Made")
+
 _BODY = form_body({"file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database")}, required=["file"])
+
+_CHECK_BODY = form_body(
+    {
+        "file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database"),
+        "robot": binary_part("the robot file, whose joints, limits and layout it is read by"),
+        "urdf": binary_part("the URDF that the robot file names, by its bare name"),
+        "request": model_reference(ReadingRequest),
+    },
+    required=["file"],
+    encoding={"request": {"contentType": JSON}},
+)
 
 
 @router.post(
@@ -56,6 +76,37 @@ async def keep_recording(request: Request, response: Response, services: Service
     return _answer(kept)
 
 
+@router.post(
+    "/check",
+    summary="Check a recording before it is sent for good",
+    responses=problem_responses("bad-request", "limit-exceeded", "media-type", "robot-file", "worker-lost"),
+    openapi_extra={"requestBody": {"required": True, "content": _CHECK_BODY}},
+)
+async def check_sent_recording(request: Request, services: ServicesDep) -> UnderstandingAnswer:
+    """Its columns and units as they are understood, and what it holds when it is read so; nothing is kept."""
+    if media_type(request) != FORM:
+        raise refuse_media_type(request, FORM)
+    folder = await run_in_threadpool(services.recordings.stage)
+    try:
+        settings, robots = services.settings, folder / "robot"
+        await run_in_threadpool(robots.mkdir)
+        rules = {
+            "request": PartRule(settings.max_document_bytes),
+            "file": PartRule(settings.max_upload_bytes, folder),
+            **robot_part_rules(robots),
+        }
+        form = await receive_form(request, rules)
+        file, robot_file = form.file("file"), form.file("robot")
+        if file is None:
+            raise ProblemError("invalid-request", "the form has no part file; send the recording as part file")
+        options = parse_document(form.texts.get("request", b"{}"), ReadingRequest, within="part request")
+        robot = robot_file and await run_in_threadpool(read_received_robot, robots, robot_file.name)
+        work = services.checks.submit(understand_recording, file.path, robot, options.reading)
+        return UnderstandingAnswer.model_validate(await _of_worker(work, file.name))
+    finally:
+        await run_in_threadpool(services.recordings.discard, folder)
+
+
 @router.get("", summary="List the recordings on the server")
 def list_recordings(services: ServicesDep) -> RecordingListAnswer:
     """Sent ones, and those that the operator put into the folder."""
@@ -78,12 +129,8 @@ async def report_on_recording(
 ) -> RecordingReportAnswer:
     """What it holds, and what to look at before trusting it."""
     path = await run_in_threadpool(services.recordings.path, name)
-    try:
-        report = await asyncio.wrap_future(services.checks.submit(check_kept_recording, path, joint_count))
-    except BrokenExecutor:
-        text = f"{name}: the process that looked into it ended unexpectedly; is the file damaged, or far too large?"
-        raise ProblemError("worker-lost", text) from None
-    return RecordingReportAnswer.model_validate(report)
+    work = services.checks.submit(check_kept_recording, path, joint_count)
+    return RecordingReportAnswer.model_validate(await _of_worker(work, name))
 
 
 @router.get(
@@ -102,11 +149,7 @@ async def get_samples(name: Name, services: ServicesDep, most: MostSamples = 100
     `shown`), then each column as little-endian 32-bit floats; time counts from the first sample.
     """
     path = await run_in_threadpool(services.recordings.path, name)
-    try:
-        content = await asyncio.wrap_future(services.checks.submit(read_kept_samples, path, most))
-    except BrokenExecutor:
-        text = f"{name}: the process that read it ended unexpectedly; is the file damaged, or far too large?"
-        raise ProblemError("worker-lost", text) from None
+    content = await _of_worker(services.checks.submit(read_kept_samples, path, most), name)
     return Response(content, media_type="application/octet-stream")
 
 
@@ -128,6 +171,21 @@ def get_content(name: Name, services: ServicesDep) -> FileResponse:
 def remove_recording(name: Name, services: ServicesDep) -> None:
     """Identifications that wait for it will fail."""
     services.recordings.remove(name)
+
+
+async def _of_worker(work: "Future[Made]", name: str) -> Made:
+    """What a worker process makes of a recording.
+
+    Raises
+    ------
+    ProblemError
+        if the process was lost
+    """
+    try:
+        return await asyncio.wrap_future(work)
+    except BrokenExecutor:
+        text = f"{name}: the process that read it ended unexpectedly; is the file damaged, or far too large?"
+        raise ProblemError("worker-lost", text) from None
 
 
 def _answer(recording: StoredRecording) -> RecordingAnswer:

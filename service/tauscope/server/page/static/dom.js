@@ -114,6 +114,12 @@ export function state(name) {
   return h("span", { class: `state ${kind}` }, h("span", { "aria-hidden": "true" }, marks[name] ?? "◐"), ` ${named(name)}`);
 }
 
+/** A verdict as a word with a mark of its own shape. */
+export function verdict(name) {
+  const [mark, kind] = { consistent: ["●", "good"], explained: ["◆", "good"], partly_explained: ["◈", "live"], unexplained: ["✕", "bad"], inconclusive: ["?", "muted"], wrong_values: ["≠", "bad"] }[name] ?? ["–", "muted"];
+  return h("span", { class: `state ${kind}` }, h("span", { "aria-hidden": "true" }, mark), ` ${named(`${name ?? "no verdict"}`)}`);
+}
+
 /** What went wrong, and the page that explains its code: in a tab of its own, since this one may be watching an arm. */
 export function explained(problem) {
   const { code } = problem;

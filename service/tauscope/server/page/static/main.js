@@ -7,6 +7,7 @@ import { showCampaign, showCampaigns, showNewCampaign } from "./campaigns.js";
 import { showDiagnoses, showDiagnosis } from "./diagnoses.js";
 import { askForKey, isAsked, keyButton } from "./keys.js";
 import { keepLeases } from "./leases.js";
+import { showHome } from "./home.js";
 import { showHistory } from "./history.js";
 import { showIdentification, showIdentifications } from "./identifications.js";
 import { showRecording, showRecordings } from "./recordings.js";
@@ -15,14 +16,14 @@ import { showRun, showRuns } from "./runs.js";
 import { stopEverything } from "./stop.js";
 
 const VIEWS = [
-  [/^\/$/, showCampaigns], [/^\/new$/, showNewCampaign], [/^\/campaigns\/([^/]+)$/, showCampaign],
+  [/^\/$/, showHome], [/^\/campaigns$/, showCampaigns], [/^\/new$/, showNewCampaign], [/^\/campaigns\/([^/]+)$/, showCampaign],
   [/^\/robots$/, showRobots], [/^\/robots\/([^/]+)$/, showRobot],
   [/^\/runs$/, showRuns], [/^\/runs\/([^/]+)$/, showRun],
   [/^\/recordings$/, showRecordings], [/^\/recordings\/([^/]+)$/, showRecording],
   [/^\/identifications$/, showIdentifications], [/^\/identifications\/([^/]+)$/, showIdentification],
   [/^\/history$/, showHistory], [/^\/diagnoses$/, showDiagnoses], [/^\/diagnoses\/([^/]+)$/, showDiagnosis],
 ];
-const MENU = [["/", "Campaigns"], ["/robots", "Robots"], ["/runs", "Runs"], ["/recordings", "Recordings"], ["/identifications", "Identifications"], ["/diagnoses", "Diagnoses"], ["/history", "Over time"]];
+const MENU = [["/", "Home"], ["/campaigns", "Campaigns"], ["/robots", "Robots"], ["/runs", "Runs"], ["/recordings", "Recordings"], ["/identifications", "Identifications"], ["/diagnoses", "Diagnoses"], ["/history", "Over time"]];
 const PULSE_MS = 2000;
 const THEMES = ["auto", "light", "dark"];
 
@@ -39,7 +40,7 @@ async function show() {
   const path = location.hash.slice(1).split("?")[0] || "/";
   for (const link of document.querySelectorAll("#navigation a")) {
     const target = link.getAttribute("href").slice(1);
-    const here = target === "/" ? ["/", "/new"].includes(path) || path.startsWith("/campaigns") : path.startsWith(target);
+    const here = target === "/" ? path === "/" : path.startsWith(target) || (target === "/campaigns" && path === "/new");
     if (here) {
       link.setAttribute("aria-current", "page");
       link.scrollIntoView({ block: "nearest", inline: "nearest" }); // on a narrow screen the menu is longer than its line
@@ -48,7 +49,7 @@ async function show() {
   const found = VIEWS.map(([pattern, view]) => [pattern.exec(path), view]).find(([match]) => match);
   render(content, h("div", { class: "placeholder", "aria-busy": "true" }));
   if (!found) {
-    render(content, h("h1", { text: "There is no such page" }), h("p", {}, h("a", { href: "#/", text: "Go to the campaigns" })));
+    render(content, h("h1", { text: "There is no such page" }), h("p", {}, h("a", { href: "#/", text: "Go home" })));
     return;
   }
   try {

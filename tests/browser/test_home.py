@@ -1,0 +1,111 @@
+"""Home: files are dropped, a column is mended, and the verdict is read; an example is one click away."""
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from browser.conftest import Visit
+from server.http.serving import Served
+from tauscope.server.page.example import example_files
+
+pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(600)]
+
+VERDICT_MS = 200_000
+
+DROP = """
+(files) => {
+  const transfer = new DataTransfer();
+  for (const [name, text] of Object.entries(files)) transfer.items.add(new File([text], name));
+  document.querySelector(".drop").dispatchEvent(new DragEvent("drop", { dataTransfer: transfer, bubbles: true }));
+}
+"""
+
+
+def renamed(name: str) -> str:
+    """A recording of the example as another tool names its columns, the positions of its joints the wrong way round."""
+    text = example_files()[name].decode()
+    return text.replace("t,q1,q2,tau1,tau2", "timestamp,pos_2,pos_1,torque_1,torque_2", 1)
+
+
+def read(page: Page) -> None:
+    """Wait until every file that was dropped has been read."""
+    expect(page.get_by_role("region", name="Recordings").get_by_role("listitem").first).to_be_visible()
+    expect(page.get_by_text("Reading …")).to_have_count(0)
+
+
+def test_the_example_is_diagnosed_with_two_clicks(visit: Visit, tmp_path: Path) -> None:
+    page = visit.page
+    visit.go("/")
+    page.get_by_role("button", name="Try the example").click()
+    read(page)
+    expect(page.get_by_label("Use of example-held-out.csv")).to_have_value("held_out")
+    expect(page.get_by_label("Position of elbow")).to_have_value("q2")
+    assert visit.barriers() == []
+    visit.keep("page-home", tmp_path)
+    page.get_by_role("button", name="Diagnose", exact=True).click()
+    expect(page.get_by_text("spring is missing at elbow").first).to_be_visible(timeout=VERDICT_MS)
+    visit.go("/")
+    recent = page.get_by_role("region", name="Recent robots")
+    expect(recent.get_by_role("link", name="spring is missing at elbow")).to_be_visible()
+    expect(recent).to_contain_text("explained")
+    assert visit.barriers() == []
+
+
+def test_files_of_another_tool_are_dropped_and_a_column_is_mended(
+    visit: Visit, service: Served, tmp_path: Path
+) -> None:
+    page = visit.page
+    visit.go("/")
+    expect(page.locator(".drop")).to_be_visible()
+    files = {"example-arm.yaml": example_files()["example-arm.yaml"].decode(), "notes.md": "none"}
+    files |= {name: renamed(name) for name in example_files() if name.endswith(".csv")}
+    page.evaluate(DROP, files)
+    read(page)
+    expect(page.get_by_text("Guessed from the names")).to_be_visible()
+    expect(page.get_by_text("Not used: notes.md")).to_be_visible()
+    with page.expect_response("**/recordings/check"):
+        page.get_by_label("Position of shoulder").select_option("pos_2")
+    read(page)
+    expect(page.get_by_label("Position of elbow")).to_have_value("pos_1")
+    visit.keep("page-mapping", tmp_path)
+    with page.expect_response("**/api/v1/identifications") as answer:
+        page.get_by_role("button", name="Identify only").click()
+    handed_in = answer.value.json()
+    columns = handed_in["options"]["columns"]
+    assert (columns["q1"], columns["q2"], columns["t"]) == ("pos_2", "pos_1", "timestamp")
+    expect(page.get_by_text("The model explains")).to_be_visible(timeout=VERDICT_MS)
+
+
+def test_a_unit_is_mended_with_one_click_and_a_folder_is_taken_whole(visit: Visit, tmp_path: Path) -> None:
+    folder = tmp_path / "arm"
+    folder.mkdir()
+    (folder / "example-arm.yaml").write_bytes(example_files()["example-arm.yaml"])
+    header, *rows = example_files()["example-train.csv"].decode().splitlines()
+    cells = [row.split(",") for row in rows]
+    lines = [",".join([t, *(f"{57.29578 * float(q):.4f}" for q in (q1, q2)), *rest]) for t, q1, q2, *rest in cells]
+    (folder / "degrees.csv").write_text("\n".join([header, *lines, ""]), encoding="utf-8")
+    page = visit.page
+    visit.go("/")
+    page.locator("#folder").set_input_files(folder)
+    read(page)
+    expect(page.get_by_role("alert").filter(has_text="beyond its limits")).to_be_visible()
+    expect(page.get_by_role("button", name="Diagnose", exact=True)).to_be_disabled()
+    visit.keep("page-refused", tmp_path)
+    with page.expect_response("**/recordings/check"):
+        page.get_by_role("button", name="Read q in deg").click()
+    read(page)
+    expect(page.get_by_label("Unit of position")).to_have_value("deg")
+    expect(page.get_by_role("button", name="Diagnose", exact=True)).to_be_enabled()
+
+
+def test_home_fits_a_phone(visit: Visit, tmp_path: Path) -> None:
+    page = visit.page
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.emulate_media(color_scheme="dark")
+    visit.go("/")
+    page.get_by_role("button", name="Try the example").click()
+    read(page)
+    assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+    assert visit.barriers() == []
+    page.screenshot(path=tmp_path / "phone.png", full_page=True)
