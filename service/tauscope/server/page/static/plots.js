@@ -1,6 +1,8 @@
 // Plots over uPlot: many samples thinned to what a screen shows, zoomed by mouse, keys or buttons, in step with each other.
 
-import { h } from "./dom.js";
+import { h, number } from "./dom.js";
+import { csvText, fileName, pngBlob, saveAs, svgText } from "./figure_files.js";
+import { nearest, thinned } from "./thinning.js";
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const alive = new Set();
@@ -8,50 +10,6 @@ const alive = new Set();
 /** Draw all plots anew, in the colours that hold now. */
 export function recolour() {
   for (const plot of alive) plot.redraw(false, true);
-}
-
-/** First index whose value is not below `value`, of an increasing column. */
-function lowerBound(column, value) {
-  let low = 0;
-  let high = column.length;
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (column[middle] < value) low = middle + 1;
-    else high = middle;
-  }
-  return low;
-}
-
-/** Least and greatest value of every column in each of `buckets` stretches between two instants. */
-export function thinned(time, columns, from, to, buckets) {
-  const first = Math.max(lowerBound(time, from) - 1, 0);
-  const last = Math.min(lowerBound(time, to) + 1, time.length);
-  const count = last - first;
-  if (count <= 2 * buckets) {
-    return [Array.from(time.subarray ? time.subarray(first, last) : time.slice(first, last)),
-      ...columns.map((column) => Array.from(column.slice(first, last), (v) => (Number.isFinite(v) ? v : null)))];
-  }
-  const x = new Array(2 * buckets);
-  const out = columns.map(() => new Array(2 * buckets));
-  for (let bucket = 0; bucket < buckets; bucket += 1) {
-    const start = first + Math.floor((bucket * count) / buckets);
-    const stop = first + Math.floor(((bucket + 1) * count) / buckets);
-    x[2 * bucket] = time[start];
-    x[2 * bucket + 1] = time[Math.max(stop - 1, start)];
-    columns.forEach((column, place) => {
-      let low = Infinity;
-      let high = -Infinity;
-      for (let row = start; row < stop; row += 1) {
-        const value = column[row];
-        if (value < low) low = value;
-        if (value > high) high = value;
-      }
-      const empty = low === Infinity;
-      out[place][2 * bucket] = empty ? null : low;
-      out[place][2 * bucket + 1] = empty ? null : high;
-    });
-  }
-  return [x, ...out];
 }
 
 /**
@@ -63,8 +21,8 @@ export function thinned(time, columns, from, to, buckets) {
 export function plot(spec) {
   const holder = h("div", { class: `canvas ${spec.tall ? "tall" : ""}`, tabindex: "0", role: "group", "aria-label": `${spec.label}. Arrow keys move, plus and minus zoom, zero shows everything.` });
   const legend = h("div", { class: "legend" });
-  const box = h("figure", { class: "plot" }, h("figcaption", {}, h("span", { text: spec.label }), legend), holder);
-  const time = spec.x;
+  const box = h("figure", { class: "plot" }, h("figcaption", {}, h("span", { text: spec.label }), legend, files()), holder);
+  let time = spec.x;
   const columns = spec.series.map((each) => each.values);
   const full = [time[0], time[time.length - 1]];
   let chart = null;
@@ -105,6 +63,7 @@ export function plot(spec) {
       if (chart) later(min, max);
     },
     replace(x, values) {
+      time = x;
       spec.series.forEach((each, place) => { columns[place] = values[place]; });
       chart?.setData([x, ...values]);
     },
@@ -114,6 +73,28 @@ export function plot(spec) {
     full: () => zoom(...full),
   };
   spec.group?.members.add(api);
+
+  const readings = spec.series.map(() => h("output", { class: "reading" }));
+  const instant = h("span", { class: "key instant" });
+
+  /** Values at the cursor, of the samples themselves; nothing where it is away. */
+  function read(u) {
+    const isThere = u.cursor.left >= 0 && u.cursor.idx !== null;
+    const row = isThere ? nearest(time, u.posToVal(u.cursor.left, "x")) : -1;
+    readings.forEach((each, place) => { each.textContent = isThere ? number(columns[place][row] ?? NaN, 4) : ""; });
+    instant.textContent = isThere ? `at ${number(time[row], 5)}` : "";
+  }
+
+  /** The plot as a file. */
+  function files() {
+    const save = {
+      PNG: async () => saveAs(await pngBlob(chart, spec, css), "image/png", `${fileName(spec.label)}.png`),
+      SVG: () => saveAs(svgText(chart, spec, css), "image/svg+xml", `${fileName(spec.label)}.svg`),
+      CSV: () => saveAs(csvText(spec.xLabel, spec.series, time, columns, api.range()), "text/csv", `${fileName(spec.label)}.csv`),
+    };
+    return h("span", { class: "files", role: "group", "aria-label": `Save ${spec.label}` },
+      Object.entries(save).map(([name, write]) => h("button", { type: "button", class: "link", text: name, onclick: () => { if (chart) write(); } })));
+  }
 
   /** Marks of an axis, written as all other numbers are: not in the manner of the browser's language. */
   const marks = (_, values) => values.map((value) => (value === null ? "" : `${Number(value.toPrecision(10))}`.replace("-", "−")));
@@ -143,6 +124,7 @@ export function plot(spec) {
           u.ctx.fillStyle = css("--band");
           u.ctx.fillRect(u.bbox.left, Math.max(top, u.bbox.top), u.bbox.width, Math.min(bottom, u.bbox.top + u.bbox.height) - Math.max(top, u.bbox.top));
         }],
+        setCursor: [read],
         setSelect: [(u) => {
           if (u.select.width < 4) return;
           zoom(u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x"));
@@ -174,15 +156,16 @@ export function plot(spec) {
   spec.series.forEach((each, place) => {
     if (each.hidden) return;
     const swatch = h("span", { class: `swatch ${each.points ? "dot" : each.dash ? "dashed" : ""} ${each.colour.slice(2)}`, "aria-hidden": "true" });
-    if (spec.series.length === 1) { legend.append(h("span", { class: "key" }, swatch, each.label)); return; }
+    if (spec.series.length === 1) { legend.append(h("span", { class: "key" }, swatch, each.label, readings[place])); return; }
     const button = h("button", { type: "button", class: "key", "aria-pressed": each.show === false ? "false" : "true", onclick: () => {
       const on = button.getAttribute("aria-pressed") !== "true";
       button.setAttribute("aria-pressed", on ? "true" : "false");
       chart?.setSeries(place + 1, { show: on });
-    } }, swatch, each.label);
+    } }, swatch, each.label, readings[place]);
     legend.append(button);
   });
   if (spec.noise) legend.append(h("span", { class: "key" }, h("span", { class: "swatch band", "aria-hidden": "true" }), "± 2 σ of the noise"));
+  legend.append(instant);
   requestAnimationFrame(() => { if (holder.isConnected && window.uPlot && time.length > 1) begin(); });
   return api;
 }
