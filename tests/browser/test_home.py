@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from browser.conftest import Visit
 from server.http.serving import Served
@@ -34,6 +34,15 @@ def read(page: Page) -> None:
     expect(page.get_by_text("Reading …")).to_have_count(0)
 
 
+def with_a_tentative_finding(route: Route) -> None:
+    """The result with a second finding that held-out motion does not confirm, and a warning."""
+    result = route.fetch().json()
+    other = {"effect": "backlash", "joint": "shoulder", "confirmed": False, "held_out_change": None}
+    result["tentative"] = [{**result["findings"][0], **other}]
+    warning = {"code": "weak-excitation", "joint": "elbow", "text": "the motion is slow", "remedy": "move faster"}
+    route.fulfill(json={**result, "warnings": [warning]})
+
+
 def test_the_example_is_diagnosed_with_two_clicks(visit: Visit, tmp_path: Path) -> None:
     page = visit.page
     visit.go("/")
@@ -45,11 +54,24 @@ def test_the_example_is_diagnosed_with_two_clicks(visit: Visit, tmp_path: Path) 
     visit.keep("page-home", tmp_path)
     page.get_by_role("button", name="Diagnose", exact=True).click()
     expect(page.get_by_text("spring is missing at elbow").first).to_be_visible(timeout=VERDICT_MS)
+    address = page.url
     visit.go("/")
     recent = page.get_by_role("region", name="Recent robots")
     expect(recent.get_by_role("link", name="spring is missing at elbow")).to_be_visible()
     expect(recent).to_contain_text("explained")
     assert visit.barriers() == []
+    page.route("**/result", with_a_tentative_finding)
+    page.goto(address)
+    expect(page.get_by_role("heading", level=1)).to_contain_text("spring is missing at elbow")
+    confirmed = page.get_by_role("region", name="Confirmed findings")
+    tentative = page.get_by_role("region", name="Tentative findings")
+    expect(confirmed.get_by_role("heading", level=3)).to_have_text("Joint spring at elbow")
+    expect(tentative.get_by_role("heading", level=3)).to_have_text("Backlash at shoulder")
+    expect(tentative).to_contain_text("not confirmed")
+    page.get_by_text("1 warning", exact=True).click()
+    expect(page.get_by_text("the motion is slow; move faster.")).to_be_visible()
+    assert visit.barriers() == []
+    visit.keep("page-findings", tmp_path)
 
 
 def test_files_of_another_tool_are_dropped_and_a_column_is_mended(

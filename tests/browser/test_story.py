@@ -71,8 +71,10 @@ def read_the_diagnosis(visit: Visit, tmp_path: Path) -> None:
     page = visit.page
     page.get_by_role("link", name="Read the diagnosis").click()
     headings = page.get_by_role("heading", level=2)
-    expect(headings.first).to_have_text("Where")
-    assert headings.all_inner_texts()[:5] == ["Where", "What", "How much", "The proof", "What next"]
+    expect(headings.first).to_have_text("Confirmed findings")
+    sections = ["Confirmed findings", "Next experiment", "Residual by state", "Proof", "Residual and parameters"]
+    assert [text for text in headings.all_inner_texts() if text != "Tentative findings"][:5] == sections
+    expect(page.get_by_role("heading", level=1)).to_contain_text("spring is missing at joint1")
     expect(page.locator(".canvas canvas").first).to_be_visible()
     assert visit.barriers() == []
     visit.keep("page-diagnosis", tmp_path)

@@ -5,7 +5,7 @@ import { cautions, explained, h, moment, render, section, state, title } from ".
 import { HEADLINES, appendRobot } from "./diagnoses.js";
 import { DRIVERS } from "./drivers.js";
 import { move } from "./leases.js";
-import { items } from "./lists.js";
+import { figuresOf, outcome, searchable } from "./lists.js";
 import { robotSheet } from "./robots.js";
 import { liveMonitor } from "./runs.js";
 
@@ -15,11 +15,12 @@ const ROBOT_OF = /^(campaigns|runs|identifications|diagnoses)\/[\w-]+$/; // wher
 const RUN_ENDS = ["finished", "degraded", "stopped", "failed", "interrupted", "damaged", "waiting"];
 
 export async function showCampaigns(root, { signal }) {
-  const { campaigns } = await getJson("campaigns?limit=200", signal);
+  const [{ campaigns }, verdicts] = await Promise.all([getJson("campaigns?limit=1000", signal), figuresOf("diagnosis", signal)]);
+  const outcomeFor = (each) => outcome(each, verdicts.get(each.links.diagnosis?.split("/").pop()));
   render(root, h("h1", { text: "Campaigns" }),
     h("p", { class: "lead", text: "Design a motion, drive the arm, identify it, and say what its model leaves out." }),
     h("div", { class: "row" }, h("a", { class: "button primary", href: "#/new", text: "New campaign" })),
-    items(campaigns.map((each) => ({ href: `#/campaigns/${each.id}`, name: each.robot ?? each.id, detail: each.backend?.name, state: each.state, when: moment(each.created) })),
+    searchable(campaigns.map((each) => ({ href: `#/campaigns/${each.id}`, name: each.robot ?? each.id, detail: each.backend?.name, outcome: outcomeFor(each), created: each.created })),
       "No campaign yet. Begin with a robot file."));
 }
 

@@ -1,14 +1,14 @@
 // A diagnosis as a story: where, what, how much, the proof, what next.
 
 import { download, getJson } from "./api.js";
-import { chance, explained, figures, h, moment, named, number, percent, render, s, section, table, tabs, title, unit, unitsOf, withError } from "./dom.js";
+import { chance, explained, figures, h, moment, named, number, percent, render, s, section, table, tabs, title, unit, unitsOf, verdict, withError } from "./dom.js";
 import { VARIABLES, heatMap } from "./heat.js";
 import { waiting } from "./identifications.js";
 import { move } from "./leases.js";
 import { jobList } from "./lists.js";
 import { group, plot, zoomButtons } from "./plots.js";
 
-export const showDiagnoses = jobList("diagnoses", "Diagnoses", "What a model leaves out, and how sure that is.",
+export const showDiagnoses = jobList("diagnoses", "diagnosis", "Diagnoses", "What a model leaves out, and how sure that is.",
   (each) => (each.recordings ?? []).map((entry) => entry.name).join(", "));
 
 export const HEADLINES = {
@@ -27,26 +27,29 @@ const MOST_FINDINGS = 5;
 
 export async function showDiagnosis(root, { id, signal, show }) {
   const job = await getJson(`diagnoses/${id}`, signal);
-  const head = [h("p", { class: "eyebrow", text: "Diagnosis" }), h("h1", { text: job.robot ?? id }), h("p", { class: "meta", text: moment(job.created) })];
+  const of = [...(job.recordings ?? []), ...(job.held_out ?? [])].map((each) => each.name).join(", ");
+  const robot = job.robot ? h("a", { href: `#/robots/${encodeURIComponent(job.robot)}`, text: job.robot }) : id;
+  const eyebrow = h("p", { class: "eyebrow" }, "Diagnosis · ", robot);
+  const meta = h("p", { class: "meta", text: `${moment(job.created)} · ${of}` });
+  const head = [eyebrow, h("h1", { text: job.robot ?? id }), meta];
   if (job.state !== "succeeded") return waiting(root, head, job, signal, show);
   const [result, plots] = await Promise.all([getJson(job.links.result, signal), getJson(job.links.plots, signal)]);
   const fit = result.fit.held_out ?? result.fit.train;
   const ratio = (values) => values.map((rms, place) => rms / result.noise_std[place]);
   const [before, after] = [ratio(fit.rms_before), ratio(fit.rms_after)];
   const most = before.indexOf(Math.max(...before));
-  render(root, ...head,
-    result.headline ? h("p", { class: "headline", text: result.headline }) : null,
-    h("p", { class: "lead", text: HEADLINES[result.verdict] }),
+  render(root, eyebrow, h("h1", { class: "headline", text: result.headline || HEADLINES[result.verdict] }),
+    h("p", { class: "verdict" }, verdict(result.verdict), ` · ${HEADLINES[result.verdict]}`), meta,
+    warningList(result.warnings ?? []),
     figures([
-      ["Verdict", named(result.verdict), AGAINST[result.against]],
-      ["Findings", `${result.findings.length}`, [...new Set(result.findings.map((each) => title(each.effect)))].join(", ") || "nothing is named"],
+      ["Findings", `${result.findings.length}`, result.tentative?.length ? `and ${result.tentative.length} tentative` : AGAINST[result.against]],
       ["Residual / noise", `${number(before[most], 3)} → ${number(after[most], 3)}`, result.fit.held_out ? `${result.joints[most]}, held-out motion` : `${result.joints[most]}, its own motion`],
       ["Noise known from", result.noise_method === "periods" ? "repetition" : "the residual", `band ${number(result.cutoff_hz, 3)} Hz`],
     ]),
     h("div", { class: "row" }, h("button", { type: "button", class: "primary", onclick: () => download(job.links.report, `diagnosis-${id}.html`), text: "Download the proof" }),
       h("button", { type: "button", onclick: () => download(job.links.model, `model-${id}.json`), text: "Model with findings" }),
       h("button", { type: "button", onclick: () => download(job.links.result, `diagnosis-${id}.json`), text: "JSON" })),
-    whereSection(result, plots), whatSection(result), howMuchSection(result), proofSection(plots), nextSection(job, result, signal), detectableSection(result));
+    findingsSection(result), nextSection(job, result, signal), whereSection(result, plots), proofSection(plots), howMuchSection(result), detectableSection(result));
   return null;
 }
 
@@ -92,7 +95,7 @@ function whereSection(result, plots) {
   draw("before");
   look();
   const significant = result.mismatch.filter((each) => each.significant);
-  return section("where", "Where",
+  return section("where", "Residual by state",
     significant.length ? h("ul", { class: "plain" }, significant.map((each) => h("li", { text: located(each, unitsOf(plots.joint_types?.[each.joint])) }))) : h("p", { text: "At no joint is there more than noise." }),
     result.findings.length ? tabs("Map", ["Without the findings", "With them"], 0, (chosen) => draw(chosen ? "after" : "before")) : null,
     map, told, h("p", { class: "note", text: "Each cell holds as many samples as any other of its row and group. Click one, or go there with the arrow keys, to see the residual there; or choose:" }),
@@ -113,17 +116,34 @@ function placed(name) {
   return at < 0 ? title(name) : `${title(name.slice(0, at))} at ${name.slice(at + 1)}`;
 }
 
-function whatSection(result) {
-  const cards = result.findings.map((each, place) => findingCard(each, place, result.joints));
-  const tentative = (result.tentative ?? []).map((each, place) => findingCard(each, place, result.joints));
-  return section("what", "What", cards.length ? null : h("p", { text: "No effect of the catalogue is named." }),
-    cards.slice(0, MOST_FINDINGS),
-    cards.length > MOST_FINDINGS ? h("details", {}, h("summary", { text: `${cards.length - MOST_FINDINGS} more` }), cards.slice(MOST_FINDINGS)) : null,
-    tentative.length ? h("details", {}, h("summary", { text: `Tentative: held-out motion does not confirm these (${tentative.length})` }), tentative) : null);
+/** What to know of the robot file and the recordings before the findings are trusted. */
+function warningList(warnings) {
+  if (!warnings.length) return null;
+  const entries = warnings.map((each) => h("li", {}, each.joint ? `${each.joint}: ` : "", `${each.text}; ${each.remedy}.`));
+  return h("details", { class: "cautions" }, h("summary", { text: entries.length === 1 ? "1 warning" : `${entries.length} warnings` }), h("ul", { class: "plain" }, entries));
 }
 
-function findingCard(each, place, joints) {
-  return h("article", { class: "card" },
+/** What held-out motion confirms, and apart from it what is tentative. */
+function findingsSection(result) {
+  const cards = (findings, kind) => findings.map((each, place) => findingCard(each, place, result.joints, kind));
+  const confirmed = cards(result.findings, "");
+  const tentative = cards(result.tentative ?? [], "tentative");
+  const isJudged = Boolean(result.fit.held_out);
+  return [
+    section("findings", isJudged ? "Confirmed findings" : "Findings",
+      confirmed.length ? null : h("p", { text: isJudged ? "Held-out motion confirms no effect of the catalogue." : "No effect of the catalogue is named." }),
+      confirmed.length && !isJudged ? h("p", { class: "note", text: "No recording was held out: add one to confirm these." }) : null, folded(confirmed)),
+    tentative.length ? section("tentative", "Tentative findings", h("p", { class: "note", text: "These would explain a part of the residual. Held-out motion does not confirm them." }), folded(tentative)) : null,
+  ];
+}
+
+/** The first cards, and the rest behind a fold. */
+function folded(cards) {
+  return [cards.slice(0, MOST_FINDINGS), cards.length > MOST_FINDINGS ? h("details", {}, h("summary", { text: `${cards.length - MOST_FINDINGS} more` }), cards.slice(MOST_FINDINGS)) : null];
+}
+
+function findingCard(each, place, joints, kind) {
+  return h("article", { class: `card ${kind}` },
     h("p", { class: "rank", "aria-hidden": "true", text: `${place + 1}` }),
     h("div", {}, h("h3", {}, title(each.effect), h("span", { text: each.joint ? ` at ${each.joint}` : " of the whole arm" })), h("p", { text: each.statement }),
       h("dl", {}, each.parameters.flatMap((q) => [h("dt", { text: q.name }), h("dd", { text: `${withError(q.value, 1.96 * q.std)}${unit(q.unit)} (95 %)` })]),
@@ -149,10 +169,10 @@ function howMuchSection(result) {
   const columns = ["joint", "without the findings", "with them", ...(heldOut ? ["held out, without", "held out, with"] : [])];
   const rows = result.joints.map((name, place) => [name, ...[train.rms_before, train.rms_after, ...(heldOut ? [heldOut.rms_before, heldOut.rms_after] : [])].map((each) => number(each[place], 3))]);
   const p = result.constancy.p_value;
-  return section("how-much", "How much",
+  return section("how-much", "Residual and parameters",
     h("h3", { text: "Residual rms at the recorded rate" }), table("Residual rms", columns, rows),
-    result.parameter_differences.length ? [h("h3", { text: "What the simulation has wrong" }), h("ul", { class: "plain" }, (result.wrong_values ?? []).map((each) => h("li", { text: `${each}.` }))), bars(result.parameter_differences.map((each) => [each.parameter, each.difference_in_std, `${number(each.simulation)} → ${number(each.real)}`]))] : null,
-    result.parameter_shifts.length ? [h("h3", { text: "What had been absorbed where" }), h("p", { class: "note", text: "How far estimates moved when the findings were added, in standard errors; within the shaded part nothing has moved." }),
+    result.parameter_differences.length ? [h("h3", { text: "Wrong values of the simulation" }), h("ul", { class: "plain" }, (result.wrong_values ?? []).map((each) => h("li", { text: `${each}.` }))), bars(result.parameter_differences.map((each) => [each.parameter, each.difference_in_std, `${number(each.simulation)} → ${number(each.real)}`]))] : null,
+    result.parameter_shifts.length ? [h("h3", { text: "Parameter shifts" }), h("p", { class: "note", text: "How far estimates moved when the findings were added, in standard errors; within the shaded part nothing has moved." }),
       bars(result.parameter_shifts.slice(0, 14).map((each) => [each.parameter, each.shift_in_std, `${number(each.before)} → ${number(each.after)}`]))] : null,
     h("p", { class: "note", text: result.constancy.moved.length ? `Parameters do not all hold from one recording to the next: ${result.constancy.moved.map((each) => each.parameter).join(", ")} (p = ${number(p, 2)}).` : `The parameters hold from one recording to the next (p = ${number(p, 2)}).` }));
 }
@@ -184,18 +204,18 @@ function proofSection(plots) {
       spectrum ? plot({ label: "Spectrum of the residual", raw: true, log: true, x: spectrum.frequency, xLabel: "frequency [Hz]", yLabel: units.spectrum, series: [
         { label: "without the findings", values: spectrum.before, colour: "--before" }, { label: "with them", values: spectrum.after, colour: "--after" }, { label: "noise", values: spectrum.noise, colour: "--muted", dash: [5, 4] }] }).element : null);
   }
-  if (!plots.overlays.length) return section("proof", "The proof", h("p", { text: "This diagnosis was made before proofs were kept." }));
+  if (!plots.overlays.length) return section("proof", "Proof", h("p", { text: "This diagnosis was made before proofs were kept." }));
   const gains = plots.overlays.map((curve) => curve.measured.reduce((sum, value, k) => sum + (value - curve.before[k]) ** 2 - (value - curve.after[k]) ** 2, 0) / curve.noise ** 2);
   const best = gains.indexOf(Math.max(...gains));
   choose(best);
   const unseen = plots.overlays[0].held_out;
-  return section("proof", "The proof", h("p", { class: "lead", text: unseen ? "On held-out motion, from which neither model was made; the stretch in which the findings help most." : "No recording was held out: this is the motion that the models were made from." }),
+  return section("proof", "Proof", h("p", { class: "lead", text: unseen ? "On held-out motion, from which neither model was made; the stretch in which the findings help most." : "No recording was held out: this is the motion that the models were made from." }),
     tabs("Joint", plots.overlays.map((each) => each.joint), best, choose), place);
 }
 
 function nextSection(job, result, signal) {
   const next = result.next_experiment;
-  if (!next) return section("next", "What next", h("p", { text: "Nothing is open that another motion would decide." }));
+  if (!next) return section("next", "Next experiment", h("p", { text: "No question is open that another motion would decide." }));
   const place = h("div", {});
   const said = h("p", { role: "status", class: "note" });
   const button = h("button", { type: "button", class: "primary", text: "Run it on the simulated arm", onclick: async () => {
@@ -208,8 +228,8 @@ function nextSection(job, result, signal) {
   if (job.links.next_trajectory) {
     getJson(job.links.next_trajectory, signal).then((trajectory) => render(place, h("p", { class: "note", text: `Planned: ${(trajectory.segments ?? []).length} segments, within the robot file's limits.` }))).catch(() => {});
   }
-  return section("next", "What next", h("p", { text: `${next.why.charAt(0).toUpperCase()}${next.why.slice(1)}.` }),
-    next.separates.length ? h("p", { text: `It tells apart: ${next.separates.map(placed).join(", ")}.` }) : null, place,
+  return section("next", "Next experiment", h("p", { text: `${next.why.charAt(0).toUpperCase()}${next.why.slice(1)}.` }),
+    next.separates.length ? h("p", { text: `It separates: ${next.separates.map(placed).join(", ")}.` }) : null, place,
     job.links.next_trajectory ? h("div", { class: "row" }, button, h("button", { type: "button", onclick: () => download(job.links.next_trajectory, `next-${job.id}.json`), text: "Save the motion" })) : null, said);
 }
 
@@ -244,6 +264,6 @@ function detectableSection(result) {
     const own = places.map((name) => result.detectable.find((each) => each.effect === effect && each.joint === name));
     return [title(effect), [...new Set(own.filter(Boolean).map((each) => each.unit))].join(", "), ...own.map((each) => (each ? number(each.minimum, 2) : ""))];
   });
-  return section("detectable", "What would have been seen", h("p", { class: "lead", text: "The smallest size of each effect that nine of ten such data sets would have shown. What is smaller may be there and not be named." }),
+  return section("detectable", "Detection limits", h("p", { class: "lead", text: "The smallest size of each effect that nine of ten such data sets show. A smaller effect may exist without being named." }),
     table("Smallest visible size", ["effect", "unit", ...places.map((name) => name ?? "whole arm")], rows, 2));
 }

@@ -5,7 +5,7 @@ import { explained, figures, h, moment, number, percent, render, s, section, sta
 import { jobList } from "./lists.js";
 import { group, plot, zoomButtons } from "./plots.js";
 
-export const showIdentifications = jobList("identifications", "Identifications", "Parameters and friction from recordings.",
+export const showIdentifications = jobList("identifications", "identification", "Identifications", "Parameters and friction from recordings.",
   (each) => (each.recordings ?? []).map((entry) => entry.name).join(", "));
 
 const CONDITION = [[30, "well excited"], [100, "acceptable"], [1000, "poor: some parameters lean on few samples"], [Infinity, "very poor: excite the joints more"]];

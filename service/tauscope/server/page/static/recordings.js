@@ -2,7 +2,7 @@
 
 import { download, getJson, getSamples, post } from "./api.js";
 import { bytes, cautions, explained, figures, h, moment, number, render, section, table } from "./dom.js";
-import { items } from "./lists.js";
+import { searchable } from "./lists.js";
 import { group, jointStyle, plot, zoomButtons } from "./plots.js";
 
 export async function showRecordings(root, { signal, show }) {
@@ -20,7 +20,7 @@ export async function showRecordings(root, { signal, show }) {
   const newest = [...recordings].sort((a, b) => b.modified.localeCompare(a.modified));
   render(root, h("h1", { text: "Recordings" }), h("p", { class: "lead", text: "CSV, Parquet or MCAP; each one continuous motion." }),
     h("form", { class: "sheet" }, h("label", { for: "upload" }, "Keep a recording on the server", input)), said,
-    items(newest.map((each) => ({ href: `#/recordings/${encodeURIComponent(each.name)}`, name: each.name, middle: bytes(each.size), when: moment(each.modified) })), "Nothing yet."));
+    searchable(newest.map((each) => ({ href: `#/recordings/${encodeURIComponent(each.name)}`, name: each.name, middle: bytes(each.size), created: each.modified })), "Nothing yet."));
 }
 
 export async function showRecording(root, { id, signal }) {

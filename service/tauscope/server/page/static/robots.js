@@ -3,17 +3,22 @@
 import { armDrawing, jointRows } from "./arm.js";
 import { getJson } from "./api.js";
 import { cautions, figures, h, moment, named, number, percent, render, section, table, title } from "./dom.js";
-import { items } from "./lists.js";
+import { items, outcome, searchable } from "./lists.js";
 
 const KINDS = { run: "runs", identification: "identifications", diagnosis: "diagnoses", campaign: "campaigns" };
 const STANDS_STILL = ["created", "finished", "degraded", "stopped", "failed", "interrupted", "damaged"];
 const LATELY = 12;
 
 export async function showRobots(root, { signal }) {
-  const [{ robots }, { leases }] = await Promise.all([getJson("robots", signal), getJson("leases", signal)]);
+  const [{ robots }, { leases }, { items: kept }] = await Promise.all([getJson("robots", signal), getJson("leases", signal), getJson("items?limit=1000", signal)]);
+  const last = (robot) => {
+    const own = kept.filter((each) => each.robot === robot);
+    const told = ["diagnosis", "identification"].map((kind) => own.find((each) => each.kind === kind && each.state === "succeeded")).find(Boolean) ?? own[0];
+    return told && outcome(told, told.figures);
+  };
   const newest = [...robots].sort((a, b) => b.last_seen.localeCompare(a.last_seen));
-  render(root, h("h1", { text: "Robots" }), h("p", { class: "lead", text: "Every arm that something is kept about, the last one used first." }),
-    items(newest.map((each) => ({ href: pageOf(each.name), name: each.name, middle: holderOf(leases, each.name), when: moment(each.last_seen) })),
+  render(root, h("h1", { text: "Robots" }), h("p", { class: "lead", text: "Most recent first, each with its last verdict." }),
+    searchable(newest.map((each) => ({ href: pageOf(each.name), name: each.name, detail: holderOf(leases, each.name), outcome: last(each.name), created: each.last_seen })),
       "No robot yet: begin a campaign with its file."));
 }
 
@@ -50,7 +55,7 @@ export async function showRobot(root, { id: robot, signal }) {
       section("arm", "The arm", robotSheet(report), cautions(report.findings)),
     ] : null,
     section("lately", "Lately", items(here.slice(0, LATELY).map((each) => ({
-      href: `#/${KINDS[each.kind]}/${each.id}`, name: title(each.kind), state: each.state, when: moment(each.created) })), "Nothing yet.")));
+      href: `#/${KINDS[each.kind]}/${each.id}`, name: title(each.kind), outcome: outcome(each, each.figures), created: each.created })), "Nothing yet.")));
 }
 
 /** How well a model did where it was judged. */

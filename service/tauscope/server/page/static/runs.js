@@ -10,7 +10,7 @@ const ENDS = ["finished", "degraded", "stopped", "failed", "interrupted", "damag
 const KEPT = 1500;
 const NEAR = 0.15;
 
-export const showRuns = jobList("runs", "Runs", "Motions that were played on an arm.", (run) => (run.campaign ? "part of a campaign" : run.backend?.name));
+export const showRuns = jobList("runs", "run", "Runs", "Motions that were played on an arm.", (run) => (run.campaign ? "part of a campaign" : run.backend?.name));
 
 export async function showRun(root, { id, signal, show }) {
   const run = await getJson(`runs/${id}`, signal);
