@@ -1,5 +1,6 @@
 """Home: files are dropped, a column is mended, and the verdict is read; an example is one click away."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -43,7 +44,13 @@ def with_a_tentative_finding(route: Route) -> None:
     route.fulfill(json={**result, "warnings": [warning]})
 
 
-def test_the_example_is_diagnosed_with_two_clicks(visit: Visit, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def diagnosis() -> dict[str, str]:
+    """Where the diagnosis of the example is."""
+    return {}
+
+
+def test_the_example_is_diagnosed_with_two_clicks(visit: Visit, tmp_path: Path, diagnosis: dict[str, str]) -> None:
     page = visit.page
     visit.go("/")
     page.get_by_role("button", name="Try the example").click()
@@ -54,14 +61,18 @@ def test_the_example_is_diagnosed_with_two_clicks(visit: Visit, tmp_path: Path) 
     visit.keep("page-home", tmp_path)
     page.get_by_role("button", name="Diagnose", exact=True).click()
     expect(page.get_by_text("spring is missing at elbow").first).to_be_visible(timeout=VERDICT_MS)
-    address = page.url
+    diagnosis["url"] = page.url
     visit.go("/")
     recent = page.get_by_role("region", name="Recent robots")
     expect(recent.get_by_role("link", name="spring is missing at elbow")).to_be_visible()
     expect(recent).to_contain_text("explained")
     assert visit.barriers() == []
+
+
+def test_confirmed_and_tentative_findings_stand_apart(visit: Visit, tmp_path: Path, diagnosis: dict[str, str]) -> None:
+    page = visit.page
     page.route("**/result", with_a_tentative_finding)
-    page.goto(address)
+    page.goto(diagnosis["url"])
     expect(page.get_by_role("heading", level=1)).to_contain_text("spring is missing at elbow")
     confirmed = page.get_by_role("region", name="Confirmed findings")
     tentative = page.get_by_role("region", name="Tentative findings")
@@ -72,6 +83,54 @@ def test_the_example_is_diagnosed_with_two_clicks(visit: Visit, tmp_path: Path) 
     expect(page.get_by_text("the motion is slow; move faster.")).to_be_visible()
     assert visit.barriers() == []
     visit.keep("page-findings", tmp_path)
+
+
+def test_the_arm_moves_with_the_plots_coloured_by_its_residual(
+    visit: Visit, tmp_path: Path, diagnosis: dict[str, str]
+) -> None:
+    page = visit.page
+    page.goto(diagnosis["url"])
+    motion = page.get_by_role("region", name="Residual over the motion")
+    expect(motion.locator("canvas")).to_be_visible()
+    slider, elbow = page.get_by_label("Time of the motion"), motion.locator('[data-joint="2"]')
+    area = motion.locator(".u-over")
+    box = area.bounding_box()
+    assert box is not None
+    area.hover(position={"x": 0.5 * box["width"], "y": 20})
+    expect(slider).to_have_attribute("aria-valuetext", re.compile(r"^(9\.|10\.)"))
+    expect(elbow).to_have_class(re.compile("h[5-7]$"))
+    visit.keep("page-motion", tmp_path)
+    motion.get_by_role("button", name="With them").click()
+    expect(elbow).to_have_class(re.compile("h[0-2]$"))
+    drawn = elbow.inner_html()
+    motion.get_by_role("img").focus()
+    page.keyboard.press("ArrowUp")
+    assert elbow.inner_html() != drawn
+    page.mouse.move(5, 5)
+    motion.get_by_role("button", name="Play").click()
+    expect(slider).not_to_have_attribute("aria-valuetext", re.compile(r"^(9\.|10\.)"))
+    motion.get_by_role("button", name="Pause").click()
+    expect(motion.locator(".reading").last).not_to_be_empty()
+    assert visit.barriers() == []
+
+
+def test_a_simulated_arm_without_a_model_takes_that_of_its_last_diagnosis(visit: Visit, tmp_path: Path) -> None:
+    """After the example was diagnosed."""
+    page = visit.page
+    visit.go("/new")
+    bare = example_files()["example-arm.yaml"].decode().partition("model:")[0]
+    robot = {"name": "bare.yaml", "mimeType": "application/yaml", "buffer": bare.encode()}
+    page.get_by_label("Robot file").set_input_files(robot)  # pyright: ignore[reportArgumentType]
+    expect(page.get_by_text("The robot file states no model")).to_be_visible()
+    expect(page.get_by_role("button", name="Begin")).to_be_disabled()
+    visit.keep("page-no-model", tmp_path)
+    page.get_by_role("button", name="Use the model of its diagnosis").click()
+    expect(page.get_by_text("The robot file states no model")).to_have_count(0)
+    expect(page.get_by_role("button", name="Begin")).to_be_enabled()
+    page.get_by_label("Robot file").set_input_files(robot)  # pyright: ignore[reportArgumentType]
+    expect(page.get_by_text("The robot file states no model")).to_be_visible()
+    page.locator("#backend").select_option("CANopen drives")
+    expect(page.get_by_role("button", name="Begin")).to_be_enabled()
 
 
 def test_files_of_another_tool_are_dropped_and_a_column_is_mended(

@@ -88,14 +88,20 @@ def read_the_diagnosis(visit: Visit, tmp_path: Path) -> None:
 
 
 def run_the_next_experiment(visit: Visit, service: Served, tmp_path: Path) -> None:
-    """One click, and the arm that was diagnosed plays the planned motion: with what it conceals."""
+    """One click: the arm that was diagnosed plays the planned motion, and is diagnosed again."""
     page = visit.page
     expect(page.locator("#next").get_by_text(re.compile("^Planned: "))).to_be_visible()
-    page.get_by_role("button", name="Run it on the simulated arm").click()
+    page.get_by_role("button", name="Run it on the simulated arm, and diagnose again").click()
     page.wait_for_url("**/#/runs/*")
-    expect(page.get_by_role("link", name="Look at the recording")).to_be_visible(timeout=CAMPAIGN_MS)
+    run = service.client.get(f"/api/v1/runs/{page.url.rsplit('/', 1)[1].partition('?')[0]}").json()
+    page.wait_for_url("**/#/diagnoses/*before=*", timeout=CAMPAIGN_MS)
+    expect(page.get_by_text("Since the experiment")).to_be_visible(timeout=CAMPAIGN_MS)
+    expect(page.locator(".change")).to_contain_text("Joint spring at joint1: ")
+    visit.keep("page-change", tmp_path)
+    visit.go(f"/runs/{run['id']}")
+    expect(page.get_by_role("link", name="Look at the recording")).to_be_visible()
     visit.keep("page-run", tmp_path)
-    run = service.client.get(f"/api/v1/runs/{page.url.rsplit('/', 1)[1]}").json()
+    run = service.client.get(f"/api/v1/runs/{run['id']}").json()
     (effect,) = run["backend"]["scenario"]["effects"]
     assert (run["state"], effect["effect"], run["recording"]["partial"]) == ("finished", "joint_spring", False)
     page.get_by_role("link", name="Look at the recording").click()

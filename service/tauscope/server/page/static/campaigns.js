@@ -1,6 +1,6 @@
 // Campaigns: begun from a robot file, followed step by step, and read.
 
-import { follow, getJson, post } from "./api.js";
+import { fetchRaw, follow, getJson, post } from "./api.js";
 import { cautions, explained, h, moment, render, section, state, title } from "./dom.js";
 import { HEADLINES, appendRobot } from "./diagnoses.js";
 import { DRIVERS } from "./drivers.js";
@@ -118,7 +118,7 @@ export async function showNewCampaign(root, { signal }) {
   const input = h("input", { type: "file", id: "robot", multiple: true, accept: ".yaml,.yml,.json,.urdf,.xml", onchange: () => take([...input.files]) });
   const drop = h("div", { class: "drop", ondragover: (event) => { event.preventDefault(); drop.classList.add("over"); }, ondragleave: () => drop.classList.remove("over"),
     ondrop: (event) => { event.preventDefault(); drop.classList.remove("over"); take([...event.dataTransfer.files]); } },
-  h("label", { for: "robot" }, "Robot file (YAML), and its URDF if it names one", input));
+  h("label", { for: "robot" }, "Robot file: URDF, MJCF or YAML, with the URDF that it names", input));
 
   async function take(files) {
     const robot = files.find((file) => /\.(ya?ml|json)$/i.test(file.name)) ?? files[0];
@@ -133,8 +133,8 @@ export async function showNewCampaign(root, { signal }) {
       chosen.files = [robot, urdf];
       chosen.report = report;
       said.textContent = "";
-      begin.disabled = false;
       render(sheet, h("h2", { text: report.name }), robotSheet(report), cautions(report.findings));
+      await offerModel();
       render(joints, ...report.joints.map((joint) => h("option", { value: joint.number, text: joint.name })));
     } catch (error) {
       render(sheet);
@@ -142,6 +142,27 @@ export async function showNewCampaign(root, { signal }) {
     }
   }
 
+  /** A simulated arm needs a model: say so before anything begins, and offer the last one that was found. */
+  async function offerModel() {
+    const isMissing = chosen.report?.total_mass === null && DRIVERS[backend.value].is_simulated;
+    begin.disabled = !chosen.report || isMissing;
+    render(lacking);
+    if (!isMissing) return;
+    const found = await getJson(`items?kind=diagnosis&state=succeeded&robot=${encodeURIComponent(chosen.report.name)}&limit=1`, signal);
+    const last = found.items.find((each) => each.is_here);
+    render(lacking, h("p", { text: "The robot file states no model: the simulated arm needs mass, first moment and inertia of every link." }),
+      last ? h("p", {}, h("button", { type: "button", text: `Use the model of its diagnosis of ${moment(last.created)}`, onclick: () => useModelOf(last.id) })) : null);
+  }
+
+  async function useModelOf(id) {
+    try {
+      const [text, robot] = await Promise.all([fetchRaw(`diagnoses/${id}/improved-robot`).then((answer) => answer.text()), getJson(`diagnoses/${id}/robot`)]);
+      const beside = robot.files.filter((file) => file.name !== robot.robot_file).map((file) => new File([file.content], file.name));
+      await take([new File([text], "improved-robot.yaml"), ...beside]);
+    } catch (error) { render(said, explained(error)); }
+  }
+
+  const lacking = h("div", { class: "lacking", role: "status" });
   const backend = choice("backend", BACKENDS);
   const time = choice("time", TIMES);
   const conceal = choice("conceal", CONCEALED_WORDS);
@@ -156,6 +177,7 @@ export async function showNewCampaign(root, { signal }) {
     clearLabel.hidden = !real;
     clear.required = real;
     simulated.forEach((each) => { each.disabled = real; });
+    offerModel();
   };
   const form = h("form", { class: "sheet", onsubmit: async (event) => {
     event.preventDefault();
@@ -183,5 +205,5 @@ export async function showNewCampaign(root, { signal }) {
     appendRobot(parts, robot);
     await take([parts.get("robot"), parts.get("urdf")].filter(Boolean));
   }
-  render(root, h("h1", { text: "New campaign" }), h("p", { class: "lead", text: "A motion is designed, driven twice, and the arm identified and diagnosed. Stop, above, ends it at any moment." }), drop, said, sheet, form);
+  render(root, h("h1", { text: "New campaign" }), h("p", { class: "lead", text: "A motion is designed, driven twice, and the arm identified and diagnosed. Stop, above, ends it at any moment." }), drop, said, sheet, lacking, form);
 }

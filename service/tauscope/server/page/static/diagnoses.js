@@ -1,11 +1,12 @@
 // A diagnosis as a story: where, what, how much, the proof, what next.
 
-import { download, getJson } from "./api.js";
+import { download, getJson, post } from "./api.js";
 import { chance, explained, figures, h, moment, named, number, percent, render, s, section, table, tabs, title, unit, unitsOf, verdict, withError } from "./dom.js";
 import { VARIABLES, heatMap } from "./heat.js";
 import { waiting } from "./identifications.js";
 import { move } from "./leases.js";
 import { jobList } from "./lists.js";
+import { motionSection } from "./motion.js";
 import { group, plot, zoomButtons } from "./plots.js";
 
 export const showDiagnoses = jobList("diagnoses", "diagnosis", "Diagnoses", "What a model leaves out, and how sure that is.",
@@ -33,13 +34,16 @@ export async function showDiagnosis(root, { id, signal, show }) {
   const meta = h("p", { class: "meta", text: `${moment(job.created)} · ${of}` });
   const head = [eyebrow, h("h1", { text: job.robot ?? id }), meta];
   if (job.state !== "succeeded") return waiting(root, head, job, signal, show);
-  const [result, plots] = await Promise.all([getJson(job.links.result, signal), getJson(job.links.plots, signal)]);
+  const [result, plots, report] = await Promise.all([getJson(job.links.result, signal), getJson(job.links.plots, signal), getJson(`diagnoses/${id}/robot`, signal).then((robot) => robot.report, () => null)]);
+  const earlier = new URLSearchParams(location.hash.split("?")[1] ?? "").get("before");
+  const previous = earlier && (await getJson(`diagnoses/${encodeURIComponent(earlier)}/result`, signal).catch(() => null));
   const fit = result.fit.held_out ?? result.fit.train;
   const ratio = (values) => values.map((rms, place) => rms / result.noise_std[place]);
   const [before, after] = [ratio(fit.rms_before), ratio(fit.rms_after)];
   const most = before.indexOf(Math.max(...before));
   render(root, eyebrow, h("h1", { class: "headline", text: result.headline || HEADLINES[result.verdict] }),
     h("p", { class: "verdict" }, verdict(result.verdict), ` · ${HEADLINES[result.verdict]}`), meta,
+    previous ? changeList(previous, result) : null,
     warningList(result.warnings ?? []),
     figures([
       ["Findings", `${result.findings.length}`, result.tentative?.length ? `and ${result.tentative.length} tentative` : AGAINST[result.against]],
@@ -49,7 +53,7 @@ export async function showDiagnosis(root, { id, signal, show }) {
     h("div", { class: "row" }, h("button", { type: "button", class: "primary", onclick: () => download(job.links.report, `diagnosis-${id}.html`), text: "Download the proof" }),
       h("button", { type: "button", onclick: () => download(job.links.model, `model-${id}.json`), text: "Model with findings" }),
       h("button", { type: "button", onclick: () => download(job.links.result, `diagnosis-${id}.json`), text: "JSON" })),
-    findingsSection(result), nextSection(job, result, signal), whereSection(result, plots), proofSection(plots), howMuchSection(result), detectableSection(result));
+    report ? motionSection(report, result, plots) : null, findingsSection(result), nextSection(job, result, signal), whereSection(result, plots), proofSection(plots), howMuchSection(result), detectableSection(result));
   return null;
 }
 
@@ -121,6 +125,30 @@ function warningList(warnings) {
   if (!warnings.length) return null;
   const entries = warnings.map((each) => h("li", {}, each.joint ? `${each.joint}: ` : "", `${each.text}; ${each.remedy}.`));
   return h("details", { class: "cautions" }, h("summary", { text: entries.length === 1 ? "1 warning" : `${entries.length} warnings` }), h("ul", { class: "plain" }, entries));
+}
+
+/** What has changed since the diagnosis before the last experiment. */
+function changeList(before, result) {
+  const place = (each) => (each.joint ? `${title(each.effect)} at ${each.joint}` : title(each.effect));
+  const chances = (found) => new Map(found.findings.map((each) => [place(each), chance(each.probability)]));
+  const [old, now] = [chances(before), chances(result)];
+  const lines = [...new Set([...old.keys(), ...now.keys()])].map((name) => {
+    if (!now.has(name)) return `${name}: no longer found`;
+    return old.has(name) ? `${name}: ${old.get(name)} → ${now.get(name)}` : `${name}: new, ${now.get(name)}`;
+  });
+  return h("div", { class: "change" }, h("p", {}, h("strong", { text: "Since the experiment" }), `: ${named(before.verdict)} → ${named(result.verdict)}`),
+    lines.length ? h("ul", { class: "plain" }, lines.map((text) => h("li", { text }))) : null);
+}
+
+/** Diagnose again with a run that was made for a diagnosis; all other recordings have to lie on the service. */
+export async function diagnoseAgain(id, recording) {
+  const [job, robot] = await Promise.all([getJson(`diagnoses/${encodeURIComponent(id)}`), getJson(`diagnoses/${encodeURIComponent(id)}/robot`)]);
+  const kept = (role) => job[role].filter((each) => each.origin === "server").map((each) => each.name);
+  const form = new FormData();
+  const request = { recordings: [...kept("recordings"), recording], held_out: kept("held_out"), options: { ...job.options, next_trajectory: false } };
+  form.append("request", new Blob([JSON.stringify(request)], { type: "application/json" }));
+  appendRobot(form, robot);
+  return post("diagnoses", form);
 }
 
 /** What held-out motion confirms, and apart from it what is tentative. */
@@ -218,11 +246,13 @@ function nextSection(job, result, signal) {
   if (!next) return section("next", "Next experiment", h("p", { text: "No question is open that another motion would decide." }));
   const place = h("div", {});
   const said = h("p", { role: "status", class: "note" });
-  const button = h("button", { type: "button", class: "primary", text: "Run it on the simulated arm", onclick: async () => {
+  // Files that came with the request alone cannot be named in another one.
+  const isRepeatable = ["identified", "model"].includes(job.options.against) && [...job.recordings, ...job.held_out].every((each) => each.origin === "server");
+  const button = h("button", { type: "button", class: "primary", text: isRepeatable ? "Run it on the simulated arm, and diagnose again" : "Run it on the simulated arm", onclick: async () => {
     button.disabled = true;
     try {
       const run = await move("runs", await nextRun(job), job.robot, "sim");
-      location.hash = `#/runs/${run.id}`;
+      location.hash = `#/runs/${run.id}${isRepeatable ? `?after=${job.id}` : ""}`;
     } catch (error) { render(said, explained(error)); button.disabled = false; }
   } });
   if (job.links.next_trajectory) {

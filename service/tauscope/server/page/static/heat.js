@@ -4,13 +4,15 @@ import { h, named, number, s } from "./dom.js";
 
 const LEVELS = [1.1, 1.3, 1.6, 2, 3, 5, 10];
 export const VARIABLES = ["velocity", "position", "load", "acceleration", "time"];
+export const LEVEL_WORDS = ["noise", ...LEVELS.map((edge) => `> ${edge} ×`)];
 const ROW = 24;
 const LABELS = 96;
 const GAP = 14;
 const WIDTH = 960;
 const TOP = 24;
 
-const level = (ratio) => LEVELS.filter((edge) => ratio > edge).length;
+/** Level of a residual, given as a multiple of the noise. */
+export const level = (ratio) => LEVELS.filter((edge) => ratio > edge).length;
 
 /** The map; `choose(joint, variable, bin, words)` is told which cell was clicked, or reached with the arrow keys. */
 export function heatMap(plots, joints, key, choose) {
@@ -47,7 +49,7 @@ export function heatMap(plots, joints, key, choose) {
     });
   });
   joints.forEach((joint, row) => parts.push(s("text", { x: 0, y: TOP + row * ROW + 15, text: joint.length > 14 ? `${joint.slice(0, 13)}…` : joint })));
-  ["noise", ...LEVELS.map((edge) => `> ${edge} ×`)].forEach((word, place) => {
+  LEVEL_WORDS.forEach((word, place) => {
     const x = LABELS + 84 * place;
     parts.push(s("rect", { class: `h${place}`, x, y: height - 14, width: 16, height: 11 }));
     parts.push(s("text", { class: "small", x: x + 21, y: height - 5, text: word }));

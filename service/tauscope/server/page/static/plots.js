@@ -16,7 +16,7 @@ export function recolour() {
  * A plot over a common axis.
  *
  * spec: { label, x: column, xLabel, yLabel, height, group, log, band: [low, high],
- *         series: [{ label, values, colour, width, dash, points: in place of a line, marks: on the line }] }
+ *         onCursor: told the instant under the mouse, series: [{ label, values, colour, width, dash, points: in place of a line, marks: on the line }] }
  */
 export function plot(spec) {
   const holder = h("div", { class: `canvas ${spec.tall ? "tall" : ""}`, tabindex: "0", role: "group", "aria-label": `${spec.label}. Arrow keys move, plus and minus zoom, zero shows everything.` });
@@ -27,6 +27,7 @@ export function plot(spec) {
   const full = [time[0], time[time.length - 1]];
   let chart = null;
   let pending = null;
+  let isPointed = false; // whether the cursor is put there by the page, not by the reader
 
   const width = () => Math.max(Math.floor(holder.clientWidth), 60);
   const height = () => Math.max(Math.floor(holder.clientHeight), 80);
@@ -67,6 +68,13 @@ export function plot(spec) {
       spec.series.forEach((each, place) => { columns[place] = values[place]; });
       chart?.setData([x, ...values]);
     },
+    /** Put the cursor at an instant. */
+    point(at) {
+      if (!chart) return;
+      isPointed = true;
+      chart.setCursor({ left: chart.valToPos(at, "x"), top: 0 });
+      isPointed = false;
+    },
     redraw: (...args) => chart?.redraw(...args),
     zoom,
     range: () => pending ?? [chart.scales.x.min, chart.scales.x.max],
@@ -82,6 +90,7 @@ export function plot(spec) {
     const isThere = u.cursor.left >= 0 && u.cursor.idx !== null;
     const row = isThere ? nearest(time, u.posToVal(u.cursor.left, "x")) : -1;
     readings.forEach((each, place) => { each.textContent = isThere ? number(columns[place][row] ?? NaN, 4) : ""; });
+    if (isThere && !isPointed) spec.onCursor?.(time[row]);
     instant.textContent = isThere ? `at ${number(time[row], 5)}` : "";
   }
 
@@ -107,7 +116,7 @@ export function plot(spec) {
     });
     chart = new window.uPlot({
       width: width(), height: height(), legend: { show: false }, padding: [8, 8, 0, 0],
-      cursor: { drag: { x: true, y: false, setScale: false }, points: { show: false }, sync: spec.group ? { key: spec.group.key, setSeries: false } : undefined },
+      cursor: { y: false, drag: { x: true, y: false, setScale: false }, points: { show: false }, sync: spec.group ? { key: spec.group.key, setSeries: false } : undefined },
       scales: { x: { time: false, range: spec.xRange }, y: spec.log ? { distr: 3 } : { range: spec.yRange } },
       axes: [axis(spec.xLabel, { size: 2.8 * text, space: 5 * text }), axis(spec.yLabel, { size: 4.8 * text })],
       series: [{ label: spec.xLabel }, ...spec.series.map((each) => ({

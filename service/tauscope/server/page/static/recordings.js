@@ -3,6 +3,7 @@
 import { download, getJson, getSamples, post } from "./api.js";
 import { bytes, cautions, explained, figures, h, moment, number, render, section, table } from "./dom.js";
 import { searchable } from "./lists.js";
+import { replay } from "./motion.js";
 import { group, jointStyle, plot, zoomButtons } from "./plots.js";
 
 export async function showRecordings(root, { signal, show }) {
@@ -28,21 +29,30 @@ export async function showRecording(root, { id, signal }) {
   const head = [h("p", { class: "eyebrow", text: "Recording" }), h("h1", { text: id }),
     h("div", { class: "row" }, h("button", { type: "button", onclick: () => download(`${path}/content`, id), text: "Download" }))];
   render(root, ...head, h("div", { class: "placeholder", "aria-busy": "true" }));
-  const [report, samples] = await Promise.all([getJson(`${path}/report`, signal), getSamples(id, signal)]);
+  const run = /^run-(.+)\.csv$/.exec(id)?.[1]; // only of runs it is known what moved
+  const [report, samples, robot] = await Promise.all([getJson(`${path}/report`, signal), getSamples(id, signal),
+    run ? getJson(`runs/${encodeURIComponent(run)}/robot`, signal).then((answer) => answer.report, () => null) : null]);
   const together = group();
   const time = samples.columns.t;
   const joints = Array.from({ length: samples.joint_count }, (_, place) => place + 1);
-  const make = (label, prefix, unit) => plot({ label, x: time, xLabel: "time [s]", yLabel: unit, group: together, tall: true,
+  const motion = robot?.joints.length === joints.length ? replay(robot, time, joints.map((joint) => samples.columns[`q${joint}`]), null, (row, isPlayed) => { if (isPlayed) charts.forEach((each) => each.point(time[row])); }) : null;
+  const make = (label, prefix, unit) => plot({ label, onCursor: motion?.seek, x: time, xLabel: "time [s]", yLabel: unit, group: together, tall: true,
     series: joints.map((joint) => ({ label: `${prefix}${joint}`, values: samples.columns[`${prefix}${joint}`], ...jointStyle(joint - 1) })) });
+  const charts = [make("Position", "q", "rad or m"), make(samples.effort === "tau" ? "Torque" : "Current or drive units", samples.effort, samples.effort === "tau" ? "Nm or N" : "drive units")];
   render(root, ...head,
     figures([["Samples", `${report.samples}`, `${number(report.duration_s, 4)} s`], ["Rate", `${number(report.rate_hz, 4)} Hz`, `${report.gaps.count} gaps`],
       ["Periods", report.periods ? `${report.periods.count}` : "–", report.periods ? "repeated motion" : "none marked"],
-      ["Missed", `${Object.values(report.missed).reduce((sum, each) => sum + each, 0)}`, "values"]]),
+      ["Missing", `${missing(report)}`, "of time, position and effort"]]),
     cautions(report.findings),
+    motion ? section("replay", "Replay", motion.element) : null,
     zoomButtons(together),
-    make("Position", "q", "rad or m").element,
-    make(samples.effort === "tau" ? "Torque" : "Current or drive units", samples.effort, samples.effort === "tau" ? "Nm or N" : "drive units").element,
+    charts.map((each) => each.element),
     samples.shown < samples.samples ? h("p", { class: "note", text: `${samples.shown} of ${samples.samples} samples are shown: those that keep every curve's peaks.` }) : null,
     section("channels", "Channels", table("Channels", ["joint", "position from", "to", "effort from", "to"], report.joints.map((each, place) =>
       [`${place + 1}`, ...each.position.map((v) => number(v, 4)), ...each.effort.map((v) => number(v, 4))]))));
+}
+
+/** Values that are missing where every sample has one: other columns, such as the period, may stay empty. */
+function missing(report) {
+  return Object.entries(report.missed).filter(([name]) => /^(t|(q|tau|i)\d+)$/.test(name)).reduce((sum, [, count]) => sum + count, 0);
 }

@@ -7,6 +7,7 @@ import { items, outcome, searchable } from "./lists.js";
 
 const KINDS = { run: "runs", identification: "identifications", diagnosis: "diagnoses", campaign: "campaigns" };
 const STANDS_STILL = ["created", "finished", "degraded", "stopped", "failed", "interrupted", "damaged"];
+const DONE = ["succeeded", "finished"];
 const LATELY = 12;
 
 export async function showRobots(root, { signal }) {
@@ -39,7 +40,7 @@ export async function showRobot(root, { id: robot, signal }) {
   const model = models.find((each) => each.state === "active");
   const error = here.find((each) => each.kind === "identification" && each.id === model?.id)?.figures;
   const diagnosis = here.find((each) => each.kind === "diagnosis" && each.state === "succeeded");
-  const source = here.find((each) => each.state !== "damaged");
+  const source = here.find((each) => DONE.includes(each.state)) ?? here.find((each) => each.state !== "damaged"); // what failed may have failed for its robot file
   const path = source && `${KINDS[source.kind]}/${source.id}`;
   const report = path ? await getJson(`${path}/robot`, signal).then((answer) => answer.report, () => null) : null;
   const linkTo = (kind, id, words) => h("a", { href: `#/${KINDS[kind]}/${id}`, text: words });

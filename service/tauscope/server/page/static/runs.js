@@ -3,6 +3,7 @@
 import { armDrawing } from "./arm.js";
 import { download, follow, getJson, post } from "./api.js";
 import { explained, figures, h, moment, named, number, render, section, state, table, unitsOf } from "./dom.js";
+import { diagnoseAgain } from "./diagnoses.js";
 import { jobList } from "./lists.js";
 import { group, jointStyle, plot } from "./plots.js";
 
@@ -22,6 +23,14 @@ export async function showRun(root, { id, signal, show }) {
     run.problem ? h("p", { role: "alert" }, explained(run.problem)) : null,
     monitor?.element,
     monitor ? null : finished(run, arm));
+  const after = new URLSearchParams(location.hash.split("?")[1] ?? "").get("after");
+  if (after && run.state === "finished" && run.recording?.name) {
+    render(status, state(run.state), h("span", { text: " Handing the diagnosis in …" }));
+    try {
+      const job = await diagnoseAgain(after, run.recording.name);
+      location.replace(`#/diagnoses/${job.id}?before=${encodeURIComponent(after)}`); // the way back hands in no second one
+    } catch (error) { render(status, state(run.state), " ", explained(error)); }
+  }
   if (monitor) {
     let current = run.state;
     await follow(run.links.events, signal, (event) => {
