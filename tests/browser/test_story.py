@@ -58,7 +58,7 @@ def watch_it_to_its_end(visit: Visit, tmp_path: Path) -> None:
     expect(page.get_by_text("Waiting for the arm").or_(page.get_by_text(" of ").first).first).to_be_visible(
         timeout=CAMPAIGN_MS
     )
-    expect(page.get_by_text("The findings explain all that the model left.")).to_be_visible(timeout=CAMPAIGN_MS)
+    expect(page.get_by_text("The findings explain the whole residual.")).to_be_visible(timeout=CAMPAIGN_MS)
     expect(page.get_by_text("Joint spring at joint1")).to_be_visible()
     steps = page.locator(".steps li")
     expect(steps).to_have_count(6)

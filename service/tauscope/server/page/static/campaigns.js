@@ -1,7 +1,7 @@
 // Campaigns: begun from a robot file, followed step by step, and read.
 
 import { fetchRaw, follow, getJson, post } from "./api.js";
-import { cautions, explained, h, moment, render, section, state, title } from "./dom.js";
+import { cautions, explained, h, moment, render, section, state, title, verdict } from "./dom.js";
 import { HEADLINES, appendRobot } from "./diagnoses.js";
 import { DRIVERS } from "./drivers.js";
 import { move } from "./leases.js";
@@ -9,7 +9,7 @@ import { figuresOf, outcome, searchable } from "./lists.js";
 import { robotSheet } from "./robots.js";
 import { liveMonitor } from "./runs.js";
 
-const STEPS = { design: "Design the motion", run: "Run it", "held-out design": "Design a second one", "held-out run": "Run that", identify: "Identify", diagnose: "Diagnose" };
+const STEPS = { design: "Design motion", run: "Run motion", "held-out design": "Design held-out motion", "held-out run": "Run held-out motion", identify: "Identify", diagnose: "Diagnose" };
 const ENDS = ["succeeded", "failed", "cancelled", "interrupted", "damaged"];
 const ROBOT_OF = /^(campaigns|runs|identifications|diagnoses)\/[\w-]+$/; // where the robot of a new campaign may be taken from
 const RUN_ENDS = ["finished", "degraded", "stopped", "failed", "interrupted", "damaged", "waiting"];
@@ -18,7 +18,7 @@ export async function showCampaigns(root, { signal }) {
   const [{ campaigns }, verdicts] = await Promise.all([getJson("campaigns?limit=1000", signal), figuresOf("diagnosis", signal)]);
   const outcomeFor = (each) => outcome(each, verdicts.get(each.links.diagnosis?.split("/").pop()));
   render(root, h("h1", { text: "Campaigns" }),
-    h("p", { class: "lead", text: "Design a motion, drive the arm, identify it, and say what its model leaves out." }),
+    h("p", { class: "lead", text: "Design a motion, drive the arm, identify it, and diagnose its model." }),
     h("div", { class: "row" }, h("a", { class: "button primary", href: "#/new", text: "New campaign" })),
     searchable(campaigns.map((each) => ({ href: `#/campaigns/${each.id}`, name: each.robot ?? each.id, detail: each.backend?.name, outcome: outcomeFor(each), created: each.created })),
       "No campaign yet. Begin with a robot file."));
@@ -72,7 +72,8 @@ const linked = (path) => `#/${path.replace(/^\/api\/v1\//, "")}`;
 function outcomeOf(campaign, { diagnosis }) {
   const id = (path) => path.split("/").pop();
   return [
-    h("p", { class: "headline", text: diagnosis ? HEADLINES[diagnosis.verdict] : "The arm is identified." }),
+    h("p", { class: "headline", text: diagnosis ? diagnosis.headline || HEADLINES[diagnosis.verdict] : "The arm is identified." }),
+    diagnosis ? h("p", { class: "verdict" }, verdict(diagnosis.verdict), ` · ${HEADLINES[diagnosis.verdict]}`) : null,
     diagnosis?.findings.map((each) => h("p", {}, h("strong", { text: each.joint ? `${title(each.effect)} at ${each.joint}` : title(each.effect) }), ". ", h("span", { text: each.statement }))),
     h("div", { class: "row" },
       campaign.links.diagnosis ? h("a", { class: "button primary", href: `#/diagnoses/${id(campaign.links.diagnosis)}`, text: "Read the diagnosis" }) : null,

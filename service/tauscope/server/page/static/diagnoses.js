@@ -9,15 +9,15 @@ import { jobList } from "./lists.js";
 import { motionSection } from "./motion.js";
 import { group, plot, zoomButtons } from "./plots.js";
 
-export const showDiagnoses = jobList("diagnoses", "diagnosis", "Diagnoses", "What a model leaves out, and how sure that is.",
+export const showDiagnoses = jobList("diagnoses", "diagnosis", "Diagnoses", "Physics that models lack, and how certain each finding is.",
   (each) => (each.recordings ?? []).map((entry) => entry.name).join(", "));
 
 export const HEADLINES = {
-  consistent: "The model explains the recordings: nothing but noise is left.",
-  explained: "The findings explain all that the model left.",
-  partly_explained: "The findings explain part of what the model left; something remains.",
-  unexplained: "Something is missing that nothing in the catalogue explains.",
-  inconclusive: "These recordings cannot decide it.",
+  consistent: "The model explains the recordings: only noise is left.",
+  explained: "The findings explain the whole residual.",
+  partly_explained: "The findings explain a part of the residual; a significant rest remains.",
+  unexplained: "The model misses something that no effect of the catalogue explains.",
+  inconclusive: "These recordings cannot decide.",
   wrong_values: "No physics is missing, but stated values are wrong.",
 };
 const AGAINST = { identified: "compared with the best model that the data allow", model: "compared with the robot file's model", simulation: "compared with the simulator's recordings" };
@@ -294,6 +294,6 @@ function detectableSection(result) {
     const own = places.map((name) => result.detectable.find((each) => each.effect === effect && each.joint === name));
     return [title(effect), [...new Set(own.filter(Boolean).map((each) => each.unit))].join(", "), ...own.map((each) => (each ? number(each.minimum, 2) : ""))];
   });
-  return section("detectable", "Detection limits", h("p", { class: "lead", text: "The smallest size of each effect that nine of ten such data sets show. A smaller effect may exist without being named." }),
+  return section("detectable", "Detection limits", h("p", { class: "lead", text: "The smallest size of each effect that nine of ten such data sets show. A smaller effect may exist unnamed." }),
     table("Smallest visible size", ["effect", "unit", ...places.map((name) => name ?? "whole arm")], rows, 2));
 }

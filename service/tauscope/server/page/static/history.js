@@ -15,8 +15,8 @@ export async function showHistory(root, { signal, show }) {
   const place = h("div", {});
   const choose = (chosen) => showRobot(place, robots[chosen], models.filter((each) => each.robot === robots[chosen]), signal);
   if (robots.length) await choose(0);
-  render(root, h("h1", { text: "Over time" }), h("p", { class: "lead", text: "Models that were judged, the drift of their parameters, and what is done by itself." }),
-    events.length ? h("ul", { class: "cautions" }, events.map((event) => noteForm(event, show))) : h("p", { class: "note", text: "No drift that nobody has taken note of." }),
+  render(root, h("h1", { text: "Over time" }), h("p", { class: "lead", text: "Models and their gates, the drift of their parameters, and schedules." }),
+    events.length ? h("ul", { class: "cautions" }, events.map((event) => noteForm(event, show))) : h("p", { class: "note", text: "No open drift alerts." }),
     robots.length > 1 ? tabs("Robot", robots, 0, choose) : null, place, schedules);
   if (!robots.length) render(place, h("p", { class: "lead", text: "No model has been judged yet: identify an arm first." }));
 }

@@ -68,6 +68,6 @@ async function beat(lease, tell) {
   } catch (error) {
     if (error.code !== "lease-lost" || !held.includes(lease)) return; // the next beat may come through
     keep(held.filter((each) => each !== lease));
-    tell(arms(), `The lease of ${lease.arm} is lost, and what moved by it was stopped. Look at the arm before you begin again.`);
+    tell(arms(), `The lease of ${lease.arm} is lost, and its run was stopped. Look at the arm before you begin again.`);
   }
 }

@@ -91,7 +91,7 @@ function connection(now) {
   shown.classList.toggle("lost", !now);
   shown.textContent = now ? (moving ? "An arm is in use" : "Connected") : "Not connected";
   if (now !== reached) {
-    notice(now ? "" : "The connection to the service is lost. What is shown may be old. Stop is tried again and again when pressed; to be sure, use the arm's own emergency stop.");
+    notice(now ? "" : "The connection to the service is lost. The page may show old values. Stop is tried again and again when pressed; to be sure, use the arm's own emergency stop.");
     reached = now;
     if (now) window.dispatchEvent(new Event("tauscope:back"));
   }

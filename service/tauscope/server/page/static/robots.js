@@ -44,7 +44,7 @@ export async function showRobot(root, { id: robot, signal }) {
   const path = source && `${KINDS[source.kind]}/${source.id}`;
   const report = path ? await getJson(`${path}/robot`, signal).then((answer) => answer.report, () => null) : null;
   const linkTo = (kind, id, words) => h("a", { href: `#/${KINDS[kind]}/${id}`, text: words });
-  render(root, h("p", { class: "eyebrow", text: "Robot" }), h("h1", { text: robot }), h("p", { class: "meta", text: holderOf(leases, robot) || "Nobody has its lease." }),
+  render(root, h("p", { class: "eyebrow", text: "Robot" }), h("h1", { text: robot }), h("p", { class: "meta", text: holderOf(leases, robot) || "No lease is open." }),
     figures([
       ["Now", moving ? linkTo("run", moving.id, named(moving.state)) : "at rest", moving ? "open it to watch" : "no run of this service moves it"],
       ["Last run", used ? linkTo("run", used.id, named(used.state)) : "–", used ? moment(used.created) : "none yet"],
