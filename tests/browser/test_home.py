@@ -133,6 +133,34 @@ def test_a_simulated_arm_without_a_model_takes_that_of_its_last_diagnosis(visit:
     expect(page.get_by_role("button", name="Begin")).to_be_enabled()
 
 
+def test_what_failed_is_no_robot_of_the_next_campaign_and_an_entry_is_removed_with_undo(
+    visit: Visit, service: Served, tmp_path: Path
+) -> None:
+    """After the example was diagnosed: a bad file of the same robot fails, and changes nothing."""
+    robot = example_files()["example-arm.yaml"].partition(b"model:")[0]
+    files = {"robot": ("arm.yaml", robot), "recordings": ("bad.csv", b"t,q1,tau1\n0,1,x\n")}
+    answer = service.client.post("/api/v1/identifications", files=files)
+    assert answer.status_code == 202, answer.text
+    service.client.get(f"{answer.headers['location']}/events", timeout=60)
+    page = visit.page
+    visit.go("/robots/example-arm")
+    link = page.get_by_role("link", name="New campaign with it")
+    expect(link).to_have_attribute("href", re.compile("^#/new.robot=(diagnoses|identifications)/"))
+    assert answer.json()["id"] not in (link.get_attribute("href") or "")
+    visit.go("/identifications")
+    entry = page.get_by_role("listitem").first
+    expect(entry).to_contain_text("failed")
+    entry.get_by_role("button", name="Remove example-arm").click()
+    visit.keep("page-undo", tmp_path)
+    page.get_by_role("button", name="Undo").click()
+    expect(page.get_by_role("listitem").first).to_contain_text("failed")
+    page.get_by_role("listitem").first.get_by_role("button", name="Remove example-arm").click()
+    with page.expect_response(lambda response: response.request.method == "DELETE") as removed:
+        visit.go("/robots")  # leaving counts as thought
+    assert removed.value.status == 204
+    assert service.client.get(answer.headers["location"]).status_code == 404
+
+
 def test_files_of_another_tool_are_dropped_and_a_column_is_mended(
     visit: Visit, service: Served, tmp_path: Path
 ) -> None:

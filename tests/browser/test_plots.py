@@ -147,3 +147,23 @@ def test_a_plot_is_saved_as_it_is_zoomed(visit: Visit, kept: str, tmp_path: Path
     assert png.startswith(b"\x89PNG")
     (tmp_path / "position.png").write_bytes(png)
     assert visit.barriers() == []
+
+
+def test_another_recording_is_laid_over_and_taken_off(visit: Visit, kept: str, service: Served, tmp_path: Path) -> None:
+    shifted = motion() + np.array([0.0, 0.25, 0.25, 1.0, 1.0])
+    rows = "\n".join(",".join(f"{value:.6f}" for value in row) for row in shifted)
+    service.client.post(RECORDINGS, files={"file": ("later.csv", f"t,q1,q2,tau1,tau2\n{rows}\n")})
+    page = open_recording(visit, kept)
+    with page.expect_response("**/later.csv/samples"):
+        page.get_by_label("Overlay").select_option("later.csv")
+    expect(page.get_by_role("button", name="q1, other")).to_be_visible()
+    visit.keep("page-overlay", tmp_path)
+    with page.expect_response("**/later.csv/samples"):
+        page.get_by_label("Difference").check()
+    expect(page.get_by_text("Position, difference", exact=True)).to_be_visible()
+    with page.expect_download() as download:
+        page.get_by_role("group", name="Save Torque, difference").get_by_role("button", name="CSV").click()
+    _, *lines = Path(download.value.path()).read_text(encoding="utf-8").splitlines()
+    values = np.array([[float(cell) for cell in line.split(",")] for line in lines])
+    np.testing.assert_allclose(values[:, 1:], -1.0, atol=1e-5)
+    assert visit.barriers() == []

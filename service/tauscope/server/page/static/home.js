@@ -15,12 +15,13 @@ const dropped = { robot: [], report: null, recordings: [], unused: [], reading: 
 
 export async function showHome(root, { signal }) {
   const [{ robots }, { items }] = await Promise.all([getJson("robots", signal), getJson("items?limit=300", signal)]);
+  const diagnoses = items.filter((each) => each.is_here && each.kind === "diagnosis" && each.state === "succeeded");
   const said = h("p", { role: "status", class: "note" });
   const sheet = h("div", {});
   const working = { turn: 0 };
   const redraw = () => {
     drop.classList.toggle("filled", Boolean(dropped.robot.length || dropped.recordings.length));
-    render(sheet, dropped.robot.length || dropped.recordings.length ? understood(dropped, { redraw, recheck, said }) : null);
+    render(sheet, dropped.robot.length || dropped.recordings.length ? understood(dropped, { redraw, recheck, said, diagnoses }) : null);
   };
 
   async function take(files) {
@@ -122,7 +123,7 @@ function fault(found) {
   return found.problem ?? (error ? `column ${error.where}: ${error.text}` : null);
 }
 
-function understood(all, { redraw, recheck, said }) {
+function understood(all, { redraw, recheck, said, diagnoses }) {
   const { report, recordings } = all;
   const shown = recordings.find((each) => each.found?.mapping)?.found.mapping;
   const used = recordings.filter((each) => each.role);
@@ -146,7 +147,7 @@ function understood(all, { redraw, recheck, said }) {
       mappingForm(shown, report?.joints ?? Array.from({ length: count }, (_, place) => ({ name: `joint ${place + 1}` })), all.reading, change)) : null,
     hasError && recordings.some((each) => each.found?.report && fault(each.found)) ? h("label", { class: "check", for: "trust" },
       h("input", { type: "checkbox", id: "trust", checked: Boolean(all.reading.trust_units), onchange: (event) => change({ trust_units: event.target.checked }) }), "Use these values as they are.") : null,
-    startRow(all, isReady, said),
+    startRow(all, isReady, said, diagnoses.filter((each) => each.robot === report?.name)),
   ];
 }
 
@@ -169,15 +170,18 @@ function recordingRow(each, change, redraw) {
   doubts.length ? h("details", {}, h("summary", { text: doubts.length === 1 ? "1 remark" : `${doubts.length} remarks` }), h("ul", { class: "plain" }, doubts.map((one) => h("li", { class: "note", text: `${one.where}: ${one.text}` })))) : null);
 }
 
-function startRow(all, isReady, said) {
+function startRow(all, isReady, said, earlier) {
   const against = h("select", { id: "against" }, h("option", { value: "identified", text: "the best model that the data allow" }),
-    h("option", { value: "model", text: "the masses and friction that the robot file states" }));
-  const start = (kind, options) => async (event) => {
+    all.report?.total_mass ? h("option", { value: "model", text: "the masses and friction that the robot file states" }) : null,
+    earlier.map((each) => h("option", { value: each.id, text: `its diagnosis of ${moment(each.created)}: what has changed` })));
+  /** A request that compares with a model of the file, of the data, or of an earlier diagnosis. */
+  const compared = () => (against.value.includes("-") ? { model: against.value, options: { against: "saved" } } : { options: { against: against.value } });
+  const start = (kind, more) => async (event) => {
     const buttons = event.target.parentElement.querySelectorAll("button");
     buttons.forEach((each) => { each.disabled = true; });
     render(said, "Sending …");
     const form = robotForm();
-    form.append("request", new Blob([JSON.stringify({ options: { ...all.reading, ...options() } })], { type: "application/json" }));
+    form.append("request", new Blob([JSON.stringify({ ...more(), options: { ...all.reading, ...more().options } })], { type: "application/json" }));
     for (const { role, file } of all.recordings) if (role) form.append(role, file, file.name);
     try {
       const job = await post(kind, form);
@@ -188,9 +192,9 @@ function startRow(all, isReady, said) {
     }
   };
   return h("div", { class: "row start" },
-    h("button", { type: "button", class: "primary", disabled: !isReady, text: "Diagnose", onclick: start("diagnoses", () => ({ against: against.value })) }),
+    h("button", { type: "button", class: "primary", disabled: !isReady, text: "Diagnose", onclick: start("diagnoses", compared) }),
     h("button", { type: "button", disabled: !isReady, text: "Identify only", onclick: start("identifications", () => ({})) }),
-    all.report?.total_mass ? h("label", { for: "against", class: "inline" }, "Compare with ", against) : null,
+    against.length > 1 ? h("label", { for: "against", class: "inline" }, "Compare with ", against) : null,
     h("button", { type: "button", class: "quiet", text: "Clear", onclick: () => { clear(); window.dispatchEvent(new Event("hashchange")); } }));
 }
 

@@ -1,6 +1,6 @@
 // Identifications: how well the model explains the torque, its parameters, and its friction.
 
-import { download, follow, getJson } from "./api.js";
+import { download, follow, getJson, remove } from "./api.js";
 import { explained, figures, h, moment, number, percent, render, s, section, state, table, tabs, unitsOf, withError } from "./dom.js";
 import { jobList } from "./lists.js";
 import { group, plot, zoomButtons } from "./plots.js";
@@ -8,6 +8,7 @@ import { group, plot, zoomButtons } from "./plots.js";
 export const showIdentifications = jobList("identifications", "identification", "Identifications", "Parameters and friction from recordings.",
   (each) => (each.recordings ?? []).map((entry) => entry.name).join(", "));
 
+const ENDS = ["failed", "cancelled", "interrupted", "damaged"];
 const CONDITION = [[30, "well excited"], [100, "acceptable"], [1000, "poor: some parameters lean on few samples"], [Infinity, "very poor: excite the joints more"]];
 
 /** Share of the torque's power that a model explains. */
@@ -37,12 +38,36 @@ export async function showIdentification(root, { id, signal, show }) {
   return null;
 }
 
+/** A job that has not succeeded: its steps and its time as it goes on, and the way to cancel it; or its problem. */
 export function waiting(root, head, job, signal, show) {
-  const said = h("p", { role: "status" }, state(job.state), job.step ? h("span", { text: ` ${job.step}` }) : "");
-  render(root, ...head, said, job.problem ? h("p", { role: "alert" }, explained(job.problem)) : null);
-  if (job.problem || ["failed", "cancelled", "interrupted", "damaged"].includes(job.state)) return null;
+  const isOver = job.problem || ENDS.includes(job.state);
+  const now = h("p", { role: "status" }, state(job.state));
+  if (isOver) {
+    render(root, ...head, now, job.problem ? h("p", { role: "alert" }, explained(job.problem)) : null);
+    return null;
+  }
+  const elapsed = h("span", { class: "note" });
+  const steps = h("ol", { class: "plain done" });
+  const said = h("span", { role: "alert" });
+  const begun = Date.parse(job.started ?? job.created);
+  const tick = () => { elapsed.textContent = `${Math.max(0, Math.round((Date.now() - begun) / 1000))} s`; };
+  const timer = setInterval(tick, 1000);
+  signal.addEventListener("abort", () => clearInterval(timer), { once: true });
+  tick();
+  let step = null; // as the events tell it, from the first one on
+  const draw = (name, words) => render(now, state(name), words ? ` ${words}` : "");
+  draw(job.state, job.step);
+  const cancel = h("button", { type: "button", class: "quiet", text: "Cancel", onclick: async () => {
+    cancel.disabled = true;
+    try { await remove(job.links.self); } catch (error) { render(said, explained(error)); cancel.disabled = false; }
+  } });
+  render(root, ...head, h("progress", { "aria-label": "Progress" }), steps, now, h("div", { class: "row" }, elapsed, cancel, said));
   return follow(job.links.events, signal, (event) => {
-    if (event.step) render(said, state("running"), h("span", { text: ` ${event.step}` }));
+    if (event.step && event.step !== step) {
+      if (step) steps.append(h("li", { text: `✓ ${step}` }));
+      step = event.step;
+      draw("running", step);
+    }
     if (event.kind === "ended") show();
   });
 }

@@ -1,8 +1,10 @@
 // Lists of what is kept, the newest first: each entry with its outcome, found by words and by kind of outcome.
 
-import { getJson } from "./api.js";
-import { h, moment, named, percent, render, state, verdict } from "./dom.js";
+import { getJson, remove } from "./api.js";
+import { explained, h, moment, named, percent, render, state, verdict } from "./dom.js";
 
+const REMOVABLE = ["succeeded", "finished", "degraded", "failed", "stopped", "cancelled", "interrupted", "damaged"]; // what goes on is cancelled or stopped
+const UNDO_MS = 6000;
 const FEW = 6; // entries that need no search
 
 /** An outcome in words: verdict and headline of a diagnosis, error of an identification; else the state. */
@@ -17,10 +19,43 @@ export function outcome(entry, figures = {}) {
 /** A list of links; entries: { href, name, detail, outcome, when }. */
 export function items(entries, empty) {
   if (!entries.length) return h("p", { class: "lead", text: empty });
-  return h("ul", { class: "list" }, entries.map((each) => h("li", {}, h("a", { class: "item", href: each.href },
+  return h("ul", { class: "list" }, entries.map(row));
+}
+
+function row(each) {
+  const link = h("a", { class: "item", href: each.href },
     h("span", {}, h("strong", { text: each.name }), each.detail ? h("span", { class: "meta", text: ` ${each.detail}` }) : null),
     h("span", {}, each.outcome?.content ?? each.middle ?? ""),
-    h("span", { class: "when", text: moment(each.created) })))));
+    h("span", { class: "when", text: moment(each.created) }));
+  if (!each.path) return h("li", {}, link);
+  const line = h("li", { class: "removable" });
+  const cross = h("button", { type: "button", class: "quiet", "aria-label": `Remove ${each.name}, ${moment(each.created)}`, text: "×", onclick: () => takeAway(line, each, () => render(line, link, cross)) });
+  render(line, link, cross);
+  return line;
+}
+
+/** Remove an entry, but not before there was time to think again; leaving the page counts as thought. */
+function takeAway(line, each, restore) {
+  const act = async () => {
+    clearTimeout(timer);
+    window.removeEventListener("hashchange", act);
+    try {
+      await remove(each.path);
+      line.remove();
+    } catch (error) {
+      restore();
+      line.append(h("p", { role: "alert" }, explained(error)));
+    }
+  };
+  const timer = setTimeout(act, UNDO_MS);
+  window.addEventListener("hashchange", act);
+  const undo = h("button", { type: "button", class: "link", text: "Undo", onclick: () => {
+    clearTimeout(timer);
+    window.removeEventListener("hashchange", act);
+    restore();
+  } });
+  render(line, h("p", { role: "status" }, `${each.name} is removed. `, undo));
+  undo.focus();
 }
 
 /** The same with a search by words and a choice of outcomes. */
@@ -60,7 +95,7 @@ export function jobList(plural, kind, heading, lead, detail) {
   return async (root, { signal }) => {
     const [answer, figures] = await Promise.all([getJson(`${plural}?limit=1000`, signal), figuresOf(kind, signal)]);
     render(root, h("h1", { text: heading }), h("p", { class: "lead", text: lead }), searchable(answer[plural].map((each) => ({
-      href: `#/${plural}/${each.id}`, name: each.robot ?? each.id, detail: detail(each), outcome: outcome(each, figures.get(each.id)), created: each.created,
+      href: `#/${plural}/${each.id}`, path: REMOVABLE.includes(each.state) ? `${plural}/${each.id}` : null, name: each.robot ?? each.id, detail: detail(each), outcome: outcome(each, figures.get(each.id)), created: each.created,
     })), "Nothing yet."));
   };
 }
