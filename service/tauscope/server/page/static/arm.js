@@ -38,6 +38,7 @@ export function chain(joints, q) {
 const WIDTH = 400;
 const HEIGHT = 320;
 const DISTANCE = 6; // of the eye, in radii of what is seen: a gentle perspective
+const THICKNESS = 0.09; // half the length of a joint's body, in radii of what is seen
 const STEP = 0.12; // a key turns the view by [rad]
 const GRID = 4; // lines of the ground to each side
 
@@ -102,23 +103,22 @@ export function armDrawing(report) {
     const { points, axes } = chain(joints, view.q);
     for (const point of [...points, ...view.path]) radius = Math.max(radius, Math.hypot(...raised(point).map((value, k) => value - middle[k])));
     const places = points.map(project);
-    const size = 0.06 * Math.min(reach, 2 * radius);
-    const thick = size / radius;
+    const size = THICKNESS * radius;
     const solids = [];
     for (let k = 1; k < places.length; k += 1) {
       const ends = [places[k - 1], places[k]];
       if (Math.hypot(...points[k].map((value, axis) => value - points[k - 1][axis])) < 1e-6 * reach) continue;
-      const width = 0.85 * thick * ((ends[0].scale + ends[1].scale) / 2);
+      const width = 0.85 * THICKNESS * ((ends[0].scale + ends[1].scale) / 2);
       const lit = ends.map((end) => ({ x: end.x - 0.16 * width, y: end.y - 0.16 * width }));
       solids.push({ depth: (ends[0].depth + ends[1].depth) / 2, element: s("g", {}, stroke("link-shadow", ends, width + 3), stroke("link", ends, width), stroke("link-light", lit, 0.34 * width)) });
     }
     axes.forEach(({ at, along, type }, place) => {
       const tip = (sign) => project(at.map((value, k) => value + sign * size * along[k]));
       const centre = project(at);
-      const width = 1.5 * thick * centre.scale;
+      const width = 1.5 * THICKNESS * centre.scale;
       const level = view.levels ? ` h${view.levels[place]}` : "";
       solids.push({ depth: centre.depth + 0.01, element: s("g", { class: `joint ${type}${level}`, "data-joint": place + 1 },
-        cylinder(tip(-1), tip(1), width, size / radius)) });
+        cylinder(tip(-1), tip(1), width, THICKNESS)) });
     });
     // Joints that sit in one place share a label.
     const labels = [];

@@ -41,7 +41,7 @@ export async function showDiagnosis(root, { id, signal, show }) {
   const ratio = (values) => values.map((rms, place) => rms / result.noise_std[place]);
   const [before, after] = [ratio(fit.rms_before), ratio(fit.rms_after)];
   const most = before.indexOf(Math.max(...before));
-  render(root, eyebrow, h("h1", { class: "headline", text: result.headline || HEADLINES[result.verdict] }),
+  render(root, eyebrow, h("h1", { class: "headline", text: unbroken(result.headline) || HEADLINES[result.verdict] }),
     h("p", { class: "verdict" }, verdict(result.verdict), ` · ${HEADLINES[result.verdict]}`), meta,
     previous ? changeList(previous, result) : null,
     warningList(result.warnings ?? []),
@@ -119,6 +119,9 @@ function placed(name) {
   const at = name.indexOf("@");
   return at < 0 ? title(name) : `${title(name.slice(0, at))} at ${name.slice(at + 1)}`;
 }
+
+/** A sentence whose numbers stay with their units. */
+const unbroken = (text) => text?.replace(/(\d) (?=[A-Za-zµ°%])/g, "$1\u00a0");
 
 /** What to know of the robot file and the recordings before the findings are trusted. */
 function warningList(warnings) {

@@ -137,7 +137,7 @@ function understood(all, { redraw, recheck, said, diagnoses }) {
   };
   return [
     section("robot", "Robot", report ? [
-      h("p", { class: "whole" }, h("strong", { text: report.name }), ` · ${report.joints.length} joints: ${report.joints.map((each) => each.name).join(", ")}`,
+      h("p", { class: "whole" }, h("strong", { text: report.name }), ` · ${report.joints.length === 1 ? "1 joint" : `${report.joints.length} joints`}: ${report.joints.map((each) => each.name).join(", ")}`,
         report.total_mass === null ? " · no masses stated" : ` · ${number(report.total_mass, 3)} kg stated`),
       cautions(report.findings),
     ] : h("p", { class: "note", text: all.robot.length ? "The robot file cannot be used; drop another one." : "Add the robot file: URDF, MJCF or YAML." })),

@@ -55,16 +55,17 @@ export function waiting(root, head, job, signal, show) {
   signal.addEventListener("abort", () => clearInterval(timer), { once: true });
   tick();
   let step = null; // as the events tell it, from the first one on
-  const draw = (name, words) => render(now, state(name), words ? ` ${words}` : "");
+  const readable = (words) => words.replaceAll("_", " ").replace("@", " at ");
+  const draw = (name, words) => render(now, state(name), words ? ` ${readable(words)}` : "");
   draw(job.state, job.step);
   const cancel = h("button", { type: "button", class: "quiet", text: "Cancel", onclick: async () => {
     cancel.disabled = true;
     try { await remove(job.links.self); } catch (error) { render(said, explained(error)); cancel.disabled = false; }
   } });
-  render(root, ...head, h("progress", { "aria-label": "Progress" }), steps, now, h("div", { class: "row" }, elapsed, cancel, said));
+  render(root, ...head, now, h("progress", { "aria-label": "Progress" }), h("div", { class: "row" }, elapsed, cancel, said), steps);
   return follow(job.links.events, signal, (event) => {
     if (event.step && event.step !== step) {
-      if (step) steps.append(h("li", { text: `✓ ${step}` }));
+      if (step) steps.prepend(h("li", { text: `✓ ${readable(step)}` }));
       step = event.step;
       draw("running", step);
     }

@@ -27,7 +27,7 @@ export function replay(report, time, columns, levels, told) {
     const row = nearest(time, instant);
     slider.value = instant;
     slider.setAttribute("aria-valuetext", `${number(instant, 3)} s`);
-    clock.textContent = `${number(instant, 4)} s`;
+    clock.textContent = `${instant.toFixed(2)} s`;
     arm.show(at(row), levels?.(row) ?? null);
     told?.(row, Boolean(frame));
   }
