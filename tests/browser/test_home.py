@@ -208,6 +208,26 @@ def test_a_unit_is_mended_with_one_click_and_a_folder_is_taken_whole(visit: Visi
     expect(page.get_by_role("button", name="Diagnose", exact=True)).to_be_enabled()
 
 
+def test_without_a_connection_nothing_is_lost(visit: Visit, service: Served) -> None:
+    page = visit.page
+    visit.go("/")
+    page.get_by_role("button", name="Try the example").click()
+    read(page)
+    before = len(service.client.get("/api/v1/diagnoses").json()["diagnoses"])
+    visit.context.set_offline(True)
+    page.get_by_role("button", name="Diagnose", exact=True).click()
+    expect(page.get_by_text("The service does not answer. Check the connection, and try again.")).to_be_visible()
+    expect(page.get_by_label("Use of example-train.csv")).to_be_visible()
+    visit.context.set_offline(False)
+    expect(page.locator("#link-state")).to_have_text("Connected")
+    with page.expect_response("**/api/v1/diagnoses") as answer:
+        page.get_by_role("button", name="Diagnose", exact=True).click()
+    assert answer.value.status == 202
+    page.get_by_role("button", name="Cancel").click()
+    expect(page.get_by_role("status").filter(has_text="cancelled")).to_be_visible()
+    assert len(service.client.get("/api/v1/diagnoses").json()["diagnoses"]) == before + 1
+
+
 def test_home_fits_a_phone(visit: Visit, tmp_path: Path) -> None:
     page = visit.page
     page.set_viewport_size({"width": 390, "height": 844})

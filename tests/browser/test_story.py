@@ -71,9 +71,16 @@ def read_the_diagnosis(visit: Visit, tmp_path: Path) -> None:
     page = visit.page
     page.get_by_role("link", name="Read the diagnosis").click()
     headings = page.get_by_role("heading", level=2)
-    expect(headings.first).to_have_text("Confirmed findings")
-    sections = ["Confirmed findings", "Next experiment", "Residual by state", "Proof", "Residual and parameters"]
-    assert [text for text in headings.all_inner_texts() if text != "Tentative findings"][:5] == sections
+    expect(headings.first).to_have_text("Residual over the motion")
+    sections = [
+        "Residual over the motion",
+        "Confirmed findings",
+        "Next experiment",
+        "Residual by state",
+        "Proof",
+        "Residual and parameters",
+    ]
+    assert [text for text in headings.all_inner_texts() if text != "Tentative findings"][:6] == sections
     expect(page.get_by_role("heading", level=1)).to_contain_text("spring is missing at joint1")
     expect(page.locator(".canvas canvas").first).to_be_visible()
     assert visit.barriers() == []

@@ -9,6 +9,7 @@ import { group, jointStyle, plot } from "./plots.js";
 
 const ENDS = ["finished", "degraded", "stopped", "failed", "interrupted", "damaged"];
 const KEPT = 1500;
+const KEPT_KEYS = ["position", "target", "effort"];
 const NEAR = 0.15;
 
 export const showRuns = jobList("runs", "run", "Runs", "Motions that were played on an arm.", (run) => (run.campaign ? "part of a campaign" : run.backend?.name));
@@ -72,7 +73,7 @@ export function liveMonitor(id) {
   let charts = null;
   let drawing = null;
   let arm = [];
-  const rows = { position: [], effort: [] };
+  const rows = { position: [], target: [], effort: [] };
 
   let isKnown = false; // whether it has been answered what the joints are called
   getJson(`runs/${id}/robot`).then(({ report }) => { arm = report.joints; drawing = armDrawing(report); render(pose, drawing.element); })
@@ -80,10 +81,12 @@ export function liveMonitor(id) {
 
   function begin(count) {
     const together = group();
-    const make = (label, key, unit) => plot({ label, x: [0, 1], xLabel: "time [s]", yLabel: unit, raw: true, group: together,
-      series: Array.from({ length: count }, (_, joint) => ({ label: nameOf(arm, joint), values: [null, null], ...jointStyle(joint) })), key });
-    charts = { position: make("Position", "position", "rad or m"), effort: make("Torque", "effort", "Nm or N") };
-    for (const key of ["position", "effort"]) rows[key] = Array.from({ length: count }, () => []);
+    const each = (make) => Array.from({ length: count }, (_, joint) => ({ values: [null, null], ...jointStyle(joint), ...make(joint) }));
+    const measured = each((joint) => ({ label: nameOf(arm, joint) }));
+    const targets = each((joint) => ({ label: `${nameOf(arm, joint)}, target`, dash: [2, 4], width: 1 }));
+    const make = (label, unit, series) => plot({ label, x: [0, 1], xLabel: "time [s]", yLabel: unit, raw: true, group: together, series });
+    charts = { position: make("Position", "rad or m", [...measured, ...targets]), effort: make("Torque", "Nm or N", measured) };
+    for (const key of KEPT_KEYS) rows[key] = Array.from({ length: count }, () => []);
     render(plots, charts.position.element, charts.effort.element);
   }
 
@@ -96,9 +99,12 @@ export function liveMonitor(id) {
     if (!charts) begin(data.position.length);
     if (times.length && data.time_s <= times[times.length - 1]) return;
     times.push(data.time_s);
-    for (const key of ["position", "effort"]) data[key].forEach((value, joint) => rows[key][joint].push(value));
-    if (times.length > KEPT) { times.shift(); for (const key of ["position", "effort"]) rows[key].forEach((each) => each.shift()); }
-    if (times.length > 1) for (const key of ["position", "effort"]) charts[key].replace(times, rows[key]);
+    for (const key of KEPT_KEYS) rows[key].forEach((column, joint) => column.push(data[key]?.[joint] ?? null));
+    if (times.length > KEPT) { times.shift(); for (const key of KEPT_KEYS) rows[key].forEach((column) => column.shift()); }
+    if (times.length > 1) {
+      charts.position.replace(times, [...rows.position, ...rows.target]);
+      charts.effort.replace(times, rows.effort);
+    }
     drawing?.pose(data.position);
     words.textContent = `${number(data.time_s, 3)} of ${number(data.duration_s, 3)} s`;
     jitter.textContent = `Loop: ${number(data.lateness_us?.p99, 3)} µs late at 99 %, ${number(data.lateness_us?.max, 3)} µs at most; ${data.missed_periods} cycles missed, ${data.lost_rows} rows lost.`;
