@@ -1,7 +1,7 @@
 // A diagnosis as a story: where, what, how much, the proof, what next.
 
 import { download, getJson, post } from "./api.js";
-import { chance, explained, figures, h, moment, named, number, percent, render, s, section, table, tabs, title, unit, unitsOf, verdict, withError } from "./dom.js";
+import { chance, explained, figures, h, moment, named, number, parameterName, percent, render, s, section, table, tabs, title, unit, unitsOf, verdict, withError } from "./dom.js";
 import { VARIABLES, heatMap } from "./heat.js";
 import { waiting } from "./identifications.js";
 import { move } from "./leases.js";
@@ -213,7 +213,7 @@ function bars(entries) {
   const scale = (value) => Math.sign(value) * Math.log1p(Math.abs(value));
   const reach = Math.max(...entries.map(([, value]) => Math.abs(scale(value))), scale(4));
   const at = (value) => 100 + (98 * scale(value)) / reach;
-  return h("div", { class: "bars" }, entries.map(([name, value, words]) => [h("span", { text: name }),
+  return h("div", { class: "bars" }, entries.map(([name, value, words]) => [h("span", {}, parameterName(name)),
     s("svg", { viewBox: "0 0 200 16", preserveAspectRatio: "none", role: "img", "aria-label": `${number(value, 3)} standard errors, ${words}` },
       s("rect", { class: "zone", x: at(-1.96), width: at(1.96) - at(-1.96), y: 0, height: 16 }),
       s("rect", { x: Math.min(at(value), 100), width: Math.abs(at(value) - 100), y: 4, height: 8 }), s("title", { text: words })), h("span", { text: number(value, 3) })]));

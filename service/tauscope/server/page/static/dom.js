@@ -57,6 +57,18 @@ export function unitsOf(type) {
   return Object.fromEntries(Object.entries(REVOLUTE).map(([name, own]) => [name, own === PRISMATIC[name] ? own : `${own} or ${PRISMATIC[name]}`]));
 }
 
+const QUANTITIES = { m: "mass", ms: "first moment", I: "inertia" };
+
+/** A base parameter by its leading term, such as "first moment x of link 2"; the whole expression on demand. */
+export function parameterName(name) {
+  const terms = name.split(/ [+-] /);
+  const [, quantity, axes, link] = /^(?:[\d.e-]+\*)?(ms|m|I)([xyz]*)(\d+)$/.exec(terms[0]) ?? [];
+  if (!quantity) return name;
+  const lead = `${QUANTITIES[quantity]}${axes ? ` ${axes}` : ""} of link ${link}`;
+  if (terms.length === 1) return h("span", { title: name, text: lead });
+  return h("details", { class: "parameter" }, h("summary", { text: `${lead}, and ${terms.length - 1} more` }), h("code", { text: name }));
+}
+
 /** A value and its standard error, to the error's second digit. */
 export function withError(value, std) {
   if (!Number.isFinite(std) || std <= 0) return number(value);

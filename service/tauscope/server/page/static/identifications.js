@@ -1,7 +1,7 @@
 // Identifications: how well the model explains the torque, its parameters, and its friction.
 
 import { download, follow, getJson, remove } from "./api.js";
-import { explained, figures, h, moment, number, percent, render, s, section, state, table, tabs, unitsOf, withError } from "./dom.js";
+import { explained, figures, h, moment, number, parameterName, percent, render, s, section, state, table, tabs, unitsOf, withError } from "./dom.js";
 import { jobList } from "./lists.js";
 import { group, plot, zoomButtons } from "./plots.js";
 
@@ -147,6 +147,9 @@ function parameterSection(result) {
     h("h3", { text: "Friction" }),
     table("Friction coefficients", ["joint", "stiction", "Stribeck", "viscous", "offset"], result.friction.map((entry) => [entry.joint, ...["stiction", "stribeck", "viscous", "offset"].map((name) => coefficient(entry, name))])),
     h("h3", { text: "Base parameters" }),
-    table("Base parameters", ["parameter", "value ± standard error", "unit", "95 % interval, one axis a unit"], result.base_parameters.map((entry) =>
-      [entry.name, withError(entry.value, entry.std ?? NaN), unit(entry), interval(entry.value, entry.std, ...ends[unit(entry)])])));
+    table("Base parameters", ["parameter", "value ± standard error", "unit", "95 % interval, one axis a unit"], [...result.base_parameters].sort((a, b) => linkOf(a) - linkOf(b)).map((entry) =>
+      [parameterName(entry.name), withError(entry.value, entry.std ?? NaN), unit(entry), interval(entry.value, entry.std, ...ends[unit(entry)])])));
 }
+
+/** Number of the link of a parameter's leading term. */
+const linkOf = (entry) => Number(/\d+$/.exec(Object.keys(entry.terms)[0])?.[0] ?? 0);
