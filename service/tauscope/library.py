@@ -5,13 +5,19 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeAlias, Union
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Union
 
-from tauscope.errors import AcquisitionError, TauscopeError
+from tauscope.errors import AcquisitionError
 
 if TYPE_CHECKING:
     from tauscope.recording import Recording
-    from tauscope.results import DiagnosisResult, ExcitationResult, IdentificationResult, SimulationResult
+    from tauscope.results import (
+        DiagnosisResult,
+        ExcitationResult,
+        IdentificationResult,
+        RolloutResult,
+        SimulationResult,
+    )
     from tauscope.robot import Robot
     from tauscope.trajectory import Trajectory
 
@@ -118,10 +124,11 @@ def identify(
         the data or the robot cannot answer
     """
     from tauscope import identification
+    from tauscope.actuation import make_efforts
     from tauscope.results import IdentificationResult
 
     arm = _robot(robot)
-    train, judge = _recordings(recordings, arm), _recordings(held_out, arm)
+    arm, train, judge = make_efforts(arm, _recordings(recordings, arm), _recordings(held_out, arm))
     options = identification.Options(identification.Estimator(estimator), cutoff_hz, rotor_inertia, prior)
     return IdentificationResult(identification.identify(arm, train, judge, options, progress), train, judge)
 
@@ -154,6 +161,7 @@ def diagnose(
         the data or the robot cannot answer
     """
     from tauscope import diagnosis
+    from tauscope.actuation import make_efforts
     from tauscope.diagnosis.next_experiment import planned_experiment
     from tauscope.export.model_file import read_extended_model
     from tauscope.identification import Options
@@ -163,7 +171,7 @@ def diagnose(
     is_saved = isinstance(against, str | Path) and Path(against).suffix.lower() == ".json"
     saved = read_extended_model(Path(str(against)), arm) if is_saved else None
     simulated = () if is_saved or against in ("identified", "model") else _recordings(against, arm)
-    train, judge = _recordings(recordings, arm), _recordings(held_out, arm)
+    arm, train, judge = make_efforts(arm, _recordings(recordings, arm), _recordings(held_out, arm))
     if headroom:
         from tauscope.headroom import measure_headroom, require_black_box
 
@@ -277,15 +285,34 @@ def simulate(
         return SimulationResult(replace(recording, name=name, is_examined=True))
 
 
-def rollout(robot: RobotSource, recordings: Recordings) -> NoReturn:
-    """Simulate the closed loop on a recording's commands. Not available in this version.
+def rollout(
+    robot: RobotSource,
+    recordings: Recordings,
+    *,
+    model: str | Path | None = None,
+    progress: Callable[[str], None] = _ignore,
+) -> "RolloutResult":
+    """Close the loop in MuJoCo on a recording's commands, and compare real and simulated motion.
+
+    Parameters
+    ----------
+    model : path or None
+        what ``tauscope identify`` or ``diagnose`` wrote with ``--model``: rolled out without and with its findings
 
     Raises
     ------
     TauscopeError
-        always
+        the data, the robot or the model cannot answer
+    MissingExtraError
+        the sim extra is not installed
     """
-    raise TauscopeError("rollout is not available in this version; compare torques with tauscope.diagnose")
+    from tauscope.closed_loop import roll_out
+    from tauscope.export.model_file import read_export_models
+    from tauscope.results import RolloutResult
+
+    arm = _robot(robot)
+    exports = () if model is None else read_export_models(Path(model))
+    return RolloutResult(roll_out(arm, _recordings(recordings, arm), exports, progress))
 
 
 def _robot(source: RobotSource) -> "Robot":

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from tauscope.closed_loop import Rollout, RolloutDocument
     from tauscope.diagnosis import Diagnosis, DiagnosisDocument
     from tauscope.diagnosis.documents.result import HeadroomEntry
     from tauscope.diagnosis.next_experiment import PlannedExperiment
@@ -105,6 +106,43 @@ class DiagnosisResult:
             axis.plot(overlay.time, overlay.measured, label="measured")
             axis.plot(overlay.time, overlay.before, label="without the findings")
             axis.plot(overlay.time, overlay.after, label="with the findings")
+        axes[0].legend(loc="upper right")
+        return figure
+
+
+@dataclass(frozen=True, eq=False)
+class RolloutResult:
+    """Real and simulated motion."""
+
+    rollout: "Rollout"
+
+    @cached_property
+    def document(self) -> "RolloutDocument":
+        """The result, typed."""
+        return self.rollout.document
+
+    def to_dict(self) -> dict[str, Any]:
+        """Schema ``tauscope.rollout/1``."""
+        return _to_dict(self.document)
+
+    def to_frame(self) -> "pd.DataFrame":
+        """One row a recording, model and joint: rms, worst [rad or m], lag [s]."""
+        rows = [
+            (recording.recording, entry.model, joint, entry.rms[place], entry.worst[place], entry.lag[place])
+            for recording in self.document.recordings
+            for entry in recording.models
+            for place, joint in enumerate(self.document.joints)
+        ]
+        return _frame(rows, ("recording", "model", "joint", "rms", "worst", "lag"))
+
+    def plot(self) -> "Figure":
+        """Real and simulated position of every joint, in the first recording."""
+        trace = self.rollout.traces[0]
+        figure, axes = _axes(self.document.joints, "position [rad or m]")
+        for joint, axis in enumerate(axes):
+            axis.plot(trace.motion.rows, trace.motion.measured[:, joint], label="real")
+            for model, positions in trace.simulated.items():
+                axis.plot(trace.motion.rows, positions[:, joint], label=model)
         axes[0].legend(loc="upper right")
         return figure
 

@@ -10,7 +10,7 @@ Bodies without a joint, and bodies on joints that rest, belong to the link that 
 # (MuJoCo's extension modules come without type stubs)
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tauscope.errors import RobotFileError
+from tauscope.robot.actuator import Actuator
 from tauscope.robot.chain import Chain, ResultWarning, default_ends_note, rigid_branch_note
 from tauscope.robot.document import MOST_JOINTS
 from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.placement import compose, rotation_of_z_to
 from tauscope.robot.robot import (
-    Actuator,
     Coupling,
     FrictionCoefficients,
     JointLimits,
@@ -40,6 +40,9 @@ from tauscope_sim.mjcf_compiler import compile_model
 Array = NDArray[np.float64]
 
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+CHOSEN_STD = 0.2
+"""Relative standard error of an MJCF's gains: most are chosen so that the arm looks right."""
+
 OF_JOINT = int(mujoco.mjtTrn.mjTRN_JOINT)
 
 
@@ -396,15 +399,17 @@ class _Reader:
             gear = float(model.actuator_gear[index, 0])
             affine = model.actuator_biastype[index] == int(mujoco.mjtBias.mjBIAS_AFFINE)
             if not affine:
-                found = found or Actuator("motor", 0.0, 0.0)
+                found = found or Actuator("torque")
                 continue
             kp, kv = -float(model.actuator_biasprm[index, 1]), -float(model.actuator_biasprm[index, 2])
             kp, kv = kp * gear * gear + 0.0, kv * gear * gear + 0.0  # no negative zero
-            actuator = Actuator("position" if kp else "velocity", kp, kv)
+            loop = Actuator("position", kp, kv) if kp else Actuator("velocity", kv)
+            actuator = replace(loop, scale_std=CHOSEN_STD)
             if found is None or found.kind != "position":
                 found = actuator
-        if found is not None and found.kind != "motor":
-            text = f"a {found.kind} actuator drives it, kp {found.kp:g}, kv {found.kv:g} in joint units"
+        if found is not None and found.kind != "torque":
+            gains = (found.kp, found.kd) if found.kind == "position" else (0.0, found.kp)
+            text = f"a {found.kind} actuator drives it, kp {gains[0]:g}, kv {gains[1]:g} in joint units"
             self._remark(Severity.INFO, joint, text)
         return found
 

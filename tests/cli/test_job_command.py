@@ -33,8 +33,8 @@ def data(tmp_path: Path) -> Path:
 @pytest.fixture
 def done_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Work is done in this process: what is tested here are not the workers."""
-    for name in ("WorkerPool", "open_executor"):
-        monkeypatch.setattr(f"tauscope.server.http.services.{name}", lambda _: InlineExecutor())
+    for name in ("open_readers", "open_executor"):
+        monkeypatch.setattr(f"tauscope.server.http.services.{name}", lambda *_, **__: InlineExecutor())
     monkeypatch.setattr("tauscope.cli.job_run.POLL_S", 0.02)
 
 

@@ -22,7 +22,7 @@ def data(tmp_path: Path) -> Path:
     database = Database(tmp_path / FILE_NAME)
     index = Index(database, "here")
     index.register("data", NOON)
-    index.put(ItemMetadata("run", "20251103T110000Z-00000002", "finished", True, "9", NOON, robot="arm"))
+    index.put([ItemMetadata("run", "20251103T110000Z-00000002", "finished", True, "9", NOON, robot="arm")])
     history = ModelHistory(database)
     for day, viscous in ((1, 0.5), (22, 0.6), (43, 0.7)):
         given = candidate(day, identified({"viscous": viscous}, friction__0__std__viscous=0.01))

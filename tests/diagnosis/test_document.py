@@ -1,23 +1,14 @@
 """What a document says is so: what held-out motion refutes stands apart, and no impossible value stands as true."""
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from diagnosis.diagnosed_arm import recordings
-from diagnosis.made_up_findings import JOINTS, finding, form
 from diagnosis.test_diagnosis_of_simulated_arms import spring
-from tauscope.diagnosis import Diagnosis, Finding, Verdict, diagnose, document
+from tauscope.diagnosis import Diagnosis, Verdict, diagnose, document
 from tauscope.diagnosis.documents.impossible import impossible_places
-from tauscope.diagnosis.findings.finding import is_confirmed
-from tauscope.diagnosis.findings.tentative import set_refuted_apart
-from tauscope.diagnosis.model.term import Term
-from tauscope.diagnosis.selection.choice import Selection
-from tauscope.effects.external_contact import JointContact
-from tauscope.effects.joint_spring import JointSpring
 from tauscope.identification import document as identification_document
 from tauscope.robot import Model, read_robot
 from tauscope_sim.examples import example_robot
@@ -112,66 +103,3 @@ def test_only_what_must_be_positive_is_impossible_below_zero(found: Diagnosis) -
     assert {"stiction joint1", "viscous joint3"} <= set(names)
     assert "offset joint1" not in names
     assert not [name for name in names if " - " in name or name.startswith("ms")]
-
-
-def fit_of(terms: list[Term]) -> Any:
-    """A fit of which only its terms are asked."""
-    return SimpleNamespace(model=SimpleNamespace(terms=terms))
-
-
-def changed(*relative: float, acts_on: int = 1) -> Any:
-    """A spring, and residuals that change so much."""
-    rng = np.random.default_rng(3)
-    after = 1.0 + np.array(relative)
-    return finding(form(JointSpring, acts_on), [0.6], before=[1.0] * JOINTS, after=after.tolist(), rng=rng)
-
-
-@pytest.mark.parametrize(
-    ("seen_again", "relative", "expected"),
-    [
-        (None, (0.0, -0.1, 0.0, 0.0, 0.0, 0.0), True),
-        (True, (0.0, 0.1, 0.0, 0.0, 0.0, 0.0), False),
-        (True, (0.0, -0.1, 0.2, 0.0, 0.0, 0.0), False),
-        (False, (0.0, -0.1, 0.0, 0.0, 0.0, 0.0), False),
-    ],
-)
-def test_held_out_motion_decides(seen_again: bool | None, relative: tuple[float, ...], expected: bool) -> None:
-    made = changed(*relative)
-    assert is_confirmed(made.terms[0], made.before, made.after, seen_again=seen_again) is expected
-
-
-def test_without_held_out_motion_nothing_is_decided() -> None:
-    made = finding(form(JointSpring), [0.6])
-    assert is_confirmed(made.terms[0], made.before, made.after, seen_again=None) is None
-
-
-def test_a_push_in_training_needs_no_gain_on_other_motion_but_does_no_harm() -> None:
-    push = Term(form(JointContact), np.array([0.0, 1.0, 2.0, 0.0]), np.array([0.6]))
-    idle, harmful = changed(*[0.0] * JOINTS), changed(0.2, *[0.0] * (JOINTS - 1))
-    assert is_confirmed(push, idle.before, idle.after, seen_again=True)
-    assert not is_confirmed(push, harmful.before, harmful.after, seen_again=True)
-
-
-def test_the_least_refuted_finding_leaves_the_model_first() -> None:
-    large, middle, small = (
-        replace(finding(form(JointSpring, joint), [0.6]), gain=gain, confirmed=confirmed)
-        for joint, gain, confirmed in ((0, 9.0, True), (1, 5.0, False), (2, 1.0, False))
-    )
-    terms = [large.terms[0], middle.terms[0], small.terms[0]]
-
-    def find(at: Any) -> tuple[Finding, ...]:
-        present = [term.effect.joint for term in at.fit.model.terms]
-        cured = replace(middle, confirmed=True) if 2 not in present else middle
-        return tuple(each for each in (large, cured, small) if each.terms[0].effect.joint in present)
-
-    def without(fit: Any, places: list[int]) -> Any:
-        return fit_of([term for place, term in enumerate(fit.model.terms) if place not in places])
-
-    choices: Any = ("a", "b", "c")
-    nothing: Any = None
-    start = Selection(nothing, fit_of(terms), choices, ())
-    fitter: Any = SimpleNamespace(without=without)
-    left, findings, tentative = set_refuted_apart(start, find, fitter)
-    assert [each.terms[0].effect.joint for each in findings] == [0, 1]
-    assert [each.terms[0].effect.joint for each in tentative] == [2]
-    assert (left.choices, left.rejected) == (("a", "b"), ("c",))

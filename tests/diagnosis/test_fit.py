@@ -11,6 +11,7 @@ from tauscope.diagnosis import diagnose
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.model.extended import with_terms
 from tauscope.diagnosis.model.term import Term
+from tauscope.effects import possible_effects
 
 JOINT, SIZE, SPEED = 1, 2.5, 0.3
 STEP = 1e-3
@@ -32,7 +33,7 @@ def curve(diagnosis: Diagnosis) -> Term:
     """The Stribeck curve as it is."""
     (form,) = [
         each
-        for each in diagnosis.screen.effects
+        for each in possible_effects(diagnosis.setting)
         if each.id == "stribeck_friction" and each.joint == JOINT and each.grid[0, 1] == 1.0
     ]
     return Term(form, np.array([SPEED, 1.0]), np.array([SIZE]))
@@ -77,7 +78,7 @@ def test_a_fit_ends_where_nothing_is_left_to_gain(diagnosis: Diagnosis, speed: f
 
 def test_energy_is_what_the_model_leaves_and_not_what_a_step_promises(diagnosis: Diagnosis) -> None:
     fitter = diagnosis.fitter
-    begun = fitter.fit(with_terms(diagnosis.selection.nominal.model, [curve(diagnosis)]), steps=0)
+    begun = fitter.fit(with_terms(diagnosis.selection.nominal.model, [curve(diagnosis)]))
     left = sum(float(rows @ rows) for rows in fitter.white_residual(begun.model))
     _, of_prior = begun.model.prior()
     assert begun.energy == pytest.approx(left + float(of_prior @ of_prior), rel=1e-9)
@@ -100,7 +101,9 @@ def test_a_constant_at_its_limit_promises_nothing(diagnosis: Diagnosis) -> None:
 def test_a_shape_at_its_bound_promises_nothing_and_is_not_known(diagnosis: Diagnosis) -> None:
     """A power of speed near one comes as near to a curve that falls with speed as its bound allows."""
     nominal, fitter = diagnosis.selection.nominal.model, diagnosis.fitter
-    powers = [each for each in diagnosis.screen.effects if (each.id, each.joint) == ("nonlinear_viscous", JOINT)]
+    powers = [
+        each for each in possible_effects(diagnosis.setting) if (each.id, each.joint) == ("nonlinear_viscous", JOINT)
+    ]
     power = max(powers, key=lambda each: float(each.lower[0]))
     found = fitter.fit(with_terms(nominal, [Term(power, np.array([1.3]), np.array([1.0]))]))
     assert found.model.terms[0].shape == power.lower
@@ -108,4 +111,3 @@ def test_a_shape_at_its_bound_promises_nothing_and_is_not_known(diagnosis: Diagn
     assert found.projection.step[place] == 0.0
     assert found.energy == pytest.approx(found.projection.energy, abs=0.1)
     assert found.covariance[place, place] > 0.0
-    assert found.joint_energies.sum() <= found.energy

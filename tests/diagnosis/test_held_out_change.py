@@ -1,9 +1,11 @@
-"""The change on held-out motion against statistics of made-up errors, and what it confirms."""
+"""The change on held-out motion against statistics of made-up errors."""
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from tauscope.diagnosis.model.held_out_change import SHOWN, STRETCHES, HeldOutChange, sum_stretches
+from tauscope.diagnosis.model.held_out_change import LOST, SHOWN, SPILLED, STRETCHES, HeldOutChange, sum_stretches
 
 SAMPLES = 4800
 
@@ -49,27 +51,59 @@ def test_nothing_is_told_of_motion_that_is_too_short_or_of_no_error_at_all() -> 
 
 
 @pytest.mark.parametrize(
-    ("relative", "error", "touched", "expected"),
+    ("relative", "expected"),
     [
-        ([-0.2, 0.0], [0.01, 0.01], [0], True),
-        ([-0.2, 0.015], [0.01, 0.01], [0], True),  # within two standard errors
-        ([-0.2, 0.03], [0.01, 0.01], [0], False),
-        ([-0.2, 0.9 * SHOWN], [0.01, 1e-4], [0], True),  # no number that is shown changes
-        ([0.0, -0.2], [0.01, 0.01], [0], False),
-        ([0.1, -0.2], [0.2, 0.01], [0, 1], True),
-        ([0.1, -0.2], [0.01, 0.01], [0, 1], False),
+        (0.015, []),  # within two standard errors
+        (0.03, [1]),
+        (-0.03, []),
     ],
 )
-def test_a_joint_that_it_acts_on_gains_and_none_loses(
-    relative: list[float], error: list[float], touched: list[int], expected: bool
-) -> None:
-    assert HeldOutChange(np.array(relative), np.array(error)).confirms(touched) is expected
+def test_a_joint_loses_where_it_is_clearly_predicted_worse(relative: float, expected: list[int]) -> None:
+    assert HeldOutChange(np.array([-0.2, relative]), np.full(2, 0.01)).losing == expected
+
+
+def test_a_loss_that_changes_no_number_that_is_shown_is_none() -> None:
+    assert HeldOutChange(np.array([0.9 * SHOWN]), np.array([1e-4])).losing == []
+
+
+RELATIVE = st.floats(-0.5, 0.5)
+
+
+def change(relative: list[float], error: float = 0.01) -> HeldOutChange:
+    return HeldOutChange(np.array(relative), np.full(len(relative), error))
+
+
+@given(st.lists(RELATIVE, min_size=1, max_size=7), st.floats(1e-3, 0.1))
+def test_log_odds_are_twice_the_square_of_every_joint_with_its_sign(relative: list[float], error: float) -> None:
+    own = -2.0 * np.sign(relative) * (np.array(relative) / error) ** 2
+    found = change(relative, error)
+    assert found.log_odds() == pytest.approx(float(own.sum()))
+    assert found.log_odds([0]) == pytest.approx(float(own[0]))
+
+
+def test_a_change_without_an_error_says_nothing() -> None:
+    assert change([-0.2, 0.0], 0.0).log_odds() == 0.0
 
 
 @pytest.mark.parametrize(
-    ("gain", "loss", "expected"), [(-0.13, 0.013, False), (-0.13, 0.015, True), (0.0, 0.0051, True)]
+    ("relative", "harm"),
+    [
+        ([-0.2, 0.0], 0.0),
+        ([-0.2, 0.9 * LOST * 0.01], 0.0),  # worse by chance
+        ([0.0, 0.1], np.log(1.1)),
+        ([-0.3, 0.1], np.log(1.1) + SPILLED * np.log(0.7)),  # others gain far more
+        ([-0.1, 0.1], np.log(1.1) + SPILLED * np.log(0.9)),
+    ],
 )
-def test_a_small_loss_beside_a_large_gain_spills_over_through_the_links(
-    gain: float, loss: float, expected: bool
-) -> None:
-    assert HeldOutChange(np.array([gain, loss]), np.array([0.02, 0.0015])).harms is expected
+def test_harm_is_what_joints_lose_beyond_a_part_of_what_others_gain(relative: list[float], harm: float) -> None:
+    assert change(relative).harm == pytest.approx(harm)
+
+
+def test_a_small_loss_beside_a_large_gain_is_no_harm() -> None:
+    assert change([-0.3, 0.05]).harm <= 0.0 < change([-0.1, 0.1]).harm
+
+
+@given(st.lists(RELATIVE, min_size=1, max_size=7))
+def test_only_a_joint_that_is_clearly_worse_is_harmed(relative: list[float]) -> None:
+    found = change(relative)
+    assert found.harm <= 0.0 or bool((found.standard > LOST).any())

@@ -9,6 +9,7 @@ from tauscope.diagnosis import Diagnosis, diagnose, document
 from tauscope.diagnosis.deflection.measured import MeasuredDeflection, measure_deflection
 from tauscope.diagnosis.extended_model.saved import model_document, restored
 from tauscope.diagnosis.model.nominal import nominal_model
+from tauscope.effects import possible_effects
 from tauscope.identification import identify
 from tauscope.recording import Recording, examine_recording
 
@@ -124,5 +125,5 @@ def test_a_diagnosis_names_what_the_encoders_show() -> None:
 def test_a_rigid_joint_is_never_called_elastic() -> None:
     """The torque of a spring that the motors do not show is none of a transmission."""
     found = diagnosed()
-    assert not [each for each in found.screen.effects if each.id in ("joint_elasticity", "backlash")]
+    assert not [each for each in possible_effects(found.setting) if each.id in ("joint_elasticity", "backlash")]
     assert document(found).verdict == "consistent"

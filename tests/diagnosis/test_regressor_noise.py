@@ -11,12 +11,11 @@ from tauscope.diagnosis.fitting.regressor_noise import (
     ROUNDED,
     _step_error,
     _steps,
-    row_weightings,
     shared_errors,
     weightings_of_motion,
 )
 from tauscope.diagnosis.model.extended import ExtendedModel
-from tauscope.diagnosis.noise.floor import with_noise
+from tauscope.diagnosis.noise.floor import with_pure_error
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.observations.whitening import JointNoise
 from tauscope.identification.autocorrelation import Autoregression
@@ -25,8 +24,9 @@ from tauscope.recording.conditioning.filters import smooth
 
 def test_rows_far_from_reversals_count_fully_and_those_at_reversals_less() -> None:
     observations, model = observed()
-    known, _ = with_noise(observations, model, ())
-    weights = [each.weights for each in row_weightings(known, model)]
+    known = with_pure_error(observations, model)
+    assert known is not None
+    weights = [each.weights for each in weightings_of_motion(known, model)]
     assert [len(row) for row in weights] == [int(known.kept(joint).sum()) for joint in range(3)]
     for joint, own in enumerate(weights):
         (piece,) = known.pieces
@@ -57,31 +57,17 @@ def test_the_step_is_known_as_well_as_the_velocity() -> None:
 
 def test_an_encoder_that_rounds_leaves_slow_motion_uncertain_and_one_that_is_merely_noisy_does_not() -> None:
     observations, model = observed()
-    known, _ = with_noise(observations, model, ())
+    known = with_pure_error(observations, model)
+    assert known is not None
     (piece,) = known.pieces
     assert (piece.position_noise.step < 1e-6).all(), "these positions are not rounded"
     rounded_noise = replace(piece.position_noise, step=0.01 / piece.state_hz)
     coarse = replace(known, pieces=(replace(piece, position_noise=rounded_noise),))
-    both = [[each.weights for each in row_weightings(seen, model)] for seen in (known, coarse)]
+    both = [[each.weights for each in weightings_of_motion(seen, model)] for seen in (known, coarse)]
     for fine, rounded in zip(*both, strict=True):
         assert (rounded <= fine + 1e-12).all()
         assert rounded.min() < fine.min()
         assert np.mean(rounded < 0.99 * fine) < 0.5, "fast motion crosses steps quickly: that is noise"
-
-
-def test_a_model_that_leaves_nearly_everything_is_no_guide() -> None:
-    quiet, _ = with_noise(*observed(), ())
-    observations, model = observed(20.0)
-    for own in row_weightings(observations.with_noise(quiet.noise), model):
-        assert (own.weights == 1.0).all()
-        assert not own.shrinkage.size
-
-
-def test_it_is_still_one_at_other_joints() -> None:
-    quiet, _ = with_noise(*observed(), ())
-    observations, model = observed(np.array([0.0, 0.0, 20.0]))
-    known = observations.with_noise(quiet.noise)
-    assert [own.is_guided for own in row_weightings(known, model)] == [True, True, False]
 
 
 def observed_without_noise() -> tuple[Observations, ExtendedModel]:

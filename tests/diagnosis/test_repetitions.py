@@ -7,7 +7,7 @@ from diagnosis.diagnosed_arm import POSITION_NOISE, motions
 from identification.simulated import PAPER_NOISE, Array
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.nominal import nominal_model
-from tauscope.diagnosis.noise.floor import repeated_differences, with_noise
+from tauscope.diagnosis.noise.floor import repeated_differences, with_pure_error
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.identification import identify
 from tauscope.recording.conditioning import Conditioner
@@ -58,6 +58,6 @@ def test_differences_have_the_noise_s_power() -> None:
 def test_what_repeats_is_no_noise() -> None:
     quiet, waving = (power(*observed(wave)) for wave in (0.0, 2.0))
     assert np.sqrt(waving / quiet) == pytest.approx(np.ones(3), abs=0.05)
-    known, pure = with_noise(*observed(), ())
-    assert pure
+    known = with_pure_error(*observed())
+    assert known is not None
     assert [noise.model.variance for noise in known.noise] == pytest.approx(quiet, rel=0.05)

@@ -20,5 +20,4 @@ def test_errors_of_the_stated_covariance_become_white(seed: int, shared_count: i
 
 def test_certain_rows_stay_as_they_are() -> None:
     rows = np.random.default_rng(3).standard_normal((4, 9))
-    assert RowWeighting.certain(9).applied(rows) == pytest.approx(rows, abs=0.0)
     assert RowWeighting.of(np.ones(9), np.zeros((2, 9))).applied(rows) == pytest.approx(rows)

@@ -6,17 +6,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from concealed.generator.trial import unknown_trial
 from diagnosis.diagnosed_arm import at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
 from tauscope.diagnosis import diagnose, document
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
+from tauscope.diagnosis.fitting.fit import Fitter
 from tauscope.diagnosis.fitting.lack_of_fit import lack_of_fit
-from tauscope.diagnosis.noise.floor import FAR_ABOVE
-from tauscope.diagnosis.selection.admission import Admission
-from tauscope.diagnosis.selection.choice import Choice
-from tauscope.diagnosis.selection.pruning import without_proxies, without_superfluous
-from tauscope.diagnosis.selection.table import fitted_option
+from tauscope.diagnosis.fitting.regressor_noise import weightings_of_motion
+from tauscope.diagnosis.fitting.spilled_misfit import without_spilled
+from tauscope.diagnosis.noise.floor import with_pure_error
 
 pytestmark = pytest.mark.slow
 
@@ -39,39 +37,19 @@ def diagnosed(seed: int) -> Diagnosis:
 
 
 def test_what_the_fit_spreads_is_told_of_the_joint_that_is_wrong() -> None:
-    """With this noise the plain model leaves more than noise at the third joint too, where nothing is wrong."""
+    """By the noise of repetitions a fit of the plain model leaves more at the others too, where nothing is wrong."""
     found = diagnosed(5)
-    plain = lack_of_fit(found.selection.nominal, found.fitter.observations, pure_error=found.pure_error)
-    assert plain.significant == [False, True, True]
+    model = found.selection.nominal.model
+    rows = with_pure_error(found.fitter.observations, model)
+    assert rows is not None
+    fitter = Fitter(rows.with_weightings(weightings_of_motion(rows, model)))
+    fit = fitter.fit(model)
+    plain = lack_of_fit(fit, fitter.observations, pure_error=True)
+    assert plain.significant == [True, True, True]
+    assert without_spilled(plain, fit, fitter, pure_error=True).significant == [False, True, False]
+
+
+def test_a_diagnosis_names_the_joint_that_is_wrong_alone() -> None:
+    found = diagnosed(5)
     assert found.misfit_before.significant == [False, True, False]
     assert [(each.effect, each.joint) for each in document(found).findings] == [("unknown", "joint2")]
-
-
-@pytest.mark.parametrize("seed", [1, 5])
-def test_what_explains_bent_links_is_not_named(seed: int) -> None:
-    """A gain of the third joint makes up for links that were bent for the second: nothing of it is there."""
-    found = diagnosed(seed)
-    nominal, fitter = found.selection.nominal, found.fitter
-    gain, *_ = [
-        each
-        for each in found.screen.candidates(nominal)
-        if each.effect.id == "torque_gain_error" and each.effect.joint == 2
-    ]
-    option = fitted_option(gain, nominal, fitter)
-    choices = [Choice((option,), None, 0.0)]
-    admission = Admission(found.screen, pure_error=True)
-    _, plainly_needed = without_superfluous(option.fit, choices, fitter, admission)
-    assert plainly_needed == choices
-    fit, kept = without_proxies(nominal, option.fit, choices, fitter, admission)
-    assert kept == []
-    assert fit.model.terms == ()
-
-
-def test_the_noise_of_other_joints_stays_what_repetitions_differ_by() -> None:
-    """However much is wrong at one: the fit that tells how much it is over them does not bend the links for it."""
-    trial = unknown_trial("paper", "crossed_spring", 0, 400.0, motion_seed=31, seed=4)
-    found = diagnose(trial.robot, trial.train, trial.held_out)
-    wrong, *others = [own.over_repetitions for own in found.fitter.observations.noise]
-    assert wrong > FAR_ABOVE
-    assert others == [1.0, 1.0]
-    assert found.mismatched == [True, False, False]

@@ -206,14 +206,6 @@ def test_a_finding_less_likely_than_something_else_advises_nothing() -> None:
     assert text.endswith("Something else is likelier: do not act on this alone.")
 
 
-def test_doubts_are_told_in_words_that_a_reader_knows() -> None:
-    small = stated(finding(form(JointSpring), [0.6], behind=form(CableForce), as_law=0.2)).text
-    assert f"It is small: the formula of cable force{AT} may cause it." in small
-    assert "Low confidence: unmodelled physics may be causing this." in small
-    gear = stated(finding(form(TorqueGainError), [0.1], behind=form(LoadDependentFriction))).text
-    assert "A gear's efficiency, or load friction of another formula, may look the same." in gear
-
-
 def test_numbers_without_an_error_have_no_interval() -> None:
     assert numbers_text([Quantity("n", 2.0, 0.0, "1")]) == "n = 2"
     assert numbers_text([Quantity("d", 0.0123, 0.001, "s")]) == "d = 12.3 ± 2.0 ms (95 %)"

@@ -13,6 +13,7 @@ from tauscope.diagnosis.model.extended import ExtendedModel, with_terms
 from tauscope.diagnosis.model.residual import predicted_rows
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.model.torque_scale import covariance_on_the_arm, on_the_arm
+from tauscope.effects import possible_effects
 
 pytestmark = pytest.mark.slow
 
@@ -32,7 +33,7 @@ def diagnosis() -> Diagnosis:
 
 
 def term(diagnosis: Diagnosis, effect: str, joint: int, *coefficients: float) -> Term:
-    form = next(each for each in diagnosis.screen.effects if (each.id, each.joint) == (effect, joint))
+    form = next(each for each in possible_effects(diagnosis.setting) if (each.id, each.joint) == (effect, joint))
     return Term(form, form.grid[0], np.array(coefficients))
 
 
@@ -81,7 +82,6 @@ def test_nothing_is_named_that_is_not_there(diagnosis: Diagnosis) -> None:
     found = {each.place for each in diagnosis.findings}
     assert ("cogging", JOINT) in found
     assert found <= {("cogging", JOINT), ("torque_gain_error", JOINT)}
-    assert all(own.is_guided for own in diagnosis.fitter.observations.weightings)
 
 
 def test_cogging_is_told_as_large_as_it_is(diagnosis: Diagnosis) -> None:
@@ -89,7 +89,7 @@ def test_cogging_is_told_as_large_as_it_is(diagnosis: Diagnosis) -> None:
     at_nine = replace(teeth, shape=np.array([9.0]))
     terms = [term(diagnosis, "torque_gain_error", JOINT, 0.1), at_nine]
     fit = diagnosis.fitter.fit(with_terms(diagnosis.selection.nominal.model, terms))
-    covariance = covariance_on_the_arm(fit.model, 1, diagnosis.fitter.covariance(fit))
+    covariance = covariance_on_the_arm(fit.model, 1, fit.covariance)
     found = Finding((fit.model.terms[1],), (covariance,), 1e3, 0.9, diagnosis.before, diagnosis.after)
     told = document(replace(diagnosis, selection=replace(diagnosis.selection, fit=fit), findings=(found,)))
     size = next(each for each in told.findings[0].parameters if each.name == "amplitude")

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tauscope.diagnosis.findings.detectability import detectable, needed_strength
+from tauscope.diagnosis.findings.detectability import Visibility, detectable
 from tauscope.diagnosis.findings.verdict import OPEN, Evidence, Verdict, verdict
-from tauscope.diagnosis.screening.screen import Candidate
 from tauscope.effects.joint_spring import JointSpring
 
 
@@ -28,13 +27,13 @@ def test_each_verdict_follows_from_tests(
     assert verdict(Evidence(findings, before, after, holds)) is expected
 
 
-def candidate(information: float, visible: bool = True) -> Candidate:
-    return Candidate(JointSpring(0), np.zeros(0), np.zeros(1), 0.0, np.eye(1), visible, 3.0, information)
+def spring(information: float) -> Visibility:
+    return Visibility(JointSpring(0), information, 3.0)
 
 
 def test_a_spring_of_the_smallest_visible_size_is_found_nine_times_in_ten() -> None:
     level = 1e-4
-    (size,) = detectable([candidate(400.0)], level, 1.0)
+    (size,) = detectable([spring(400.0)], level, 1.0)
     assert size.minimum is not None
     rng = np.random.default_rng(1)
     scores = (size.minimum * 20.0 + rng.standard_normal(20_000)) ** 2
@@ -43,14 +42,14 @@ def test_a_spring_of_the_smallest_visible_size_is_found_nine_times_in_ten() -> N
 
 
 def test_more_misfit_and_more_shapes_need_a_larger_effect() -> None:
-    (plain,), (inflated,) = (detectable([candidate(400.0)], 1e-4, factor) for factor in (1.0, 4.0))
+    (plain,), (inflated,) = (detectable([spring(400.0)], 1e-4, factor) for factor in (1.0, 4.0))
     assert plain.minimum is not None
     assert inflated.minimum == pytest.approx(2.0 * plain.minimum)
-    assert needed_strength(candidate(1.0), 1e-6) > needed_strength(candidate(1.0), 1e-3)
+    assert spring(1.0).needed_strength(1e-6) > spring(1.0).needed_strength(1e-3)
 
 
 def test_what_lies_within_the_nominal_columns_is_not_visible() -> None:
-    (size,) = detectable([candidate(0.0, visible=False)], 1e-4, 1.0)
+    (size,) = detectable([spring(0.0)], 1e-4, 1.0)
     assert not size.visible
     assert size.minimum is None
 

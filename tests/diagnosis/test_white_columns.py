@@ -13,7 +13,7 @@ from tauscope.diagnosis.fitting.white_columns import WhiteColumns
 from tauscope.diagnosis.model.extended import ExtendedModel, with_terms
 from tauscope.diagnosis.model.residual import residual_rows
 from tauscope.diagnosis.model.term import Term
-from tauscope.effects import Effect
+from tauscope.effects import Effect, possible_effects
 
 IDS = ("stribeck_friction", "load_dependent_friction", "torque_gain_error", "time_delay", "joint_spring", "base_tilt")
 
@@ -32,7 +32,7 @@ def full(diagnosis: Diagnosis) -> ExtendedModel:
     """A model with effects of every kind at one joint and at all, and Θ that is not the best."""
     rng = np.random.default_rng(8)
     nominal = diagnosis.selection.nominal.model
-    forms = [next(each for each in diagnosis.screen.effects if each.id == name) for name in IDS]
+    forms = [next(each for each in possible_effects(diagnosis.setting) if each.id == name) for name in IDS]
     moved = replace(nominal, parameters=nominal.parameters * rng.uniform(0.9, 1.1, nominal.structure.size))
     return with_terms(moved, [any_term(form, rng) for form in forms])
 
@@ -83,7 +83,7 @@ def columns_of(effect: Effect, model: ExtendedModel, diagnosis: Diagnosis, *, as
 def test_terms_that_need_no_parameters_have_the_same_columns_beside_any(diagnosis: Diagnosis) -> None:
     """Every form: with Θ and K_v that no signals were made for, as terms and with signals of their own."""
     nominal = diagnosis.selection.nominal.model
-    for number, effect in enumerate(diagnosis.screen.effects):
+    for number, effect in enumerate(possible_effects(diagnosis.setting)):
         rng = np.random.default_rng(number)
         steeper = tuple(replace(each, k_v=each.k_v * rng.uniform(0.5, 2.0)) for each in nominal.structure.terms)
         parameters = nominal.parameters * rng.uniform(0.5, 2.0, nominal.structure.size)

@@ -258,19 +258,6 @@ def test_a_swinging_link_tells_its_compliance_twice() -> None:
     assert (once.value, once.std) == (pytest.approx(1.6e-4), pytest.approx(np.hypot(1e-6, formula)))
 
 
-def test_a_resonance_is_looked_for_between_the_grid_s() -> None:
-    elastic = form("joint_elasticity", 2)
-    swinging = elastic.grid[-1, 1]
-    finer = np.concatenate(elastic.alike(np.array([10.0, swinging])))
-    others = np.unique(elastic.grid[elastic.grid[:, 1] > 0.0, 1])
-    nearest = others[others != swinging][np.argmin(np.abs(np.log(others[others != swinging] / swinging)))]
-    step = np.abs(np.log(nearest / swinging))
-    assert np.abs(np.diff(np.log(np.sort(np.unique(finer[:, 1]))))).max() < 0.3 * step
-    assert np.log(finer[:, 1] / swinging).max() > 0.5 * step
-    assert set(finer[:, 0]) == set(elastic.grid[elastic.grid[:, 1] > 0.0, 0])
-    assert not len(elastic.alike(np.array([10.0, 0.0])))
-
-
 def test_a_soft_curve_that_is_only_bent_a_little_may_have_any_share_of_a_higher_level() -> None:
     """tanh(τ/c) ≈ τ/c - (τ/c)³/3: a c and a/c² are one; its level is c/√a."""
     soft = form("torque_saturation", 2)
@@ -289,13 +276,6 @@ def test_what_gives_way_is_what_the_link_swings_on() -> None:
     assert elastic.is_consistent(np.array([1e-6]), np.array([10.0, 0.0])), (
         "where nothing swings there is nothing to compare"
     )
-
-
-def test_shapes_that_their_own_size_contradicts_are_passed_over_where_there_are_others() -> None:
-    elastic = form("joint_elasticity", 2)
-    shapes = np.array([[10.0, 1e-4], [10.0, 0.0], [14.0, 2e-5]])
-    assert elastic.preferable(np.array([[1.6e-5], [3e-5], [1.9e-5]]), shapes).tolist() == [False, True, True]
-    assert elastic.preferable(np.array([[1.6e-5], [1e-7]]), shapes[::2]).tolist() == [True, True], "one must be told"
 
 
 @pytest.mark.parametrize("joint", range(SIGNALS.robot.joint_count))

@@ -1,11 +1,15 @@
 """The scripts of docs/examples run as they are, and find what they say."""
 
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's extension modules come without type stubs)
+
 import runpy
 import subprocess
 import sys
 from typing import Any
 
 import pytest
+from mujoco import MjSpec
 
 from shared_data import REPOSITORY
 
@@ -21,7 +25,7 @@ def run(name: str) -> dict[str, Any]:
 
 def test_every_example_is_run_here() -> None:
     names = {path.stem for path in EXAMPLES.glob("*.py")}
-    assert names == {"identify_from_csv", "compare_with_simulation", "campaign", "test_arm"}
+    assert names == {"identify_from_csv", "compare_with_simulation", "campaign", "test_arm", "close_the_loop"}
 
 
 def test_a_csv_and_a_urdf_give_a_model() -> None:
@@ -35,6 +39,13 @@ def test_the_spring_that_the_simulation_lacks_is_found(capsys: pytest.CaptureFix
         "joint_spring"
     ]
     assert "spring is missing at elbow" in capsys.readouterr().out
+
+
+def test_positions_and_commands_bring_the_simulated_arm_to_the_real_one(capsys: pytest.CaptureFixture[str]) -> None:
+    made = run("close_the_loop")
+    assert (made["before"] > 3.0 * made["after"]).all()
+    assert MjSpec.from_file(str(made["patched"])).joint("shoulder_pan").frictionloss == pytest.approx(0.2, abs=0.05)
+    assert "the mean error falls" in capsys.readouterr().out
 
 
 def test_the_campaign_decides_what_was_open() -> None:

@@ -125,7 +125,7 @@ def test_actuators_have_gains(folder: Path, model: Path, run: Run) -> None:
     out = folder / "servo.xml"
     assert run("export", model, out, "--actuator", "position", "--kp", "400,300", "--kv", "20").status == 0
     robot = read_robot(out)
-    gains = [(each.actuator.kp, each.actuator.kv) for each in robot.joints if each.actuator]
+    gains = [(each.actuator.kp, each.actuator.kd) for each in robot.joints if each.actuator]
     assert gains == [(400.0, 20.0), (300.0, 20.0)]
     assert [each.limits.torque for each in robot.joints] == [60.0, 60.0]
 

@@ -57,7 +57,11 @@ def test_every_test_that_is_named_is_there() -> None:
         ("deploy/systemd/tauscope.service", "tests/deploy/test_systemd_units.py", "tests/diagnosis"),
         ("tests/diagnosis/diagnosed_arm.py", "tests/diagnosis/test_springs.py", "tests/runtime/test_kill.py"),
         ("tests/diagnosis/test_fit.py", "tests/diagnosis/test_fit.py", "tests/diagnosis/test_springs.py"),
-        ("tests/diagnosis/test_fit.py", "tests/diagnosis/test_kinds.py", "tests/diagnosis/test_springs.py"),
+        (
+            "tests/diagnosis/test_repetitions.py",
+            "tests/diagnosis/test_lack_of_fit.py",
+            "tests/diagnosis/test_springs.py",
+        ),
         ("service/tauscope/library.py", "tests/examples/test_examples.py", "tests/diagnosis"),
     ],
 )

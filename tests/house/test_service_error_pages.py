@@ -250,6 +250,13 @@ def a_file_that_was_changed(bench: Bench) -> Response:
     return bench.result(job)
 
 
+def a_model_in_use(bench: Bench) -> Response:
+    job = bench.identify()
+    bench.executor.run()
+    bench.patch.setattr(bench.services.models.history, "list_protected", lambda: frozenset({job["id"]}))
+    return bench.client().delete(job["links"]["self"])
+
+
 def entries_that_were_lost(bench: Bench) -> Response:
     bench.services.audit.lost = 2
     return bench.client().get("/readyz")
@@ -284,7 +291,8 @@ def a_full_disk_before_a_motion(bench: Bench) -> Response:
 
 def a_worker_that_dies(bench: Bench) -> Response:
     job = bench.identify()
-    bench.executor.fail(BrokenProcessPool("killed"))
+    for _ in range(MOST_ATTEMPTS):
+        bench.executor.fail(BrokenProcessPool("killed"))
     return bench.result(job)
 
 
@@ -331,6 +339,7 @@ PROVOKED: list[tuple[str, Callable[[Bench], Response]]] = [
     ("cancelled", a_job_that_was_cancelled),
     ("interrupted", a_job_that_kills_the_service),
     ("damaged", a_file_that_was_changed),
+    ("in-use", a_model_in_use),
     ("not-ready", entries_that_were_lost),
     ("not-ready", a_service_that_ends),
     ("queue-full", a_full_queue),

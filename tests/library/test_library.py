@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 import tauscope
 from cli.simulated_files import SimulatedFiles, write_files
-from tauscope.errors import MissingExtraError, RecordingMismatchError, TauscopeError
+from tauscope.errors import MissingExtraError, RecordingMismatchError
 from tauscope.library import RecordingSource
 from tauscope.results import DiagnosisResult, ExcitationResult, IdentificationResult, SimulationResult
 
@@ -37,7 +37,7 @@ def motion() -> ExcitationResult:
     from tauscope_sim.examples import example_robot
 
     options = {"slow_reversals": False, "closing_period": False}
-    return tauscope.design_excitation(example_robot("paper_arm"), period_s=2.0, harmonics=2, periods=2, **options)
+    return tauscope.design_excitation(example_robot("paper_arm"), period_s=5.0, harmonics=3, periods=2, **options)
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +122,13 @@ def test_pandas_is_asked_for_in_one_line(identification: IdentificationResult, m
         identification.to_frame()
 
 
-def test_rollout_says_that_it_is_not_there(files: SimulatedFiles) -> None:
-    with pytest.raises(TauscopeError, match="rollout is not available in this version"):
-        tauscope.rollout(files.robot, files.train[0])
+def test_rollout(simulation: SimulationResult) -> None:
+    """Torque of the spring's arm drives one without it: the rollout sees the difference."""
+    from tauscope_sim.examples import example_robot
+
+    result = tauscope.rollout(example_robot("paper_arm"), simulation)
+    assert result.to_dict()["schema"] == "tauscope.rollout/1"
+    assert result.document.drive == "torque"
+    assert [entry.model for entry in result.document.summary] == ["stated"]
+    assert list(result.to_frame().columns) == ["recording", "model", "joint", "rms", "worst", "lag"]
+    assert len(result.plot().axes) == 3

@@ -24,7 +24,7 @@ from server.conftest import connected
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http import services as http_services
 from tauscope.server.http.services import Services
-from tauscope.server.queue.executors import WorkerPool
+from tauscope.server.queue import worker_pool
 from tauscope.server.store.database import database as database_engine
 from tauscope.server.store.database.database import FILE_NAME
 
@@ -110,8 +110,8 @@ class Life:
         if not self._plan.in_processes:
             return ThreadPoolExecutor(1)
         context = multiprocessing.get_context("fork")
-        multiprocessing.get_context = lambda _method=None: context
-        return WorkerPool(1)
+        worker_pool.get_context = lambda _method=None: context
+        return worker_pool.WorkerPool(1)
 
     def meet_fate(self) -> None:
         """Called by the work: in a process of its own it may be killed, at a step that was drawn."""

@@ -59,6 +59,18 @@ def undrawn_figures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPa
     leave_figures_undrawn(monkeypatch)
 
 
+@pytest.fixture(autouse=True)
+def inline_readers(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files are read in this process, unless a test asks for `reader_processes`: to start them takes a second."""
+    if "reader_processes" not in request.fixturenames:
+        monkeypatch.setattr("tauscope.server.http.services.open_readers", lambda _: InlineExecutor())
+
+
+@pytest.fixture
+def reader_processes() -> None:
+    """Files are read in processes of their own."""
+
+
 @pytest.fixture
 def drawn_figures() -> None:
     """Figures are drawn as a user's are."""

@@ -90,7 +90,7 @@ def test_includes_defaults_references_and_missing_meshes(tmp_path: Path) -> None
     assert robot.mjcf == tmp_path / "arm.xml"
     assert robot.joints[0].limits.position == pytest.approx((-np.pi / 2, np.pi / 2))
     assert [joint.limits.torque for joint in robot.joints] == [30.0, 100.0, None]
-    assert robot.joints[0].actuator == Actuator("position", 100.0, 3.0)
+    assert robot.joints[0].actuator == Actuator("position", 100.0, 3.0, scale_std=0.2)
     assert robot.model.rotor_inertia == (0.02, 0.02, 0.02)
     assert robot.model.friction is not None
     assert [(f.stiction, f.viscous) for f in robot.model.friction] == [(0.0, 0.3), (0.4, 0.3), (0.0, 0.3)]

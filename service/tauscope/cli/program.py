@@ -38,6 +38,7 @@ from tauscope.cli.prove_command import prove
 from tauscope.cli.recording_command import recording
 from tauscope.cli.release_command import release
 from tauscope.cli.robot_command import robot
+from tauscope.cli.rollout_command import rollout
 from tauscope.cli.run_command import run
 from tauscope.cli.serve_command import serve
 from tauscope.cli.store_command import store
@@ -70,6 +71,7 @@ app = typer.Typer(
 )
 add_verb(app, identify, SeveralValuesCommand)
 add_verb(app, diagnose, SeveralValuesCommand)
+add_verb(app, rollout)
 add_verb(app, excite)
 add_verb(app, export)
 app.add_typer(robot, name="robot")

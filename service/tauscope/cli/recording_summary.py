@@ -65,6 +65,13 @@ def convert_file(
         console.print(plain(f"damage passed over: {done.damage}"), soft_wrap=True)
 
 
+EFFORT_WORDS = {
+    EffortKind.TORQUE: "torque",
+    EffortKind.CURRENT: "drive units",
+    EffortKind.COMMAND: "none; commands of position",
+}
+
+
 def _clock(report: RecordingReport) -> Table:
     """Duration, rate, gaps, periods, columns."""
     periods = report.periods
@@ -78,7 +85,7 @@ def _clock(report: RecordingReport) -> Table:
             ABSENT if periods is None else f"{periods.count} of {periods.shortest} … {periods.longest} samples",
         ),
         ("missed values (NaN)", str(sum(report.missed.values()))),
-        ("effort", "drive units" if report.effort_kind is EffortKind.CURRENT else "torque"),
+        ("effort", EFFORT_WORDS[report.effort_kind]),
         ("columns", " ".join(report.columns)),
     ]
     return Table(("figure", "value"), rows, words=2)

@@ -1,5 +1,6 @@
 """``tauscope serve``: its arguments."""
 
+import os
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -42,6 +43,9 @@ def serve(
     sim_socket: Annotated[
         Path | None,
         typer.Option(metavar="SOCKET", help="Where a simulated arm that runs by the clock listens; else one a run."),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, show_default="one a core", help="Analyses that are worked on at a time.")
     ] = None,
     name: Annotated[
         list[str] | None, typer.Option(metavar="HOST", help="Host name by which it is called too; may be repeated.")
@@ -101,6 +105,7 @@ def serve(
         backend=backend,
         sim_time=sim_time,
         sim_socket=sim_socket,
+        workers=workers or len(os.sched_getaffinity(0)),
         names=tuple(name or ()),
         tls_certificate=tls_certificate,
         tls_key=tls_key,

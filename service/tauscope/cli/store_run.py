@@ -52,6 +52,7 @@ def open_store(data: Path | None, database: str | None) -> Iterator[OpenStore]:
         try:
             index = Index(opened, site_identifier(folder))
             keeper = open_index(index, item_stores(folder), RecordingStore(folder / RECORDINGS), folder.name)
+            keeper.sync(thorough=True)
             yield OpenStore(folder, opened, keeper)
         finally:
             opened.close()

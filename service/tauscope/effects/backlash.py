@@ -22,9 +22,9 @@ GAPS = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
 BANDS = np.array([2.0, 1.0, 0.35])
 """Bands to which the load is smoothed, relative to the common one."""
 
-FARTHEST_FLOWN = 1.6
-"""Gap that is flown over, relative to b, beyond which no teeth are as far apart: on simulated arms it is 0.75 to
-1.3 of b, and 2 or more where something else is taken for play."""
+SAME = 2.0
+"""Factor between the gap that a link crosses and the one by which it is found to move, up to which they are the same: a
+link that bounces at other instants than the model's seems to move by less, and on simulated arms by up to 1.7 times."""
 
 SPRINGY_GAPS = np.geomspace(2e-5, 1e-2, 9)
 """Gaps on springy teeth that are looked at, relative to the joint's range of motion: closer to each other, as a link
@@ -46,18 +46,6 @@ back by some v - 2/3 c v²."""
 DAMPING = 0.2
 """Damping ratio of teeth that touch, beside what they lose under load: where less is lost a link bounces on, but when
 it comes back hangs on everything that a recording does not show."""
-
-MORE_THAN_A_SPRING = 10.0
-"""What springy teeth have to explain more than plainer shapes, beside what tells two effects apart [noise variances]:
-together as much as an elastic joint's resonance."""
-
-SAME = 1.6
-"""Factor between the gap that is crossed on springy teeth and the one that is found, up to which they are the same."""
-
-LEAST_MET = 0.4
-"""Part of the gap that is crossed by which a link moves at least as foreseen, where nothing else is missing: bounces at
-other instants than the model's add nothing, on simulated arms up to half of it. Beside others it is `SAME`: what a
-spring's or friction's formula leaves, at another joint too, is taken for teeth that a link meets half the time."""
 
 
 def place_between_teeth(load: Array, inertia: Array, gap: float, rate_hz: float) -> Array:
@@ -202,9 +190,9 @@ class Backlash(Deflection):
         """How wide."""
         return f"the transmission has {size_text(found['b'])} of backlash"
 
-    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
+    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
         """Whether the gap that the link flies over is the one by which it moves."""
-        return bool(shape[0] <= FARTHEST_FLOWN * coefficients[0])
+        return bool(shape[0] <= SAME * coefficients[0])
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
         """Place between the teeth."""
@@ -215,12 +203,12 @@ class SpringyTeeth(Backlash):
     """The same where the teeth give way, so that a link that has crossed the gap swings on them."""
 
     is_variant = True
+    refines = frozenset({"backlash", "joint_elasticity"})
     shapes = (
         *Backlash.shapes,
         Shape("swinging", "{q}/{tau}", logarithmic=True, reported=False),
         Shape("loss", "s/{q}", logarithmic=True, reported=False),
     )
-    swings = True
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
@@ -242,14 +230,9 @@ class SpringyTeeth(Backlash):
         """None: these are."""
         return ()
 
-    def reluctance(self, shapes: Array) -> Array:
-        """They must explain clearly more than a spring: with almost no gap they are one, with a resonance to choose."""
-        return np.full(len(shapes), MORE_THAN_A_SPRING)
-
-    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
+    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
         """Whether the gap that the link crosses is the one by which it moves."""
-        least = LEAST_MET if alone else 1.0 / SAME
-        return bool(least < coefficients[0] / shape[0] < SAME)
+        return bool(1.0 / SAME < coefficients[0] / shape[0] < SAME)
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
         """Place between and on the teeth; where no inertia is known that could swing, as on stiff ones."""

@@ -30,7 +30,6 @@ def tilt_directions(gravity: Array) -> tuple[Array, Array]:
 class BaseTilt(Effect):
     """τ = ∂τ/∂g (|g| α_1 e_1 + |g| α_2 e_2), e_1 and e_2 across gravity."""
 
-    of_motion_alone = True  # the consistent links, as for `KinematicError`
     id = "base_tilt"
     rank = 200
     german = "geneigte Basis"

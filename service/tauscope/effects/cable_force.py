@@ -16,19 +16,12 @@ ONSETS = np.linspace(0.2, 0.9, 8)
 
 EXPONENTS = np.array([1.0, 1.5, 2.0])
 
-USUAL_EXPONENT = 1.5
-"""Of hoses and cables; data that see a short way past the angle hardly tell exponents apart, and extrapolate badly."""
-
-CLEARLY_BETTER = 10.0
-"""What another exponent has to explain more [noise variances]."""
-
 
 @dataclass(frozen=True, eq=False)
 class CableForce(Effect):
     """τ = ±k max(±(q - q_t), 0)^p."""
 
     of_motion_alone = True
-    may_exceed_measured = True
     id = "cable_force"
     rank = 190
     german = "Kabelkraft"
@@ -55,14 +48,6 @@ class CableForce(Effect):
                     bounds = np.array([onsets[0], 1.0]), np.array([onsets[-1], 2.0])
                     made.append(cls(joint, mesh(onsets, EXPONENTS), *bounds, side=side))
         return made
-
-    def reluctance(self, shapes: Array) -> Array:
-        """Another exponent than the usual one has to be clearly better."""
-        return np.where(shapes[:, 1] == USUAL_EXPONENT, 0.0, CLEARLY_BETTER)
-
-    def alike(self, shape: Array) -> Sequence[Array]:
-        """The other exponents: on a grid of onsets any of them may come nearest."""
-        return [self.grid[self.grid[:, 1] == exponent] for exponent in EXPONENTS if exponent != shape[1]]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """±max(±(q - q_t), 0)^p."""

@@ -47,7 +47,6 @@ _Slopes = tuple[NDArray[np.intp], NDArray[np.float32]]
 class Deflection(Effect):
     """δ of one joint's transmission, per unit of its one coefficient: an effect says which δ its load makes."""
 
-    of_motion_and_load = True
     no_code = "it needs the positions of all joints and the state of the link"
     no_scenario = "the simulated transmission also needs the inertia of its rotor, which was not measured"
     arguments = frozenset({"position", "velocity", "acceleration", "load"})

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.effects.context import ArmContext, Signals
 from tauscope.number_text import significant
@@ -102,16 +101,9 @@ class Effect(ABC):
         bounds of the shape parameters
 
     Columns of an effect `of_motion_alone` are the same beside every model, and are made once; those of one that
-    `has_step` change with K_v of its joint; one `of_motion_and_step` changes with nothing else of the model, and one
-    `of_motion_and_load` with nothing but the links that it has found, as far as they load the joint.
-    Columns of what `swings` with the load hold the noise of the positions as the residual does: it changes the load
-    that is predicted, and a resonance turns its phase round.
-    What a sensor does not pass on, a spring carries for the motor, or a displaced link for its neighbours,
-    `may_exceed_measured`; nothing else can.
+    `has_step` change with K_v of its joint; one `of_motion_and_step` changes with nothing else of the model.
     An effect that is `screened` is looked for beside the nominal model; any other becomes a finding by comparison with
     a given model.
-    What an effect that is `within_step` explains lies where friction turns its sign and nowhere else.
-    One that does not do the same whenever the motion does, that does not `repeats_with_motion`, passes for noise there.
     What its law depends on are its `arguments`: ``position``, ``velocity``, ``acceleration`` of its joint, the ``load``
     on its transmission, ``time``, the ``others``' motion; None where it acts on whatever torque there is.
     `code` is the torque as an expression that C and Python share: q, v and load are position, velocity and rigid-body
@@ -134,6 +126,7 @@ class Effect(ABC):
     no_scenario: ClassVar[str] = ""
     rank: ClassVar[int] = 0
     is_variant: ClassVar[bool] = False
+    refines: ClassVar[frozenset[str]] = frozenset()
     is_expected: ClassVar[bool] = False
     has_constant: ClassVar[bool] = False
     coefficients: ClassVar[tuple[Coefficient, ...]]
@@ -142,12 +135,7 @@ class Effect(ABC):
     of_motion_alone: ClassVar[bool] = False
     has_step: ClassVar[bool] = False
     of_motion_and_step: ClassVar[bool] = False
-    of_motion_and_load: ClassVar[bool] = False
-    within_step: ClassVar[bool] = False
-    swings: ClassVar[bool] = False
-    may_exceed_measured: ClassVar[bool] = False
     screened: ClassVar[bool] = True
-    repeats_with_motion: ClassVar[bool] = True
     arguments: ClassVar[frozenset[str] | None] = None
 
     joint: int | None
@@ -223,40 +211,6 @@ class Effect(ABC):
         """
         return 1.0
 
-    def rough_grid(self) -> Array:
-        """Some of the grid's shapes, for those who only want to know what the effect may look like, (g, k)."""
-        return self.grid
-
-    def reluctance(self, shapes: Array) -> Array:
-        """By how much more than others a shape has to explain before it is preferred, (g,) [noise variances].
-
-        Parameters
-        ----------
-        shapes : (g, k) float64
-            values of the shape parameters
-        """
-        return np.zeros(len(shapes))
-
-    def alike(self, shape: Array) -> Sequence[Array]:
-        """Shapes of each other kind that look nearly as this one does, (g, k): only their optima tell which is better.
-
-        Parameters
-        ----------
-        shape : (k,) float64
-            values of the shape parameters
-        """
-        return ()
-
-    def recurs(self, shape: Array) -> bool:
-        """Whether it acts in recordings that it was not found in, too.
-
-        Parameters
-        ----------
-        shape : (k,) float64
-            values of the shape parameters
-        """
-        return True
-
     def is_possible(self, shape: Array, k_v: float | None) -> bool:
         """Whether this shape is still what the effect means, beside the joint's friction as it was fitted with it.
 
@@ -269,7 +223,7 @@ class Effect(ABC):
         """
         return True
 
-    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
+    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
         """Whether coefficients and shape, each fitted freely, can belong to one thing.
 
         Parameters
@@ -280,22 +234,6 @@ class Effect(ABC):
             values of the shape parameters
         """
         return True
-
-    def preferable(self, coefficients: Array, shapes: Array) -> NDArray[np.bool_]:
-        """Shapes to choose among, (g,): those that belong together with their coefficients, or all where none does.
-
-        What explains most may be a shape that its own size contradicts: a resonance at which the data have something
-        else, on a spring that gives way by far less.
-
-        Parameters
-        ----------
-        coefficients : (g, c) float64
-            of every shape
-        shapes : (g, k) float64
-            values of the shape parameters
-        """
-        possible = [self.is_consistent(*each, alone=True) for each in zip(coefficients, shapes, strict=True)]
-        return np.array(possible) if any(possible) else np.ones(len(shapes), dtype=bool)
 
     def touched(self, joint_count: int) -> tuple[int, ...]:
         """Joints whose torque the effect changes: its own one, or all."""

@@ -19,9 +19,6 @@ LENGTHS_S = (0.5, 1.5, 4.5)
 OVERLAP = 0.4
 """Part of a window that its neighbour covers too."""
 
-SINE_WIDTH = 1.35
-"""Length of a half sine, relative to the rectangle that is most like it: that holds 0.92 of its energy."""
-
 JOINTS_FOR_A_FORCE = 3
 """Joints from which the three components of a force can be told apart."""
 
@@ -61,14 +58,6 @@ class ExternalContact(TimeLocalEffect):
             return []
         whole = [cls(None, grid, *bounds)] if context.robot.joint_count >= JOINTS_FOR_A_FORCE else []
         return [*whole, *(JointContact(joint, grid, *bounds) for joint in context.joints)]
-
-    def alike(self, shape: Array) -> Sequence[Array]:
-        """A push that rises and falls beside one that is there at once, and the other way about."""
-        scope, start, end, profile = shape
-        was_sine = profile == HALF_SINE
-        half = 0.5 * (end - start) * (1.0 / SINE_WIDTH if was_sine else SINE_WIDTH)
-        middle = 0.5 * (start + end)
-        return [np.array([[scope, max(middle - half, 0.0), middle + half, 0.0 if was_sine else HALF_SINE]])]
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
         """How strong a force at the tool."""

@@ -26,9 +26,6 @@ FASTEST = 0.06
 NO_RATE = 1e-9
 """Rate below which friction is a straight line in temperature [1/K]."""
 
-BESIDE_SENSOR = 10.0
-"""What the clock has to explain more than a temperature that was recorded [noise variances]."""
-
 
 @dataclass(frozen=True, eq=False)
 class FrictionDrift(Effect):
@@ -40,11 +37,8 @@ class FrictionDrift(Effect):
 
     duration_s : float
         D, of the longest recording [s]
-    beside_sensor : bool
-        whether the temperature was recorded, too
     """
 
-    repeats_with_motion = False
     has_step = True
     id = "friction_drift"
     rank = 80
@@ -61,7 +55,6 @@ class FrictionDrift(Effect):
 
     duration_s: float = 1.0
     by_heat: bool = False
-    beside_sensor: bool = False
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
@@ -72,14 +65,10 @@ class FrictionDrift(Effect):
         found: list[Effect] = []
         for joint in (joint for joint in context.joints if context.moves(joint)):
             if context.warming(joint) >= LEAST_WARMING:
-                found += [ThermalDrift.of(context, joint), cls(joint, *grid, longest, beside_sensor=True)]
+                found += [ThermalDrift.of(context, joint), cls(joint, *grid, longest)]
             else:
                 found += [cls(joint, *grid, longest, by_heat) for by_heat in (False, True)]
         return found
-
-    def reluctance(self, shapes: Array) -> Array:
-        """Beside a temperature that was recorded the clock must explain clearly more."""
-        return np.full(len(shapes), BESIDE_SENSOR if self.beside_sensor else 0.0)
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
         """Whether friction rises or falls, at the joint's usual speed."""

@@ -20,14 +20,8 @@ SWINGING_BANDS = BANDS[:2]
 RESONANCES = np.array([0.6, 0.75, 0.9, 1.1, 1.35, 1.7, 2.2, 3.0])
 """Resonances of the link at its mean inertia, the motor held, relative to the common band; beyond, nothing is seen."""
 
-BETWEEN = np.geomspace(1.0 / 1.5, 1.5, 15)
-"""Compliances that swing, relative to the grid's best: a resonance within the band is far narrower than the grid."""
-
 SAME = 1.6
 """Factor between the compliance that swings and the one that is found, up to which they are the same."""
-
-CLEARLY_BETTER = 20.0
-"""What a resonance has to explain more than a joint that follows its load at once [noise variances]."""
 
 DAMPING = 0.1
 """Damping ratio of the resonance: gears and bearings make it heavier than steel alone."""
@@ -80,7 +74,6 @@ class JointElasticity(Deflection):
     revealing_motion = "sharp reversals from constant speed, and an encoder on the link"
     coefficients = (Coefficient("c", "{q}/{tau}", positive=True),)
     shapes = (BAND, Shape("swinging", "{q}/{tau}", fixed=True, reported=False))
-    swings = True
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
@@ -97,18 +90,7 @@ class JointElasticity(Deflection):
             made.append(cls(joint, grid, grid.min(axis=0), grid.max(axis=0)))
         return made
 
-    def reluctance(self, shapes: Array) -> Array:
-        """A resonance has to be clearly better: where little is seen, any of them fits some noise."""
-        return np.where(shapes[:, 1] == 0.0, 0.0, CLEARLY_BETTER)
-
-    def alike(self, shape: Array) -> Sequence[Array]:
-        """What swings a little slower or faster, in either band."""
-        if shape[1] == 0.0:
-            return ()
-        bands = np.unique(self.grid[self.grid[:, 1] > 0.0, 0])
-        return [np.stack([np.full(len(BETWEEN), band), shape[1] * BETWEEN], axis=1) for band in bands]
-
-    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
+    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
         """Whether what gives way is what the link swings on."""
         return bool(shape[1] == 0.0 or 1.0 / SAME < coefficients[0] / shape[1] < SAME)
 

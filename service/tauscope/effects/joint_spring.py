@@ -15,7 +15,6 @@ class JointSpring(Effect):
     """
 
     of_motion_alone = True
-    may_exceed_measured = True
     has_constant = True
     id = "joint_spring"
     rank = 180

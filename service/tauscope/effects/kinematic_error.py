@@ -35,8 +35,6 @@ class KinematicError(Effect):
     revealing_motion = "none: measure the tool's place in several postures instead"
     coefficients = (Coefficient("d", "m", largest=LARGEST_M),)
     shapes = (Shape("link", "1", fixed=True), Shape("axis", "1", fixed=True))
-    may_exceed_measured = True  # links that are balanced in one place are not in another
-    of_motion_alone = True  # the consistent links, which no model of a diagnosis changes
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
@@ -44,10 +42,6 @@ class KinematicError(Effect):
         links = np.arange(1.0, context.robot.link_count)
         grid = np.stack(np.meshgrid(links, np.arange(1.0, 4.0), indexing="ij"), axis=-1).reshape(-1, 2)
         return [cls(None, grid, grid[0], grid[-1])] if len(grid) else []
-
-    def rough_grid(self) -> Array:
-        """None: nearly all of these columns is the identified parameters' own, and the rest like everything else."""
-        return self.grid[:0]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """Torque per metre, (g, 1, n, N)."""

@@ -78,6 +78,10 @@ class PayloadChange(TimeLocalEffect):
 
     def when(self, coefficients: Array, shape: Array, names: Sequence[str], durations: Sequence[float]) -> str:
         """When it is picked up and dropped, in words."""
+        recording = int(-2 - shape[0])
+        if shape[0] < EVERY and shape[1] > (1.0 - NEAR_EDGE) * durations[recording]:
+            verb = "is carried" if coefficients[0] > 0.0 else "is missing"
+            return f"{verb} from {names[recording + 1]} on"
         _, instants = carried(float(coefficients[0]), shape, durations)
         verbs = {"t_on": "is picked up", "t_off": "is dropped"}
         said = [f"{verbs[name]} at {shape[place]:.2f} s" for name, place in instants.items()]

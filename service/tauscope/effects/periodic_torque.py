@@ -239,7 +239,6 @@ class Cogging(_Periodic):
 class TorqueRipple(_Periodic):
     """τ = τ_rb Σ a sin(k q + φ)."""
 
-    of_motion_and_load = True
     id = "torque_ripple"
     rank = 110
     german = "Drehmomentwelligkeit"

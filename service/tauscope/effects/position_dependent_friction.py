@@ -54,10 +54,6 @@ class PositionDependentFriction(Effect):
         """Whether k is estimated between the grid's points."""
         return not self.turns
 
-    def rough_grid(self) -> Array:
-        """Once a turn, or a few waves along a rail."""
-        return self.grid[:1] if self.turns else self.grid[::3]
-
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """A(q̇) cos kq, A(q̇) sin kq."""
         step, angle = signals.step[self.joint], shapes * signals.position[self.joint]

@@ -59,7 +59,6 @@ class PreslidingHysteresis(Effect):
 
     has_step = True
     of_motion_and_step = True
-    within_step = True
     id = "presliding_hysteresis"
     rank = 70
     german = "Hysterese vor dem Gleiten"

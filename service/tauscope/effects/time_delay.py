@@ -119,10 +119,6 @@ class Shift(LateTorque):
         recorded = np.stack([self.late(torque, float(constant), signals) for constant in shapes[:, 0]])
         return (recorded - torque)[:, None]
 
-    def rough_grid(self) -> Array:
-        """None: what it looks like is roughly what a small delay looks like."""
-        return self.grid[:0]
-
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:

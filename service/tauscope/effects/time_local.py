@@ -1,21 +1,13 @@
-"""Effects that are there for a part of the time only: what they do, and the window in which they do it.
-
-A window is found by its edges among a great many. Their columns are one and the same torque, seen through different
-windows: a screening needs that torque once (`tauscope.diagnosis.screening.windows`), and the exact columns where it
-refines.
-"""
+"""Effects that are there for a part of the time only: what they do, and the window in which they do it."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.effects.context import Signals
 from tauscope.effects.effect import Effect
 from tauscope.recording.recording import Array
-
-IndexArray = NDArray[np.intp]
 
 EVERY = -1.0
 """Scope of a window that lies at the same instants of every recording, held-out ones included."""
@@ -25,10 +17,6 @@ HALF_SINE = 1.0
 
 OUTSIDE = -1.0
 """…of one that is open wherever the rectangular one is shut, in the training recordings; any other is rectangular."""
-
-
-ROUGHLY = 40
-"""Windows that stand for all in a rough grid."""
 
 
 def since(recording: int) -> float:
@@ -48,7 +36,6 @@ class TimeLocalEffect(Effect):
     The scope is the index of the one recording that the window belongs to, `EVERY`, or `since` a recording.
     """
 
-    repeats_with_motion = False
     no_code = "it belongs to instants of the recordings"
 
     @abstractmethod
@@ -70,14 +57,6 @@ class TimeLocalEffect(Effect):
             values of the shape parameters
         """
         return None
-
-    def recurs(self, shape: Array) -> bool:
-        """Whether the window lies at the same instants of every recording."""
-        return bool(shape[0] == EVERY)
-
-    def rough_grid(self) -> Array:
-        """Few of the many windows, (g, k)."""
-        return self.grid[:: max(1, len(self.grid) // ROUGHLY)]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """The torque within the windows.
@@ -150,24 +129,3 @@ def open_share(shapes: Array, recording: int, time: Array, interval_s: float) ->
         return np.where(profile == OUTSIDE, 0.0, share)
     share = np.where(first < recording, 1.0, share)
     return np.where(profile == OUTSIDE, 1.0 - share, share)
-
-
-def open_samples(shapes: Array, recording: int, time: Array, interval_s: float) -> tuple[IndexArray, IndexArray]:
-    """First sample of every window, and the one after its last, (g,) each: all others are shut.
-
-    Parameters
-    ----------
-    shapes : (g, k) float64
-        scope, start [s], end [s], profile
-    time : (N,) float64
-        instants in rising order, from the beginning of the recording [s]
-    interval_s : float
-        what one instant stands for [s]
-    """
-    scope, start, end, profile = shapes[:, :4].T
-    opened = np.where(scope < EVERY, -2.0 - scope, np.inf)
-    first = np.searchsorted(time, start - interval_s)
-    last = np.searchsorted(time, np.where(scope < EVERY, np.inf, end + interval_s))
-    whole = (opened < recording) | (profile == OUTSIDE)
-    shut = ~whole & (scope != EVERY) & (scope != recording) & (opened != recording)
-    return np.where(whole, 0, first), np.where(shut, 0, np.where(whole, len(time), last))

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Sizes, per_joint_columns, percent_text
+from tauscope.effects.effect import Coefficient, Effect, Entry, Sizes, percent_text
 from tauscope.number_text import significant
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
@@ -24,7 +24,6 @@ class TorqueGainError(Effect):
     no_code = "it changes the recorded torque, not the arm's"
     revealing_motion = "fast motion of neighbouring joints that share inertia, or a known added mass"
     coefficients = (Coefficient("g", "1"),)
-    may_exceed_measured = True
 
     @classmethod
     def can_act(cls, context: ArmContext, joint: int) -> bool:
@@ -33,7 +32,7 @@ class TorqueGainError(Effect):
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """The model's torque."""
-        return per_joint_columns(signals.torque[self.joint][None, None])
+        return signals.torque[list(self.touched(len(signals.torque)))][None, None]
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
         """A wrong sign first; else which way it is wrong."""

@@ -33,7 +33,6 @@ class Saturation(Effect):
     no_code = "it changes the recorded torque, not the arm's"
     revealing_motion = "the same motion slower and without payload, well below the level"
     shapes = (Shape("c", "{tau}", logarithmic=True),)
-    may_exceed_measured = True
 
     @classmethod
     def of_levels(cls, context: ArmContext, parts: Array) -> list[Effect]:
@@ -86,7 +85,7 @@ class TorqueSaturation(Saturation):
         """A soft curve, c tanh(τ/c), (g, N)."""
         return levels * np.tanh(torque / levels)
 
-    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
+    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
         """Whether a curve with a = 1 that is bent as much has a level that a sensor may have."""
         return bool(shape[0] >= self.lower[0] * np.sqrt(coefficients[0]))
 

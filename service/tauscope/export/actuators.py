@@ -98,8 +98,8 @@ def joint_gains(
         stated = described.actuator
         kp = _given(choice.kp, joint)
         kv = _given(choice.kv, joint)
-        if kp is None and stated is not None and stated.kind == "position":
-            kp, kv = stated.kp, stated.kv if kv is None else kv
+        if kp is None and stated is not None and stated.kind == "position" and stated.stiffness is not None:
+            kp, kv = stated.stiffness, stated.damping if kv is None else kv
         if kp is None:
             kp = float(inertia[joint]) * BANDWIDTH_RAD_S**2
             notes.append(

@@ -14,7 +14,7 @@ from tauscope.export.joint_model import (
     friction_notes,
     joint_models,
 )
-from tauscope.export.mjcf_findings import NEWER, Additions, JointExtras, add_findings, numbers
+from tauscope.export.mjcf_findings import NEWER, REST, Additions, JointExtras, add_findings, numbers
 from tauscope.export.model import ExportModel
 from tauscope.robot import JointLimits, JointType, Robot, Segment
 from tauscope.robot.messages import one_line, shown
@@ -170,6 +170,7 @@ def _joint(segment: Segment, label: str, model: JointModel, extras: JointExtras,
         dry, damping = dry_friction_and_damping(label, model.friction)
         orders = (damping, *extras.damping) if any(extras.damping) else (damping,)
         attributes |= {"damping": numbers(*orders), "frictionloss": numbers(max(0.0, dry - extras.dry_friction))}
+        attributes |= REST
     attributes["armature"] = numbers(_armature(label, model))
     written = " ".join(f'{key}="{value}"' for key, value in (attributes | extras.attributes).items())
     return f"<joint name={_quoted(label)} {written}/>"

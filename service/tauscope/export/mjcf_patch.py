@@ -19,7 +19,7 @@ from tauscope.export.joint_model import (
     without_branch,
 )
 from tauscope.export.mjcf import passive_elements, tendon_elements
-from tauscope.export.mjcf_findings import JointExtras, add_findings, numbers
+from tauscope.export.mjcf_findings import REST, JointExtras, add_findings, numbers
 from tauscope.export.model import ExportModel
 from tauscope.export.xml_spans import Element, XmlText
 from tauscope.robot.messages import nearest, one_line, shown
@@ -110,6 +110,7 @@ def _joint_attributes(root: Element, label: str, model: JointModel, extras: Join
         dry, damping = dry_friction_and_damping(label, model.friction)
         orders = (damping, *extras.damping) if any(extras.damping) else (damping,)
         attributes |= {"damping": numbers(*orders), "frictionloss": numbers(max(0.0, dry - extras.dry_friction))}
+        attributes |= REST
     # A rotor that was not identified by itself is part of the links.
     return attributes | {"armature": numbers(model.rotor_inertia or 0.0)}
 

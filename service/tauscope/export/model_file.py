@@ -23,7 +23,7 @@ from tauscope.export.compensation import RecordingSource
 from tauscope.export.model import ExportModel, Origin, of_extended_model
 from tauscope.identification import Identification
 from tauscope.recording import EffortKind
-from tauscope.robot import Actuator, LinkInertia, Robot, robot_from_dict, robot_to_dict
+from tauscope.robot import LinkInertia, Robot, robot_from_dict, robot_to_dict
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.messages import one_line
 from tauscope.strict_model import ResultModel
@@ -35,7 +35,6 @@ class ArmEntry(ResultModel):
     robot: dict[str, Any] = Field(description="as robot_to_dict writes it")
     segments: list[str] = Field(description="joints of the URDF or MJCF, one a segment")
     branches: list[list[float]] = Field(description="bodies on joints beside the chain: ten standard parameters a link")
-    actuators: list[list[Any] | None] = Field(description="kind, kp and kv of each joint's actuator in the user's MJCF")
     urdf: str | None = Field(description="the URDF, one character a byte; null where there is none")
     is_mjcf: bool = Field(description="whether the links' frames are bodies of an MJCF")
     effort: str = Field(description="torque or current")
@@ -48,18 +47,17 @@ class ModelFile(ModelDocument):
     """An extended model and its arm."""
 
     arm: ArmEntry | None = Field(default=None, description="null in files of older versions")
+    plain: ModelDocument | None = Field(
+        default=None, description="the model that the same recordings give without findings; null where it is this one"
+    )
 
 
-def model_file(document: ModelDocument, robot: Robot, origin: Origin) -> ModelFile:
-    """A model's document with its arm."""
+def model_file(document: ModelDocument, robot: Robot, origin: Origin, plain: ModelDocument | None = None) -> ModelFile:
+    """A model's document with its arm, and beside it the model without findings where that is another."""
     arm = ArmEntry(
         robot=robot_to_dict(robot),
         segments=list(robot.segment_names),
         branches=[[float(value) for value in link.to_vector()] for link in robot.branches],
-        actuators=[
-            None if each.actuator is None else [each.actuator.kind, each.actuator.kp, each.actuator.kv]
-            for each in robot.joints
-        ],
         urdf=None if origin.urdf is None else origin.urdf.decode("latin-1"),
         is_mjcf=origin.is_mjcf,
         effort=origin.effort_kind.value,
@@ -67,7 +65,9 @@ def model_file(document: ModelDocument, robot: Robot, origin: Origin) -> ModelFi
         created=origin.created.isoformat(),
         version=origin.version,
     )
-    return ModelFile.model_construct(**{name: getattr(document, name) for name in ModelDocument.model_fields}, arm=arm)
+    return ModelFile.model_construct(
+        **{name: getattr(document, name) for name in ModelDocument.model_fields}, arm=arm, plain=plain
+    )
 
 
 def identified_document(result: Identification) -> ModelDocument:
@@ -144,7 +144,20 @@ def read_extended_model(path: Path, robot: Robot) -> ExtendedModel:
 
 
 def read_export_model(path: Path) -> ExportModel:
-    """The model of a file as exports need it.
+    """The model of a file as exports need it, findings included.
+
+    Raises
+    ------
+    ExportError
+        where the file has no arm
+    IdentificationError
+        naming the file and the key
+    """
+    return read_export_models(path)[-1]
+
+
+def read_export_models(path: Path) -> tuple[ExportModel, ...]:
+    """The models of a file as exports need them: without findings where the file has that, and with them.
 
     Raises
     ------
@@ -158,25 +171,24 @@ def read_export_model(path: Path) -> ExportModel:
     if arm is None:
         text = "the file has no block arm: it was written by an older version; write it again with --model"
         raise ExportError(one_line(f"{path}: {text}"))
+    urdf = None if arm.urdf is None else arm.urdf.encode("latin-1", errors="replace")
+    models = []
     try:
         robot = _robot(arm)
-        model = restored(document, robot)
         created = datetime.fromisoformat(arm.created)
         sources = tuple(RecordingSource(name, digest) for name, digest in arm.recordings)
-        effort = EffortKind(arm.effort)
+        origin = Origin(sources, EffortKind(arm.effort), created, urdf, arm.is_mjcf, arm.version)
+        for each in (document.plain, document):
+            if each is not None:
+                links = [LinkInertia.from_vector(np.array(link)) for link in each.links]
+                models.append(of_extended_model(restored(each, robot), links, origin))
     except (IdentificationError, RobotFileError, ValueError, TypeError) as error:
         raise IdentificationError(one_line(f"{path}: {error}")) from None
-    urdf = None if arm.urdf is None else arm.urdf.encode("latin-1", errors="replace")
-    links = [LinkInertia.from_vector(np.array(link)) for link in document.links]
-    return of_extended_model(model, links, Origin(sources, effort, created, urdf, arm.is_mjcf, arm.version))
+    return tuple(models)
 
 
 def _robot(arm: ArmEntry) -> Robot:
     """The robot of the block."""
     robot = robot_from_dict(arm.robot, "arm.robot")
-    actuators = [
-        None if each is None else Actuator(str(each[0]), float(each[1]), float(each[2])) for each in arm.actuators
-    ]
-    joints = tuple(replace(joint, actuator=each) for joint, each in zip(robot.joints, actuators, strict=True))
     branches = tuple(LinkInertia.from_vector(np.array(link)) for link in arm.branches)
-    return replace(robot, joints=joints, segment_names=tuple(arm.segments), branches=branches)
+    return replace(robot, segment_names=tuple(arm.segments), branches=branches)

@@ -28,7 +28,7 @@ def leaves_open(diagnosis: Diagnosis) -> list[bool]:
 
 def _rows(diagnosis: Diagnosis, observations: Observations) -> list[MotionRows]:
     """The pieces of some recordings."""
-    pieces = (observations.as_measured or observations).pieces
+    pieces = observations.pieces
     ends: dict[int, float] = {}
     for piece in pieces:
         number = piece.prepared.recording

@@ -46,7 +46,7 @@ class NoiseFloor:
 
 def noise_floors(diagnosis: Diagnosis, motions: Sequence[MotionRows]) -> list[NoiseFloor]:
     """The floor of every joint: by repeated periods, by recordings of the same motion, or by noise above the band."""
-    observations = diagnosis.fitter.observations.as_measured or diagnosis.fitter.observations
+    observations = diagnosis.fitter.observations
     model = diagnosis.selection.fit.model
     known: list[tuple[FloorKind, Array]] = [
         ("repetitions", noise_between_periods(observations, model)),

@@ -4,8 +4,9 @@ cov Θ̂ = B M B,  B = (Σ_j w_j² A_jᵀ A_j + P⁻¹)⁻¹,  M = Σ_j w_j⁴ A
 
 with Ω_j the covariance of joint j's residual by its autoregressive model, w_j = 1/σ_j (WLS) or 1 (LS), P⁻¹ the prior's
 precision, zero for the free estimate, and D the deviation from the prior that the data show. For white residuals this
-is (LᵀΣ⁻¹L + P⁻¹)⁻¹ where D = 1. Estimated shape constants of the friction enter as columns of their own, so that what
-they leave uncertain shows in the coefficients.
+is (LᵀΣ⁻¹L + P⁻¹)⁻¹ where D = 1. Torque that is made of commands has a scale of relative standard error s_j, which adds
+s_j² v_j v_jᵀ, v_j = w_j² A_jᵀ y_j, to M. Estimated shape constants of the friction enter as columns of their own, so
+that what they leave uncertain shows in the coefficients.
 """
 
 from collections.abc import Iterable, Sequence
@@ -33,6 +34,8 @@ def parameter_covariance(
     autoregressions: Sequence[Autoregression],
     shapes: Sequence[ShapeParameter] = (),
     posterior: Posterior | None = None,
+    *,
+    scale_std: Sequence[float] = (),
 ) -> Array:
     """Covariance of all parameters, with the estimated shape constants appended.
 
@@ -42,6 +45,8 @@ def parameter_covariance(
         the estimate
     weight : (n,) float64
         w_j, the weights that the estimate was made with
+    scale_std : sequence of float
+        s_j, one a joint; empty where torque was measured
 
     Returns
     -------
@@ -71,6 +76,9 @@ def parameter_covariance(
             place = np.ix_(index, index)
             bread[place] += weight[joint] ** 2 * (columns @ columns.T)
             meat[place] += weight[joint] ** 4 * (coloured @ coloured.T)
+    for joint, (factor, std) in enumerate(zip(factors, scale_std, strict=False)):  # none where torque was measured
+        along = weight[joint] ** 2 * (factor.triangle[:, :-1].T @ factor.triangle[:, -1])
+        meat[np.ix_(factor.columns, factor.columns)] += std**2 * np.outer(along, along)
     # The parameters took their degrees of freedom out of the residual where it is strongest; coloured rows count less.
     rows = sum(f.rows / model.long_run_ratio for f, model in zip(factors, autoregressions, strict=True))
     taken = size if posterior is None else posterior.freedom + len(shapes)

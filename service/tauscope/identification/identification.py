@@ -181,6 +181,7 @@ def identify(
         residuals.autoregressions,
         shape_parameters(found.shapes),
         found.posterior if options.prior else None,
+        scale_std=[max(each) for each in zip(*(r.effort_std for r in recordings if r.effort_std), strict=True)],
     )
     noise = _moving_noise(found, residuals.fit)
     outside = np.maximum(residuals.fit.rms**2 - residuals.fit.band_rms**2, 0.0)

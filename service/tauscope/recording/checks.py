@@ -95,6 +95,8 @@ def report_recording(recording: Recording, robot: Robot | None = None, *, trust_
     findings += [*_about_columns(recording), *_about_clock(gaps), *_about_missed(measures.missed)]
     for joint, measure in enumerate(measures.joints, 1):
         findings += _about_position(f"q{joint}", measure)
+        if recording.effort_kind is EffortKind.COMMAND:  # a target may rest
+            continue
         findings += _about_effort(f"{recording.effort_kind}{joint}", measure, len(recording))
     return RecordingReport(
         name=recording.name,

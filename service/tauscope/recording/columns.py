@@ -16,10 +16,10 @@ from tauscope.recording.words import listed, printable
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.recording_layout import RecordingLayout
 
-OPTIONAL_GROUPS = ("qd", "qdd", "qref", "taucmd", "temp", "qlink")
+OPTIONAL_GROUPS = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt", "kp")
 """Columns of which a joint may have one, in the order in which a table keeps them."""
 
-_JOINT_COLUMN = re.compile(r"(q|tau|i|qd|qdd|qref|taucmd|temp|qlink)([1-9][0-9]{0,3})")
+_JOINT_COLUMN = re.compile(r"(q|tau|i|qd|qdd|qref|taucmd|temp|qlink|volt|kp)([1-9][0-9]{0,3})")
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,8 @@ class ColumnLayout:
 
 def table_columns(joint_count: int, effort_kind: EffortKind, groups: Sequence[str] = ()) -> tuple[str, ...]:
     """Names of a table's columns where every joint has every column."""
-    prefixes = ["q", effort_kind.value, *(group for group in OPTIONAL_GROUPS if group in groups)]
+    optional = (group for group in OPTIONAL_GROUPS if group in groups and group != effort_kind.value)
+    prefixes = ["q", effort_kind.value, *optional]
     names = ["t", *(f"{prefix}{joint}" for prefix in prefixes for joint in range(1, joint_count + 1))]
     return (*names, "period") if "period" in groups else tuple(names)
 
@@ -172,7 +173,7 @@ def find_columns(header: Sequence[str], file: str, *, counts_rows: bool = False)
                 f"{file}: column {name} belongs to no joint: joints are numbered from 1, q1 is the first"
             )
     joints = {prefix: _joints_of(prefix, where) for prefix in ("q", "tau", "i", *OPTIONAL_GROUPS)}
-    effort_kind = EffortKind.TORQUE if joints["tau"] or not joints["i"] else EffortKind.CURRENT
+    effort_kind = next((kind for kind in EffortKind if joints[kind.value]), EffortKind.TORQUE)
     joint_count = _joint_count(joints, effort_kind, header, file)
     names = _order_names(joints, effort_kind, joint_count, where, file)
     used = set(names)
@@ -237,7 +238,8 @@ def _joint_count(joints: dict[str, list[int]], effort_kind: EffortKind, header: 
         raise RecordingError(f"{file}: column q1 (position of joint 1) is missing; the columns are {listed(header)}")
     if not joints[effort]:
         raise RecordingError(
-            f"{file}: column tau1 (or i1, torque or current of joint 1) is missing; the columns are {listed(header)}"
+            f"{file}: column tau1 (or i1, torque or current of joint 1) is missing, and qref1, of which a"
+            f" stated actuator makes it; the columns are {listed(header)}"
         )
     joint_count = max(joints["q"][-1], joints[effort][-1])
     for prefix in ("q", effort):
@@ -254,7 +256,7 @@ def _order_names(
     """Columns in the order in which a table keeps them."""
     names = list(table_columns(joint_count, effort_kind))
     for group in OPTIONAL_GROUPS:
-        for joint in joints[group]:
+        for joint in joints[group] if group != effort_kind.value else ():
             if joint > joint_count:
                 raise RecordingError(
                     f"{file}: column {group}{joint} belongs to no joint: the positions are q1 to q{joint_count}"

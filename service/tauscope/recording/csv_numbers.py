@@ -18,7 +18,7 @@ from tauscope.recording.samples import Array
 
 _NUMBER_BYTES = b"0123456789+-.eE \tnaN"
 _NOT_SEPARATORS = bytes(set(range(256)) - set(b",\n"))
-_NUMBER = re.compile(rb"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_NUMBER = re.compile(rb"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _MISSED = re.compile(rb"[+-]?nan", re.IGNORECASE)
 _DATE = re.compile(rb"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ]")
 _SHOWN_CHARACTERS = 40

@@ -22,3 +22,12 @@ def require_plausible_inflation(packed_bytes: int, unpacked_bytes: int, name: st
         ratio = unpacked_bytes // max(packed_bytes, 1)
         hint = "no recording packs so well; record it again, or save it uncompressed"
         raise RecordingError(f"{name}: unpacks to {unpacked_bytes} bytes, {ratio} times its size; {hint}")
+
+
+ALWAYS_ACCEPTED_RECORDS = 200_000
+"""Records that are never refused: they are walked within a fraction of a second."""
+
+
+def count_plausible_records(packed_bytes: int) -> int:
+    """Most records that a file may hold: one a byte, beyond a number that does no harm."""
+    return ALWAYS_ACCEPTED_RECORDS + packed_bytes

@@ -11,6 +11,7 @@ from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, Schema
 from mcap.stream_reader import get_chunk_data_stream
 
+from tauscope.recording.inflation import LARGEST_RATIO
 from tauscope.recording.joint_state_log import MessageHandler
 
 RECORD = struct.Struct("<BQ")
@@ -32,6 +33,8 @@ UNREADABLE = (
 """Errors that damaged records raise."""
 
 _LARGEST_CHUNK_BYTES = 2**28
+_PLAIN_CHUNK_BYTES = 2**26
+"""Unpacked size of a chunk up to which it may pack by any ratio: a chunk holds one large message, or some megabytes."""
 
 
 class DamageError(Exception):
@@ -68,7 +71,7 @@ def unpack_chunk(body: bytes) -> bytes:
     if chunk.compression == "zstd":
         # The frame states its own size and the decompressor believes it: look before it allocates.
         declared.append(max(zstandard.frame_content_size(chunk.data), 0))
-    if max(declared) > _LARGEST_CHUNK_BYTES:
+    if max(declared) > min(_LARGEST_CHUNK_BYTES, max(_PLAIN_CHUNK_BYTES, LARGEST_RATIO * len(body))):
         raise ValueError("implausible chunk size")
     stream, size = get_chunk_data_stream(chunk, validate_crc=True)
     return stream.read(size)

@@ -18,7 +18,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
 from tauscope.errors import RecordingError
-from tauscope.recording.inflation import require_plausible_inflation
+from tauscope.recording.inflation import count_plausible_records, require_plausible_inflation
 from tauscope.recording.joint_state_log import JointStateLog, MessageHandler
 from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.mcap_chunk import (
@@ -134,7 +134,7 @@ class _Scan:
 
     def __init__(self, file: BinaryIO, size: int, sink: MessageSink) -> None:
         self._file, self._size, self._sink = file, size, sink
-        self._checksum = self._unpacked_bytes = self._messages = 0
+        self._checksum = self._unpacked_bytes = self._messages = self._records = 0
         self._schemas: dict[int, Schema] = {}
         self._handlers: dict[int, MessageHandler | None] = {}
 
@@ -180,12 +180,15 @@ class _Scan:
         data = unpack_chunk(body)
         self._unpacked_bytes += len(data)
         require_plausible_inflation(self._file.tell(), self._unpacked_bytes, "what was read so far")
-        at = 0
+        at, most_records = 0, count_plausible_records(self._file.tell())
         while at < len(data):
             opcode, length = RECORD.unpack_from(data, at)
             at += RECORD.size
-            if length > len(data) - at:
-                raise ValueError("a record leaves its chunk")
+            if not 0 < length <= len(data) - at:
+                raise ValueError("a record is empty" if length == 0 else "a record leaves its chunk")
+            self._records += 1
+            if self._records > most_records:
+                raise ValueError(f"more than {most_records} records in so few bytes")
             self._take(opcode, data, at, at + length)
             at += length
 

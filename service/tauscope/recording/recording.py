@@ -22,6 +22,8 @@ class Recording:
 
     notes : tuple of ResultWarning
         warnings without its name
+    effort_std : tuple of float
+        relative standard error of each joint's effort as a whole; empty where it was measured
     is_examined : bool
         whether units and samples were looked at, so that they need not be again
     """
@@ -32,6 +34,7 @@ class Recording:
     table: Table
     ignored_columns: tuple[str, ...] = ()
     notes: tuple[ResultWarning, ...] = ()
+    effort_std: tuple[float, ...] = ()
     is_examined: bool = False
 
     def __len__(self) -> int:
@@ -77,6 +80,8 @@ class Recording:
             effort_command=groups["taucmd"],
             temperature=groups["temp"],
             link_position=groups["qlink"],
+            voltage=groups["volt"],
+            gain=groups["kp"],
             period=block[:, where["period"]] if "period" in where else None,
         )
 
@@ -97,7 +102,14 @@ class Recording:
         ------
         RecordingMismatchError
             the efforts have another number of joints than the robot
+        RecordingError
+            commands were recorded, and no actuator has made torque of them
         """
+        if self.effort_kind is EffortKind.COMMAND:
+            raise RecordingError(
+                f"{self.name}: column tau1 is missing, and joint 1 ({robot.joints[0].name}) has no position loop that"
+                " makes torque of qref1; record torques, or state joints[].actuator in the robot file"
+            )
         if effort.ndim != 2 or effort.shape[1] != robot.joint_count:
             raise RecordingMismatchError(
                 f"{self.name}: efforts of shape {effort.shape} do not fit the robot's {robot.joint_count} joints"
@@ -121,6 +133,8 @@ class Recording:
         effort_command: Array | None = None,
         temperature: Array | None = None,
         link_position: Array | None = None,
+        voltage: Array | None = None,
+        gain: Array | None = None,
         period: Array | None = None,
     ) -> "Recording":
         """Make a recording of arrays, held to the same rules as a file.
@@ -145,6 +159,10 @@ class Recording:
             motor or joint temperature [°C]
         link_position : (N, n) float64 or None
             position behind the transmission [rad or m]
+        voltage : (N, n) float64 or None
+            supply of the joint's bridge [V]
+        gain : (N, n) float64 or None
+            gain kp in force, in the unit of the robot file's actuator
         period : (N,) float64 or None
             index of the repeated excitation period, NaN outside the repeated part
 
@@ -160,6 +178,8 @@ class Recording:
             "taucmd": effort_command,
             "temp": temperature,
             "qlink": link_position,
+            "volt": voltage,
+            "kp": gain,
         }
         present = {group: array for group, array in groups.items() if array is not None}
         return _from_groups(name, time, position, effort, EffortKind(effort_kind), present, period)
@@ -184,6 +204,8 @@ _ARGUMENTS = {
     "q": "position",
     "tau": "effort",
     "i": "effort",
+    "volt": "voltage",
+    "kp": "gain",
     "qd": "velocity",
     "qdd": "acceleration",
     "qref": "reference",
@@ -213,8 +235,8 @@ def _from_groups(
     position = _check("position", position, name, (len(time), None))
     shape = (len(time), position.shape[1])
     columns = [time[:, None], position, _check("effort", effort, name, shape)]
-    columns += [_check(_ARGUMENTS[group], groups[group], name, shape) for group in OPTIONAL_GROUPS if group in groups]
-    present = list(groups)
+    present = [group for group in OPTIONAL_GROUPS if group in groups and group != effort_kind.value]
+    columns += [_check(_ARGUMENTS[group], groups[group], name, shape) for group in present]
     if period is not None:
         columns.append(_check("period", period, name, (len(time),))[:, None])
         present.append("period")

@@ -15,6 +15,7 @@ class EffortKind(StrEnum):
 
     TORQUE = "tau"
     CURRENT = "i"
+    COMMAND = "qref"
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,9 +27,10 @@ class Samples:
     position : (N, n) float64
         q [rad or m]
     effort : (N, n) float64
-        τ [Nm or N], or drive units (current) as `Recording.effort_kind` says, sign and constant not yet applied
-    velocity, acceleration, reference, effort_command, temperature, link_position : (N, n) float64 or None
-        the optional columns qd, qdd, qref, taucmd, temp, qlink; a joint without such a column is NaN
+        τ [Nm or N], or drive units (current), or commanded positions, as `Recording.effort_kind` says, sign and
+        constant not yet applied
+    velocity, acceleration, reference, effort_command, temperature, link_position, voltage, gain : (N, n) float64, None
+        the optional columns qd, qdd, qref, taucmd, temp, qlink, volt, kp; a joint without such a column is NaN
     period : (N,) float64 or None
         index of the repeated excitation period, NaN outside the repeated part
     """
@@ -42,6 +44,8 @@ class Samples:
     effort_command: Array | None = None
     temperature: Array | None = None
     link_position: Array | None = None
+    voltage: Array | None = None
+    gain: Array | None = None
     period: Array | None = None
 
     @property

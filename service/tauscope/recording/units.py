@@ -121,7 +121,9 @@ class Conversion:
         time = reading.units.get("t", "s")
         seconds = 1.0 / (reading.rate_hz or 1.0) if time == "index" else SECONDS[time]
         torque = reading.units.get("tau")
-        kind = effort_kind if torque is None else EffortKind.CURRENT if torque in CURRENTS else EffortKind.TORQUE
+        kind = effort_kind
+        if torque is not None and effort_kind is not EffortKind.COMMAND:
+            kind = EffortKind.CURRENT if torque in CURRENTS else EffortKind.TORQUE
         columns, factors = [], []
         for name in names:
             group = name.rstrip("0123456789")

@@ -1,5 +1,6 @@
 """What the arm is: joints, chain, limits, and what the user's simulation believes; the robot file."""
 
+from tauscope.robot.actuator import SERVOS, Actuator, Servo
 from tauscope.robot.chain import Chain
 from tauscope.robot.check import JointSummary, RobotReport, check_robot
 from tauscope.robot.denavit_hartenberg import DenavitHartenbergRow, modified_segments, standard_segments
@@ -16,7 +17,6 @@ from tauscope.robot.recording_layout import (
 from tauscope.robot.recording_layout_file import layout_from_dict, read_layout
 from tauscope.robot.robot import (
     STANDARD_PARAMETERS,
-    Actuator,
     Coupling,
     FrictionCoefficients,
     FrictionShape,
@@ -36,6 +36,7 @@ from tauscope.robot.urdf import read_urdf_chain
 
 __all__ = [
     "PRESETS",
+    "SERVOS",
     "STANDARD_PARAMETERS",
     "Actuator",
     "Chain",
@@ -56,6 +57,7 @@ __all__ = [
     "Robot",
     "RobotReport",
     "Segment",
+    "Servo",
     "Severity",
     "check_robot",
     "find_column_fault",

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.result_warning import ResultWarning
+from tauscope.robot.actuator import Actuator
 from tauscope.robot.finding import Finding
 from tauscope.robot.messages import one_line, shown
-from tauscope.robot.robot import Actuator, FrictionCoefficients, JointLimits, JointType, LinkInertia, Repair, Segment
+from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Repair, Segment
 
 MOST_NAMES = 4
 """Names that a note lists."""

@@ -1,9 +1,10 @@
 """The robot file as CONTRACT.md defines it, one class a mapping; what the fields mean stands there."""
 
-from typing import Annotated, Self
+from typing import Annotated, Self, get_args
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from tauscope.robot.actuator import SERVOS, ActuatorKind, GainUnit
 from tauscope.robot.document_fields import (
     Document,
     Motion,
@@ -15,10 +16,12 @@ from tauscope.robot.document_fields import (
     Positive,
     Range,
     Rotation,
+    Share,
     Sign,
     Text,
     Vector,
     check_source,
+    choice,
     refusal,
 )
 from tauscope.robot.messages import shown
@@ -126,6 +129,58 @@ class FrictionShapeDocument(Document):
     delta: Positive | None = None
 
 
+class ActuatorDocument(Document):
+    """The drive of a joint, as `Actuator` has it.
+
+    kp : float or None
+        of the loop, in `unit`
+    kd : float
+        torque per velocity [Nm s/rad or N s/m], or a register value
+    supply_voltage : float or None
+        [V]
+    torque_per_volt : float or None
+        [Nm/V or N/V]
+    max_duty : float or None
+        share of the supply, 0 to 1
+    back_emf : float
+        [V s/rad or V s/m]
+    dead_band : float or None
+        [rad or m]
+    delay : float or None
+        [s]; None: estimated
+    rate_hz : float or None
+        [Hz]
+    temperature_slope : float
+        relative loss of torque per volt [1/K]
+    scale_std : float or None
+        relative standard error of the torque's scale
+    """
+
+    kind: Annotated[ActuatorKind, choice("kind", get_args(ActuatorKind))]
+    kp: Positive | None = None
+    kd: NotNegative = 0.0
+    unit: Annotated[GainUnit | None, choice("unit", get_args(GainUnit))] = None
+    servo: Annotated[str | None, choice("servo", SERVOS)] = None
+    supply_voltage: Positive | None = None
+    torque_per_volt: Positive | None = None
+    max_duty: Share | None = None
+    back_emf: NotNegative = 0.0
+    dead_band: NotNegative | None = None
+    delay: NotNegative | None = None
+    rate_hz: Positive | None = None
+    temperature_slope: NotNegative = 0.0
+    scale_std: NotNegative | None = None
+
+    @model_validator(mode="after")
+    def _check_loop(self) -> Self:
+        """A loop has a gain."""
+        if self.kind != "torque" and self.kp is None:
+            raise refusal(f"a {self.kind} loop needs kp, in the unit of `unit`: register or Nm_per_rad")
+        if self.servo is not None and self.unit == "Nm_per_rad":
+            raise refusal("servo converts registers; write unit: register, or leave servo out", "servo")
+        return self
+
+
 class JointDocument(Document):
     """One joint."""
 
@@ -136,6 +191,7 @@ class JointDocument(Document):
     sign: Sign | None = None
     friction_shape: FrictionShapeDocument | None = None
     drive: PlainMapping | None = None
+    actuator: ActuatorDocument | None = None
 
 
 class InertiaDocument(Document):

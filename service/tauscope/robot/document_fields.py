@@ -1,7 +1,7 @@
 """Fields of the robot file: strict numbers and names, each refusal worded for the user."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, model_validator
@@ -80,6 +80,25 @@ def _name(value: Any) -> str:
     if len(value) > LONGEST_NAME or not value.isprintable():
         raise refusal(f"{shown(value)} must be printable text of at most {LONGEST_NAME} characters")
     return value
+
+
+def _share(value: float) -> float:
+    """A number above 0, up to 1."""
+    if not 0.0 < value <= 1.0:
+        raise refusal(f"must be a share above 0 and up to 1, but is {value:g}")
+    return value
+
+
+def choice(key: str, known: Iterable[str]) -> BeforeValidator:
+    """Accepts one of several words, or nothing."""
+    words = tuple(known)
+
+    def check(value: Any) -> Any:
+        if value is not None and (not isinstance(value, str) or value not in words):
+            raise refusal(f"{shown(value)} is no {key} of an actuator; write one of {', '.join(words)}")
+        return value
+
+    return BeforeValidator(check)
 
 
 def _text(value: Any) -> str:
@@ -172,6 +191,7 @@ def _plain_mapping(value: Any) -> dict[str, Any]:
 Number = Annotated[float, BeforeValidator(_number)]
 Positive = Annotated[Number, AfterValidator(_positive)]
 NotNegative = Annotated[Number, AfterValidator(_not_negative)]
+Share = Annotated[Number, AfterValidator(_share)]
 Nonzero = Annotated[Number, AfterValidator(_nonzero)]
 Name = Annotated[str, BeforeValidator(_name)]
 Text = Annotated[str, BeforeValidator(_text)]

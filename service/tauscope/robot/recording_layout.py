@@ -29,8 +29,8 @@ Two of them for t are seconds and nanoseconds.
 """
 
 _COLUMN = re.compile(r"(t|q|qd|tau)([1-9][0-9]{0,3})?")
-_TARGET = re.compile(r"t|period|(q|tau|i|qd|qdd|qref|taucmd|temp|qlink)([1-9][0-9]{0,3})?")
-_GROUPS = "t, q, tau, i, qd, qdd, qref, taucmd, temp, qlink, period"
+_TARGET = re.compile(r"t|period|(q|tau|i|qd|qdd|qref|taucmd|temp|qlink|volt|kp)([1-9][0-9]{0,3})?")
+_GROUPS = "t, q, tau, i, qd, qdd, qref, taucmd, temp, qlink, volt, kp, period"
 
 
 @dataclass(frozen=True)

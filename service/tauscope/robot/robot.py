@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.result_warning import ResultWarning
+from tauscope.robot.actuator import Actuator
 from tauscope.robot.finding import Finding
 from tauscope.robot.recording_layout import RecordingLayout
 
@@ -59,23 +60,6 @@ class FrictionShape:
 
 
 @dataclass(frozen=True)
-class Actuator:
-    """The drive of a joint in a simulator's file.
-
-    kind : str
-        ``motor``, ``position`` or ``velocity``
-    kp : float
-        torque per position error [Nm/rad or N/m]
-    kv : float
-        torque per velocity [Nm s/rad or N s/m]
-    """
-
-    kind: str
-    kp: float
-    kv: float
-
-
-@dataclass(frozen=True)
 class Joint:
     """One joint: its name, its limits and what turns a recorded drive signal into joint torque.
 
@@ -84,7 +68,7 @@ class Joint:
     has_torque_constant : bool
         whether the robot file states the constant; 1 stands where it does not
     actuator : Actuator or None
-        of the joint in the user's MJCF
+        of the robot file, else of the user's MJCF
     """
 
     name: str

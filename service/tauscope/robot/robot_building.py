@@ -1,14 +1,16 @@
 """A validated document to a Robot."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from tauscope.robot.actuator import Actuator
 from tauscope.robot.chain import Chain
 from tauscope.robot.denavit_hartenberg import DenavitHartenbergRow, modified_segments, standard_segments
 from tauscope.robot.document import (
+    ActuatorDocument,
     JointDocument,
     LinkDocument,
     ModelDocument,
@@ -170,13 +172,13 @@ def _joints(documents: list[JointDocument] | None, chain: _Kinematics, origin: D
     stated = {document.name: document for document in documents or ()}
     rows = zip(names, chain.chain.joint_types, chain.chain.limits, chain.chain.actuators, strict=True)
     return tuple(
-        replace(_joint(stated.get(name, JointDocument(name=name)), kind, limits), actuator=actuator)
+        _joint(stated.get(name, JointDocument(name=name)), kind, limits, actuator)
         for name, kind, limits, actuator in rows
     )
 
 
-def _joint(document: JointDocument, kind: JointType, own: JointLimits) -> Joint:
-    """One joint; a limit of the robot file goes before one of the URDF or MJCF."""
+def _joint(document: JointDocument, kind: JointType, own: JointLimits, actuator: Actuator | None = None) -> Joint:
+    """One joint; a limit or actuator of the robot file goes before one of the URDF or MJCF."""
     limits, shape = document.limits, document.friction_shape
     position = tuple(limits.position) if limits and limits.position else own.position
     return Joint(
@@ -194,7 +196,16 @@ def _joint(document: JointDocument, kind: JointType, own: JointLimits) -> Joint:
         sign=1 if document.sign is None else document.sign,
         friction_shape=FrictionShape() if shape is None else FrictionShape(shape.k_v, shape.delta),
         drive=document.drive,
+        actuator=actuator if document.actuator is None else _actuator(document.actuator),
     )
+
+
+def _actuator(document: ActuatorDocument) -> Actuator:
+    """The drive of a joint."""
+    values = document.model_dump()
+    values["kp"] = document.kp or 0.0
+    values["unit"] = document.unit or ("Nm_per_rad" if document.servo is None else "register")
+    return Actuator(**values)
 
 
 def _model(

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tauscope.errors import RobotFileError
+from tauscope.robot.actuator import Actuator
 from tauscope.robot.document import PlainRobotDocument
 from tauscope.robot.document_origin import DocumentOrigin
 from tauscope.robot.messages import nearest, one_line, shown
@@ -108,8 +109,14 @@ def _joint(joint: Joint) -> dict[str, Any]:
             "sign": joint.sign,
             "friction_shape": _stated({"k_v": joint.friction_shape.k_v, "delta": joint.friction_shape.delta}) or None,
             "drive": None if joint.drive is None else dict(joint.drive),
+            "actuator": None if joint.actuator is None else _actuator(joint.actuator),
         }
     )
+
+
+def _actuator(actuator: Actuator) -> dict[str, Any]:
+    """An actuator as a mapping."""
+    return _stated(asdict(actuator) | ({} if actuator.has_loop else {"kp": None}))
 
 
 def _model(model: Model) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from tauscope.robot.messages import one_line, shown
 from tauscope.robot.placement import rotation_of_roll_pitch_yaw
 from tauscope.robot.robot import Placement
 
-NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+NUMBER = re.compile(r"[-+]?([0-9]+(?:\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 EXPAND = "expand the file first: pip install xacro; xacro FILE > arm.urdf"
 """What to do with a file that xacro has not processed."""

@@ -3,7 +3,7 @@
 import math
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, ConfigDict
+from pydantic import BeforeValidator, ConfigDict, Field
 
 from tauscope.strict_model import StrictModel
 
@@ -12,6 +12,12 @@ class AnswerModel(StrictModel):
     """An answer; it may be made from an object with attributes of the same names."""
 
     model_config = ConfigDict(from_attributes=True)
+
+
+class PageAnswer(AnswerModel):
+    """A page of a list."""
+
+    next: str | None = Field(default=None, description="to be given as `after` for the next page; null: it is the last")
 
 
 def _no_nan(value: Any) -> Any:

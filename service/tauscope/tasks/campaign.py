@@ -36,7 +36,8 @@ class CampaignOptions(StrictModel):
         default=ExcitationDesignOptions(), description="how the training motion is designed"
     )
     held_out: HeldOutMotion | None = Field(
-        default=HeldOutMotion(), description="a second motion, by which the model is judged; null: none"
+        default_factory=HeldOutMotion,  # generators of clients know no default that is an object
+        description="a second motion, by which the model is judged; absent: one of 2 periods; null: none",
     )
     run: RunOptions = Field(default=RunOptions(), description="how the motions are run")
     identification: IdentificationOptions = Field(

@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from tauscope.actuation import make_efforts
 from tauscope.diagnosis import (
     Diagnosis,
     DiagnosisDocument,
@@ -21,7 +22,7 @@ from tauscope.diagnosis.next_experiment import PlannedExperiment, planned_experi
 from tauscope.errors import ExcitationError, IdentificationError
 from tauscope.export.formats import CODE_FILES, EXPORT_FILES, ExportFormat, make_export
 from tauscope.export.model import Origin, of_diagnosis
-from tauscope.export.model_file import model_file, read_extended_model
+from tauscope.export.model_file import identified_document, model_file, read_extended_model
 from tauscope.export.simulation_files import improved_robot, scenario_text
 from tauscope.identification import Options
 from tauscope.recording import Recording
@@ -148,7 +149,9 @@ class Result:
         return make_export(export_format, of_diagnosis(self.diagnosis, self._origin))
 
     def _model(self) -> str:
-        return json_text(model_file(model_document(self.diagnosis), self.diagnosis.robot, self._origin))
+        found = self.diagnosis
+        plain = identified_document(found.identification) if found.findings else None
+        return json_text(model_file(model_document(found), found.robot, self._origin, plain))
 
     @property
     def _origin(self) -> Origin:
@@ -179,6 +182,7 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     saved = None if request.model is None else read_extended_model(files.find("model", request.model), robot)
     recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)
     held_out = read_recordings(files, "held_out", request.held_out, robot, request.options)
+    robot, recordings, held_out = make_efforts(robot, recordings, held_out)
     simulated = read_recordings(files, "simulated", request.simulated, robot, request.options)
     options = Options(cutoff_hz=request.options.cutoff_hz)
     found = diagnose(robot, recordings, held_out, options, progress)

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from tauscope.actuation import make_efforts
 from tauscope.export.formats import EXPORT_FILES, ExportFormat, make_export
 from tauscope.export.model import Origin, of_identification
 from tauscope.export.model_file import identified_document, model_file
@@ -134,6 +135,7 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     robot = read_robot(files.find("robot", request.robot))
     recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)
     held_out = read_recordings(files, "held_out", request.held_out, robot, request.options)
+    robot, recordings, held_out = make_efforts(robot, recordings, held_out)
     asked = request.options
     options = Options(Estimator(asked.estimator), asked.cutoff_hz, asked.rotor_inertia, asked.prior)
     found = identify(robot, recordings, held_out, options, progress)

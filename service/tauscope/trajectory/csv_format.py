@@ -31,6 +31,10 @@ POSITION_ROUNDING = 1e-4
 _COLUMN = re.compile(r"^(qdd|qd|q)([1-9][0-9]{0,2})$")
 
 
+PIECE_ROWS = 10_000
+"""Rows of a piece of text: some megabytes, made in a fraction of a second."""
+
+
 def trajectory_csv(trajectory: Trajectory, rate_hz: float) -> str:
     """A trajectory as CSV text: t, q1…, qd1…, qdd1…, period; shortest digits that read back as they were.
 
@@ -39,15 +43,28 @@ def trajectory_csv(trajectory: Trajectory, rate_hz: float) -> str:
     rate_hz : float
         samples a second [Hz]
     """
-    samples = trajectory.samples(rate_hz)
+    starts = range(0, trajectory.count_samples(rate_hz), PIECE_ROWS)
+    return "".join(write_trajectory_rows(trajectory, rate_hz, start) for start in starts)
+
+
+def write_trajectory_rows(trajectory: Trajectory, rate_hz: float, start: int) -> str:
+    """`PIECE_ROWS` rows of the text from row `start` on; the header goes before the first ones.
+
+    Parameters
+    ----------
+    rate_hz : float
+        samples a second [Hz]
+    """
+    stop = min(start + PIECE_ROWS, trajectory.count_samples(rate_hz))
+    samples = trajectory.evaluate(np.arange(start, stop) / rate_hz)
     joints = range(1, trajectory.joint_count + 1)
     header = ["t", *(f"{group}{joint}" for group in GROUPS for joint in joints), "period"]
     columns = [samples.time[:, None], samples.position, samples.velocity, samples.acceleration]
-    lines = [f"# trajectory of {trajectory.robot!r}", ",".join(header)]
+    lines = [f"# trajectory of {trajectory.robot!r}", ",".join(header)] if start == 0 else []
     for row, period in zip(np.hstack(columns).tolist(), samples.period.tolist(), strict=True):
         label = "nan" if math.isnan(period) else str(int(period))
         lines.append(",".join([*map(repr, row), label]))
-    return "\n".join(lines) + "\n"
+    return "".join(f"{line}\n" for line in lines)
 
 
 def parse_trajectory_csv(text: str, name: str, robot: str, joints: tuple[str, ...]) -> Trajectory:

@@ -149,6 +149,16 @@ class Trajectory:
         ExcitationError
             for a rate that is not positive, or absurd
         """
+        return self.evaluate(np.arange(self.count_samples(rate_hz)) / rate_hz)
+
+    def count_samples(self, rate_hz: float) -> int:
+        """How many samples it has at a constant rate [1/s].
+
+        Raises
+        ------
+        ExcitationError
+            for a rate that is not positive, or absurd
+        """
         if not (np.isfinite(rate_hz) and rate_hz > 0.0):
             raise ExcitationError(f"the sampling rate is {rate_hz} Hz; give a positive number")
         count = self.duration_s * rate_hz
@@ -156,7 +166,7 @@ class Trajectory:
             raise ExcitationError(
                 f"{self.duration_s:.4g} s at {rate_hz:.4g} Hz are {count:.2g} samples; ask for a lower rate"
             )
-        return self.evaluate(np.arange(int(np.ceil(count - 1e-6)) + 1) / rate_hz)
+        return int(np.ceil(count - 1e-6)) + 1
 
     def evaluate(self, time: Array) -> TrajectorySamples:
         """The trajectory at given instants; before its start and after its end it stands still.

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from concealed.sealing.truth import label
 from tauscope.diagnosis.fitting.fit import Fit, Fitter
+from tauscope.diagnosis.fitting.white_columns import SHAPES_AT_ONCE, white_columns
 from tauscope.diagnosis.model.nominal import nominal_model, setting_of
 from tauscope.diagnosis.model.residual import residual_rows
 from tauscope.diagnosis.observations.band import diagnosis_cutoff
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.observations.whitening import JointNoise
-from tauscope.diagnosis.screening.screen import SHAPES_AT_ONCE, Screen, model_signals
 from tauscope.effects import Effect, TimeLocalEffect, possible_effects
 from tauscope.identification import identify
 from tauscope.identification.autocorrelation import Autoregression
@@ -57,7 +57,7 @@ class Ground:
 
     fit: Fit
     effects: list[Effect]
-    screen: Screen
+    observations: Observations
     names: tuple[str, ...]
 
     @property
@@ -67,13 +67,13 @@ class Ground:
 
     def columns(self) -> Iterator[Columns]:
         """All columns, a few shapes at once."""
-        signals = model_signals(self.fit.model, self.screen.observations)
+        signals = [self.fit.model.signals(piece) for piece in self.observations]
         for effect in self.effects:
             place = label(effect.id, None if effect.joint is None else self.names[effect.joint])
             free = sum(effect.is_free(number) for number in range(effect.grid.shape[1]))
             for first in range(0, len(effect.grid), SHAPES_AT_ONCE):
                 shapes = effect.grid[first : first + SHAPES_AT_ONCE]
-                yield Columns(place, free, self.screen.white_columns(effect, shapes, signals))
+                yield Columns(place, free, white_columns(self.observations, effect, shapes, signals))
 
 
 def ground(robot: Robot, recordings: Sequence[Recording]) -> Ground:
@@ -88,7 +88,7 @@ def ground(robot: Robot, recordings: Sequence[Recording]) -> Ground:
     effects = [each for each in possible_effects(setting) if not isinstance(each, TimeLocalEffect)]
     scaled = bare.with_noise([_scale(rows) for rows in residual_rows(model, bare)])
     fit = Fitter(scaled).projected(model)
-    return Ground(fit, effects, Screen(scaled, effects), tuple(joint.name for joint in robot.joints))
+    return Ground(fit, effects, scaled, tuple(joint.name for joint in robot.joints))
 
 
 def _scale(rows: Sequence[Array]) -> JointNoise:

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 GROUPS = np.array([0, 0, 1, 1, 2, 2, -1, -1])
 BOUNDS = np.array([0, 20, 28, 28, 40])
+COUNTS = np.diff(BOUNDS).astype(np.float64)
 ROWS = int(BOUNDS[-1])
 PLACES = (np.array([0, 1, 2]), np.array([1, 2, 3]))
 
@@ -60,7 +61,7 @@ def problem(seed: int) -> Problem:
         [draws.standard_normal((*shape, ROWS)) for _ in PLACES] for shape in ((), (3,), (len(GROUPS),))
     )
     joints = tuple(
-        JointMoments.of(index, *rows, BOUNDS, 1.0, GROUPS)
+        JointMoments.of(index, *rows, BOUNDS, COUNTS, GROUPS)
         for index, rows in zip(PLACES, zip(targets, columns, features, strict=True), strict=True)
     )
     root = draws.standard_normal((4, 4))
@@ -97,7 +98,7 @@ def test_a_parameter_that_is_held_is_one_that_is_known(seed: int, value: float) 
     targets = [y - value * x[np.flatnonzero(at == 2)[0]] for y, x, at in parts]
     columns = [x[at != 2] for x, at in zip(case.columns, PLACES, strict=True)]
     joints = tuple(
-        JointMoments.of(at[at != 2], y, x, b, BOUNDS, 1.0, GROUPS)
+        JointMoments.of(at[at != 2], y, x, b, BOUNDS, COUNTS, GROUPS)
         for at, y, x, b in zip(PLACES, targets, columns, case.features, strict=True)
     )
     expected = LinearModel(joints, case.model.mean, case.model.precision)
@@ -128,12 +129,39 @@ def test_scales_of_highest_evidence_are_those_that_made_the_rows() -> None:
     found: list[Sequence[float]] = []
     for seed in range(6):
         draws = np.random.default_rng(seed)
-        bounds = np.array([0, 900, 900, 900, 1200])
+        bounds, groups = np.array([0, 900, 900, 900, 1200]), np.zeros(60, dtype=np.intp)
+        counts = np.diff(bounds).astype(np.float64)
         columns, features = draws.standard_normal((3, 1200)), draws.standard_normal((60, 1200))
         noise = 2.0 * draws.standard_normal(1200) * np.where(np.arange(1200) < 900, 1.0, np.sqrt(1.0 + 9.0))
         target = columns.sum(axis=0) + 0.5 * draws.standard_normal(60) @ features + noise
-        own = JointMoments.of(np.arange(3), target, columns, features, bounds, 1.0, np.zeros(60, dtype=np.intp))
+        own = JointMoments.of(np.arange(3), target, columns, features, bounds, counts, groups)
         model = LinearModel((own,), np.zeros(3), np.eye(3))
         (scales,) = model.most_probable([Scales.start(4.0)], [0])
         found.append([np.exp(scales.values[0]), np.exp(scales.values[1]), np.exp(scales.values[-1])])
     np.testing.assert_allclose(np.mean(found, axis=0), [2.0, 0.5, 3.0], rtol=0.08)
+
+
+@settings(max_examples=20)
+@given(SEEDS, st.floats(-3.0, 3.0))
+def test_a_parameter_that_is_held_keeps_its_value_and_tells_the_others_what_was_believed(
+    seed: int, value: float
+) -> None:
+    """Of the others, the conditional mean of the prior is believed."""
+    case = problem(seed)
+    held = case.model.hold(np.array([2]), np.array([value]))
+    mean, precision = case.model.mean, case.model.precision
+    others = np.array([0, 1, 3])
+    given = np.linalg.solve(precision[np.ix_(others, others)], precision[others, 2] * (value - mean[2]))
+    np.testing.assert_allclose(held.mean[others], mean[others] - given, atol=1e-4)
+    assert held.mean[2] == pytest.approx(value, abs=1e-4)
+    posterior = held.posterior(case.scales)
+    assert posterior.mean[2] == pytest.approx(value, abs=1e-3)
+    assert np.linalg.norm(posterior.spread[2]) < 1e-2
+
+
+@given(SEEDS)
+def test_to_hold_nothing_changes_nothing(seed: int) -> None:
+    model = problem(seed).model
+    held = model.hold(np.array([], dtype=np.intp), np.array([]))
+    np.testing.assert_allclose(held.mean, model.mean, atol=1e-9)
+    np.testing.assert_array_equal(held.precision, model.precision)

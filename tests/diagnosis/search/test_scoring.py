@@ -34,7 +34,8 @@ def beside() -> tuple[Proposer, Hypothesis]:
     assert known is not None
     rows = EvidenceRows.prepare(known, model)
     effects = possible_effects(setting_of(model, bare, surveyed, CUTOFF_HZ))
-    return Proposer(rows, effects), Laboratory(rows, Prior.of(identification, model)).start(model)
+    laboratory = Laboratory(rows, Prior.of(identification, model))
+    return Proposer(laboratory, effects), laboratory.start(model)
 
 
 @pytest.mark.parametrize("effect_id", ["joint_spring", "load_dependent_friction", "cogging", "base_tilt"])
@@ -43,13 +44,16 @@ def test_a_factor_is_the_ratio_of_two_evidences(beside: tuple[Proposer, Hypothes
     effect = next(each for each in proposer.effects if each.id == effect_id)
     shapes = effect.grid[:2]
     signals = [at.model.signals(piece) for piece in proposer.rows.observations]
-    columns = proposer.columns(effect, shapes, signals)
+    columns = proposer.columns(effect, shapes, signals, at.dependence)
     found, _ = Scorer(proposer.rows, at).score(effect, shapes, columns)
     before = at.posterior.log_evidence
     for place in range(len(shapes)):
         own = {joint: rows[place] for joint, rows in columns.items()}
         shares = np.max(
-            [np.sqrt(np.mean(rows**2, axis=-1)) / proposer.rows.measured_rms(joint) for joint, rows in own.items()],
+            [
+                np.sqrt(np.mean(rows**2, axis=-1)) / proposer.rows.measured_rms(joint, at.dependence[joint])
+                for joint, rows in own.items()
+            ],
             axis=0,
         )
         width = len(effect.coefficients)

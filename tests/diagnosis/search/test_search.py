@@ -23,7 +23,7 @@ PLACES = {"load_dependent_friction": 1, "cogging": 2}
 def found_on(effect: EffectTorque | None) -> Found:
     robot, draws = paper_robot(), np.random.default_rng(11)
     train, held_out = recordings((1, 2), effect, draws), recordings((5,), effect, draws)
-    return search(identify(robot, train, held_out), train, held_out)
+    return search(identify(robot, train, held_out), train, held_out).found
 
 
 @pytest.mark.parametrize("effect_id", CONCEALED)

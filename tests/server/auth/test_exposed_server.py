@@ -52,7 +52,7 @@ def test_tls_keys_and_revocation(tmp_path: Path) -> None:
                 assert client.get("/api/v1/runs").status_code == 401
                 assert client.get("/healthz", headers={"host": "evil.example"}).status_code == 400
                 client.headers["authorization"] = f"Bearer {key}"
-                assert client.get("/api/v1/runs").json() == {"runs": []}
+                assert client.get("/api/v1/runs").json() == {"runs": [], "next": None}
                 subprocess.run(
                     [*PROGRAM, "key", "revoke", "ann", *data], cwd=REPOSITORY, check=True, capture_output=True
                 )

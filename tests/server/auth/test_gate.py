@@ -183,3 +183,14 @@ def test_no_key_is_ever_logged(app: FastAPI, keys: dict[Scope, str], caplog: pyt
         client_with(app, key).get("/api/v1/nothing")
     said = caplog.text + "".join(str(vars(record)) for record in caplog.records)
     assert "tsk_" not in said
+
+
+def test_a_key_sends_so_much_in_a_day_and_others_have_room(app: FastAPI, keys: dict[Scope, str]) -> None:
+    services: Services = app.state.services
+    object.__setattr__(services.access, "uploads", RateLimit(1.0, 1000.0, clock=lambda: 0.0))
+    flood, other = client_with(app, keys[Scope.ANALYSE]), client_with(app, keys[Scope.MOVE])
+    assert flood.post("/api/v1/recordings", files={"file": ("a.csv", bytes(2000))}).status_code == 201
+    answer = flood.post("/api/v1/recordings", files={"file": ("b.csv", b"t")})
+    assert "sent as much as it may in a day" in assert_problem(answer, "rate-limited", 429)["detail"]
+    assert int(answer.headers["retry-after"]) > 1000
+    assert other.post("/api/v1/recordings", files={"file": ("b.csv", b"t")}).status_code == 201

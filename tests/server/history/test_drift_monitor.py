@@ -19,7 +19,7 @@ def history(database: Database) -> ModelHistory:
         Index(database, site).register(site, NOON)
     for number, robot in enumerate(("arm", "other"), start=1):
         facts = ItemMetadata("run", f"20251103T110000Z-0000000{number}", "finished", True, "9", NOON, robot=robot)
-        Index(database, "here").put(facts)
+        Index(database, "here").put([facts])
     return ModelHistory(database)
 
 

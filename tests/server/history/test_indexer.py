@@ -43,7 +43,9 @@ def keeper(data: Path, database: Database) -> Indexer:
 
 
 def opened(data: Path, database: Database) -> Indexer:
-    return open_index(Index(database, "here"), item_stores(data), RecordingStore(data / RECORDINGS), "data")
+    keeper = open_index(Index(database, "here"), item_stores(data), RecordingStore(data / RECORDINGS), "data")
+    keeper.sync(thorough=True)
+    return keeper
 
 
 def all_of(keeper: Indexer) -> list[ItemEntry]:

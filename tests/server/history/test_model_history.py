@@ -24,7 +24,7 @@ def history(database: Database) -> ModelHistory:
     """Of one arm, about which something is kept already."""
     index = Index(database, "here")
     index.register("data", NOON)
-    index.put(ItemMetadata("run", "20251103T110000Z-00000002", "finished", True, "9", NOON, robot="arm"))
+    index.put([ItemMetadata("run", "20251103T110000Z-00000002", "finished", True, "9", NOON, robot="arm")])
     return ModelHistory(database)
 
 

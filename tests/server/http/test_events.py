@@ -1,12 +1,12 @@
 """Events of a job over HTTP: complete, resumed where they broke off, ended with the job."""
 
 import asyncio
-from dataclasses import replace
+import threading
+import time
 from pathlib import Path
 from typing import Any, cast
 
 import pytest
-from anyio import CapacityLimiter
 from fastapi import Request
 from starlette.testclient import TestClient
 
@@ -17,7 +17,10 @@ from server.queue.executors import InlineExecutor, ManualExecutor
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.services import Services
 from tauscope.server.http.tasks import events as event_routes
+from tauscope.server.http.tasks.event_feeds import EventFeeds
+from tauscope.server.queue.record import JobRecord, JobState
 from tauscope.server.queue.workspace import Workspace
+from tauscope.server.store.items import utc_now
 
 
 @pytest.fixture
@@ -134,7 +137,8 @@ def test_a_quiet_stream_lives_by_comments_and_ends_with_service_or_client(
     end: str, settings: Settings, executor: ManualExecutor, files: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(event_routes, "HEARTBEAT_S", 0.0)
-    monkeypatch.setattr(event_routes, "POLL_S", 0.001)
+    monkeypatch.setattr(event_routes, "PRESENCE_S", 0.001)
+    monkeypatch.setattr("tauscope.server.http.tasks.event_feeds.POLL_S", 0.001)
     app, caller = create_app(settings, executor), _Caller()
     with connected(app) as client:
         status = client.post(IDENTIFICATIONS, files=files).json()
@@ -142,16 +146,44 @@ def test_a_quiet_stream_lives_by_comments_and_ends_with_service_or_client(
 
         async def listen() -> list[bytes]:
             workspace = Workspace(settings.identifications_folder / status["id"])
-            quiet = replace(services, followers=CapacityLimiter(1))
+            feeds = EventFeeds(services.closing)
             heard: list[bytes] = []
-            async for piece in event_routes._stream(cast(Request, caller), quiet, workspace, workspace.events.follow()):
+            async for piece in event_routes._stream(cast(Request, caller), feeds, workspace, 0):
                 heard.append(piece)
-                if piece.startswith(b":"):
+                if piece.startswith(b":") and any(each.startswith(b"event") for each in heard):
                     caller.is_gone = end == "the client is gone"
                     services.closing.set() if end == "the service ends" else None
             return heard
 
         heard = asyncio.run(listen())
     assert heard[0] == b"retry: 1000\n\n"
-    assert heard[1].startswith(b"event: state\n")
-    assert heard[2:] == [b": ping\n\n"]
+    told = [piece for piece in heard[1:] if not piece.startswith(b":")]
+    assert told[0].startswith(b"event: state\n")
+    assert heard[-1] == b": ping\n\n"
+
+
+def test_a_thousand_streams_are_told_within_a_second(tmp_path: Path) -> None:
+    """Ten jobs, followed by a hundred clients each: the logs are read ten times a round, not a thousand times."""
+    workspaces = [Workspace(tmp_path / str(number)) for number in range(10)]
+    for workspace in workspaces:
+        workspace.folder.mkdir()
+        workspace.write_record(JobRecord(state=JobState.QUEUED, created=utc_now()))
+
+    async def listen(feeds: EventFeeds, workspace: Workspace) -> float:
+        async for piece in event_routes._stream(cast(Request, _Caller()), feeds, workspace, 0):
+            if b"event: ended" in piece:
+                return time.monotonic()
+        raise AssertionError("the stream ended before the job was told to have ended")
+
+    async def follow() -> float:
+        feeds = EventFeeds(threading.Event())
+        streams = [asyncio.create_task(listen(feeds, workspaces[number % 10])) for number in range(1000)]
+        await asyncio.sleep(0.5)
+        for workspace in workspaces:
+            record = workspace.read_record()
+            assert record is not None
+            workspace.write_record(record.moved(JobState.CANCELLED, utc_now()))
+        told = time.monotonic()
+        return max(await asyncio.gather(*streams)) - told
+
+    assert asyncio.run(follow()) < 1.0

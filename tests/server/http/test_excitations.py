@@ -50,7 +50,7 @@ def test_a_design_all_the_way(client: TestClient, settings: Settings) -> None:
     assert {"step", "cost", "best_cost"} == set(progress[0]["figures"])
     assert told[-1].data["state"] == "succeeded"
     assert client.delete(here).status_code == 204
-    assert client.get(EXCITATIONS).json() == {"excitations": []}
+    assert client.get(EXCITATIONS).json() == {"excitations": [], "next": None}
 
 
 def test_limits_that_leave_no_motion(client: TestClient) -> None:

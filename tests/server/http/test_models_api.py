@@ -44,9 +44,27 @@ def test_from_an_identification_to_the_active_model(paper: TestClient) -> None:
     assert paper.get(second["links"]["self"]).json() == second
     result = paper.get(f"{IDENTIFICATIONS}/{second['id']}/result").json()
     assert paper.get(second["links"]["document"]).json() == result
-    assert paper.delete(f"{IDENTIFICATIONS}/{second['id']}").status_code == 204
-    assert paper.get(second["links"]["document"]).json() == result
     assert models(paper)[0]["state"] == "active"
+
+
+def test_a_model_outlives_its_identification(paper: TestClient) -> None:
+    _, first = models(paper)
+    result = paper.get(f"{IDENTIFICATIONS}/{first['id']}/result").json()
+    assert paper.delete(f"{IDENTIFICATIONS}/{first['id']}").status_code == 204
+    assert paper.get(first["links"]["document"]).json() == result
+
+
+def test_evidence_of_a_model_in_use_is_not_removed(paper: TestClient) -> None:
+    second, first = models(paper)
+    for path in (f"{IDENTIFICATIONS}/{second['id']}", f"{RECORDINGS}/a.csv", f"{RECORDINGS}/b.csv"):
+        detail = assert_problem(paper.delete(path), "in-use", 409)["detail"]
+        assert f"model {second['id']} is in use" in detail
+        assert paper.get(path).status_code == 200
+    for role in ("activate", "make-reference"):
+        paper.post(f"{first['links']['self']}/{role}", json={"reason": "back to the one before"})
+    assert paper.delete(f"{IDENTIFICATIONS}/{second['id']}").status_code == 204
+    assert paper.delete(f"{RECORDINGS}/b.csv").status_code == 204
+    assert_problem(paper.delete(f"{RECORDINGS}/a.csv"), "in-use", 409)
 
 
 def test_a_model_waits_for_its_campaign_and_is_judged_by_its_diagnosis(

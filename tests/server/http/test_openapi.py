@@ -13,6 +13,7 @@ from server.http import write_openapi
 from server.http.problem_check import assert_problem
 from server.http.write_openapi import COMMITTED, document_text
 from tauscope.errors import TauscopeError
+from tauscope.server.http.openapi import resolve_reference
 from tauscope.server.problems import KINDS
 from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, WORKER_LOST
 
@@ -66,12 +67,18 @@ def test_every_operation_says_what_it_does_and_which_problems_it_has(document: d
     for name, operation in operations(document):
         assert operation["summary"], name
         assert operation["description"], name
-        for status, answer in operation["responses"].items():
+        for status, reference in operation["responses"].items():
+            answer = resolve_reference(document, reference)
             assert answer["description"], (name, status)
             if int(status) >= 400:
                 (media_type,) = answer["content"]
                 assert media_type == "application/problem+json", (name, status)
-                assert answer["content"][media_type]["examples"], (name, status)
+                examples = answer["content"][media_type]["examples"].values()
+                assert all(resolve_reference(document, example)["value"]["code"] for example in examples), (
+                    name,
+                    status,
+                )
+                assert examples, (name, status)
 
 
 def test_every_body_is_strict_and_has_an_example(document: dict[str, Any]) -> None:

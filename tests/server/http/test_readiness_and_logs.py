@@ -14,7 +14,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from server.http.problem_check import assert_problem
-from tauscope.server.http import health, heartbeat
+from tauscope.server.http import Settings, heartbeat, readiness
 from tauscope.server.http.server import log_as_json
 from tauscope.server.http.services import Services
 
@@ -37,14 +37,14 @@ def test_a_disk_that_takes_nothing(client: TestClient, monkeypatch: pytest.Monke
 
 
 def test_a_disk_that_is_nearly_full(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(health, "LEAST_FREE_BYTES", 2**60)
+    monkeypatch.setattr(readiness, "LEAST_FREE_BYTES", 2**60)
     assert "MiB left" in assert_problem(client.get("/readyz"), "not-ready", 503)["detail"]
 
 
 def test_a_disk_that_hangs(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     let_go = threading.Event()
-    monkeypatch.setattr("tauscope.server.http.health.TIMEOUT_S", 0.05)
-    monkeypatch.setattr(health, "_disk_obstacles", lambda _: let_go.wait(20.0) and [])
+    monkeypatch.setattr(readiness, "TIMEOUT_S", 0.05)
+    monkeypatch.setitem(services_of(client).readiness.checks, "disk", lambda: let_go.wait(20.0) and None)
     try:
         assert "not answered" in assert_problem(client.get("/readyz"), "not-ready", 503)["detail"]
     finally:
@@ -63,6 +63,36 @@ def test_a_service_that_ends_or_has_lost_entries(client: TestClient) -> None:
 def test_a_cluster_that_is_away(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(services_of(client).jobs, "can_work", lambda: False)
     assert "Dask cluster" in assert_problem(client.get("/readyz"), "not-ready", 503)["detail"]
+
+
+@pytest.mark.parametrize("damage", ["overwritten", "cut off", "gone"])
+def test_a_database_that_is_damaged(client: TestClient, settings: Settings, damage: str) -> None:
+    path = settings.data_folder / "tauscope.db"
+    if damage == "gone":
+        path.unlink()
+    else:
+        content = path.read_bytes()
+        path.write_bytes(bytes(len(content)) if damage == "overwritten" else content[:10_000])
+    detail = assert_problem(client.get("/readyz"), "not-ready", 503)["detail"]
+    assert "tauscope.db: is damaged" in detail
+    assert "restore a backup" in detail
+    assert 'tauscope_ready{part="database"} 0.0' in client.get("/metrics").text
+
+
+def test_a_clock_that_was_never_set_or_is_set_back() -> None:
+    wall = [1_800_000_000.0]
+    clock = readiness.Clock(lambda: wall[0], lambda: 0.0)
+    assert clock.check() is None
+    wall[0] -= 61.0
+    assert "set back by 61 s" in (clock.check() or "")
+    wall[0] = 0.0
+    assert "the clock says 1970-01-01" in (clock.check() or "")
+
+
+def test_every_part_has_a_metric(client: TestClient) -> None:
+    text = client.get("/metrics").text
+    for part in ("service", "database", "disk", "workers", "clock", "audit log"):
+        assert f'tauscope_ready{{part="{part}"}} 1.0' in text
 
 
 @pytest.fixture

@@ -2,8 +2,9 @@
 
 import hashlib
 import json
+import os
+import signal
 from collections.abc import Iterator
-from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,6 @@ from starlette.testclient import TestClient
 
 from server.conftest import RECORDINGS
 from server.http.problem_check import assert_problem
-from server.queue.executors import ManualExecutor
 from tauscope.server.http import Settings
 
 CSV = b"t,q1,tau1\n" + b"".join(b"%.2f,0.1,%.1f\n" % (0.01 * k, k % 3) for k in range(50))
@@ -30,7 +30,7 @@ def test_a_recording_is_kept_with_its_hash(client: TestClient, settings: Setting
     assert answer.headers["location"] == f"{RECORDINGS}/log%201.csv"
     entry = client.get(answer.headers["location"]).json()
     assert (entry["name"], entry["size"], entry["sha256"]) == ("log 1.csv", len(CSV), hashlib.sha256(CSV).hexdigest())
-    assert client.get(RECORDINGS).json() == {"recordings": [entry]}
+    assert client.get(RECORDINGS).json() == {"recordings": [entry], "next": None}
     assert (settings.recordings_folder / "log 1.csv").read_bytes() == CSV
     assert {file.name for file in settings.recordings_folder.iterdir()} == {".sha256", "log 1.csv"}
 
@@ -85,19 +85,16 @@ def test_a_recording_of_other_joints(client: TestClient) -> None:
         assert_problem(answer, "invalid-request", 422)
 
 
-def test_a_check_whose_process_dies_is_a_problem(
-    waiting_client: TestClient, executor: ManualExecutor, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    waiting_client.post(RECORDINGS, files={"file": ("a.csv", CSV)})
-    submit = executor.submit
+@pytest.mark.usefixtures("reader_processes")
+def test_a_check_whose_process_dies_is_a_problem(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    client.post(RECORDINGS, files={"file": ("a.csv", CSV)})
+    monkeypatch.setattr("tauscope.server.http.recordings.router.check_kept_recording", die)
+    assert_problem(client.get(f"{RECORDINGS}/a.csv/report"), "worker-lost", 500)
 
-    def submit_and_die(*arguments: object) -> object:
-        future = submit(*arguments)  # pyright: ignore[reportArgumentType]
-        executor.fail(BrokenProcessPool("killed"))
-        return future
 
-    monkeypatch.setattr(executor, "submit", submit_and_die)
-    assert_problem(waiting_client.get(f"{RECORDINGS}/a.csv/report"), "worker-lost", 500)
+def die(*_: object) -> None:
+    """End the process that calls this."""
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def test_a_recording_is_removed(client: TestClient, settings: Settings) -> None:
@@ -236,7 +233,7 @@ def test_a_recording_is_understood_and_nothing_of_it_is_kept(client: TestClient,
     assert found["mapping"]["columns"] == {"t": "t", "q1": "q1", "tau1": "tau1"}
     assert found["mapping"]["units"] == {"t": "s", "q": "rad", "qd": "rad", "tau": "Nm"}
     assert (found["mapping"]["is_guessed"], found["report"]["samples"], found["problem"]) == (False, 50, None)
-    assert client.get(RECORDINGS).json() == {"recordings": []}
+    assert client.get(RECORDINGS).json()["recordings"] == []
     assert [path.name for path in settings.recordings_folder.iterdir() if path.name != ".sha256"] == []
 
 

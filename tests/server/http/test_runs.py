@@ -19,7 +19,7 @@ from tauscope.runtime.record import RunProblem
 from tauscope.runtime.states import RunState
 from tauscope.server.control.run import RunWorkspace
 from tauscope.server.http import Settings, create_app
-from tauscope.server.http.tasks import events as event_routes
+from tauscope.server.http.tasks import event_feeds
 from tauscope.server.queue.excitation import ExcitationWorkspace
 from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import RecordingStore, StoredRecording
@@ -114,7 +114,7 @@ def test_the_events_of_a_run(arm: TestClient, controls: HandControls) -> None:
 def test_the_end_is_told_when_everything_is_in_its_place(
     arm: TestClient, controls: HandControls, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(event_routes, "LAST_WAIT_S", 0.0)
+    monkeypatch.setattr(event_feeds, "LAST_WAIT_S", 0.0)
     keep, go_on = RecordingStore.keep, threading.Event()
 
     def slowly(self: RecordingStore, file: KeptFile) -> tuple[StoredRecording, bool]:
@@ -158,7 +158,7 @@ def test_stop_works_while_everything_else_is_stuck(
 
     app = create_app(settings, executor, controls)
     with connected(app) as client:
-        answer = begin_with(client, executor)
+        answer = begin(client)
         control = controls.next()
         control.go(RunState.RUNNING)
         services = app.state.services
@@ -179,17 +179,6 @@ def test_stop_works_while_everything_else_is_stuck(
         for thread in threads:
             thread.join(60.0)
         control.finish(RunState.STOPPED)
-
-
-def begin_with(client: TestClient, executor: ManualExecutor) -> dict[str, Any]:
-    """Begin a run whose trajectory is checked when the executor is run by hand."""
-    answers: list[dict[str, Any]] = []
-    thread = threading.Thread(target=lambda: answers.append(begin(client)))
-    thread.start()
-    wait_until(lambda: bool(executor.tasks))
-    executor.run()
-    thread.join(60.0)
-    return answers[0]
 
 
 def test_an_arm_has_one_run_at_a_time(arm: TestClient, controls: HandControls) -> None:

@@ -12,8 +12,8 @@ import pytest
 from server.queue.executors import InlineExecutor, ManualExecutor
 from tauscope.errors import RecordingError
 from tauscope.server.queue.cluster_executor import ClusterUnavailableError
-from tauscope.server.queue.executors import WorkerPool
 from tauscope.server.queue.fleet import AWAY, LOST, FleetEntry, FleetResult, analyse_fleet, read_manifest
+from tauscope.server.queue.worker_pool import WorkerPool
 
 HEADER = "name,robot,recordings,held_out\n"
 

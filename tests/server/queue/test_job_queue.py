@@ -10,7 +10,7 @@ import pytest
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.one_kind import make_queue, problem_of, state_of, succeed
 from tauscope.errors import NotFoundError
-from tauscope.server.queue.queue import JobKind, JobQueue, QueueFullError, Work
+from tauscope.server.queue.queue import MOST_ATTEMPTS, JobKind, JobQueue, QueueFullError, Work
 from tauscope.server.queue.record import JobProblem, JobState
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.items import ItemStore
@@ -55,10 +55,46 @@ def test_an_unforeseen_failure_is_logged_and_not_told(items: ItemStore, caplog: 
     assert "ZeroDivisionError: a bug" in caplog.text
 
 
-def test_a_worker_that_dies_fails_its_job_and_the_next_one_runs(items: ItemStore, executor: ManualExecutor) -> None:
+def test_a_job_whose_worker_was_killed_is_done_again(items: ItemStore, executor: ManualExecutor) -> None:
+    queue = make_queue(items, executor)
+    job = queue.submit(items.stage())
+    executor.fail(BrokenProcessPool("killed"))
+    executor.run()
+    assert state_of(items, job) == "succeeded"
+
+
+def test_light_jobs_pass_heavy_ones(tmp_path: Path, executor: ManualExecutor) -> None:
+    heavy = JobKind(ItemStore(tmp_path / "heavy", "job"), succeed, is_heavy=True)
+    light = JobKind(ItemStore(tmp_path / "light", "job"), succeed)
+    queue = JobQueue([heavy, light], executor, slots=2, most_waiting=10)
+    first, second = (queue.submit(heavy, heavy.items.stage()) for _ in range(2))
+    quick = queue.submit(light, light.items.stage())
+    states = [state_of(heavy.items, first), state_of(heavy.items, second), state_of(light.items, quick)]
+    assert states == ["running", "queued", "running"]
+    executor.run()
+    assert [state_of(heavy.items, each) for each in (first, second)] == ["succeeded", "running"]
+
+
+def test_a_caller_has_so_many_jobs_and_others_have_room(items: ItemStore, executor: ManualExecutor) -> None:
+    kind = JobKind(items, succeed)
+    queue = JobQueue([kind], executor, slots=1, most_waiting=10, most_each=2)
+    first, _ = (queue.submit(kind, items.stage(), "flood") for _ in range(2))
+    with pytest.raises(QueueFullError, match="2 jobs of flood have not ended"):
+        queue.submit(kind, items.stage(), "flood")
+    queue.submit(kind, items.stage(), "other")
+    executor.run()
+    assert state_of(items, first) == "succeeded"
+    queue.submit(kind, items.stage(), "flood")
+
+
+def test_a_worker_that_dies_again_and_again_fails_its_job_and_the_next_one_runs(
+    items: ItemStore, executor: ManualExecutor
+) -> None:
     queue = make_queue(items, executor)
     lost, following = queue.submit(items.stage()), queue.submit(items.stage())
-    executor.fail(BrokenProcessPool("killed"))
+    for _ in range(MOST_ATTEMPTS):
+        assert state_of(items, lost) == "running"
+        executor.fail(BrokenProcessPool("killed"))
     assert (state_of(items, lost), problem_of(items, lost)) == ("failed", "worker-lost")
     executor.run()
     assert state_of(items, following) == "succeeded"

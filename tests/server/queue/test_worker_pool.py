@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
@@ -11,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from shared_data import REPOSITORY
-from tauscope.server.queue.executors import WorkerPool
+from tauscope.errors import LimitExceededError
+from tauscope.server.queue.worker_pool import WorkerPool
 
 
 @pytest.fixture
@@ -39,6 +41,47 @@ def test_a_worker_that_is_killed_breaks_its_work_only(pool: WorkerPool) -> None:
     assert pool.submit(os.getpid).result(60) != worker
 
 
+def test_a_worker_that_is_killed_takes_nothing_of_its_neighbour(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with WorkerPool(2) as pool:
+        neighbour = pool.submit((tmp_path / "pipe").read_bytes)
+        with (tmp_path / "pipe").open("wb") as pipe:
+            with pytest.raises(BrokenProcessPool):
+                pool.submit(signal.raise_signal, signal.SIGKILL).result(60)
+            pipe.write(b"whole")
+        assert neighbour.result(60) == b"whole"
+
+
+def test_work_beyond_its_deadline_is_ended() -> None:
+    with WorkerPool(1, deadline_s=0.3) as pool:
+        with pytest.raises(LimitExceededError, match=r"took longer than the 0.3 s"):
+            pool.submit(signal.pause).result(60)
+        assert pool.submit(os.getpid).result(60)
+
+
+def test_work_beyond_its_memory_is_ended() -> None:
+    with WorkerPool(1, memory_bytes=300 * 2**20) as pool:
+        with pytest.raises(LimitExceededError, match="more than the 300 MiB of memory"):
+            pool.submit(bytes, 400 * 2**20).result(60)
+        assert pool.submit(len, bytes(2**20)).result(60) == 2**20
+
+
+def test_cancelled_work_ends_at_once_in_the_middle() -> None:
+    with WorkerPool(1) as pool:
+        worker = pool.submit(os.getpid).result(60)
+        endless = pool.submit(signal.pause)
+        time.sleep(0.1)
+        assert endless.cancel()
+        assert pool.submit(os.getpid).result(60) != worker
+        assert not os.path.exists(f"/proc/{worker}")
+
+
+def test_a_failure_says_where_it_happened(pool: WorkerPool) -> None:
+    error = pool.submit(int, "many").exception(60)
+    assert isinstance(error, ValueError)
+    assert "worker_process.py" in error.__notes__[0]
+
+
 def test_shutting_down_at_once_ends_work_in_the_middle(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     pool = WorkerPool(1)
@@ -52,7 +95,8 @@ def test_shutting_down_at_once_ends_work_in_the_middle(tmp_path: Path) -> None:
 
 SERVICE = """
 import os, signal
-from tauscope.server.queue.executors import WorkerPool
+from tauscope.errors import LimitExceededError
+from tauscope.server.queue.worker_pool import WorkerPool
 if __name__ == "__main__":
     pool = WorkerPool(1)
     print(pool.submit(os.getpid).result(60), flush=True)

@@ -31,7 +31,7 @@ def data(tmp_path: Path) -> Path:
 def fill(database: Database) -> ModelHistory:
     index = Index(database, "here")
     index.register("data", NOON)
-    index.put(ItemMetadata("run", "20251103T110000Z-00000002", "finished", True, "9", NOON, robot="arm α"))
+    index.put([ItemMetadata("run", "20251103T110000Z-00000002", "finished", True, "9", NOON, robot="arm α")])
     history = ModelHistory(database)
     for day, viscous in ((1, 0.5), (40, 0.8)):
         given = candidate(day, identified({"viscous": viscous}, friction__0__std__viscous=0.01), robot="arm α")

@@ -42,7 +42,7 @@ def identifiers(index: Index, **query: object) -> list[str]:
 
 
 def test_what_is_put_in_is_found_as_it_was(index: Index) -> None:
-    index.put(IDENTIFIED)
+    index.put([IDENTIFIED])
     (found,) = index.search(ItemQuery())
     assert (found.kind, found.identifier, found.site) == ("identification", IDENTIFIED.identifier, "here")
     assert (found.state, found.robot, found.created, found.ended) == ("succeeded", "arm", NOON, IDENTIFIED.ended)
@@ -53,9 +53,9 @@ def test_what_is_put_in_is_found_as_it_was(index: Index) -> None:
 
 
 def test_putting_again_replaces(index: Index) -> None:
-    index.put(IDENTIFIED)
+    index.put([IDENTIFIED])
     changed = replace(IDENTIFIED, state="damaged", problem=("damaged", "gone"), artefacts=(), recordings=(), figures={})
-    index.put(changed)
+    index.put([changed])
     (found,) = index.search(ItemQuery())
     assert (found.state, found.problem_code, found.problem_detail) == ("damaged", "damaged", "gone")
     assert found.figures == {"relative_error": None, "held_out_error": None}
@@ -64,8 +64,8 @@ def test_putting_again_replaces(index: Index) -> None:
 
 
 def test_searches(index: Index) -> None:
-    index.put(IDENTIFIED)
-    index.put(RUN)
+    index.put([IDENTIFIED])
+    index.put([RUN])
     assert identifiers(index) == [IDENTIFIED.identifier, RUN.identifier]
     assert identifiers(index, kind="run") == [RUN.identifier]
     assert identifiers(index, robot="Arm α/β") == [RUN.identifier]
@@ -80,8 +80,8 @@ def test_searches(index: Index) -> None:
 def test_two_sites_of_one_database(index: Index, database: Database) -> None:
     other = Index(database, "elsewhere")
     other.register("data", NOON)
-    index.put(IDENTIFIED)
-    other.put(replace(IDENTIFIED, robot="arm", created=NOON + timedelta(days=1)))
+    index.put([IDENTIFIED])
+    other.put([replace(IDENTIFIED, robot="arm", created=NOON + timedelta(days=1))])
     assert [entry.site for entry in index.search(ItemQuery())] == ["elsewhere", "here"]
     other.forget("identification", [IDENTIFIED.identifier])
     assert [entry.site for entry in index.search(ItemQuery())] == ["here"]

@@ -6,7 +6,7 @@ import numpy as np
 
 from tauscope.diagnosis.against.attribution import Explanation
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
-from tauscope.diagnosis.findings.finding import Finding, sizes
+from tauscope.diagnosis.findings.finding import Finding
 from tauscope.diagnosis.model.term import Term
 from tauscope.effects.carried_body import FARTHEST_M
 from tauscope.effects.payload import Payload
@@ -23,7 +23,7 @@ def payload_finding(diagnosis: Diagnosis, carried: Explanation) -> Finding:
         covariances=(carried.covariance,),
         gain=carried.gain * diagnosis.inflation,
         probability=float(1.0 / (1.0 + np.exp(-carried.log_odds))),
-        before=sizes(replace(model, parameters=parameters), diagnosis.fitter, diagnosis.held_out),
+        before=diagnosis.sizes(replace(model, parameters=parameters)),
         after=diagnosis.after,
         in_model=False,
     )

@@ -19,9 +19,9 @@ from tauscope.diagnosis.against.link_changes import stated_links
 from tauscope.diagnosis.against.simulated import fit_to_simulation
 from tauscope.diagnosis.against.wrong_values import attribute
 from tauscope.diagnosis.findings.diagnosed import Diagnosis, ParameterDifference
-from tauscope.diagnosis.findings.finding import Finding, FitSizes, sizes
+from tauscope.diagnosis.findings.finding import Finding, FitSizes
 from tauscope.diagnosis.findings.plain import with_plain_terms
-from tauscope.diagnosis.selection.choice import Place
+from tauscope.diagnosis.model.term import Place
 from tauscope.effects.rotor_inertia import RotorInertia
 from tauscope.errors import IdentificationError
 from tauscope.identification import Options
@@ -163,9 +163,9 @@ def compared(diagnosis: Diagnosis, given: Given, kind: Literal["model", "simulat
     found = with_plain_terms(plain, given.lacking)
     fit = found.selection.fit
     size, structure = fit.model.structure.size, fit.model.structure
-    covariance = fit.covariance[:size, :size] * found.inflation
+    covariance = fit.free_covariance[:size, :size] * found.inflation
     covariance = covariance if given.covariance is None else covariance + given.covariance
-    names, real = list(structure.names), fit.model.parameters.copy()
+    names, real = list(structure.names), fit.free_parameters.copy()
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     count, several = structure.base_count, _several(len(given.values))
     explanations: list[Explanation] = []
@@ -209,7 +209,7 @@ def _given_sizes(diagnosis: Diagnosis, given: Given) -> FitSizes:
     if any(name not in given.values for name in names[: model.structure.base_count]):
         return diagnosis.before
     stated: Array = np.array([given.values.get(name, 0.0) for name in names])
-    return sizes(replace(model, parameters=stated), diagnosis.fitter, diagnosis.held_out)
+    return diagnosis.sizes(replace(model, parameters=stated))
 
 
 def is_wrong(difference: ParameterDifference, several: float) -> bool:

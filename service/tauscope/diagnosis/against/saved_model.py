@@ -6,7 +6,6 @@ import numpy as np
 
 from tauscope.diagnosis.against.given_model import CLEAR, Given, beside, compared, is_wrong, ordered
 from tauscope.diagnosis.findings.diagnosed import Diagnosis, ParameterDifference
-from tauscope.diagnosis.findings.finding import sizes
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.torque_scale import on_the_arm
 from tauscope.recording.recording import Array
@@ -40,7 +39,7 @@ def against_saved(diagnosis: Diagnosis, saved: ExtendedModel) -> Diagnosis:
                 )
             )
     wrong = [each for each in differences if is_wrong(each, CLEAR)]
-    before = sizes(saved, diagnosis.fitter, diagnosis.held_out)
+    before = diagnosis.sizes(saved)
     return replace(found, differences=ordered([*found.differences, *wrong]), before=before)
 
 

@@ -7,11 +7,11 @@ import numpy as np
 
 from tauscope.diagnosis.findings.diagnosed import Diagnosis, ParameterDifference
 from tauscope.diagnosis.fitting.fit import Fit, Fitter
-from tauscope.diagnosis.fitting.regressor_noise import row_weightings
+from tauscope.diagnosis.fitting.regressor_noise import weightings_of_motion
 from tauscope.diagnosis.model.extended import ExtendedModel, with_terms
 from tauscope.diagnosis.model.nominal import nominal_model
 from tauscope.diagnosis.model.term import Term
-from tauscope.diagnosis.noise.floor import with_noise
+from tauscope.diagnosis.noise.floor import band_share, white_noise, with_pure_error
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.effects import TimeLocalEffect
 from tauscope.identification import Options, identify
@@ -53,10 +53,10 @@ def fit_to_simulation(diagnosis: Diagnosis, simulated: Sequence[Recording], opti
     conditioners = [Conditioner.survey(recording, diagnosis.robot) for recording in simulated]
     base, cutoff = start.structure.base, diagnosis.cutoff_hz
     rows = Observations.prepare(conditioners, diagnosis.robot, base, cutoff, start.steepness)
-    rows, pure_error = with_noise(rows, with_terms(start, ()), [term.effect for term in lasting])
-    rows = rows.with_weightings(row_weightings(rows, start))
-    fit = Fitter(rows).fit(start)
-    inflation = 1.0 if pure_error else fit.inflation()
+    repeated = with_pure_error(rows, start)
+    rows = repeated or rows.with_noise(white_noise(rows, start, band_share(rows)))
+    fit = Fitter(rows.with_weightings(weightings_of_motion(rows, start))).fit(start)
+    inflation = 1.0 if repeated else fit.inflation()
     size = start.structure.size
     covariance = fit.covariance[:size, :size] * inflation
     return SimulatedFit(fit.model.parameters, covariance, _shared(diagnosis, fit, inflation))

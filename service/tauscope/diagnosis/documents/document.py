@@ -25,7 +25,6 @@ from tauscope.diagnosis.documents.result import (
 )
 from tauscope.diagnosis.documents.statement import HEADLINES, state_finding, state_unknown
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
-from tauscope.diagnosis.findings.elsewhere import spread
 from tauscope.diagnosis.findings.finding import Finding
 from tauscope.diagnosis.findings.location import JointMismatch, Place
 from tauscope.diagnosis.findings.verdict import OPEN, Verdict
@@ -203,7 +202,7 @@ def _mismatch(found: JointMismatch, names: Sequence[str], *, significant: bool) 
 def _finding(finding: Finding, diagnosis: Diagnosis, names: Sequence[str], *, tentative: bool = False) -> FindingEntry:
     effect = finding.terms[0].effect
     quantities = _quantities(finding, diagnosis)
-    others = list({option.candidate.effect.name(names): None for option in finding.alternatives})
+    others = list({rival.term.effect.name(names): None for rival in finding.alternatives})
     before, after = finding.before, finding.after
     return FindingEntry(
         effect=effect.id,
@@ -238,7 +237,6 @@ def _quantities(finding: Finding, diagnosis: Diagnosis) -> list[Quantity]:
     for number, (term, covariance) in enumerate(zip(finding.terms, finding.covariances, strict=True), start=1):
         sized = on_the_arm(diagnosis.selection.fit.model, term)
         own = _told(sized, diagnosis, covariance)
-        own = spread(own, [(each.chance, _told(each.term, diagnosis)) for each in finding.elsewhere])
         suffix = "" if number == 1 else f"_{number}"
         found += [Quantity(f"{each.name}{suffix}", each.value, each.std, each.unit) for each in own]
     return found
@@ -335,7 +333,7 @@ def _open_question(diagnosis: Diagnosis, names: Sequence[str]) -> tuple[list[str
     """What is to be told apart, and the motion for it in words; empty where nothing is open."""
     for finding in diagnosis.findings:
         if finding.alternatives:
-            effects = [finding.terms[0].effect, *(option.candidate.effect for option in finding.alternatives)]
+            effects = [finding.terms[0].effect, *(rival.term.effect for rival in finding.alternatives)]
             motions = dict.fromkeys(effect.revealing_motion for effect in effects)
             return [effect.name(names) for effect in effects], "record " + "; and ".join(motions)
     if diagnosis.verdict is Verdict.INCONCLUSIVE:

@@ -6,11 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
-from tauscope.diagnosis.findings.finding import Finding
-from tauscope.diagnosis.findings.stand_in import DOUBTED
+from tauscope.diagnosis.findings.finding import FORMULA_ERROR, Finding
 from tauscope.effects import Effect, Quantity, TimeLocalEffect
-from tauscope.effects.load_dependent_friction import LoadDependentFriction
-from tauscope.effects.torque_gain_error import TorqueGainError
 from tauscope.number_text import ABSENT, chance, significant, with_uncertainty
 
 HEADLINES = {
@@ -66,8 +63,9 @@ def state_finding(
     found = {each.name: each for each in quantities}
     effect = finding.terms[0].effect
     of_first = quantities[: len(quantities) // len(finding.terms)]
-    sentences = [numbers_text(of_first), *_doubts(finding, names)]
+    sentences = [numbers_text(of_first)]
     sentences += [_sentence(_held_out(finding, names, tentative=tentative))]
+    sentences += _doubts(finding, diagnosis, names)
     if not tentative:
         sentences.append(_sentence(effect.advice(found)) if finding.probability >= LIKELY else UNLIKELY)
     claim = _claim(finding, found, diagnosis, names)
@@ -101,7 +99,7 @@ def _claim(finding: Finding, found: dict[str, Quantity], diagnosis: Diagnosis, n
 def _rivals(finding: Finding, names: Sequence[str]) -> str:
     """What it could also be."""
     own = finding.terms[0].effect
-    rivals = list(dict.fromkeys(_noun(option.candidate.effect, own, names) for option in finding.alternatives))
+    rivals = list(dict.fromkeys(_noun(rival.term.effect, own, names) for rival in finding.alternatives))
     if not rivals:
         return ""
     shown, more = rivals[:MOST_RIVALS], len(rivals) - MOST_RIVALS
@@ -114,14 +112,18 @@ def _noun(rival: Effect, own: Effect, names: Sequence[str]) -> str:
     return words if rival.joint == own.joint else f"{words} {rival.place(names) or 'of the whole arm'}"
 
 
-def _doubts(finding: Finding, names: Sequence[str]) -> Iterator[str]:
+def _doubts(finding: Finding, diagnosis: Diagnosis, names: Sequence[str]) -> Iterator[str]:
     """Why it may be something else, beside its rivals."""
-    if isinstance(finding.terms[0].effect, TorqueGainError) and isinstance(finding.behind, LoadDependentFriction):
-        yield "A gear's efficiency, or load friction of another formula, may look the same"
-    elif finding.behind is not None:
-        law = finding.behind.id.replace("_", " ")
-        yield f"It is small: the formula of {' '.join(filter(None, (law, finding.behind.place(names))))} may cause it"
-    if finding.as_law < DOUBTED:
+    joints = finding.terms[0].effect.touched(len(names))
+    others = (each for each in diagnosis.findings if each.place != finding.place)
+    beside = [each for each in others if not set(joints).isdisjoint(each.terms[0].effect.touched(len(names)))]
+    larger = max(beside, key=lambda each: each.gain, default=None)
+    if larger is not None and finding.gain < FORMULA_ERROR * larger.gain:
+        law = larger.terms[0].effect
+        where = " ".join(filter(None, (law.id.replace("_", " "), law.place(names))))
+        yield f"It is small: the formula of {where} may cause it"
+    left = diagnosis.misfit_after
+    if any(left.significant[joint] and left.excess[joint] > finding.gain for joint in joints):
         yield "Low confidence: unmodelled physics may be causing this"
 
 

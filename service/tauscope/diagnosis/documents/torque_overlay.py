@@ -28,10 +28,10 @@ class TorqueOverlay(ResultModel):
 
 
 def judging_observations(diagnosis: Diagnosis) -> tuple[Observations, bool]:
-    """The held-out rows, or the training rows where there are none, as measured; and whether they are held out."""
+    """The held-out rows, or the training rows where there are none; and whether they are held out."""
     held_out = diagnosis.held_out
     rows = diagnosis.fitter.observations if held_out is None else held_out.observations
-    return rows.as_measured or rows, held_out is not None
+    return rows, held_out is not None
 
 
 def torque_overlays(diagnosis: Diagnosis) -> list[TorqueOverlay]:

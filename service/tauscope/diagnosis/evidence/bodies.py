@@ -20,6 +20,12 @@ from tauscope.recording.recording import Array
 WITHIN = 0.9
 """Part of the way to the nearest body without volume that one step may take."""
 
+THINNEST = 1e-6
+"""Least part of the believed body's moments that a body keeps along every axis: with its square double numbers work."""
+
+ROUNDING = 1e-10
+"""Added to the diagonal of a correlation matrix: what rounding takes off it."""
+
 _ROWS, _COLUMNS = np.array(UPPER_TRIANGLE).T
 _WEIGHT = np.where(_ROWS == _COLUMNS, 1.0, np.sqrt(2.0))
 _TRIANGLE = triangle_of_parameters()
@@ -35,12 +41,18 @@ class NormalBodies:
         dx/dΘ_L of the most probable links
     mean, precision : (m,), (m, m) float64
         of the base parameters
+    energy : float
+        -2 log p of the body, but for a constant
+    log_mass : float
+        log of the probability that the normal distribution stands for, alike: expanded elsewhere it is another
     """
 
     centre: Array
     gain: Array
     mean: Array
     precision: Array
+    energy: float
+    log_mass: float
 
     def links(self, base: Array) -> Array:
         """Most probable standard parameters of links with these base parameters, (10 n,).
@@ -105,11 +117,19 @@ class BodyPrior:
             precision[own, own] += _TRIANGLE.T @ congruence(inverse) @ _TRIANGLE
             slope[own] -= _TRIANGLE.T @ (_WEIGHT * inverse[_ROWS, _COLUMNS])
         scale = 1.0 / np.sqrt(np.diag(precision))
-        factor = cho_factor(scale[:, None] * precision * scale)
-        centre = links - scale * cho_solve(factor, scale * slope)
+        factor = _factor(scale[:, None] * precision * scale)
+        step = scale * cho_solve(factor, scale * slope)
         spread = scale[:, None] * cho_solve(factor, (self.base * scale).T)
         of_base = _inverse(self.base @ spread)
-        return NormalBodies(centre, spread @ of_base, self.base @ centre, of_base)
+        centre, energy = links - step, self._energy(links)
+        determinant = 2.0 * float(np.sum(np.log(np.diag(factor[0])) - np.log(scale)))
+        log_mass = 0.5 * (float(slope @ step) - energy - determinant)
+        return NormalBodies(centre, spread @ of_base, self.base @ centre, of_base, energy, log_mass)
+
+    def _energy(self, links: Array) -> float:
+        off = links - self.mean
+        volumes = sum(float(np.linalg.slogdet(pseudo_inertia(links[own]))[1]) for own in _each(links))
+        return float(off @ self.precision @ off) - 2.0 * volumes
 
     def share(self, links: Array, step: Array) -> float:
         """Part of a step that leaves every link its volume, at most 1.
@@ -121,7 +141,7 @@ class BodyPrior:
         """
         share = 1.0
         for own in _each(links):
-            root = cholesky(pseudo_inertia(links[own]), lower=True)
+            root = cholesky(pseudo_inertia(links[own] - THINNEST * self.mean[own]), lower=True)
             half = solve_triangular(root, pseudo_inertia(step[own]), lower=True)
             least = float(np.linalg.eigvalsh(solve_triangular(root, half.T, lower=True))[0])
             share = min(share, -WITHIN / least) if least < 0.0 else share
@@ -147,9 +167,17 @@ def _each(links: Array) -> list[slice]:
     return [slice(first, first + 10) for first in range(0, len(links), 10)]
 
 
+def _factor(correlation: Array) -> tuple[Array, bool]:
+    """Cholesky factor of a correlation matrix, whose least eigenvalues rounding may have made negative."""
+    try:
+        return cho_factor(correlation)
+    except np.linalg.LinAlgError:
+        return cho_factor(correlation + ROUNDING * np.eye(len(correlation)))
+
+
 def _inverse(matrix: Array) -> Array:
     """Inverse of a positive definite matrix whose rows have different units."""
     scale = 1.0 / np.sqrt(np.diag(matrix))
     size = len(matrix)
-    factor = cho_factor(scale[:, None] * matrix * scale + 1e-12 * np.eye(size))
+    factor = _factor(scale[:, None] * matrix * scale)
     return np.asarray(scale[:, None] * cho_solve(factor, np.eye(size)) * scale)

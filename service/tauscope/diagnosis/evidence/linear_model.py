@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_solve
+from scipy.linalg import cho_solve, solve_triangular
 from scipy.optimize import minimize
 
 from tauscope.diagnosis.evidence.moments import Index, JointMoments
@@ -23,6 +23,9 @@ STEPS = 30
 
 SETTLED = 0.02
 """Change of the log evidence at which a step is the last."""
+
+CERTAIN = 1e6
+"""Factor by which a parameter that is held is believed more precisely."""
 
 ROUNDING = 1e-12
 """Added to the diagonal of a correlation matrix: what rounding takes off it."""
@@ -55,6 +58,12 @@ class Posterior:
         """
         scale = self.scale if right.ndim == 1 else self.scale[:, None]
         return np.asarray(cho_solve((self.factor, True), right / scale) / scale)
+
+    @property
+    def spread(self) -> Array:
+        """S with S Sᵀ = A⁻¹, (p, p)."""
+        root = solve_triangular(self.factor, np.eye(len(self.mean)), lower=True, trans="T")
+        return np.asarray(root / self.scale[:, None])
 
     @property
     def covariance(self) -> Array:
@@ -98,6 +107,22 @@ class LinearModel:
         precision = np.pad(self.precision, (0, len(mean)))
         precision[index, index] = 1.0 / std**2
         return LinearModel(joints, np.concatenate([self.mean, mean]), precision)
+
+    def hold(self, places: Index, values: Array) -> "LinearModel":
+        """The same with some parameters believed to have a value.
+
+        Parameters
+        ----------
+        places : (c,) int
+            their places among all
+        values : (c,) float64
+            those values
+        """
+        precision, right = self.precision.copy(), self.precision @ self.mean
+        certain = CERTAIN * np.diag(self.precision)[places]
+        precision[places, places] += certain
+        right[places] += certain * values
+        return replace(self, mean=np.linalg.solve(precision, right), precision=precision)
 
     def without(self, places: Index, values: Array) -> "LinearModel":
         """The same with some parameters held at a value; their places stay, with no column.

@@ -32,8 +32,8 @@ class JointMoments:
         where each class begins
     products : (K, 1 + k + b, 1 + k + b) float64
         Z Zᵀ of each class
-    share : float
-        independent rows among all
+    counts : (K,) float64
+        independent rows of each class; one that tells less than a whole one counts as a part
     groups : (b,) int
         group of each feature; -1 for a column error of known size
     """
@@ -42,27 +42,28 @@ class JointMoments:
     rows: Array
     bounds: Index
     products: Array
-    share: float
+    counts: Array
     groups: Index
 
     @staticmethod
     def of(
-        index: Index, target: Array, columns: Array, features: Array, bounds: Index, share: float, groups: Index
+        index: Index,
+        target: Array,
+        columns: Array,
+        features: Array,
+        bounds: Index,
+        counts: Array,
+        groups: Index,
     ) -> "JointMoments":
         """From rows that are ordered by class."""
         rows = np.vstack([target[None], columns, features])
         products = np.stack([part @ part.T for part in _split(rows, bounds)])
-        return JointMoments(index, rows, bounds, products, share, groups)
+        return JointMoments(index, rows, bounds, products, counts, groups)
 
     @property
     def visible(self) -> int:
         """Rows of Z before the features: the target and the columns."""
         return 1 + len(self.index)
-
-    @property
-    def counts(self) -> Array:
-        """Independent rows of each class, (K,)."""
-        return self.share * np.diff(self.bounds)
 
     def against(self, columns: Array) -> tuple[Array, Array]:
         """Products of other columns with Z, (K, g, 1 + k + b), and of each with itself and its fellows, (K, s, c, c).
@@ -104,6 +105,11 @@ class JointMoments:
             products=whole[:, order][:, :, order],
         )
 
+    def counting(self, share: float) -> "JointMoments":
+        """The same rows, each counting as a share of one."""
+        root = np.sqrt(share)
+        return replace(self, rows=root * self.rows, products=share * self.products, counts=share * self.counts)
+
     def without(self, places: Index, values: Array) -> "JointMoments":
         """The same with some parameters held at a value.
 
@@ -135,6 +141,20 @@ class JointMoments:
         products = whole[:visible, :visible] - half.T @ half
         determinant = 2.0 * float(np.log(np.diag(root)).sum()) - float(self.counts @ np.log(weights))
         return Weighted(products, determinant)
+
+    def discrepancy(self, scales: Scales, direction: Array) -> Array:
+        """Most probable torque without a name, (R,).
+
+        Parameters
+        ----------
+        direction : (1 + k,) float64
+            1, then minus the columns' parameters
+        """
+        visible, amplitudes = self.visible, scales.amplitudes(self.groups)
+        whole = np.tensordot(scales.weights(), self.products, axes=1)
+        inner = np.eye(len(amplitudes)) + amplitudes[:, None] * whole[visible:, visible:] * amplitudes
+        seen = amplitudes * (whole[visible:, :visible] @ direction)
+        return (amplitudes * np.linalg.solve(inner, seen)) @ self.rows[visible:]
 
     def _half(self, whole: Array, scales: Scales) -> tuple[Array, Array]:
         """K^(-1/2) A Bᵀ W Z of target and columns, and K^(1/2) with K = 1 + A Bᵀ W B A."""
@@ -189,11 +209,9 @@ class JointMoments:
             trace = counts[place] - weight * float(np.sum(own[visible:, visible:] * kernel))
             by_class[place] = trace * weight - weight**2 * float(np.sum(seen * spread))
         inside = whole[visible:, :visible] - whole[visible:, visible:] @ taken
-        energy = np.einsum("bi,ij,bj->b", inside, spread, inside)
-        of_feature = 2.0 * amplitudes**2 * (np.diag(whole)[visible:] - energy)
-        of_feature -= (
-            2.0 * amplitudes**2 * np.einsum("bc,cd,db->b", whole[visible:, visible:], kernel, whole[visible:, visible:])
-        )
+        energy = np.sum((inside @ spread) * inside, axis=1)
+        mutual = whole[visible:, visible:]
+        of_feature = 2.0 * amplitudes**2 * (np.diag(mutual) - energy - np.sum((mutual @ kernel) * mutual, axis=1))
         return scales.collect(by_class, of_feature, self.groups)
 
 

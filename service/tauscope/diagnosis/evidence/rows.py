@@ -1,22 +1,25 @@
-"""The rows of a diagnosis as evidence sees them: those of stops left out, the others in classes of rest.
+"""The rows of a diagnosis as evidence sees them, in classes of rest.
 
 Near rest friction takes any value up to breakaway, which no curve of the velocity says: those rows have a variance of
-their own (`Scales`), and those of a stop, where friction holds with whatever torque there is, say nothing.
+their own (`Scales`). All rows of a stop count as one, whose friction is unknown up to breakaway.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tauscope.diagnosis.evidence.dependence import Succession
 from tauscope.diagnosis.evidence.discrepancy import GROUP, Reach, beyond, smooth_features
 from tauscope.diagnosis.evidence.moments import JointMoments
 from tauscope.diagnosis.evidence.scales import REST_BOUNDS, REST_SHARES
 from tauscope.diagnosis.fitting.projection import JointColumns
 from tauscope.diagnosis.fitting.regressor_noise import certainty, shared_errors
-from tauscope.diagnosis.fitting.white_columns import WhiteColumns
+from tauscope.diagnosis.fitting.white_columns import WhiteColumns, white_columns
 from tauscope.diagnosis.model.extended import ExtendedModel
-from tauscope.diagnosis.observations.observations import BoolArray, Observations, Piece
+from tauscope.diagnosis.observations.observations import Observations, Piece
+from tauscope.effects import Effect, Signals
 from tauscope.recording.recording import Array
 
 REVERSAL = 2.0
@@ -42,8 +45,8 @@ class EvidenceRows:
         weight of each of them beside friction's step, whose place the velocity's noise leaves open
     bounds : tuple of (K + 1,) int
         where each class begins
-    features : tuple of (b, R_j) float64
-        discrepancy, then errors that all reversals share
+    features : tuple of (b, R) float64
+        discrepancy, then errors that all reversals share, in order of time
     """
 
     observations: Observations
@@ -53,29 +56,40 @@ class EvidenceRows:
     bounds: tuple[NDArray[np.intp], ...]
     features: tuple[Array, ...]
     groups: NDArray[np.intp]
+    successions: tuple[Succession, ...]
 
     @staticmethod
     def prepare(observations: Observations, model: ExtendedModel) -> "EvidenceRows":
         """Rows of training recordings beside a nominal model."""
         reach, white = Reach.of(observations), WhiteColumns(observations)
-        order, certain, bounds, features = [], [], [], []
+        order, certain, bounds, features, successions = [], [], [], [], []
         shared = 0
         for joint in range(observations.robot.joint_count):
-            near, stopped = find_rest(observations, model, joint)
+            near, _ = find_rest(observations, model, joint)
             kinds = np.digitize(near, REST_BOUNDS)
-            places = [np.flatnonzero((kinds == kind) & ~stopped) for kind in range(len(REST_SHARES))]
+            places = [np.flatnonzero(kinds == kind) for kind in range(len(REST_SHARES))]
             order.append(np.concatenate(places))
-            certain.append(certainty(observations, model, joint, OPEN)[order[-1]])
+            certain.append(weigh_rows(observations, model, joint)[order[-1]])
             bounds.append(np.cumsum([0, *map(len, places)]))
             smooth = smooth_features(observations, model, joint, reach)
             errors = shared_errors(observations, model, joint, np.ones(smooth.shape[1]))
             shared = len(errors)
-            features.append(np.vstack([smooth, errors])[:, order[-1]] * certain[-1])
+            features.append(np.vstack([smooth, errors]))
+            successions.append(Succession.of(*observations.row_labels(joint)))
         groups = np.concatenate([GROUP, np.full(shared, -1)])
-        return EvidenceRows(observations, white, tuple(order), tuple(certain), tuple(bounds), tuple(features), groups)
+        return EvidenceRows(
+            observations,
+            white,
+            tuple(order),
+            tuple(certain),
+            tuple(bounds),
+            tuple(features),
+            groups,
+            tuple(successions),
+        )
 
-    def take(self, joint: int, rows: Array) -> Array:
-        """The rows of a joint that count, in order of their class, (…, R_j).
+    def take(self, joint: int, rows: Array, dependence: float) -> Array:
+        """The rows of a joint that count, as much as they tell, in order of their class, (…, R_j).
 
         Parameters
         ----------
@@ -83,35 +97,86 @@ class EvidenceRows:
             joint index, from 0
         rows : (…, R) float64
             white rows
+        dependence : float
+            κ
         """
-        return rows[..., self.order[joint]] * self.certain[joint]
+        return rows[..., self.order[joint]] * (self.certain[joint] / np.sqrt(dependence))
 
-    def moments(self, model: ExtendedModel, *, owned: bool = False) -> tuple[JointMoments, ...]:
-        """What a model leaves, and the slopes of that in all its parameters, one entry a joint.
+    def moments(
+        self, model: ExtendedModel, dependence: Sequence[float], *, owned: bool = False
+    ) -> tuple[JointMoments, ...]:
+        """Residual of a model and its slopes in all parameters, one entry a joint.
 
         The discrepancy is beyond what the nominal model can make; where terms are `owned`, beyond what they can, too.
         """
-        linear = zip(self.white.residual(model), self.white.all(model), strict=True)
         plain = model.size if owned else model.structure.size + len(model.constants)
-        return tuple(self._joint_moments(joint, *own, plain) for joint, own in enumerate(linear))
+        given = zip(self.white.residual(model), self.white.all(model), dependence, strict=True)
+        return tuple(self.joint_moments(joint, *own, plain) for joint, own in enumerate(given))
 
-    def _joint_moments(self, joint: int, residual: Array, linear: JointColumns, plain: int) -> JointMoments:
-        """Those of one joint, with a discrepancy beyond the columns of the first parameters."""
-        columns, smooth = self.take(joint, linear.rows), self.groups >= 0
-        features = self.features[joint].copy()
+    def joint_moments(
+        self, joint: int, residual: Array, linear: JointColumns, dependence: float, plain: int
+    ) -> JointMoments:
+        """Those of one joint, with a discrepancy beyond the columns of the first parameters.
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        residual : (R,) float64
+            white rows
+        dependence : float
+            κ
+        plain : int
+            number of parameters that the discrepancy leaves alone
+        """
+        columns, smooth = self.take(joint, linear.rows, dependence), self.groups >= 0
+        features = self.take(joint, self.features[joint], dependence)
         features[smooth] = beyond(columns[linear.index < plain], features[smooth])
-        share = self.observations.noise[joint].share
-        target = self.take(joint, residual)
-        return JointMoments.of(linear.index, target, columns, features, self.bounds[joint], share, self.groups)
+        # Σ log(σ² + u²) over rows of uncertainty u grows with log σ² by 1 / (1 + u²/σ²) for each.
+        told = np.add.reduceat(np.append(self.certain[joint] ** 2, 0.0), self.bounds[joint][:-1])
+        told = np.where(np.diff(self.bounds[joint]) > 0, told, 0.0)
+        counts = told * self.observations.noise[joint].share / dependence
+        target = self.take(joint, residual, dependence)
+        return JointMoments.of(linear.index, target, columns, features, self.bounds[joint], counts, self.groups)
 
-    def measured_rms(self, joint: int) -> float:
+    def dependence(self, joint: int, left: Array) -> float:
+        """κ of what a model leaves beside its discrepancy.
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        left : (R_j,) float64
+            in order of class
+        """
+        rows, moving = np.zeros(self.features[joint].shape[1]), self.bounds[joint][1]
+        rows[self.order[joint][:moving]] = left[:moving]
+        return self.successions[joint].dependence(rows)
+
+    def columns(self, effect: Effect, shapes: Array, signals: Sequence[Signals]) -> dict[int, Array]:
+        """White rows of an effect at every joint that it touches, in order of time, (s, c, R).
+
+        Parameters
+        ----------
+        shapes : (s, k) float64
+            values of its shape parameters
+        """
+        return white_columns(self.observations, effect, shapes, signals)
+
+    @property
+    def interval_s(self) -> float:
+        """Time between rows [s]."""
+        first = next(iter(self.observations)).row_times()
+        return float(first[1] - first[0])
+
+    def measured_rms(self, joint: int, dependence: float) -> float:
         """Rms of a joint's white torque."""
-        torque = self.take(joint, self.white.measured(joint))
+        torque = self.take(joint, self.white.measured(joint), dependence)
         return float(np.sqrt(np.mean(torque**2))) if torque.size else 0.0
 
 
-def find_rest(observations: Observations, model: ExtendedModel, joint: int) -> tuple[Array, BoolArray]:
-    """Share of every white row's samples near rest, (R,), and which rows are of a stop, (R,).
+def find_rest(observations: Observations, model: ExtendedModel, joint: int) -> tuple[Array, NDArray[np.intp]]:
+    """Share of every white row's samples near rest, (R,), and which stop it is of, from 1, or 0 for none, (R,).
 
     Parameters
     ----------
@@ -121,8 +186,33 @@ def find_rest(observations: Observations, model: ExtendedModel, joint: int) -> t
     order = observations.noise[joint].order if observations.noise else 0
     kept = observations.kept(joint)
     near = np.concatenate([_measure_rest(piece, model, joint)[order:] for piece in observations])
-    stopped = np.concatenate([_find_stops(piece, joint)[order:] for piece in observations])
-    return near[kept], stopped[kept]
+    stops, count = [], 0
+    for piece in observations:
+        own = _find_stops(piece, joint)
+        stops.append(np.where(own > 0, own + count, 0)[order:])
+        count += int(own.max(initial=0))
+    return near[kept], np.concatenate(stops)[kept]
+
+
+def weigh_rows(observations: Observations, model: ExtendedModel, joint: int) -> Array:
+    """How much every white row of a joint tells beside friction's step and at stops, (R,).
+
+    Parameters
+    ----------
+    joint : int
+        joint index, from 0
+    """
+    _, stops = find_rest(observations, model, joint)
+    return certainty(observations, model, joint, OPEN) * _weigh_stops(observations, model, joint, stops)
+
+
+def _weigh_stops(observations: Observations, model: ExtendedModel, joint: int, stops: NDArray[np.intp]) -> Array:
+    """Weight of each row, (R,): all rows of a stop count as one, whose friction is anything up to breakaway."""
+    column = model.structure.coefficient(joint, "stiction")
+    breakaway = 0.0 if column is None else float(model.parameters[column])
+    power = 1.0 + breakaway**2 / observations.noise[joint].model.variance
+    rows = np.bincount(stops)[stops]
+    return np.where(stops > 0, 1.0 / np.sqrt(rows * power), 1.0)
 
 
 def _measure_rest(piece: Piece, model: ExtendedModel, joint: int) -> Array:
@@ -136,9 +226,9 @@ def _measure_rest(piece: Piece, model: ExtendedModel, joint: int) -> Array:
     return np.clip(piece.repeated(motion.band.reduce(slow[None]))[0], 0.0, 1.0)
 
 
-def _find_stops(piece: Piece, joint: int) -> BoolArray:
-    """Rows of a stop of a joint, (P M,)."""
-    stopped = np.zeros(piece.rows, dtype=bool)
-    for stop in piece.prepared.stops(joint):
-        stopped[max(stop.start - AROUND_STOP, 0) : stop.stop + AROUND_STOP] = True
+def _find_stops(piece: Piece, joint: int) -> NDArray[np.intp]:
+    """Number of the stop that each row is of, from 1, or 0 for none, (P M,)."""
+    stopped = np.zeros(piece.rows, dtype=np.intp)
+    for number, stop in enumerate(piece.prepared.stops(joint), start=1):
+        stopped[max(stop.start - AROUND_STOP, 0) : stop.stop + AROUND_STOP] = number
     return np.tile(stopped, piece.repetitions)

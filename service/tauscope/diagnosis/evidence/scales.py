@@ -19,6 +19,9 @@ REST_BOUNDS = (0.02, 0.3, 0.7)
 NOISE_SPREAD = 1.5
 """Standard deviation of log σ about the noise that was estimated before."""
 
+REPEATED_SPREAD = 0.1
+"""…where repetitions of the motion tell it."""
+
 REST_SPREAD = 2.0
 """Standard deviation of log r about…"""
 
@@ -40,15 +43,25 @@ class Scales:
         log σ, log a_g of every group, log r; in units of white noise
     level : float
         rms of what the plain model leaves, white
+    noise_spread : float
+        standard deviation of log σ about the noise that was estimated before
     """
 
     values: Array
     level: float
+    noise_spread: float = NOISE_SPREAD
 
     @staticmethod
-    def start(level: float) -> "Scales":
-        """Noise as it was estimated, and a discrepancy of a tenth of what is left."""
-        return Scales(np.array([0.0, *[np.log(0.1 * level)] * GROUPS, REST]), level)
+    def start(level: float, *, repeated: bool = False) -> "Scales":
+        """Noise as it was estimated, and a discrepancy of a tenth of what is left.
+
+        Parameters
+        ----------
+        repeated : bool
+            whether repetitions of the motion tell the noise
+        """
+        values = np.array([0.0, *[np.log(0.1 * level)] * GROUPS, REST])
+        return Scales(values, level, REPEATED_SPREAD if repeated else NOISE_SPREAD)
 
     def bounds(self) -> list[tuple[float, float]]:
         """Range of each logarithm."""
@@ -94,12 +107,12 @@ class Scales:
 
     def penalty(self) -> float:
         """-log p of the scales: a discrepancy is hardly larger than what the plain model leaves."""
-        noise, rest = self.values[0] / NOISE_SPREAD, (self.values[-1] - REST) / REST_SPREAD
+        noise, rest = self.values[0] / self.noise_spread, (self.values[-1] - REST) / REST_SPREAD
         return 0.5 * float(noise**2 + rest**2 + np.sum(np.exp(2.0 * self.values[1:-1])) / self.level**2)
 
     def penalty_slopes(self) -> Array:
         """Slopes of the penalty, (2 + G,)."""
-        noise, rest = self.values[0] / NOISE_SPREAD**2, (self.values[-1] - REST) / REST_SPREAD**2
+        noise, rest = self.values[0] / self.noise_spread**2, (self.values[-1] - REST) / REST_SPREAD**2
         return np.array([noise, *np.exp(2.0 * self.values[1:-1]) / self.level**2, rest])
 
     def without_discrepancy(self, noise: float) -> "Scales":
@@ -112,4 +125,4 @@ class Scales:
         """
         values = self.values.copy()
         values[0], values[1:-1] = np.log(noise), np.log(LEAST * self.level)
-        return Scales(values, self.level)
+        return Scales(values, self.level, self.noise_spread)

@@ -22,8 +22,6 @@ from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.messages import one_line, shown
 from tauscope.strict_model import ResultModel
 
-MODEL_SCHEMA = "tauscope.model/1"
-
 LARGEST_FILE = 16 * 2**20
 
 PLACES = ("joint", "grid", "lower", "upper")

@@ -6,11 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize, stats
 
+from tauscope.diagnosis.findings.effective_number import effective_number
 from tauscope.diagnosis.fitting.fit import Fit
-from tauscope.diagnosis.screening.screen import Candidate
+from tauscope.diagnosis.fitting.projection import INVISIBLE, moments
+from tauscope.diagnosis.fitting.white_columns import SHAPES_AT_ONCE, white_columns
+from tauscope.diagnosis.observations.observations import Observations
+from tauscope.effects import Effect, Signals
+from tauscope.effects.computation import side_by_side
 from tauscope.effects.plain_terms import PlainTerm
 
 POWER = 0.9
+"""Chance at which an effect of the smallest size is found."""
 
 
 @dataclass(frozen=True)
@@ -30,17 +36,59 @@ class Detectable:
     visible: bool
 
 
-def detectable(candidates: Sequence[Candidate], level: float, inflation: float) -> tuple[Detectable, ...]:
+@dataclass(frozen=True)
+class Visibility:
+    """How much a form of an effect shows beside a fitted model.
+
+    information : float
+        energy of its first column for a size of one, at a usual shape; zero where it does not show [noise variances]
+    shapes_tried : float
+        effective number of shapes among which chance may choose
+    """
+
+    effect: Effect
+    information: float
+    shapes_tried: float
+
+    def needed_strength(self, level: float) -> float:
+        """Noncentrality λ at which the form is significant with probability `POWER`."""
+        return _strength(len(self.effect.coefficients), self.shapes_tried, level)
+
+
+def visibilities(fit: Fit, observations: Observations, effects: Sequence[Effect]) -> list[Visibility]:
+    """Forms of effects beside a fitted model."""
+    signals = [fit.model.signals(piece) for piece in observations]
+    seeds = range(len(effects))
+    return side_by_side(lambda seed: _visibility(fit, observations, effects[seed], signals, seed), seeds)
+
+
+def _visibility(
+    fit: Fit, observations: Observations, effect: Effect, signals: Sequence[Signals], seed: int
+) -> Visibility:
+    """One form, by shapes drawn from its grid; all others count as these do."""
+    rng = np.random.default_rng(seed)
+    drawn = rng.permutation(len(effect.grid))[:SHAPES_AT_ONCE]
+    shapes = effect.grid[np.sort(drawn)]
+    columns = white_columns(observations, effect, shapes, signals)
+    found = moments(fit.projection, columns)
+    visible = (found.shares > INVISIBLE).all(axis=1)
+    if not visible.any():
+        return Visibility(effect, 0.0, 1.0)
+    number = effective_number(found, columns, rng) if len(shapes) > 1 else 1.0
+    information = float(np.median(found.gram[visible, 0, 0]))
+    return Visibility(effect, information, number * len(effect.grid) / len(shapes))
+
+
+def detectable(forms: Sequence[Visibility], level: float, inflation: float) -> tuple[Detectable, ...]:
     """Smallest sizes that are found in nine of ten such data sets."""
     best: dict[tuple[str, int | None], Detectable] = {}
-    for each in candidates:
+    for each in forms:
         key = (each.effect.id, each.effect.joint)
         unit = each.effect.coefficients[0].unit
-        if not each.visible or each.information <= 0.0:
+        if each.information <= 0.0:
             best.setdefault(key, Detectable(*key, None, unit, False))
             continue
-        strength = needed_strength(each, level)
-        size = float(np.sqrt(strength * inflation / each.information))
+        size = float(np.sqrt(each.needed_strength(level) * inflation / each.information))
         if size > each.effect.coefficients[0].largest:  # nothing real is as large as that
             best.setdefault(key, Detectable(*key, None, unit, False))
             continue
@@ -64,11 +112,6 @@ def detectable_parameters(
             size = float(np.sqrt(_strength(1, 1.0, level) * variance)) if variance > 0.0 else None
             found.append(Detectable(kind.id, joint, size, kind.coefficients[0].unit, size is not None))
     return tuple(found)
-
-
-def needed_strength(candidate: Candidate, level: float) -> float:
-    """Noncentrality λ at which a form is significant with probability `POWER`."""
-    return _strength(candidate.count, candidate.shapes_tried, level)
 
 
 def _strength(count: int, shapes_tried: float, level: float) -> float:

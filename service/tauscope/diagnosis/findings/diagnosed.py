@@ -9,13 +9,12 @@ from tauscope.diagnosis.findings.constancy import Constancy
 from tauscope.diagnosis.findings.detectability import Detectable
 from tauscope.diagnosis.findings.finding import Finding, FitSizes, in_order
 from tauscope.diagnosis.findings.location import JointMismatch
+from tauscope.diagnosis.findings.unseen import Unseen
 from tauscope.diagnosis.findings.verdict import Evidence, Verdict, verdict
 from tauscope.diagnosis.findings.wrong_value import WrongValue
-from tauscope.diagnosis.fitting.fit import Fitter
+from tauscope.diagnosis.fitting.fit import Fit, Fitter
 from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit
-from tauscope.diagnosis.screening.screen import Screen
-from tauscope.diagnosis.selection.choice import Selection
-from tauscope.diagnosis.selection.confirmation import HeldOut
+from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.effects import ArmContext
 from tauscope.identification import Identification
 from tauscope.identification.warnings import extrapolations
@@ -49,6 +48,14 @@ class ParameterDifference:
 
 
 @dataclass(frozen=True, eq=False)
+class Selection:
+    """The nominal model, and the one with all findings."""
+
+    nominal: Fit
+    fit: Fit
+
+
+@dataclass(frozen=True, eq=False)
 class Diagnosis:
     """What was found.
 
@@ -75,9 +82,8 @@ class Diagnosis:
     pure_error: bool
     level: float
     cutoff_hz: float
-    screen: Screen
     fitter: Fitter
-    held_out: HeldOut | None
+    held_out: Unseen | None
     against: Literal["identified", "model", "simulation"] = "identified"
     differences: tuple[ParameterDifference, ...] = ()
     tentative: tuple[Finding, ...] = ()
@@ -118,12 +124,18 @@ class Diagnosis:
     @cached_property
     def predicts(self) -> bool:
         """Whether the final model predicts the held-out recordings, where there are any."""
-        return self.held_out is None or self.held_out.predicted_by(self.selection.fit.model)
+        return self.held_out is None or self.held_out.is_predicted_by(self.selection.fit.model)
 
     @property
     def inflation(self) -> float:
         """Factor by which the residual exceeds the modelled noise; 1 where that is known from repetitions."""
         return 1.0 if self.pure_error else self.selection.fit.inflation()
+
+    def sizes(self, model: ExtendedModel) -> FitSizes:
+        """Residuals of a model on the recordings."""
+        return FitSizes.of(
+            model, self.fitter.observations, None if self.held_out is None else self.held_out.observations
+        )
 
     def with_findings(self, added: Sequence[Finding]) -> "Diagnosis":
         """The same with more findings, those apart that held-out motion refutes."""

@@ -43,9 +43,6 @@ def with_direct_findings(
             probability=float(stats.norm.cdf(CERTAIN)),
             alternatives=(),
             confirmed=known.confirmed if agrees is None else agrees,
-            behind=None,
-            as_law=1.0,
-            elsewhere=(),
         )
     seen = tuple(limit for each in measured if not each.is_open for limit in _limits(each))
     found = replace(diagnosis, findings=(), detectable=(*diagnosis.detectable, *seen))

@@ -12,7 +12,6 @@ import numpy as np
 from tauscope.diagnosis.fitting.fit import Fit
 from tauscope.diagnosis.model.residual import residual_rows
 from tauscope.diagnosis.observations.observations import BoolArray, Observations
-from tauscope.diagnosis.selection.choice import Selection
 from tauscope.effects import Signals
 from tauscope.recording.recording import Array
 
@@ -61,11 +60,10 @@ class JointMismatch:
     time: Place | None
 
 
-def locate(selection: Selection, observations: Observations, left: Sequence[bool]) -> tuple[JointMismatch, ...]:
+def locate(nominal: Fit, fit: Fit, observations: Observations, left: Sequence[bool]) -> tuple[JointMismatch, ...]:
     """Excess residual of every joint."""
-    nominal, fit = selection.nominal, selection.fit
     before = residual_rows(nominal.model, observations)
-    after = residual_rows(fit.model, observations) if selection.choices else None
+    after = residual_rows(fit.model, observations) if fit.model.terms else None
     signals = [nominal.model.signals(piece) for piece in observations]
     terms = fit.model.terms
     found = []

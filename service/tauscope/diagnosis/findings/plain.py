@@ -7,17 +7,18 @@ says nothing, nor does a URDF: its <dynamics> are often placeholders.
 """
 
 from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 from scipy import stats
 
-from tauscope.diagnosis.findings.constant_torque import instead_of_a_constant
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
-from tauscope.diagnosis.findings.finding import Finding, is_confirmed, sizes, without_nominal
+from tauscope.diagnosis.findings.finding import Finding, equivalent
+from tauscope.diagnosis.fitting.fit import Fit
+from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.term import Term
-from tauscope.diagnosis.selection.admission import SMALLEST_SHARE
-from tauscope.diagnosis.selection.equivalence import probability_among
-from tauscope.diagnosis.selection.shape_error import HARDLY
+from tauscope.diagnosis.search.constant import weigh_constant
+from tauscope.diagnosis.search.from_recordings import Searched
 from tauscope.effects.plain_terms import CoulombFriction, PlainTerm, StribeckTerm, TorqueOffset, ViscousFriction
 from tauscope.robot import Robot
 
@@ -57,48 +58,61 @@ def with_plain_terms(diagnosis: Diagnosis, lacking: Lacking) -> Diagnosis:
     return diagnosis.with_findings(added)
 
 
+def with_rivals_of_constants(diagnosis: Diagnosis, searched: Searched) -> Diagnosis:
+    """The same, each constant with what may be in its place."""
+    findings = [
+        replace(each, alternatives=equivalent(*weigh_constant(searched, each.terms[0].effect.joint or 0)))
+        if isinstance(each.terms[0].effect, TorqueOffset)
+        else each
+        for each in diagnosis.findings
+    ]
+    return replace(diagnosis, findings=tuple(findings))
+
+
 def _finding(effect: PlainTerm, diagnosis: Diagnosis) -> Finding | None:
     """The finding of one nominal term, None where it may as well be zero."""
-    fit, inflation = diagnosis.selection.fit, diagnosis.inflation
+    fit = diagnosis.selection.fit
     joint = effect.joint or 0
     place = fit.model.structure.coefficient(joint, effect.term)
     if place is None:
         return None
-    value, variance = float(fit.model.parameters[place]), float(fit.covariance[place, place]) * inflation
-    if variance <= 0.0 or stats.chi2.sf(value**2 / variance, 1) >= diagnosis.level:
-        return None
-    without = without_nominal(fit, place, diagnosis.fitter)
-    gain = without.energy - fit.energy
-    # Beside an effect whose columns change with the parameters, the linear standard error may be too small: both count.
-    if stats.chi2.sf(max(gain, 0.0) / inflation, 1) >= diagnosis.level:
-        return None
-    residual = fit.projection.residual[joint]
-    if not diagnosis.pure_error and gain < SMALLEST_SHARE * float(residual @ residual):
+    value, variance = float(fit.model.parameters[place]), float(fit.covariance[place, place])
+    believed = float(np.linalg.inv(diagnosis.identification.posterior.precision)[_column(effect, diagnosis)] ** 0.5)
+    gain = value**2 / max(variance, np.finfo(float).tiny)
+    log_odds = 0.5 * gain - 0.5 * np.log(1.0 + believed**2 / max(variance, np.finfo(float).tiny))
+    if variance <= 0.0 or stats.chi2.sf(gain, 1) >= diagnosis.level or log_odds <= 0.0:
         return None
     delta = fit.model.structure.terms[joint].delta
     shape = np.array([delta] if isinstance(effect, StribeckTerm) and delta is not None else [])
-    others = ()
-    if isinstance(effect, TorqueOffset):
-        others = instead_of_a_constant(effect, without, gain, diagnosis.screen, diagnosis.fitter)
-    probability = probability_among(gain - 1.0, [option.score for option in others], [inflation] * len(others))
-    if probability < HARDLY:  # something else explains it better, and has been refused elsewhere
-        return None
-    term = Term(effect, shape, np.array([value]))
-    before = sizes(without.model, diagnosis.fitter, diagnosis.held_out)
     return Finding(
-        terms=(term,),
+        terms=(Term(effect, shape, np.array([value])),),
         covariances=(np.diag([variance, *np.zeros(len(shape))]),),
         gain=gain,
-        probability=probability,
-        before=before,
+        probability=float(1.0 / (1.0 + np.exp(-min(log_odds, 700.0)))),
+        before=diagnosis.sizes(_without(fit, place)),
         after=diagnosis.after,
-        alternatives=others,
-        confirmed=is_confirmed(term, before, diagnosis.after, seen_again=_seen_again(place, value, diagnosis)),
+        confirmed=_is_seen_again(place, value, diagnosis),
         in_model=False,
     )
 
 
-def _seen_again(place: int, value: float, diagnosis: Diagnosis) -> bool | None:
+def _column(effect: PlainTerm, diagnosis: Diagnosis) -> tuple[int, int]:
+    """Place of a term's variance in the prior of the identification."""
+    column = diagnosis.identification.structure.coefficient(effect.joint or 0, effect.term) or 0
+    return column, column
+
+
+def _without(fit: Fit, place: int) -> ExtendedModel:
+    """The model with one nominal parameter at zero, the others as they then most likely are."""
+    covariance, size = fit.covariance, fit.model.structure.size
+    parameters = (
+        fit.model.parameters - fit.model.parameters[place] * covariance[:size, place] / covariance[place, place]
+    )
+    parameters[place] = 0.0
+    return replace(fit.model, parameters=parameters)
+
+
+def _is_seen_again(place: int, value: float, diagnosis: Diagnosis) -> bool | None:
     """Whether held-out recordings, asked alone, give the term the same sign."""
     if diagnosis.held_out is None:
         return None

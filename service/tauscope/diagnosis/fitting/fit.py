@@ -12,7 +12,6 @@ from tauscope.diagnosis.fitting.white_columns import WhiteColumns
 from tauscope.diagnosis.model.extended import ExtendedModel, with_terms
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.observations.observations import Observations
-from tauscope.effects.computation import LastFew
 from tauscope.recording.recording import Array
 
 STEPS = 25
@@ -31,9 +30,6 @@ TRUSTED = (1.0, 0.25, 0.06, 0.015)
 FARTHEST = 3.0
 """Factor beyond which a constant of the friction curve does not move from where the identification found it."""
 
-KEPT = 8
-"""Fits without some terms that are kept."""
-
 AT_LIMIT = 1e-6
 """Part of its largest step within which a constant or a shape is at its limit."""
 
@@ -44,8 +40,6 @@ class Fit:
 
     energy : float
         Σ r² that the model leaves, the prior's included [noise variances]
-    joint_energies : (n,) float64
-        the same by joint, without the prior's
     spread : (p, r) float64
         square root of the covariance; a shape at its bound is as uncertain as if there were none
     """
@@ -53,7 +47,6 @@ class Fit:
     model: ExtendedModel
     projection: Projection
     energy: float
-    joint_energies: Array
     spread: Array
 
     @property
@@ -61,9 +54,19 @@ class Fit:
         """Covariance of all parameters for white noise of the modelled size, (p, p)."""
         return self.spread @ self.spread.T
 
-    def inflation(self, *, at_least: float = 1.0) -> float:
-        """Residual energy per degree of freedom: what is left is more than the modelled noise by this factor."""
-        return max(at_least, self.energy / self.projection.freedom)
+    @property
+    def free_parameters(self) -> Array:
+        """Θ as the data alone have it, (p,)."""
+        return self.model.parameters + self.projection.step[: self.model.structure.size]
+
+    @property
+    def free_covariance(self) -> Array:
+        """Covariance of all parameters as the data alone have it, (p, p)."""
+        return self.projection.spread @ self.projection.spread.T
+
+    def inflation(self) -> float:
+        """Residual energy per degree of freedom, at least 1: by this factor more is left than the modelled noise."""
+        return max(1.0, self.energy / self.projection.freedom)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +84,7 @@ class Tried:
     def energy(self) -> float:
         """Σ r² of the data's rows and of the prior's."""
         _, left = self.model.prior()
-        return float(_energies(self.residual).sum() + left @ left)
+        return float(sum(row @ row for row in self.residual) + left @ left)
 
 
 class Fitter:
@@ -90,14 +93,13 @@ class Fitter:
     def __init__(self, observations: Observations) -> None:
         self.observations = observations
         self._white = WhiteColumns(observations)
-        self._without: LastFew[tuple[Fit, tuple[int, ...]], Fit] = LastFew(KEPT)
 
-    def fit(self, model: ExtendedModel, *, steps: int = STEPS) -> Fit:
+    def fit(self, model: ExtendedModel) -> Fit:
         """Fit all parameters."""
         limits = _constants_limits(model)
         at = self.linear_optimum(model)
         projection = self._project(at)
-        for _ in range(steps):
+        for _ in range(STEPS):
             if at.energy - projection.energy < SETTLED:
                 break
             tried = self._descended(at, projection, limits)
@@ -108,7 +110,7 @@ class Fitter:
             if gained < SETTLED:
                 break
         projection, spread = self._within_limits(at, projection, limits)
-        return Fit(at.model, projection, at.energy, _energies(at.residual), spread)
+        return Fit(at.model, projection, at.energy, spread)
 
     def _within_limits(self, at: Tried, projection: Projection, limits: Array) -> tuple[Projection, Array]:
         """The projection without what would only lead beyond limits, and the spread of all parameters.
@@ -146,7 +148,6 @@ class Fitter:
         at = self._tried(model)
         linear = np.ones(model.size, dtype=bool)
         linear[model.structure.size : model.structure.size + len(model.constants)] = False
-        linear[list(model.unmoved)] = False
         for term, place in zip(model.terms, model.term_places(), strict=True):
             linear[place.start + len(term.coefficients) : place.stop] = False
         places = np.cumsum(linear) - 1
@@ -156,22 +157,10 @@ class Fitter:
         step[linear] = fitted_parameters(free, at.residual, int(linear.sum()))
         return self._tried(stepped(model, step))
 
-    def without(self, fit: Fit, places: Sequence[int]) -> Fit:
-        """The model fitted anew without some of its terms; the last few are kept, as several ask for the same."""
-        terms = [term for place, term in enumerate(fit.model.terms) if place not in places]
-        key = fit, tuple(sorted(places))
-        return self._without.get(key, lambda: self.fit(with_terms(fit.model, terms)))
-
     def projected(self, model: ExtendedModel) -> Fit:
         """The linear step at a model as it is, without moving it."""
         projection = self._project(self._tried(model))
-        return Fit(model, projection, projection.energy, _energies(projection.residual), projection.spread)
-
-    def covariance(self, fit: Fit) -> Array:
-        """Covariance of all parameters, (p, p); a term does not make those that it displaced more certain."""
-        if not any(term.displaced for term in fit.model.terms):
-            return fit.covariance
-        return self.projected(with_terms(fit.model, [replace(t, displaced=()) for t in fit.model.terms])).covariance
+        return Fit(model, projection, projection.energy, projection.spread)
 
     def white_residual(self, model: ExtendedModel) -> list[Array]:
         """Whitened residual of a model as it is, (R_j,) a joint."""
@@ -190,11 +179,6 @@ class Fitter:
         rows = sum(own.share * len(row) for own, row in zip(noise, at.residual, strict=True))
         columns = _without(self._white.all(at.model), but)
         return replace(project(columns, at.residual, at.model.size, at.model.prior()), independent=rows)
-
-
-def _energies(residual: Sequence[Array]) -> Array:
-    """Σ r² by joint, (n,)."""
-    return np.array([float(row @ row) for row in residual])
 
 
 def _constants_limits(model: ExtendedModel) -> Array:

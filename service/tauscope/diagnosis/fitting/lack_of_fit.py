@@ -5,6 +5,7 @@ more of the residual's energy per direction than the rest does (F test: an error
 *Pure error*: the mean over repetitions differs from the model by no more than repetitions differ among themselves.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,9 +30,6 @@ relative to the largest."""
 LEVEL = 1e-3
 """Chance, over all joints and both tests, at which a mismatch is called significant."""
 
-RARE = 0.01
-"""Chance at one joint, by either test, from which it is worth to look for more there."""
-
 
 @dataclass(frozen=True, eq=False)
 class LackOfFit:
@@ -43,15 +41,12 @@ class LackOfFit:
         Σ r² beyond the noise's, in noise variances, never negative
     measurable : (n,) float64
         the excess from which it exceeds what the noise's own power is uncertain by [noise variances]
-    structured : (n,) float64
-        the part of it that smooth functions of state and time hold, where the omnibus test tells that from chance
     """
 
     omnibus: Array
     pure_error: Array
     excess: Array
     measurable: Array
-    structured: Array
 
     @property
     def significant(self) -> list[bool]:
@@ -65,40 +60,44 @@ class LackOfFit:
         pairs = zip(self.significant, self.excess, self.measurable, strict=True)
         return [significant and bool(excess > least) for significant, excess, least in pairs]
 
-    @property
-    def worth_a_look(self) -> list[bool]:
-        """Per joint, whether so much is left rarely by chance: a search asks more of what it finds than this test."""
-        return [bool(min(a, b) < RARE) for a, b in zip(self.omnibus, self.pure_error, strict=True)]
 
+def lack_of_fit(
+    fit: Fit,
+    observations: Observations,
+    dependence: Sequence[float] | None = None,
+    *,
+    pure_error: bool,
+) -> LackOfFit:
+    """Test what a model leaves.
 
-def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed: int = 0) -> LackOfFit:
-    """Test what a model leaves."""
+    Parameters
+    ----------
+    dependence : sequence of float or None
+        number of rows of each joint that count as one; None where each does
+    """
     joints = observations.robot.joint_count
-    omnibus, pure = np.ones(joints), np.ones(joints)
-    excess, measurable, structured = np.zeros(joints), np.zeros(joints), np.zeros(joints)
+    pure = np.ones(joints)
+    excess, measurable = np.zeros(joints), np.zeros(joints)
     rows = sum(own.share * len(row) for own, row in zip(observations.noise, fit.projection.residual, strict=True))
     share = fit.projection.spread.shape[1] / max(rows, 1.0)
     repeated = pure_error_rows(observations)
     freedoms = [
-        noise.share * len(residual) * (1.0 - share)
-        for noise, residual in zip(observations.noise, fit.projection.residual, strict=True)
+        observations.independent_rows(joint, residual) * (1.0 - share)
+        for joint, residual in enumerate(fit.projection.residual)
     ]
-    tests = side_by_side(lambda joint: _omnibus(fit, observations, joint, freedoms[joint], seed), range(joints))
+    independent = [freedom / rows for freedom, rows in zip(freedoms, dependence or [1.0] * joints, strict=True)]
+    omnibus = side_by_side(lambda joint: _omnibus(fit, observations, joint, independent[joint]), range(joints))
     for joint, residual in enumerate(fit.projection.residual):
-        omnibus[joint], beyond_chance = tests[joint]
         freedom = freedoms[joint]
-        if omnibus[joint] < _level(joints):
-            structured[joint] = max(beyond_chance, 0.0)
-        over = observations.noise[joint].over_repetitions
-        energy = float(residual @ residual) * over  # in what repetitions differ by
-        excess[joint] = max(energy - freedom, 0.0) / over
-        if pure_error and repeated[joint] > 0:  # else a saturated fit of the same rows says what noise is: any excess
+        energy = float(residual @ residual)
+        excess[joint] = max(energy - freedom, 0.0)
+        if pure_error and repeated[joint] > 0:  # else the same rows say what noise is: any excess
             measurable[joint] = MEASURABLE * np.sqrt(2.0 * freedom * (1.0 + freedom / repeated[joint]))
         means = freedom - repeated[joint]
-        if (pure_error or over > 1.0) and repeated[joint] > 0 and means > 1.0:
+        if pure_error and repeated[joint] > 0 and means > 1.0:
             ratio = max(energy - repeated[joint], 0.0) / means
             pure[joint] = float(stats.f.sf(ratio, means, repeated[joint]))
-    return LackOfFit(omnibus, pure, excess, measurable, structured)
+    return LackOfFit(np.array(omnibus), pure, excess, measurable)
 
 
 def pure_error_rows(observations: Observations) -> Array:
@@ -120,20 +119,20 @@ def _level(joints: int) -> float:
     return LEVEL / (2 * joints)
 
 
-def _omnibus(fit: Fit, observations: Observations, joint: int, freedom: float, seed: int) -> tuple[float, float]:
-    """The omnibus test of one joint, as `_f_test` gives it."""
-    rows = [_reduced_features(piece, joint, observations, seed) for piece in observations]
+def _omnibus(fit: Fit, observations: Observations, joint: int, freedom: float) -> float:
+    """p-value of the omnibus test of one joint."""
+    rows = [_reduced_features(piece, joint, observations) for piece in observations]
     white = observations.white(joint, rows)
     basis = fit.projection.basis[joint]
     return _f_test(white - (white @ basis.T) @ basis, fit.projection.residual[joint], freedom)
 
 
-def _f_test(columns: Array, residual: Array, freedom: float) -> tuple[float, float]:
-    """p-value of the residual's energy in the columns' span against the rest, and what it has there beyond chance."""
+def _f_test(columns: Array, residual: Array, freedom: float) -> float:
+    """p-value of the residual's energy in the columns' span against the rest."""
     scale = np.linalg.norm(columns, axis=1)
     columns = columns[scale > 1e-9 * max(float(scale.max(initial=0.0)), 1e-300)]
     if not len(columns):
-        return 1.0, 0.0
+        return 1.0
     unit = columns / np.linalg.norm(columns, axis=1)[:, None]
     energies, axes = np.linalg.eigh(unit @ unit.T)
     known = energies > DIRECTION**2 * energies[-1]
@@ -142,23 +141,22 @@ def _f_test(columns: Array, residual: Array, freedom: float) -> tuple[float, flo
     rest = float(residual @ residual) - inside
     freedom -= count
     if freedom < count or rest <= 0.0:
-        return 1.0, 0.0
-    by_chance = count * rest / freedom
-    return float(stats.f.sf(inside / by_chance, count, freedom)), inside - by_chance
+        return 1.0
+    return float(stats.f.sf(inside / count / (rest / freedom), count, freedom))
 
 
-def _reduced_features(piece: Piece, joint: int, observations: Observations, seed: int) -> Array:
+def _reduced_features(piece: Piece, joint: int, observations: Observations) -> Array:
     """The features in the common band, (k, P M): the same whatever the model and the noise, and made once."""
-    key = f"features of joint {joint}, seed {seed}"
+    key = f"features of joint {joint}"
     if key not in piece.memory:
-        piece.memory[key] = piece.reduced(_features(piece, joint, observations, seed))
+        piece.memory[key] = piece.reduced(_features(piece, joint, observations))
     return piece.memory[key]
 
 
-def _features(piece: Piece, joint: int, observations: Observations, seed: int) -> Array:
+def _features(piece: Piece, joint: int, observations: Observations) -> Array:
     """Smooth functions of state and time at the recorded rate, (k, P, N)."""
     motion = piece.prepared.motion
-    rng = np.random.default_rng([seed, joint])
+    rng = np.random.default_rng([0, joint])
     states = np.concatenate([motion.position, motion.velocity], axis=1)
     reach = np.maximum(_reach(observations), 1e-12)
     count = observations.robot.joint_count

@@ -20,9 +20,6 @@ from tauscope.recording.recording import Array
 RANK_TOLERANCE = 1e-10
 """Singular values of the column-scaled nominal columns below this share of the largest are no direction."""
 
-SINGULAR = 1e-9
-"""Eigenvalues of a candidate's normalised Gram matrix below this are no direction."""
-
 INVISIBLE = 1e-7
 """Share of a candidate's energy outside the nominal columns below which no data of this kind can show it."""
 
@@ -165,53 +162,3 @@ def moments(projection: Projection, columns: Mapping[int, Array]) -> Moments:
     energy = np.einsum("gcc->gc", raw)
     shares = np.einsum("gcc->gc", projected) / np.where(energy > 0.0, energy, 1.0)
     return Moments(np.asarray(target), projected, np.clip(shares, 0.0, 1.0), inner)
-
-
-def statistics(found: Moments, positive: Sequence[bool]) -> tuple[Array, Array]:
-    """What each shape takes off the residual's energy, and the coefficients with which it does.
-
-    Returns
-    -------
-    tuple of (g,) float64 and (g, c) float64
-        T and the coefficients
-    """
-    gains = np.zeros(len(found.target))
-    coefficients = np.zeros_like(found.target)
-    present = found.shares > INVISIBLE
-    whole = np.flatnonzero(present.all(axis=1))
-    solved = _all_solved(found.target[whole], found.gram[whole])
-    right = ~((solved < 0.0) & np.asarray(positive)).any(axis=1)
-    coefficients[whole[right]] = solved[right]
-    gains[whole[right]] = np.sum(solved[right] * found.target[whole[right]], axis=1)
-    for place in np.setdiff1d(np.flatnonzero(present.any(axis=1)), whole[right]):
-        gains[place], coefficients[place] = _solved(found.target[place], found.gram[place], present[place], positive)
-    return gains, coefficients
-
-
-def _all_solved(target: Array, gram: Array) -> Array:
-    """Coefficients of many shapes of which every column counts, (g, c)."""
-    scale = np.sqrt(np.einsum("gcc->gc", gram))
-    values, vectors = np.linalg.eigh(gram / (scale[:, :, None] * scale[:, None, :]))
-    inverse = np.where(values > SINGULAR, 1.0 / np.where(values > SINGULAR, values, 1.0), 0.0)
-    inner = np.einsum("gcv,gc->gv", vectors, target / scale)
-    return np.einsum("gcv,gv->gc", vectors, inverse * inner) / scale
-
-
-def _solved(target: Array, gram: Array, present: NDArray[np.bool_], positive: Sequence[bool]) -> tuple[float, Array]:
-    """Gain and coefficients of one shape; columns of the wrong sign are taken out one after another."""
-    present = present.copy()
-    solution = np.zeros(len(target))
-    while present.any():
-        keep = [int(place) for place in np.flatnonzero(present)]
-        part = gram[np.ix_(keep, keep)]
-        scale = np.sqrt(np.diag(part))
-        values, vectors = np.linalg.eigh(part / np.outer(scale, scale))
-        known = values > SINGULAR
-        half = vectors[:, known] / np.sqrt(values[known])
-        solved = (half @ (half.T @ (target[keep] / scale))) / scale
-        wrong = [k for k, value in zip(keep, solved, strict=True) if positive[k] and value < 0.0]
-        if not wrong:
-            solution[keep] = solved
-            return float(target[keep] @ solved), solution
-        present[wrong] = False
-    return 0.0, solution

@@ -27,7 +27,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tauscope.diagnosis.fitting.fit import Fitter
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.observations.observations import Observations, Piece
 from tauscope.diagnosis.observations.row_weighting import RowWeighting
@@ -35,10 +34,6 @@ from tauscope.dynamics import smooth_sign
 from tauscope.recording.conditioning.common_band import Decimator
 from tauscope.recording.conditioning.filters import smooth
 from tauscope.recording.recording import Array
-
-FAR_OFF = 6.0
-"""Power that the nominal model leaves, in noise variances, beyond which its friction is no guide to anything at the
-joints where that much is left."""
 
 HALF_BAND = 0.5
 """What is left of the motion's velocity without the upper half of its band shows what the band itself does."""
@@ -55,21 +50,8 @@ REALISED = 0.15
 to a fifth of it; what a band does to all of them alike is looked at apart."""
 
 
-def row_weightings(observations: Observations, model: ExtendedModel) -> tuple[RowWeighting, ...]:
-    """How much the whitened rows count, one entry a joint."""
-    fit = Fitter(observations).fit(model)  # an identification leaves alone what it cannot tell, however large it is
-    weightings = weightings_of_motion(observations, fit.model)
-    if fit.inflation() <= FAR_OFF:
-        return weightings
-    left = [energy / len(rows) for energy, rows in zip(fit.joint_energies, fit.projection.residual, strict=True)]
-    return tuple(
-        RowWeighting.certain(len(own.weights)) if power > FAR_OFF else own
-        for power, own in zip(left, weightings, strict=True)
-    )
-
-
 def weightings_of_motion(observations: Observations, model: ExtendedModel) -> tuple[RowWeighting, ...]:
-    """The same by a model that is right about friction, whatever torque was measured."""
+    """How much the whitened rows count beside a model that is right about friction, one entry a joint."""
     whole = observations.with_weightings(())
     weightings = []
     for joint in range(len(observations.noise)):

@@ -25,7 +25,7 @@ def without_spilled(misfit: LackOfFit, fit: Fit, fitter: Fitter, *, pure_error: 
         apart = lack_of_fit(Fitter(rows).fit(fit.model), rows, pure_error=pure_error)
         suspects = (_significant(apart) & _significant(misfit)) - wrong
     spilled = np.isin(np.arange(len(misfit.excess)), list(_significant(misfit) - wrong))
-    tests = ("omnibus", "pure_error", "excess", "structured")
+    tests = ("omnibus", "pure_error", "excess")
     own = {name: np.where(spilled, getattr(apart, name), getattr(misfit, name)) for name in tests}
     return replace(misfit, **own)
 

@@ -14,7 +14,7 @@ from tauscope.diagnosis.fitting.projection import JointColumns
 from tauscope.diagnosis.model.extended import ExtendedModel, shape_slopes, term_columns
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.observations.observations import Observations
-from tauscope.effects import Effect
+from tauscope.effects import Effect, Signals
 from tauscope.effects.computation import THREADS, LastFew
 from tauscope.recording.recording import Array
 
@@ -23,6 +23,9 @@ FRICTION_KEPT = 2 * THREADS
 
 TERMS_KEPT = 24 * THREADS
 """Terms whose columns are kept: as many as two models have, and those that a step tried."""
+
+SHAPES_AT_ONCE = 48
+"""Shapes of an effect whose columns are made together: bounds memory."""
 
 OfJoints = dict[int, Array]
 """White rows (…, R_j) of each joint that a term touches."""
@@ -191,3 +194,27 @@ def _joined(index: Sequence[Sequence[int]], rows: Sequence[Sequence[Array]]) -> 
         JointColumns(np.array(places, dtype=np.intp), np.concatenate(own))
         for places, own in zip(index, rows, strict=True)
     ]
+
+
+def white_columns(
+    observations: Observations, effect: Effect, shapes: Array, signals: Sequence[Signals]
+) -> dict[int, Array]:
+    """Whitened columns (g, c, R_j) of an effect at every joint that it touches.
+
+    Parameters
+    ----------
+    shapes : (g, k) float64
+        shapes
+    """
+    touched = effect.touched(observations.robot.joint_count)
+    rows: dict[int, list[Array]] = {joint: [] for joint in touched}
+    count = 1
+    for piece, own in zip(observations, signals, strict=True):
+        columns = effect.columns(own, shapes)
+        count = columns.shape[1]
+        for slot, joint in enumerate(touched):
+            values = columns[:, :, slot]
+            flat = values.reshape(len(shapes) * count, *values.shape[2:])
+            rows[joint].append(piece.reduced(np.ascontiguousarray(flat)))
+    white = {joint: observations.white(joint, parts) for joint, parts in rows.items()}
+    return {joint: each.reshape(len(shapes), count, -1) for joint, each in white.items()}

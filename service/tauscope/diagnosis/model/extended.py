@@ -14,9 +14,6 @@ from tauscope.identification.shape_sensitivity import ShapeParameter
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
-HOLDING = 1e8
-"""Inverse of the standard error [SI] of a parameter that no fit may move."""
-
 SIGNALS_KEPT = 3 * THREADS
 """Sets of signals that are kept a piece: those of the model at hand, of the step that is tried, and of one more."""
 
@@ -49,7 +46,6 @@ class ExtendedModel:
     constants: tuple[ShapeParameter, ...]
     stated: tuple[float | None, ...]
     terms: tuple[Term, ...] = ()
-    held: tuple[int, ...] = ()
     covariance: Array | None = None
 
     @property
@@ -62,11 +58,6 @@ class ExtendedModel:
         """K_v of every joint's friction, (n,) [s/rad or s/m]."""
         return np.array([terms.k_v for terms in self.structure.terms])
 
-    @property
-    def unmoved(self) -> tuple[int, ...]:
-        """Places among Θ that no fit moves: those held, and those that a term displaces."""
-        return tuple({*self.held, *(place for term in self.terms for place in term.displaced)})
-
     def constant(self, place: int) -> float:
         """Present value of an estimated constant of the friction curve."""
         joint, name = self.constants[place]
@@ -76,15 +67,9 @@ class ExtendedModel:
     def prior(self) -> tuple[Array, Array]:
         """Rows of the robot file's statements about the friction curve, (s, p), and what they leave, (s,).
 
-        A stated constant counts as measured once, with a relative standard error of `STATED_ERROR`; a parameter that
-        is held, as measured `HOLDING` times better than any data can.
+        A stated constant counts as measured once, with a relative standard error of `STATED_ERROR`.
         """
         rows, left = [], []
-        for place in self.unmoved:
-            row = np.zeros(self.size)
-            row[place] = HOLDING
-            rows.append(row)
-            left.append(0.0)
         for place, stated in enumerate(self.stated):
             if stated is not None:
                 row = np.zeros(self.size)
@@ -219,12 +204,6 @@ class ExtendedModel:
             for sign in (STEEPNESS_DIFFERENCE, -STEEPNESS_DIFFERENCE)
         )
         return (ahead - behind) / (2.0 * STEEPNESS_DIFFERENCE)
-
-    def term_derivatives(self, term: Term, signals: Signals) -> Array:
-        """Torque per unit of each of a term's parameters, (c + f, m, N) or (c + f, m, P, N)."""
-        slopes = shape_slopes(term, signals) if term.free_shapes else ()
-        by_shape = [np.tensordot(term.coefficients, each, axes=1).astype(np.float64) for each in slopes]
-        return np.stack([*term_columns(term, signals), *by_shape])
 
 
 def term_columns(term: Term, signals: Signals) -> Array:

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from tauscope.diagnosis.model.extended import ExtendedModel
-from tauscope.diagnosis.observations.observations import Observations, Piece
+from tauscope.diagnosis.observations.observations import BoolArray, Observations, Piece
 from tauscope.dynamics import smooth_sign
 from tauscope.effects import Signals
+from tauscope.identification.dataset import MOSTLY
 from tauscope.recording.conditioning.filters import smooth_each
 from tauscope.recording.recording import Array
 
@@ -44,11 +45,12 @@ def residual_rows(model: ExtendedModel, observations: Observations) -> list[list
 def raw_squares(model: ExtendedModel, observations: Observations) -> tuple[Array, Array]:
     """Squared errors at the recorded rate, (n, N), summed over repetitions, and samples of every joint, (n,).
 
-    Nothing is filtered; pieces follow each other, and what was not measured counts zero.
+    Nothing is filtered; pieces follow each other, and what was not measured counts zero. Nor does a joint at rest:
+    there friction takes any value up to breakaway, and no model knows which.
     """
     count = observations.robot.joint_count
     squares, samples = [], np.zeros(count)
-    for piece in observations.as_measured or observations:
+    for piece in observations:
         signals, motion = _quiet(model.signals(piece), piece, model), piece.prepared.motion
         predicted = np.repeat(signals.torque[:, None], piece.repetitions, axis=1)
         for term in model.terms:
@@ -56,11 +58,19 @@ def raw_squares(model: ExtendedModel, observations: Observations) -> tuple[Array
             predicted[list(term.effect.touched(count))] += torque if torque.ndim == 3 else torque[:, None]
         own = motion.own
         measured = motion.torque[:, own].transpose(2, 0, 1)
-        known = motion.measured[:, own].transpose(2, 0, 1)
+        known = motion.measured[:, own].transpose(2, 0, 1) & _moving(piece)[:, None, own]
         error = np.where(known, measured - predicted[..., own], 0.0)
         squares.append(np.einsum("jpt,jpt->jt", error, error))
         samples += known.sum(axis=(1, 2))
     return np.concatenate(squares, axis=1), samples
+
+
+def _moving(piece: Piece) -> BoolArray:
+    """Which samples of every joint are of no stop, (n, N); all of a joint that never moves."""
+    instants = piece.row_times()[: piece.rows]
+    resting = [np.interp(piece.time[0], instants, rows) for rows in piece.prepared.at_rest]
+    moving = np.array(resting) < MOSTLY
+    return np.where(moving.any(axis=1, keepdims=True), moving, True)
 
 
 def _quiet(signals: Signals, piece: Piece, model: ExtendedModel) -> Signals:

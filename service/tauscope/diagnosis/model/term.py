@@ -9,6 +9,10 @@ DIFFERENCE = 1e-3
 """Step of a shape parameter for its derivative, relative to its bounds or, where logarithmic, to itself."""
 
 
+Place = tuple[str, int | None]
+"""Id of an effect, and index of its joint; None for an effect of the whole arm."""
+
+
 @dataclass(frozen=True, eq=False)
 class Term:
     """An effect in the model.
@@ -22,12 +26,30 @@ class Term:
     effect: Effect
     shape: Array
     coefficients: Array
-    displaced: tuple[int, ...] = ()
 
     @property
     def free_shapes(self) -> list[int]:
         """Places of the shape parameters that are estimated, not merely chosen."""
         return [place for place in range(len(self.shape)) if self.effect.is_free(place)]
+
+    @property
+    def place(self) -> Place:
+        """Which effect where."""
+        return self.effect.id, self.effect.joint
+
+    def is_possible(self, k_v: float | None) -> bool:
+        """Whether an effect can have these coefficients and this shape.
+
+        Parameters
+        ----------
+        k_v : float or None
+            of the effect's joint; None where there is none [s/rad or s/m]
+        """
+        signs = zip(self.effect.coefficients, self.coefficients, strict=True)
+        possible = all(
+            each.smallest <= abs(value) <= each.largest and (value >= 0.0 or not each.positive) for each, value in signs
+        )
+        return possible and self.effect.is_possible(self.shape, k_v)
 
     @property
     def size(self) -> int:

@@ -21,12 +21,7 @@ from tauscope.recording.recording import Array
 
 def on_the_arm(model: ExtendedModel, term: Term) -> Term:
     """A term with the coefficients that it has in the arm's own torque; one that is none of the model's as it is."""
-    return scaled_back(model, term) if any(term is each for each in model.terms) else term
-
-
-def scaled_back(model: ExtendedModel, term: Term) -> Term:
-    """A term with the coefficients that it has in the arm's own torque, at whichever shape."""
-    if not _is_scaled(model, term):
+    if not _is_scaled(model, term) or not any(term is each for each in model.terms):
         return term
     return replace(term, coefficients=term.coefficients / model.factor(term.effect.joint or 0))
 

@@ -59,9 +59,7 @@ def is_wanted(diagnosis: Diagnosis) -> bool:
     return diagnosis.verdict in OPEN or any(finding.alternatives for finding in diagnosis.findings)
 
 
-def plan_experiment(
-    diagnosis: Diagnosis, *, seed: int = 0, progress: Callable[[str], None] = lambda step: None
-) -> PlannedExperiment:
+def plan_experiment(diagnosis: Diagnosis, progress: Callable[[str], None] = lambda step: None) -> PlannedExperiment:
     """Plan the recording to make next.
 
     Raises
@@ -71,7 +69,7 @@ def plan_experiment(
     """
     progress("plan the next experiment")
     judge = _judge(diagnosis)
-    bank = Bank(diagnosis.identification, np.random.default_rng(seed))
+    bank = Bank(diagnosis.identification, np.random.default_rng(0))
     nominal = diagnosis.selection.fit.model.without_terms()
 
     def judged(primitive: Primitive) -> _Judged:
@@ -109,7 +107,7 @@ def planned_experiment(
     if not asked and not is_wanted(diagnosis):
         return None
     try:
-        return plan_experiment(diagnosis, progress=progress)
+        return plan_experiment(diagnosis, progress)
     except ExcitationError:
         if asked:
             raise
@@ -175,8 +173,8 @@ def _judge(diagnosis: Diagnosis) -> _Judge:
     for finding in diagnosis.findings:
         if finding.alternatives:
             options = finding.alternatives[: MOST_OPTIONS - 1]
-            places = (finding.place, *((o.candidate.effect.id, o.candidate.effect.joint) for o in options))
-            models = (final, *(option.fit.model for option in options))
+            places = (finding.place, *((each.term.effect.id, each.term.effect.joint) for each in options))
+            models = (final, *(each.model for each in options))
             tasks = tuple((model, tuple(other for other in models if other is not model)) for model in models)
             known = tuple(equations(model, diagnosis.fitter, others) for model, others in tasks)
             return _Judge(places, tasks, known, np.zeros(0), diagnosis.inflation)

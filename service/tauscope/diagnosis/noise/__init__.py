@@ -1,1 +1,1 @@
-"""What the rows' noise is, from the data and not from the fit; what happens once is none of it."""
+"""What the rows' noise is, from the data and not from the fit."""

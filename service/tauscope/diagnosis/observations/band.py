@@ -50,14 +50,6 @@ STEPS_SEEN = 2.5
 """Width of the motion's own band, over that of the comparison, that shows no corners of friction's steps. Where noise
 alone sets the comparison, a joint's own band is opened that far."""
 
-SECOND_LOOK = 1.3
-"""Width over the identification's band in which a second look is taken, at most. At 1.7 none of the effects is found
-that are missed at 1.3, and before much was asked of it, two of 26 simulated arms that lack nothing were given a name at
-1.6."""
-
-WORTH_A_LOOK = 1.1
-"""Width over the first look's band below which a second would see nothing else."""
-
 
 def diagnosis_cutoff(conditioners: Sequence[Conditioner], identification: Identification, steepness: Array) -> float:
     """Cut-off of the band that torque and columns share [Hz].
@@ -76,26 +68,7 @@ def diagnosis_cutoff(conditioners: Sequence[Conditioner], identification: Identi
     if explained_share(conditioners, identification) < LITTLE:
         return max(min(quiet, WIDENING * identified), min(identified, widest))
     noisiest = min(c.noise.limit_hz or np.inf for c in conditioners)
-    return min(identified, widest, max(noisiest, _without_corners(conditioners, steepness, BLURRED)))
-
-
-def wider_cutoff(
-    conditioners: Sequence[Conditioner], identification: Identification, steepness: Array, cutoff_hz: float
-) -> float | None:
-    """Cut-off of the band of a second look, in which accelerations are corrected [Hz]; None where it would be no wider.
-
-    Parameters
-    ----------
-    steepness : (n,) float64
-        K_v of every joint's friction [s/rad or s/m]
-    cutoff_hz : float
-        of the first look [Hz]
-    """
-    if identification.cutoff_hz is None:
-        return None
-    without_corners = _without_corners(conditioners, steepness, AT_MOST_BLURRED)
-    wider = min(SECOND_LOOK * identification.cutoff_hz, without_corners, _widest(conditioners))
-    return wider if wider > WORTH_A_LOOK * cutoff_hz else None
+    return min(identified, widest, max(noisiest, _without_corners(conditioners, steepness)))
 
 
 def _widest(conditioners: Sequence[Conditioner]) -> float:
@@ -103,41 +76,39 @@ def _widest(conditioners: Sequence[Conditioner]) -> float:
     return min(WIDEST_HZ, OPEN_SHARE * min(conditioner.timing.rate_hz for conditioner in conditioners))
 
 
-def _without_corners(conditioners: Sequence[Conditioner], steepness: Array, blurred: float) -> float:
-    """Widest band that shows no corners of friction's steps where noise of the velocities may be `blurred` [Hz]."""
-    return min(float(step_bands(conditioner, steepness, blurred).min()) for conditioner in conditioners) / STEPS_SEEN
+def _without_corners(conditioners: Sequence[Conditioner], steepness: Array) -> float:
+    """Widest band that shows no corners of friction's steps where noise of the velocities may be `BLURRED` [Hz]."""
+    return min(float(step_bands(conditioner, steepness, BLURRED).min()) for conditioner in conditioners) / STEPS_SEEN
 
 
-def state_cutoffs(conditioner: Conditioner, cutoff_hz: float | None, steepness: Array | None) -> Array | None:
+def state_cutoffs(conditioner: Conditioner, cutoff_hz: float | None, steepness: Array) -> Array | None:
     """Cut-off of each joint's own smoothing, (n,) [Hz]; None for no filter.
 
     Parameters
     ----------
     cutoff_hz : float or None
         of the common band [Hz]; None for no filter
-    steepness : (n,) float64 or None
+    steepness : (n,) float64
         K_v of every joint's friction [s/rad or s/m]
     """
     if cutoff_hz is None:
         return None
-    if steepness is None:
-        return _within(np.zeros(conditioner.robot.joint_count), cutoff_hz)
     without_corners = np.minimum(STEPS_SEEN * cutoff_hz, step_bands(conditioner, steepness, AT_MOST_BLURRED))
     return _within(np.maximum(step_bands(conditioner, steepness, BLURRED), without_corners), cutoff_hz)
 
 
-def quiet_cutoffs(conditioner: Conditioner, cutoff_hz: float | None, steepness: Array | None) -> Array | None:
+def quiet_cutoffs(conditioner: Conditioner, cutoff_hz: float | None, steepness: Array) -> Array | None:
     """The same for what the torque is at single samples.
 
     Parameters
     ----------
     cutoff_hz : float or None
         of the common band [Hz]; None for no filter
-    steepness : (n,) float64 or None
+    steepness : (n,) float64
         K_v of every joint's friction [s/rad or s/m]
     """
-    if cutoff_hz is None or steepness is None:
-        return state_cutoffs(conditioner, cutoff_hz, steepness)
+    if cutoff_hz is None:
+        return None
     return _within(step_bands(conditioner, steepness, QUIET), cutoff_hz)
 
 

@@ -58,8 +58,6 @@ class Piece:
         instants at the recorded rate, from the beginning of the recording [s]
     state_hz : (n,) float64
         band of each joint's own motion [Hz]
-    by_position : (n,) bool
-        joints whose acceleration was made of their positions
     quiet_hz : (n,) float64 or None
         bands in which the velocities say most of single samples [Hz]; None for no filter
     rigid_hz : float or None
@@ -74,7 +72,6 @@ class Piece:
     time: Array
     state_hz: Array
     position_noise: PositionNoise
-    by_position: BoolArray
     quiet_hz: Array | None = None
     rigid_hz: float | None = None
     temperature: Array | None = None
@@ -153,11 +150,7 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """All pieces of some recordings.
-
-    as_measured : Observations or None
-        the same recordings with their motion as it was measured, by which residuals are stated; None where these are
-    """
+    """All pieces of some recordings."""
 
     robot: Robot
     pieces: tuple[Piece, ...]
@@ -165,7 +158,6 @@ class Observations:
     noise: tuple[JointNoise, ...] = ()
     repetitions: tuple[tuple[Repetition, ...], ...] = ()
     weightings: tuple[RowWeighting, ...] = ()
-    as_measured: "Observations | None" = None
     _kept: dict[int, BoolArray] = field(default_factory=dict, repr=False)
 
     @staticmethod
@@ -174,7 +166,7 @@ class Observations:
         robot: Robot,
         base: BaseParameters,
         cutoff_hz: float | None,
-        steepness: Array | None = None,
+        steepness: Array,
     ) -> "Observations":
         """Condition recordings in a band.
 
@@ -182,7 +174,7 @@ class Observations:
         ----------
         cutoff_hz : float or None
             the common band [Hz]; None for no filter
-        steepness : (n,) float64 or None
+        steepness : (n,) float64
             K_v of every joint's friction, for the band of the motion itself [s/rad or s/m]
         """
         starts = [float(c.recording.samples(0, 1).time[0]) for c in conditioners]
@@ -194,9 +186,7 @@ class Observations:
             robot,
             pieces=tuple(
                 replace(
-                    _piece(
-                        each, starts[each.recording], conditioners[each.recording], bands[each.recording], cutoff_hz
-                    ),
+                    _piece(each, starts[each.recording], conditioners[each.recording], bands[each.recording]),
                     quiet_hz=quiet[each.recording],
                     rigid_hz=None if cutoff_hz is None else STATE_BANDS[0] * cutoff_hz,
                 )
@@ -260,6 +250,19 @@ class Observations:
         counted = whitened if kept.all() else whitened[..., kept]
         return self.weightings[joint].applied(counted) if self.weightings else counted
 
+    def independent_rows(self, joint: int, rows: Array) -> float:
+        """Number of independent rows of a joint; one that tells less than a whole one counts as a part.
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        rows : (R,) float64
+            its white rows
+        """
+        told = float(np.sum(self.weightings[joint].weights ** 2)) if self.weightings else float(len(rows))
+        return self.noise[joint].share * told
+
     def kept(self, joint: int) -> BoolArray:
         """Mask of the whitened rows that count, (rows,).
 
@@ -293,9 +296,7 @@ class Observations:
         return iter(self.pieces)
 
 
-def _piece(
-    prepared: PreparedMotion, start_s: float, conditioner: Conditioner, state_hz: Array | None, cutoff_hz: float | None
-) -> Piece:
+def _piece(prepared: PreparedMotion, start_s: float, conditioner: Conditioner, state_hz: Array | None) -> Piece:
     """The torque of every repetition in the common band."""
     motion = prepared.motion
     length = len(motion.time) / motion.rate_hz
@@ -305,7 +306,5 @@ def _piece(
     torque = np.stack([reduce(without_spikes(np.ascontiguousarray(each.T))) for each in motion.torque], axis=1)
     widest = np.full(motion.position.shape[1], motion.rate_hz / 2.0)
     width = widest if state_hz is None else np.minimum(state_hz, widest)
-    source = conditioner.source.in_band(cutoff_hz)
-    by_position = ~(source.velocity | source.acceleration)
     temperature = read_temperature(conditioner, time + start_s)
-    return Piece(prepared, torque, used, time, width, conditioner.noise, by_position, temperature=temperature)
+    return Piece(prepared, torque, used, time, width, conditioner.noise, temperature=temperature)

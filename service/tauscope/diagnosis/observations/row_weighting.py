@@ -45,16 +45,6 @@ class RowWeighting:
         _, sizes, directions = np.linalg.svd(shared, full_matrices=False)
         return RowWeighting(weights, directions, 1.0 - 1.0 / np.sqrt(1.0 + sizes**2))
 
-    @property
-    def is_guided(self) -> bool:
-        """Whether anything is said of the columns' errors."""
-        return bool(len(self.shrinkage))
-
-    @staticmethod
-    def certain(count: int) -> "RowWeighting":
-        """For columns of whose errors nothing is said."""
-        return RowWeighting(np.ones(count), np.empty((0, count)), np.empty(0))
-
     def applied(self, rows: Array) -> Array:
         """Whitened rows as they count, (k, R).
 

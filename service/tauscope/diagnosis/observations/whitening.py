@@ -29,7 +29,6 @@ class JointNoise:
 
     model: Autoregression
     share: float = 1.0
-    over_repetitions: float = 1.0
 
     @property
     def std(self) -> float:

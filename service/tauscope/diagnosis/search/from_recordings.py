@@ -1,12 +1,12 @@
-"""From an identification and its recordings to the effects that make them most probable.
+"""From an identification and its recordings to the effects that make them most probable."""
 
-It stands beside today's engine (`tauscope.diagnosis.selection`), which documents and verdicts still rest on.
-"""
-
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tauscope.diagnosis.deflection.measured import MeasuredDeflection, measure_deflection
+from tauscope.diagnosis.deflection.terms import direct_terms
 from tauscope.diagnosis.evidence.rows import EvidenceRows
 from tauscope.diagnosis.model.nominal import delivered_model, identified_rotors, setting_of
 from tauscope.diagnosis.model.term import Term
@@ -15,47 +15,95 @@ from tauscope.diagnosis.observations.band import diagnosis_cutoff
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.search.held_out import HeldOut
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory, Prior
+from tauscope.diagnosis.search.left import is_left
 from tauscope.diagnosis.search.proposals import Proposer
 from tauscope.diagnosis.search.search import Found, Search
-from tauscope.effects import Effect, possible_effects
+from tauscope.effects import ArmContext, Effect, farther_effects, possible_effects
 from tauscope.effects.rotor_inertia import RotorInertia
 from tauscope.identification import Identification
 from tauscope.recording.conditioning import Conditioner
 from tauscope.recording.recording import Recording
 
-ROTOR_SPREAD = 2.0
-"""Standard deviation believed of a rotor that the identification found, relative to what it found."""
+KNOWN_SPREAD = 2.0
+"""Standard deviation believed of a coefficient that is known beforehand, relative to its value."""
+
+
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """A search and what it rests on.
+
+    unseen : Observations or None
+        held-out rows in the same band
+    deflections : tuple of MeasuredDeflection
+        of joints with an encoder on the link
+    cutoff_hz : float
+        of the band [Hz]
+    pure_error : bool
+        whether repetitions tell the noise
+    """
+
+    found: Found
+    laboratory: Laboratory
+    effects: tuple[Effect, ...]
+    setting: ArmContext
+    rows: Observations
+    unseen: Observations | None
+    deflections: tuple[MeasuredDeflection, ...]
+    cutoff_hz: float
+    pure_error: bool
 
 
 def search(
-    identification: Identification, recordings: Sequence[Recording], held_out: Sequence[Recording] = ()
-) -> Found:
+    identification: Identification,
+    recordings: Sequence[Recording],
+    held_out: Sequence[Recording] = (),
+    progress: Callable[[str], None] = lambda step: None,
+) -> Searched:
     """The most probable effects beside what an identification delivers."""
+    progress("prepare observations")
     robot, base = identification.robot, identification.structure.base
     surveyed = [Conditioner.survey(recording, robot) for recording in recordings]
-    unseen = [Conditioner.survey(recording, robot) for recording in held_out]
     model = delivered_model(identification)
     cutoff = diagnosis_cutoff(surveyed, identification, model.steepness)
     bare = Observations.prepare(surveyed, robot, base, cutoff, model.steepness)
-    effects = possible_effects(setting_of(model, bare, surveyed, cutoff))
-    white = bare.with_noise(white_noise(bare, model, band_share(bare)))
-    rows = EvidenceRows.prepare(with_pure_error(bare, model) or white, model)
-    laboratory = Laboratory(rows, Prior.of(identification, model))
-    nominal = _with_rotors(laboratory.start(model), laboratory, identification, effects)
-    confirming = None
-    if unseen:
-        prepared = Observations.prepare(unseen, robot, base, cutoff, model.steepness)
-        confirming = HeldOut(prepared.with_noise(white_noise(prepared, model)))
-    return Search(laboratory, Proposer(rows, effects), confirming).run(nominal)
+    deflections = tuple(measure_deflection(recordings, identification, model, cutoff))
+    seen = frozenset(each.joint for each in deflections if not each.is_open)
+    setting = replace(setting_of(model, bare, surveyed, cutoff), link_encoders=seen)
+    effects = tuple(possible_effects(setting))
+    repeated = with_pure_error(bare, model)
+    white = repeated or bare.with_noise(white_noise(bare, model, band_share(bare)))
+    rows = EvidenceRows.prepare(white, model)
+    progress("compare effects")
+    laboratory = Laboratory(rows, Prior.of(identification, model), repeated is not None)
+    known = [*_rotors(identification, effects), *(each.term for each in direct_terms(deflections, setting))]
+    nominal = _with_known(laboratory.start(model), laboratory, known)
+    unseen = None
+    if held_out:
+        others = [Conditioner.survey(recording, robot) for recording in held_out]
+        unseen = Observations.prepare(others, robot, base, cutoff, model.steepness).apart()
+    confirming = None if unseen is None else HeldOut(unseen.with_noise(white_noise(unseen, model)))
+    farther = tuple(farther_effects(setting))
+    near, far = Proposer(laboratory, effects), Proposer(laboratory, [*effects, *farther])
+    found = Search(laboratory, near, confirming, farther).run(nominal)
+    named = any(not term.effect.is_expected for term in found.hypothesis.model.terms)
+    if not named and is_left(found.hypothesis, white, pure_error=repeated is not None):
+        progress("look farther")
+        found = Search(laboratory, far, confirming).run(nominal, found)
+    return Searched(found, laboratory, effects, setting, white, unseen, deflections, cutoff, repeated is not None)
 
 
-def _with_rotors(
-    nominal: Hypothesis, laboratory: Laboratory, identification: Identification, effects: Sequence[Effect]
-) -> Hypothesis:
-    """The nominal model with the rotors that the identification found: every geared joint has one."""
+def _rotors(identification: Identification, effects: Sequence[Effect]) -> list[Term]:
+    """Rotors that the identification found: every geared joint has one."""
     of_joint = {effect.joint: effect for effect in effects if isinstance(effect, RotorInertia)}
-    for joint, inertia in identified_rotors(identification).items():
-        if joint in of_joint:
-            term = Term(of_joint[joint], np.zeros(0), np.array([inertia]))
-            nominal = laboratory.with_term(nominal, term, np.array([ROTOR_SPREAD * abs(inertia)]))
-    return laboratory.settle(nominal, range(identification.robot.joint_count))
+    rotors = identified_rotors(identification)
+    return [Term(of_joint[joint], np.zeros(0), np.array([rotors[joint]])) for joint in rotors if joint in of_joint]
+
+
+def _with_known(nominal: Hypothesis, laboratory: Laboratory, known: Sequence[Term]) -> Hypothesis:
+    """The nominal model with effects that are known beforehand, each in the shape of its grid that fits best."""
+    for term in known:
+        size = KNOWN_SPREAD * np.abs(term.coefficients)
+        shapes = term.effect.grid if len(term.shape) else term.shape[None]
+        tried = [laboratory.with_term(nominal, replace(term, shape=shape), size) for shape in shapes]
+        nominal = max(tried, key=lambda each: each.log_evidence)
+    return laboratory.settle(nominal, range(len(nominal.scales)))

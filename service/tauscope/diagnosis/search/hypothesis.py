@@ -10,6 +10,7 @@ from tauscope.diagnosis.evidence.bodies import BodyPrior, NormalBodies
 from tauscope.diagnosis.evidence.linear_model import LinearModel, Posterior
 from tauscope.diagnosis.evidence.rows import EvidenceRows
 from tauscope.diagnosis.evidence.scales import Scales
+from tauscope.diagnosis.fitting.bounded_step import bounded_step
 from tauscope.diagnosis.fitting.fit import stepped
 from tauscope.diagnosis.model.extended import STATED_ERROR, ExtendedModel, with_terms
 from tauscope.diagnosis.model.term import Term
@@ -34,6 +35,24 @@ LARGEST_SHAPE_STEP = 0.15
 HALVINGS = (1.0, 0.5, 0.25, 0.1)
 """Parts of a step that are tried until the data are more probable."""
 
+WEIGHINGS = 5
+"""Rounds of dependence and scales, at most…"""
+
+ALIKE = 0.5
+"""…which end where the logarithm of κ changes by less."""
+
+NEAR = 3
+"""Steps to parameters by which proposals are ranked."""
+
+BODY_STEPS = 20
+"""Steps of the bodies within one of those, at most: a volume a million times too small doubles as often."""
+
+STEPS = 8
+"""Most steps to the most probable parameters."""
+
+ROUNDING = 1e-3
+"""Part of its standard error by which rounding may leave a coefficient below zero."""
+
 PROGRESS = 0.1
 """Gain in log probability below which a step is the last."""
 
@@ -46,6 +65,8 @@ class Hypothesis:
         standard deviation believed of every term's coefficients
     scales : tuple of Scales
         one entry a joint
+    dependence : tuple of float
+        κ of every joint
     """
 
     model: ExtendedModel
@@ -53,6 +74,7 @@ class Hypothesis:
     linear: LinearModel
     bodies: NormalBodies
     scales: tuple[Scales, ...]
+    dependence: tuple[float, ...]
 
     @cached_property
     def posterior(self) -> Posterior:
@@ -62,12 +84,14 @@ class Hypothesis:
     @cached_property
     def log_evidence(self) -> float:
         """Log evidence of data and scales."""
-        return self.posterior.log_evidence - sum(each.penalty() for each in self.scales)
+        return self.bodies.log_mass + self.posterior.log_evidence - sum(each.penalty() for each in self.scales)
 
     @cached_property
     def misfit(self) -> float:
         """-2 log probability of data and parameters as they are, but for what depends on the scales alone."""
-        believed = float(self.linear.mean @ self.linear.precision @ self.linear.mean)
+        others = slice(len(self.bodies.mean), None)
+        off = self.linear.mean[others]
+        believed = self.bodies.energy + float(off @ self.linear.precision[others, others] @ off)
         pairs = zip(self.linear.joints, self.scales, strict=True)
         return believed + sum(float(own.weighted(scales).products[0, 0]) for own, scales in pairs)
 
@@ -102,10 +126,15 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Laboratory:
-    """Makes hypotheses about the same rows."""
+    """Makes hypotheses about the same rows.
+
+    repeated : bool
+        whether repetitions of the motion tell the noise
+    """
 
     rows: EvidenceRows
     prior: Prior
+    repeated: bool = False
 
     def start(self, model: ExtendedModel) -> Hypothesis:
         """The nominal model with bodies that have volume, under scales of highest evidence."""
@@ -114,12 +143,20 @@ class Laboratory:
         count = len(self.prior.bodies.base)
         parameters[:count] = self.prior.bodies.base @ links
         nominal = replace(model, parameters=parameters, links=links)
-        moments = self.rows.moments(nominal)
+        dependence = [1.0] * model.structure.robot.joint_count
+        moments = self.rows.moments(nominal, dependence)
         levels = [float(np.sqrt(np.mean(own.rows[0] ** 2))) if own.rows.size else 1.0 for own in moments]
-        return self.settle(self.at(nominal, (), tuple(map(Scales.start, levels))), range(len(levels)), rounds=2)
+        at = self.at(nominal, (), tuple(Scales.start(level, repeated=self.repeated) for level in levels), dependence)
+        return self.settle(self.settle(at, range(len(levels))), range(len(levels)))
 
     def at(
-        self, model: ExtendedModel, sizes: Sequence[Array], scales: Sequence[Scales], *, owned: bool = False
+        self,
+        model: ExtendedModel,
+        sizes: Sequence[Array],
+        scales: Sequence[Scales],
+        dependence: Sequence[float],
+        *,
+        owned: bool = False,
     ) -> Hypothesis:
         """A model as it is.
 
@@ -142,41 +179,100 @@ class Laboratory:
             spread[place] = np.concatenate([size, _shape_spreads(term)])
         diagonal = np.arange(plain, model.size)
         precision[diagonal, diagonal] = 1.0 / spread[plain:] ** 2
-        linear = LinearModel(self.rows.moments(model, owned=owned), mean, precision)
-        return Hypothesis(model, tuple(sizes), linear, bodies, tuple(scales))
+        linear = LinearModel(self.rows.moments(model, dependence, owned=owned), mean, precision)
+        linear = _hold_impossible(linear, model, scales)
+        return Hypothesis(model, tuple(sizes), linear, bodies, tuple(scales), tuple(dependence))
 
-    def settle(self, start: Hypothesis, joints: Collection[int], *, rounds: int = 1, steps: int = 4) -> Hypothesis:
+    def settle(self, start: Hypothesis, joints: Collection[int]) -> Hypothesis:
         """The most probable parameters, and scales of highest evidence at some joints."""
-        at = start
-        for _ in range(rounds):
-            at = self.tune(at, joints)
-            estimate = self.at(at.model, at.sizes, at.scales, owned=True)
-            for _ in range(steps):
-                nearer = self._nearer(estimate)
-                if nearer is None:
-                    break
-                gained, estimate = estimate.misfit - nearer.misfit, nearer
-                if gained < 2.0 * PROGRESS:
-                    break
-            at = self.at(estimate.model, at.sizes, at.scales)
-        return self.tune(at, joints)
+        at = self.weigh(self.tune(start, joints), joints)
+        estimate = self.approach(at, STEPS)
+        return self.weigh(self.at(estimate.model, at.sizes, at.scales, at.dependence), joints)
+
+    def approach(self, at: Hypothesis, steps: int = NEAR) -> Hypothesis:
+        """The hypothesis after a few steps towards its most probable parameters, its effects believed."""
+        estimate = self._own(at)
+        for _ in range(steps):
+            nearer = self._nearer(estimate)
+            if nearer is None:
+                break
+            gained, estimate = estimate.misfit - nearer.misfit, nearer
+            if gained < 2.0 * PROGRESS:
+                break
+        return estimate
+
+    def _own(self, at: Hypothesis) -> Hypothesis:
+        """The same with all effects believed, so that the discrepancy takes no part of them, and independent rows."""
+        return self.at(at.model, at.sizes, at.scales, [1.0] * len(at.scales), owned=True)
 
     def tune(self, at: Hypothesis, joints: Collection[int]) -> Hypothesis:
         """The same model under scales of highest evidence."""
         return replace(at, scales=at.linear.most_probable(at.scales, joints))
 
+    def weigh(self, at: Hypothesis, joints: Collection[int]) -> Hypothesis:
+        """The same model under scales of highest evidence, rows counting as much as its best residual lets them."""
+        for _ in range(WEIGHINGS):
+            dependence = self._dependence(at, joints)
+            moved = max(abs(np.log(dependence[joint] / at.dependence[joint])) for joint in joints)
+            at = self.tune(self.under(at, dependence, joints), joints)
+            if moved < ALIKE:
+                break
+        return at
+
+    def _dependence(self, at: Hypothesis, joints: Collection[int]) -> list[float]:
+        """κ of every joint, of some by what the most probable parameters leave there if rows are independent."""
+        independent = self.under(at, [1.0] * len(at.scales), range(len(at.scales)))
+        dependence, mean = list(at.dependence), independent.posterior.mean
+        for joint in joints:
+            own = independent.linear.joints[joint]
+            direction = np.concatenate([[1.0], -mean[own.index]])
+            left = direction @ own.rows[: own.visible] - own.discrepancy(at.scales[joint], direction)
+            dependence[joint] = self.rows.dependence(joint, left)
+        return dependence
+
+    def under(self, at: Hypothesis, dependence: Sequence[float], joints: Collection[int]) -> Hypothesis:
+        """The same with another dependence of some joints' rows."""
+        moments, counted = list(at.linear.joints), list(at.dependence)
+        for joint in joints:
+            moments[joint] = moments[joint].counting(at.dependence[joint] / dependence[joint])
+            counted[joint] = dependence[joint]
+        return replace(at, linear=replace(at.linear, joints=tuple(moments)), dependence=tuple(counted))
+
+    def paint(self, at: Hypothesis, like: Hypothesis) -> Hypothesis:
+        """The same model under another hypothesis' scales."""
+        return self.at(at.model, at.sizes, like.scales, like.dependence)
+
     def _nearer(self, at: Hypothesis) -> Hypothesis | None:
         """The model after a step under which data and parameters are more probable; None where there is none."""
-        step = _limit(at.model, at.posterior.mean)
-        base = len(at.bodies.mean)
-        links = at.bodies.links(at.model.parameters[:base] + step[:base]) - at.model.links
-        whole = self.prior.bodies.share(at.model.links, links)
+        step, links = self._step(at)
         for part in HALVINGS:
-            moved = replace(stepped(at.model, part * whole * step), links=at.model.links + part * whole * links)
-            found = self.at(moved, at.sizes, at.scales, owned=True)
+            moved = replace(stepped(at.model, part * step), links=at.model.links + part * links)
+            found = self.at(moved, at.sizes, at.scales, at.dependence, owned=True)
             if found.misfit < at.misfit:
                 return found
         return None
+
+    def _step(self, at: Hypothesis) -> tuple[Array, Array]:
+        """The most probable step of parameters and links while columns stay as they are.
+
+        A body that is nearly without volume cannot tell how far away the most probable one is: Newton's steps double
+        its volume at best. So the prior is expanded anew on the way.
+        """
+        base, prior = len(at.bodies.mean), self.prior.bodies
+        step, start, links = np.zeros(at.model.size), at.model.parameters[:base], at.model.links
+        for _ in range(BODY_STEPS):
+            wanted = _limit(at)
+            farther = at.bodies.links(start + wanted[:base]) - links
+            share = prior.share(links, farther)
+            moved = share * (wanted - step)
+            step, links = step + moved, links + share * farther
+            bodies = prior.about(links)
+            if share == 1.0 and float(moved[:base] @ bodies.precision @ moved[:base]) < PROGRESS:
+                break
+            mean, precision = at.linear.mean.copy(), at.linear.precision.copy()
+            mean[:base], precision[:base, :base] = bodies.mean - start, bodies.precision
+            at = replace(at, bodies=bodies, linear=replace(at.linear, mean=mean, precision=precision))
+        return step, links - at.model.links
 
     def with_term(self, at: Hypothesis, term: Term, size: Array) -> Hypothesis:
         """A model with one effect more, as it is.
@@ -186,7 +282,7 @@ class Laboratory:
         size : (c,) float64
             standard deviation believed of its coefficients
         """
-        return self.at(with_terms(at.model, [*at.model.terms, term]), [*at.sizes, size], at.scales)
+        return self.at(with_terms(at.model, [*at.model.terms, term]), [*at.sizes, size], at.scales, at.dependence)
 
     def without_term(self, at: Hypothesis, place: int) -> Hypothesis:
         """A model with one effect less, as it is.
@@ -198,7 +294,41 @@ class Laboratory:
         """
         terms = [term for at_place, term in enumerate(at.model.terms) if at_place != place]
         sizes = [size for at_place, size in enumerate(at.sizes) if at_place != place]
-        return self.at(with_terms(at.model, terms), sizes, at.scales)
+        return self.at(with_terms(at.model, terms), sizes, at.scales, at.dependence)
+
+
+def _hold_impossible(linear: LinearModel, model: ExtendedModel, scales: Sequence[Scales]) -> LinearModel:
+    """The same with coefficients held at zero that would else be negative and cannot be: friction takes power."""
+    values = _one_sided(model)
+    places = np.flatnonzero(np.isfinite(values))
+    held, found = np.zeros(len(places), dtype=bool), linear
+    for _ in range(2 * len(places)):
+        posterior = found.posterior(scales)
+        wanted = (values + posterior.mean)[places] / np.linalg.norm(posterior.spread[places], axis=1)
+        freed = held & (wanted > 0.0)
+        if freed.any():
+            held &= ~freed
+        elif held.all() or wanted[~held].min() >= -ROUNDING:
+            break
+        else:
+            held[np.flatnonzero(~held)[np.argmin(wanted[~held])]] = True
+        found = linear.hold(places[held], -values[places[held]])
+    return found
+
+
+def _one_sided(model: ExtendedModel) -> Array:
+    """Values of the parameters that cannot be negative, (p,); NaN for all others."""
+    values = np.full(model.size, np.nan)
+    for joint in range(model.structure.robot.joint_count):
+        for name in ("stiction", "viscous"):
+            place = model.structure.coefficient(joint, name)
+            if place is not None:
+                values[place] = model.parameters[place]
+    for term, place in zip(model.terms, model.term_places(), strict=True):
+        for number, (coefficient, value) in enumerate(zip(term.effect.coefficients, term.coefficients, strict=True)):
+            if coefficient.positive:
+                values[place.start + number] = value
+    return values
 
 
 def _slopes(model: ExtendedModel) -> Array:
@@ -219,21 +349,24 @@ def _shape_spreads(term: Term) -> Array:
     )
 
 
-def _limit(model: ExtendedModel, step: Array) -> Array:
-    """A step whose curved parameters stay where their columns are straight."""
-    limited, first = step.copy(), model.structure.size
-    slopes = slice(first, first + len(model.constants))
-    limited[slopes] = np.clip(step[slopes], -LARGEST_LOG_STEP, LARGEST_LOG_STEP)
-    for term, place in zip(model.terms, model.term_places(), strict=True):
+def _limit(at: Hypothesis) -> Array:
+    """The most probable step within which the columns of curved parameters are straight, and these in their bounds."""
+    rows, first = [], at.model.structure.size
+    rows += [(first + place, -np.inf, np.inf, LARGEST_LOG_STEP) for place in range(len(at.model.constants))]
+    for term, place in zip(at.model.terms, at.model.term_places(), strict=True):
         effect = term.effect
-        reach = np.array(
-            [
-                LARGEST_LOG_STEP * abs(float(term.shape[free]))
-                if effect.shapes[free].logarithmic
-                else LARGEST_SHAPE_STEP * float(effect.upper[free] - effect.lower[free])
-                for free in term.free_shapes
-            ]
-        )
-        shapes = slice(place.start + len(term.coefficients), place.stop)
-        limited[shapes] = np.clip(step[shapes], -reach, reach)
-    return limited
+        for number, free in enumerate(term.free_shapes, start=place.start + len(term.coefficients)):
+            value, low, high = float(term.shape[free]), float(effect.lower[free]), float(effect.upper[free])
+            reach = (
+                LARGEST_LOG_STEP * abs(value) if effect.shapes[free].logarithmic else LARGEST_SHAPE_STEP * (high - low)
+            )
+            rows.append((number, min(low - value, 0.0), max(high - value, 0.0), max(reach, np.finfo(float).tiny)))
+    places, lower, upper, reach = np.array(rows, dtype=np.float64).reshape(-1, 4).T
+    return bounded_step(
+        at.posterior.mean,
+        at.posterior.spread,
+        places.astype(np.intp),
+        np.maximum(lower, -reach),
+        np.minimum(upper, reach),
+        reach,
+    )

@@ -5,18 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tauscope.diagnosis.evidence.linear_model import LinearModel
-from tauscope.diagnosis.evidence.rows import EvidenceRows
-from tauscope.diagnosis.evidence.scales import Scales
-from tauscope.diagnosis.model.term import Term
-from tauscope.diagnosis.screening.refinement import POINTS, neighbours, spread
-from tauscope.diagnosis.screening.screen import SHAPES_AT_ONCE, white_columns
-from tauscope.diagnosis.search.hypothesis import Hypothesis
-from tauscope.diagnosis.search.scoring import SIZES, Scored, Scorer
-from tauscope.diagnosis.selection.choice import Place, has_possible_values
-from tauscope.effects import Effect, Signals
+from tauscope.diagnosis.fitting.white_columns import SHAPES_AT_ONCE
+from tauscope.diagnosis.model.term import Place, Term
+from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
+from tauscope.diagnosis.search.neighbourhood import POINTS, neighbours, spread
+from tauscope.diagnosis.search.position_noise import is_position_noise
+from tauscope.diagnosis.search.scoring import SIZES, Scored, Scorer, unnamed_log_odds
+from tauscope.effects import Effect, Signals, TimeLocalEffect
 from tauscope.effects.computation import side_by_side
-from tauscope.identification.excitation import thin
+from tauscope.effects.deflection import Deflection
 from tauscope.recording.recording import Array
 
 LOOKED_AT = 5
@@ -25,8 +22,14 @@ LOOKED_AT = 5
 WORTH_A_LOOK = 2.0
 """Log Bayes factor on the grid below which nothing comes of a closer look."""
 
-MOST_SHAPES = 200
+MOST_SHAPES = 600
 """Shapes of a grid of thousands that are looked at first."""
+
+KINDS = (0, 3)
+"""Shape parameters of a window that are no numbers: its recordings, and its profile."""
+
+EDGES = (1, 2)
+"""…and those that have many optima."""
 
 ZOOMS = 2
 """How often the neighbourhood of a shape parameter's best value is looked at."""
@@ -42,47 +45,63 @@ class Proposal:
         the same on the grid if nothing without a name were left out
     size : (c,) float64
         standard deviation believed of its coefficients
-    scales : tuple of Scales
-        of highest evidence with it
+    unnamed : float
+        log Bayes factor of torque without a name in its place
+    found : Hypothesis
+        with it, its coefficients at zero
     """
 
     term: Term
     size: Array
     log_factor: float
     log_factor_alone: float
-    scales: tuple[Scales, ...]
+    unnamed: float
+    found: Hypothesis
 
     @property
     def place(self) -> Place:
         """Which effect where."""
-        return self.term.effect.id, self.term.effect.joint
+        return self.term.place
 
 
 class Proposer:
     """Proposes effects for the same rows."""
 
-    def __init__(self, rows: EvidenceRows, effects: Sequence[Effect]) -> None:
-        self.rows, self.effects = rows, tuple(effects)
+    def __init__(self, laboratory: Laboratory, effects: Sequence[Effect]) -> None:
+        self.laboratory, self.rows, self.effects = laboratory, laboratory.rows, tuple(effects)
 
-    def propose(self, at: Hypothesis, is_wanted: Callable[[Effect], bool]) -> list[Proposal]:
+    def propose(self, at: Hypothesis, is_wanted: Callable[[Effect], bool], most: int = LOOKED_AT) -> list[Proposal]:
         """Effects that make the data more probable, the most probable first."""
-        scorer = Scorer(self.rows, at)
+        independent = self.laboratory.under(at, [1.0] * len(at.scales), range(len(at.scales)))
+        scorer = Scorer(self.rows, independent)
         signals = [at.model.signals(piece) for piece in self.rows.observations]
         wanted = [effect for effect in self.effects if is_wanted(effect) and len(effect.grid)]
-        scored = side_by_side(lambda effect: self._on_grid(effect, scorer, signals), wanted)
-        chosen = _shortlist([pair[0] for pair in scored]) | _shortlist([pair[1] for pair in scored])
-        pairs = [scored[place] for place in sorted(chosen)]
-        found = [self._look_at(pair, scorer, at, signals) for pair in pairs]
+        scored = side_by_side(lambda effect: self._on_grid(effect, scorer, signals, independent), wanted)
+        looked: dict[int, Proposal | None] = {}
+        for kind in (0, 1):
+            seen = set[Place]()
+            for place in sorted(range(len(scored)), key=lambda place: -scored[place][kind].log_evidence):
+                if len(seen) == most or scored[place][kind].log_evidence < WORTH_A_LOOK:
+                    break
+                if _place(scored[place]) not in seen:
+                    if place not in looked:
+                        looked[place] = self._look_at(scored[place], scorer, at, signals)
+                    if looked[place] is not None:
+                        seen.add(_place(scored[place]))
         best: dict[Place, Proposal] = {}
-        for proposal in sorted((each for each in found if each is not None), key=lambda each: -each.log_factor):
+        for proposal in sorted(
+            (each for each in looked.values() if each is not None), key=lambda each: -each.log_factor
+        ):
             best.setdefault(proposal.place, proposal)
         return list(best.values())
 
-    def _on_grid(self, effect: Effect, scorer: Scorer, signals: Sequence[Signals]) -> tuple[Scored, Scored]:
+    def _on_grid(
+        self, effect: Effect, scorer: Scorer, signals: Sequence[Signals], at: Hypothesis
+    ) -> tuple[Scored, Scored]:
         """Every shape of an effect's grid."""
         parts = [
-            scorer.score(effect, shapes, self.columns(effect, shapes, signals))
-            for shapes in _parts(thin(effect.grid, MOST_SHAPES))
+            scorer.score(effect, shapes, self.columns(effect, shapes, signals, at.dependence))
+            for shapes in _parts(_spread_over(effect.grid))
         ]
         beside, alone = ([part[kind] for part in parts] for kind in (0, 1))
         return _join(beside), _join(alone)
@@ -97,67 +116,85 @@ class Proposer:
             return None
         effect, place = on_grid.effect, on_grid.best
         joints = effect.touched(len(at.scales))
-        shape, size = self._zoom(effect, on_grid.shapes[place], on_grid.sizes[place], at, signals)
-        scales, gained = self._tune(effect, shape, size, at, joints, signals)
-        if any(effect.is_free(each) for each in range(len(effect.shapes))):
-            shape, size = self._zoom(effect, shape, size, replace(at, scales=scales), signals)
-            scales, gained = self._tune(effect, shape, size, replace(at, scales=scales), joints, signals)
-        linear = self._extend(effect, shape, size, at.linear, signals)
-        coefficients = linear.posterior(scales).mean[at.linear.size :]
+        is_open = any(effect.is_free(each) for each in range(len(effect.shapes)))
+        shape, size = on_grid.shapes[place], on_grid.sizes[place]
+        if is_open:
+            shape, size = self._zoom_in_each_form(on_grid, at, signals)
+        found = self._extend(effect, shape, size, at)
+        if is_open:
+            beside = self.laboratory.paint(at, found)
+            shape, size = self.zoom(effect, shape, size, beside, signals)
+            found = self._extend(effect, shape, size, beside)
+        term = found.model.terms[-1]
+        own = found.posterior.mean[found.model.term_places()[-1]]
+        term = replace(term, coefficients=own[: len(size)])
         k_v = None if effect.joint is None else at.model.structure.terms[effect.joint].k_v
-        term = Term(effect, shape, coefficients)
-        if not (has_possible_values(term, k_v) and effect.is_consistent(coefficients, shape)):
+        if not term.is_possible(k_v):
+            return None
+        rows = self.rows.observations
+        if isinstance(effect, Deflection) and is_position_noise(effect, shape, at.model, rows, signals):
             return None
         one_sided = sum(each.positive for each in effect.coefficients)
+        # Where the effect is there, only the model that has it tells the noise.
         averaged = on_grid.log_evidence - float(on_grid.log_factors.max())
         sized = float(np.log(2.0)) * one_sided - float(np.log(len(SIZES)))
-        factor = gained - at.log_evidence + averaged + sized
-        return Proposal(term, size, factor, alone.log_evidence, scales)
+        before = self.laboratory.tune(self.laboratory.under(at, found.dependence, joints), joints)
+        factor = found.log_evidence - before.log_evidence + averaged + sized
+        return Proposal(term, size, factor, alone.log_evidence, unnamed_log_odds(at), found)
 
-    def _tune(
-        self,
-        effect: Effect,
-        shape: Array,
-        size: Array,
-        at: Hypothesis,
-        joints: Sequence[int],
-        signals: Sequence[Signals],
-    ) -> tuple[tuple[Scales, ...], float]:
-        """Scales of highest evidence with an effect, and that log evidence."""
-        linear = self._extend(effect, shape, size, at.linear, signals)
-        scales = linear.most_probable(at.scales, joints)
-        return scales, linear.evidence(scales)
+    def _zoom_in_each_form(self, on_grid: Scored, at: Hypothesis, signals: Sequence[Signals]) -> tuple[Array, Array]:
+        """The most probable shape of all values that no step changes: each has an optimum of its own."""
+        effect, scorer = on_grid.effect, Scorer(self.rows, at)
+        found = []
+        for place in on_grid.best_of_each_form():
+            shape, size = self.zoom(effect, on_grid.shapes[place], on_grid.sizes[place], at, signals)
+            columns = self.columns(effect, shape[None], signals, at.dependence)
+            found.append((float(scorer.score(effect, shape[None], columns)[0].log_factors[0]), shape, size))
+        return max(found, key=lambda each: each[0])[1:]
 
-    def _extend(
-        self, effect: Effect, shape: Array, size: Array, linear: LinearModel, signals: Sequence[Signals]
-    ) -> LinearModel:
-        columns = self.columns(effect, shape[None], signals)
-        return linear.extend({joint: own[0] for joint, own in columns.items()}, np.zeros(len(size)), size)
+    def _extend(self, effect: Effect, shape: Array, size: Array, at: Hypothesis) -> Hypothesis:
+        """A hypothesis with an effect of a given shape, under scales of highest evidence."""
+        joints = effect.touched(len(at.scales))
+        added = self.laboratory.with_term(at, Term(effect, shape, np.zeros(len(size))), size)
+        return self.laboratory.weigh(self.laboratory.tune(added, joints), joints)
 
-    def _zoom(
+    def zoom(
         self, effect: Effect, shape: Array, size: Array, at: Hypothesis, signals: Sequence[Signals]
     ) -> tuple[Array, Array]:
-        """One free shape parameter after the other between its neighbours on the grid."""
-        free = [place for place in range(len(effect.shapes)) if effect.is_free(place)]
-        if not free:
-            return shape, size
+        """One shape parameter after the other: a free one between neighbours on the grid, a window's kind in turn."""
         scorer = Scorer(self.rows, at)
-        for place in free:
+
+        def choose(values: Array, place: int) -> int | None:
+            """Which of some values of a parameter is the most probable, the last being the one at hand."""
+            nonlocal shape, size
+            shapes = np.tile(shape, (len(values) + 1, 1))
+            shapes[:-1, place] = values
+            found, _ = scorer.score(effect, shapes, self.columns(effect, shapes, signals, at.dependence))
+            if not np.isfinite(found.log_factors.max()):
+                return None
+            shape, size = found.shapes[found.best], found.sizes[found.best]
+            return found.best
+
+        if isinstance(effect, TimeLocalEffect):
+            for place in KINDS:
+                choose(np.unique(effect.grid[:, place]), place)
+            for place in EDGES:  # optima lie as close as the rows
+                choose(np.arange(*neighbours(effect, shape, place), self.rows.interval_s), place)
+            return shape, size
+        for place in (place for place in range(len(effect.shapes)) if effect.is_free(place)):
             low, high = neighbours(effect, shape, place)
             for _ in range(ZOOMS):
                 values = spread(low, high, effect.shapes[place].logarithmic)
-                shapes = np.tile(shape, (POINTS + 1, 1))
-                shapes[:POINTS, place] = values
-                found, _ = scorer.score(effect, shapes, self.columns(effect, shapes, signals))
-                if not np.isfinite(found.log_factors.max()):
+                best = choose(values, place)
+                if best is None:
                     break
-                best = found.best
-                shape, size = found.shapes[best], found.sizes[best]
                 if best < POINTS:
                     low, high = float(values[max(best - 1, 0)]), float(values[min(best + 1, POINTS - 1)])
         return shape, size
 
-    def columns(self, effect: Effect, shapes: Array, signals: Sequence[Signals]) -> dict[int, Array]:
+    def columns(
+        self, effect: Effect, shapes: Array, signals: Sequence[Signals], dependence: Sequence[float]
+    ) -> dict[int, Array]:
         """White rows of an effect at every joint that it touches, (s, c, R_j).
 
         Parameters
@@ -165,8 +202,13 @@ class Proposer:
         shapes : (s, k) float64
             values of its shape parameters
         """
-        white = white_columns(self.rows.observations, effect, shapes, signals)
-        return {joint: self.rows.take(joint, rows) for joint, rows in white.items()}
+        white = self.rows.columns(effect, shapes, signals)
+        return {joint: self.rows.take(joint, rows, dependence[joint]) for joint, rows in white.items()}
+
+
+def _spread_over(grid: Array) -> Array:
+    """Some of the shapes of a large grid; no fixed step, which would leave out all that alternate."""
+    return grid[np.unique(np.linspace(0, len(grid) - 1, min(len(grid), MOST_SHAPES)).round().astype(int))]
 
 
 def _parts(shapes: Array) -> Iterator[Array]:
@@ -181,13 +223,7 @@ def _join(parts: Sequence[Scored]) -> Scored:
     return Scored(parts[0].effect, *(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
-def _shortlist(scored: Sequence[Scored]) -> set[int]:
-    """Places of the best forms of the effects that explain most, one form an effect and joint."""
-    ranked = sorted(range(len(scored)), key=lambda place: -scored[place].log_evidence)
-    chosen: dict[Place, int] = {}
-    for place in ranked:
-        if len(chosen) == LOOKED_AT or scored[place].log_evidence < WORTH_A_LOOK:
-            break
-        effect = scored[place].effect
-        chosen.setdefault((effect.id, effect.joint), place)
-    return set(chosen.values())
+def _place(scored: tuple[Scored, Scored]) -> Place:
+    """Which effect where."""
+    effect = scored[0].effect
+    return effect.id, effect.joint

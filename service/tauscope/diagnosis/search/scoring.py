@@ -8,7 +8,7 @@ The size S is not known: it is a share κ of the joint's torque, equally likely 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -17,7 +17,7 @@ from tauscope.diagnosis.evidence.linear_model import Posterior
 from tauscope.diagnosis.evidence.rows import EvidenceRows
 from tauscope.diagnosis.evidence.scales import Scales
 from tauscope.diagnosis.search.hypothesis import Hypothesis
-from tauscope.effects import Effect
+from tauscope.effects import Effect, TimeLocalEffect
 from tauscope.recording.recording import Array
 
 SIZES = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
@@ -47,6 +47,17 @@ class Scored:
     def best(self) -> int:
         """Place of the most probable shape."""
         return int(np.argmax(self.log_factors))
+
+    def best_of_each_form(self) -> list[int]:
+        """Places of the most probable shape for each set of values that no step changes; the best where none is."""
+        effect = self.effect
+        fixed = [place for place in range(len(effect.shapes)) if not effect.is_free(place)]
+        if not fixed or isinstance(effect, TimeLocalEffect):
+            return [self.best]
+        _, forms = np.unique(self.shapes[:, fixed], axis=0, return_inverse=True)
+        places = (np.flatnonzero(forms == form) for form in np.unique(forms))
+        best = (int(own[np.argmax(self.log_factors[own])]) for own in places)
+        return [place for place in best if np.isfinite(self.log_factors[place])]
 
     @property
     def log_evidence(self) -> float:
@@ -83,7 +94,7 @@ class Scorer:
         """Rms of each column over that of the measured torque, at the joint where that is largest, (s, c)."""
         found = []
         for joint, own in columns.items():
-            measured = self._rows.measured_rms(joint)
+            measured = self._rows.measured_rms(joint, self._at.dependence[joint])
             if measured > 0.0 and own.shape[-1]:
                 found.append(np.sqrt(np.mean(own**2, axis=-1)) / measured)
         return np.max(found, axis=0) if found else np.zeros(next(iter(columns.values())).shape[:2])
@@ -128,6 +139,11 @@ def _factors(effect: Effect, shapes: Array, left: Array, outside: Array, mutual:
     possible = visible & ~((one_sided & (coefficients < 0.0)) | (np.abs(coefficients) > largest)).any(axis=1)
     found = logsumexp(factors, axis=0) - np.log(len(SIZES)) + np.log(2.0) * one_sided.sum()
     return Scored(effect, shapes, np.where(possible, found, -np.inf), coefficients, sizes[best, every])
+
+
+def unnamed_log_odds(at: Hypothesis) -> float:
+    """Log Bayes factor of torque without a name, against none."""
+    return at.log_evidence - replace(at, scales=_without_discrepancy(at)).log_evidence
 
 
 def _without_discrepancy(at: Hypothesis) -> tuple[Scales, ...]:

@@ -1,27 +1,34 @@
 """From the nominal model to the most probable set of effects: one more, one less, until nothing helps."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cmp_to_key
 
 import numpy as np
 
-from tauscope.diagnosis.search.held_out import Change, HeldOut
+from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.model.held_out_change import HeldOutChange
+from tauscope.diagnosis.model.term import Place, Term
+from tauscope.diagnosis.search.held_out import HeldOut
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
 from tauscope.diagnosis.search.proposals import Proposal, Proposer
-from tauscope.diagnosis.selection.choice import Place
-from tauscope.effects import Effect
+from tauscope.diagnosis.search.scoring import unnamed_log_odds
+from tauscope.diagnosis.search.window import window_log_odds
+from tauscope.effects import Effect, TimeLocalEffect
 from tauscope.effects.computation import side_by_side
+from tauscope.recording.recording import Array
+
+MOST_EXCHANGES = 4
+"""Effects whose place another one takes at most."""
+
+WEIGHED = 3
+"""Rivals of a finding that are looked at."""
 
 MOST_EFFECTS = 12
 """Effects that are added at most."""
 
-WORSE = 2.7
-"""Standard errors by which no joint may be predicted worse: of seven joints one is so by chance in thirty findings…"""
-
-SPILLED = 0.25
-"""…unless what it loses is less than this part of what all joints gain [log rms]."""
-
-BETTER = 1.64
-"""…and by which a joint on which an effect acts is predicted better, at least: one in twenty is so by chance."""
+NAMED = 3.0
+"""Log odds from which an effect is named, and those of its joints' held-out motion alone: nineteen in twenty."""
 
 CATALOGUED = 3.0
 """Log odds before the data that torque which is left out has a name: one in twenty laws is in no catalogue."""
@@ -31,28 +38,96 @@ CATALOGUED = 3.0
 class Step:
     """An effect that was added or refused.
 
-    log_odds : float
-        posterior, that it is there
+    log_odds, trained_log_odds : float
+        posterior, that it is there, after all motion and after training
     rivals : tuple of Proposal
         other effects that were as good as looked at in its place
-    change : Change or None
+    change : HeldOutChange or None
         on held-out motion; None where there is none
+    covariance : (p, p) float64
+        of the parameters with it
     """
 
     proposal: Proposal
     log_odds: float
     rivals: tuple[Proposal, ...]
-    change: Change | None
+    change: HeldOutChange | None
     is_confirmed: bool
+    before: ExtendedModel
+    after: ExtendedModel
+    covariance: Array
+    trained_log_odds: float
+
+    @property
+    def probability(self) -> float:
+        """Of the effect, against none: no more than even where held-out motion contradicts it."""
+        log_odds = self.log_odds if self.is_confirmed else min(self.log_odds, 0.0)
+        return float(1.0 / (1.0 + np.exp(-np.clip(log_odds, -700.0, 700.0))))
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """What may be in the place of a finding.
+
+    log_odds : float
+        posterior, against neither
+    """
+
+    term: Term
+    model: ExtendedModel
+    log_odds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """Effects of one kind at one place beside all others.
+
+    places : tuple of int
+        of their terms in the model
+    without : Hypothesis
+        all others, at their most probable parameters
+    log_odds : float
+        posterior, that it is there
+    rivals : tuple of Rival
+        the most probable first
+    """
+
+    places: tuple[int, ...]
+    without: Hypothesis
+    log_odds: float
+    rivals: tuple[Rival, ...]
+    proposals: tuple[Proposal, ...]
+
+    @property
+    def lead(self) -> float:
+        """Log odds of the best rival against it."""
+        return self.rivals[0].log_odds - self.log_odds if self.rivals else -np.inf
+
+    def refuse(self, rival: Place) -> "Weighed":
+        """The same without a rival that held-out motion refuses."""
+        return replace(self, rivals=tuple(each for each in self.rivals if each.term.place != rival))
+
+    @property
+    def probability(self) -> float:
+        """Share of all visited models that contain it (Madigan & Raftery 1994)."""
+        ahead = np.array([-self.log_odds, *(each.log_odds - self.log_odds for each in self.rivals)])
+        return float(1.0 / (1.0 + np.exp(np.clip(ahead, -700.0, 700.0)).sum()))
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What the search found."""
+    """Result of a search.
+
+    steps : tuple of Step
+        every effect that was tried, in the order of trial
+    weighed : tuple of Weighed
+        every effect of the hypothesis
+    """
 
     nominal: Hypothesis
     hypothesis: Hypothesis
     steps: tuple[Step, ...]
+    weighed: tuple[Weighed, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,64 +137,228 @@ class Search:
     laboratory: Laboratory
     proposer: Proposer
     held_out: HeldOut | None
+    farther: Sequence[Effect] = ()
 
-    def run(self, nominal: Hypothesis) -> Found:
-        """Add what makes the data most probable and held-out motion no worse."""
+    def run(self, nominal: Hypothesis, before: Found | None = None) -> Found:
+        """Add what makes the data most probable and held-out motion no worse, to what was found before."""
         at, steps, refused = nominal, list[Step](), set[Place]()
-        while len(at.model.terms) - len(nominal.model.terms) < MOST_EFFECTS:
+        if before is not None:
+            at, steps = before.hypothesis, list(before.steps)
+        first, exchanges = len(nominal.model.terms), 0
+        while True:
+            at, tried = self._grow(at, first, refused)
+            steps += tried
+            at = self._refine(self._without_harm(at, nominal), first)
+            at, weighed, exchanged = self._exchange(at, MOST_EXCHANGES - exchanges)
+            if not exchanged:
+                return Found(nominal, at, tuple(steps), weighed)
+            exchanges += exchanged
+            at = self._without_superfluous(at, first)
+
+    def _grow(self, at: Hypothesis, first: int, refused: set[Place]) -> tuple[Hypothesis, list[Step]]:
+        """One more effect, and without those that it makes superfluous, until nothing helps."""
+        steps: list[Step] = []
+        while len(at.model.terms) - first < MOST_EFFECTS:
             proposals = self.proposer.propose(at, _Wanted(_places(at), refused))
             tried, found = self._best(at, proposals)
             refused.update(step.proposal.place for step in tried if not step.is_confirmed)
             steps += tried
             if found is None:
                 break
-            at = self._without_superfluous(found, len(nominal.model.terms))
+            at = self._without_superfluous(found, first)
             refused |= _places(found) - _places(at)
-        return Found(nominal, at, tuple(steps))
+        return at, steps
+
+    def _refine(self, at: Hypothesis, first: int) -> Hypothesis:
+        """Farther forms in the place of effects that they refine, where they are more probable."""
+        for effect in self.farther:
+            places = [term.place for term in at.model.terms]
+            refined = [place for place in places[first:] if place[0] in effect.refines and place[1] == effect.joint]
+            if refined:
+                at = self._refine_by(effect, places.index(refined[0]), at, first)
+        return at
+
+    def _refine_by(self, effect: Effect, place: int, at: Hypothesis, first: int) -> Hypothesis:
+        """One of them in the place of a term, and of all others that it makes superfluous."""
+        touched, without = effect.touched(len(at.scales)), self._settle_without(at, place)
+        for proposal in Proposer(self.laboratory, [effect]).propose(without, lambda _: True):
+            found = self._settle(self._add(without, proposal), touched)
+            found = self._without_superfluous(found, first)
+            gained = self.laboratory.under(found, at.dependence, touched).log_evidence - at.log_evidence
+            gained += 0.0 if self.held_out is None else self.held_out.change(at, found).log_odds()
+            if gained > 0.0 and _is_possible(found.model):
+                return found
+        return at
+
+    def _exchange(self, at: Hypothesis, most: int) -> tuple[Hypothesis, tuple[Weighed, ...], int]:
+        """Each effect weighed beside all others, and a more probable one in its place where there is one."""
+        weighed = {own: self._weigh(at, places) for own, places in _groups(at.model).items()}
+        exchanges, stale = 0, set[Place]()
+        while weighed:
+            own: Place | None = max(weighed, key=lambda each: weighed[each].lead)
+            if weighed[own].lead <= 0.0 or len(weighed[own].places) > 1 or exchanges >= most:
+                own = next(iter(stale), None)
+            if own is None:
+                break
+            if own in stale:
+                stale.remove(own)
+                weighed[own] = self._weigh(at, _groups(at.model)[own])
+                continue
+            other, rival = self._try_rival(weighed[own]), weighed[own].rivals[0].term.place
+            if other is None:
+                weighed = {each: weighed[each].refuse(rival) for each in weighed}
+                continue
+            exchanges += 1
+            at, new = other, other.model.terms[-1].place
+            groups = _groups(at.model)
+            stale = set(groups) - {new}
+            weighed = {each: weighed[each] for each in stale} | {new: self._weigh(at, groups[new])}
+        found = tuple(each for each in weighed.values() if each.log_odds > self._least(at, each))
+        return at, found, exchanges
+
+    def _least(self, at: Hypothesis, weighed: Weighed) -> float:
+        """Log odds from which an effect is a finding: one that every arm has must stand out."""
+        return CATALOGUED if at.model.terms[weighed.places[0]].effect.is_expected else 0.0
+
+    def _try_rival(self, weighed: Weighed) -> Hypothesis | None:
+        """The hypothesis with the best rival in the place of an effect, where that is more probable."""
+        rival, without = weighed.rivals[0], weighed.without
+        proposal = next(each for each in weighed.proposals if each.term.effect is rival.term.effect)
+        step, found = self._try(without, proposal, weighed.proposals)
+        return found if step.is_confirmed and step.log_odds > weighed.log_odds else None
+
+    def _weigh(self, at: Hypothesis, places: tuple[int, ...]) -> Weighed:
+        """An effect's odds against none and against others in its place."""
+        without, touched = at, at.model.terms[places[0]].effect.touched(len(at.scales))
+        for place in reversed(places):
+            without = self.laboratory.without_term(without, place)
+        without = self.laboratory.settle(without, touched)
+        before = self.laboratory.tune(self.laboratory.under(without, at.dependence, touched), touched)
+        effect, shared = at.model.terms[places[0]].effect, set(touched)
+        lasts = not isinstance(effect, TimeLocalEffect)
+        trained = at.log_evidence - before.log_evidence + self._prior_odds(effect, unnamed_log_odds(before))
+        log_odds = trained + (0.0 if self.held_out is None else self.held_out.change(without, at).log_odds())
+        own, others = (effect.id, effect.joint), _places(without)
+
+        def competes(each: Effect) -> bool:
+            place = each.id, each.joint
+            is_new = place != own and (each.repeats or place not in others)
+            is_like = lasts != isinstance(each, TimeLocalEffect)
+            return is_new and is_like and not shared.isdisjoint(each.touched(len(at.scales)))
+
+        proposals = self.proposer.propose(without, competes, WEIGHED)
+        rivals = []
+        for proposal in (each for each in proposals if self._log_odds(each) > 0.0):
+            nearer = self.laboratory.approach(self._add(without, proposal))
+            odds = log_odds - trained + self._log_odds(proposal)
+            odds += 0.0 if self.held_out is None else self.held_out.change(at, nearer).log_odds()
+            rivals.append(Rival(nearer.model.terms[-1], nearer.model, odds))
+        rivals.sort(key=lambda each: -each.log_odds)
+        return Weighed(places, without, log_odds, tuple(rivals), tuple(proposals))
+
+    def _without_harm(self, at: Hypothesis, nominal: Hypothesis) -> Hypothesis:
+        """The same without the effects at whose cost joints are predicted worse than by the nominal model."""
+        first = len(nominal.model.terms)
+        while self.held_out is not None and len(at.model.terms) > first:
+            if self.held_out.change(nominal, at).harm <= 0.0:
+                break
+            others = [self._settle_without(at, place) for place in range(first, len(at.model.terms))]
+            harms = [self.held_out.change(nominal, each).harm for each in others]
+            at = others[int(np.argmin(harms))]
+        return at
+
+    def _settle_without(self, at: Hypothesis, place: int) -> Hypothesis:
+        touched = at.model.terms[place].effect.touched(len(at.scales))
+        return self.laboratory.settle(self.laboratory.without_term(at, place), touched)
 
     def _best(self, at: Hypothesis, proposals: list[Proposal]) -> tuple[list[Step], Hypothesis | None]:
-        """The most probable proposal that held-out motion does not contradict, after those that it does.
-
-        Where none is more probable than torque without a name, one that is as probable, and with which held-out motion
-        is predicted clearly better, is preferred to it.
-        """
+        """The most probable proposal that held-out motion does not contradict, after those that it does."""
         refusals: list[Step] = []
-        likely = [each for each in proposals if self._log_odds(each) > 0.0]
-        for proposal in likely:
+        for proposal in self._rank(at, [each for each in proposals if self._is_worth_a_try(each)]):
             step, found = self._try(at, proposal, proposals)
             if step.is_confirmed:
                 return [*refusals, step], found
             refusals.append(step)
-        others = [each for each in proposals if each not in likely and self._names(each)]
-        for proposal in sorted(others, key=lambda each: -each.log_factor_alone):
-            step, found = self._try(at, proposal, proposals)
-            if step.is_confirmed and step.change is not None and bool((step.change.standard < -WORSE).any()):
-                return [*refusals, step], found
         return refusals, None
 
-    def _try(self, at: Hypothesis, proposal: Proposal, proposals: list[Proposal]) -> tuple[Step, Hypothesis]:
+    def _rank(self, at: Hypothesis, proposals: Sequence[Proposal]) -> list[Proposal]:
+        """Proposals after all motion, the most probable first."""
+        if self.held_out is None or len(proposals) < 2:
+            return list(proposals)
+        held_out = self.held_out
+        nearer = {id(each): self.laboratory.approach(self._add(at, each)) for each in proposals}
+
+        def compare(one: Proposal, other: Proposal) -> float:
+            """Log odds of the other. What both predict alike says nothing: they are compared with each other."""
+            found = held_out.change(nearer[id(one)], nearer[id(other)]).log_odds()
+            return found + self._log_odds(other) - self._log_odds(one)
+
+        return sorted(proposals, key=cmp_to_key(lambda one, other: int(np.sign(compare(one, other)))))
+
+    def _add(self, at: Hypothesis, proposal: Proposal) -> Hypothesis:
+        return self.laboratory.with_term(self.laboratory.paint(at, proposal.found), proposal.term, proposal.size)
+
+    def _try(self, at: Hypothesis, proposal: Proposal, proposals: Sequence[Proposal]) -> tuple[Step, Hypothesis]:
         """A proposal in the model, and what held-out motion says of it."""
         touched = proposal.term.effect.touched(len(at.scales))
-        added = self.laboratory.with_term(at, proposal.term, proposal.size)
-        found = self.laboratory.settle(replace(added, scales=proposal.scales), touched)
+        found = self._settle(self._add(at, proposal), touched)
         change = None if self.held_out is None else self.held_out.change(at, found)
         rivals = tuple(each for each in proposals if each is not proposal)
-        confirmed = change is None or _is_better(change, touched)
-        return Step(proposal, self._log_odds(proposal), rivals, change, confirmed), found
+        log_odds = self._log_odds(proposal)
+        if isinstance(proposal.term.effect, TimeLocalEffect):
+            log_odds = min(log_odds, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
+        log_odds += 0.0 if change is None else change.log_odds()
+        confirmed = log_odds > NAMED and _is_possible(found.model)
+        confirmed &= change is None or _agrees(change, proposal.term.effect, touched)
+        covariance = found.posterior.covariance
+        trained = self._log_odds(proposal)
+        return Step(proposal, log_odds, rivals, change, confirmed, at.model, found.model, covariance, trained), found
+
+    def _settle(self, at: Hypothesis, touched: Sequence[int]) -> Hypothesis:
+        """The most probable parameters; the edges of a window, of which each has several, are looked for once more."""
+        found, last = self.laboratory.settle(at, touched), len(at.model.terms) - 1
+        term = found.model.terms[last]
+        if not isinstance(term.effect, TimeLocalEffect):
+            return found
+        without = self.laboratory.without_term(found, last)
+        signals = [without.model.signals(piece) for piece in self.laboratory.rows.observations]
+        shape, size = self.proposer.zoom(term.effect, term.shape, found.sizes[last], without, signals)
+        other = self.laboratory.with_term(without, replace(term, shape=shape), size)
+        other = self.laboratory.settle(other, touched)
+        compared = self.laboratory.under(other, found.dependence, touched)
+        found = other if compared.log_evidence > found.log_evidence else found
+        return self._turn(found, touched)
+
+    def _turn(self, at: Hypothesis, touched: Sequence[int]) -> Hypothesis:
+        """The same effect outside its window where held-out motion says so: training cannot tell which of the two."""
+        last = len(at.model.terms) - 1
+        term = at.model.terms[last]
+        outside = term.effect.outside(term.shape) if isinstance(term.effect, TimeLocalEffect) else None
+        if outside is None or self.held_out is None:
+            return at
+        turned = replace(term, shape=outside, coefficients=-term.coefficients)
+        other = self.laboratory.with_term(self.laboratory.without_term(at, last), turned, at.sizes[last])
+        other = self.laboratory.settle(other, touched)
+        return other if self.held_out.change(at, other).log_odds() > 0.0 else at
 
     def _log_odds(self, proposal: Proposal) -> float:
-        return proposal.log_factor + self._prior_odds(proposal.term.effect)
+        return proposal.log_factor + self._prior_odds(proposal.term.effect, proposal.unnamed)
 
-    def _names(self, proposal: Proposal) -> bool:
-        """Whether an effect is as probable as torque without a name, and far more than none."""
-        alone = proposal.log_factor_alone + self._prior_odds(proposal.term.effect)
-        return proposal.log_factor > -CATALOGUED and alone > CATALOGUED
+    def _is_worth_a_try(self, proposal: Proposal) -> bool:
+        """Whether an effect is about as probable as torque without a name, and far more than none."""
+        alone = proposal.log_factor_alone + self._prior_odds(proposal.term.effect, 0.0)
+        return self._log_odds(proposal) > (-CATALOGUED if alone > CATALOGUED else 0.0)
 
-    def _prior_odds(self, effect: Effect) -> float:
-        """Log odds before the data: one effect at one place is missing, whichever."""
+    def _prior_odds(self, effect: Effect, unnamed: float) -> float:
+        """Log odds before the data, that one effect at one place is missing, whichever.
+
+        Torque without a name needs odds of its own: something is missing at one of the joints, and in no catalogue.
+        """
         if effect.is_expected:
             return 0.0
-        return -float(np.log(len({(each.id, each.joint) for each in self.proposer.effects})))
+        sites = len({(each.id, each.joint) for each in self.proposer.effects})
+        joints = self.laboratory.rows.observations.robot.joint_count
+        return float(np.clip(unnamed, 0.0, CATALOGUED + np.log(joints)) - np.log(sites))
 
     def _without_superfluous(self, at: Hypothesis, first: int) -> Hypothesis:
         """The same without effects that the later ones made superfluous.
@@ -132,11 +371,18 @@ class Search:
         while True:
             places = range(first, len(at.model.terms) - 1)
             gains = side_by_side(lambda place, at=at: self._gain_without(at, place), places)
-            if not gains or max(gains) <= CATALOGUED:
+            pairs = sorted(zip(gains, places, strict=True), reverse=True)
+            others = (self._leave_out(at, place, gain) for gain, place in pairs if gain > CATALOGUED)
+            other = next((each for each in others if each is not None), None)
+            if other is None:
                 return at
-            place = places[int(np.argmax(gains))]
-            touched = at.model.terms[place].effect.touched(len(at.scales))
-            at = self.laboratory.settle(self.laboratory.without_term(at, place), touched)
+            at = other
+
+    def _leave_out(self, at: Hypothesis, place: int, gain: float) -> Hypothesis | None:
+        """The hypothesis without an effect; None where held-out motion asks for it."""
+        without = self._settle_without(at, place)
+        gain += 0.0 if self.held_out is None else self.held_out.change(at, without).log_odds()
+        return without if gain > CATALOGUED else None
 
     def _gain_without(self, at: Hypothesis, place: int) -> float:
         """Log posterior odds that an effect is not there."""
@@ -145,7 +391,22 @@ class Search:
         steps[: len(term.coefficients)] = -term.coefficients
         reduced = at.linear.without(np.arange(own.start, own.stop), steps)
         scales = reduced.most_probable(at.scales, effect.touched(len(at.scales)))
-        return reduced.evidence(scales) - at.log_evidence - self._prior_odds(effect)
+        return replace(at, linear=reduced, scales=scales).log_evidence - at.log_evidence - self._prior_odds(effect, 0.0)
+
+
+def _is_possible(model: ExtendedModel) -> bool:
+    """Whether every coefficient is within the bounds of its law, and agrees with its shape."""
+    pairs = ((term, term.effect.joint) for term in model.terms)
+    return all(
+        term.is_possible(None if joint is None else model.structure.terms[joint].k_v)
+        and term.effect.is_consistent(term.coefficients, term.shape)
+        for term, joint in pairs
+    )
+
+
+def _agrees(change: HeldOutChange, effect: Effect, touched: Sequence[int]) -> bool:
+    """Whether held-out motion shows an effect; a window in time is of its own recording, and has only to do no harm."""
+    return change.harm <= 0.0 and (isinstance(effect, TimeLocalEffect) or change.log_odds(touched) > NAMED)
 
 
 @dataclass(frozen=True)
@@ -157,20 +418,22 @@ class _Wanted:
 
     def __call__(self, effect: Effect) -> bool:
         place = effect.id, effect.joint
-        return place not in self.refused and (effect.repeats or place not in self.present)
+        return place not in self.refused and (effect.repeats or not self._is_present(effect))
+
+    def _is_present(self, effect: Effect) -> bool:
+        """Whether it is there at its joint, or at the whole arm: an effect of all joints and one of each are alike."""
+        joints = {joint for name, joint in self.present if name == effect.id}
+        return bool(joints) if effect.joint is None else bool(joints & {None, effect.joint})
+
+
+def _groups(model: ExtendedModel) -> dict[Place, tuple[int, ...]]:
+    """Places of the terms of each effect and joint among all."""
+    groups: dict[Place, list[int]] = {}
+    for number, term in enumerate(model.terms):
+        groups.setdefault(term.place, []).append(number)
+    return {place: tuple(each) for place, each in groups.items()}
 
 
 def _places(at: Hypothesis) -> set[Place]:
     """Effects of a hypothesis, and where."""
-    return {(term.effect.id, term.effect.joint) for term in at.model.terms}
-
-
-def _is_better(change: Change, touched: tuple[int, ...]) -> bool:
-    """Whether held-out motion is predicted better where an effect acts, and hardly worse anywhere.
-
-    All joints share the links. What is believed of these moves with an effect, and other joints with it.
-    """
-    gain = np.log1p(change.relative)
-    lost = float(gain[change.standard > WORSE].sum())
-    gained = -float(np.minimum(gain, 0.0).sum())
-    return bool(change.standard[list(touched)].min() < -BETTER) and lost < SPILLED * gained and gain.sum() < 0.0
+    return {term.place for term in at.model.terms}

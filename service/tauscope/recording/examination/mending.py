@@ -7,7 +7,7 @@ from typing import Literal
 from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, EditedTable, Numbers
 from tauscope.recording.examination.scan import Defects, JointDefects, find_defects
 from tauscope.recording.examination.sketch import joint_types
-from tauscope.recording.recording import Recording
+from tauscope.recording.recording import EffortKind, Recording
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.robot import Robot
 
@@ -37,6 +37,8 @@ def _build_edits(recording: Recording, defects: Defects) -> dict[int, ColumnEdit
         position = found.position_edit(len(recording), defects.bunched if joint == 0 else NO_NUMBERS)
         if len(position.blank) or len(position.jumps):
             edits[1 + joint] = position
+        if recording.effort_kind is EffortKind.COMMAND:  # targets may rest, jump and repeat
+            continue
         hold = found.effort_hold if found.effort_hold > 1 else 0
         effort = ColumnEdit(found.lost_efforts, hold=hold, fill=FILLED_ROWS if defects.alternate else 0)
         if len(effort.blank) or effort.hold or effort.fill:
@@ -56,13 +58,15 @@ def _describe_defects(recording: Recording, defects: Defects, joints: Sequence[s
         yield ResultWarning(
             code="time-stamps", text=f"{text}, {begin(int(defects.bunched[0]))}; left out", remedy=remedy
         )
-    if defects.alternate:
+    if defects.alternate and recording.effort_kind is not EffortKind.COMMAND:
         text = "positions and efforts stand in rows of their own; efforts are interpolated to the rows of the positions"
         yield ResultWarning(code="held-samples", text=text, remedy="record both at the same instants")
     kind = recording.effort_kind.value
     alike: dict[tuple[str, str, str | None], list[int]] = {}
     for number, joint in enumerate(defects.joints, 1):
         for column, code, text, remedy in _describe_joint(joint, begin):
+            if column == "effort" and recording.effort_kind is EffortKind.COMMAND:
+                continue
             alike.setdefault((code, f"{column}: {text}", remedy), []).append(number)
     for (code, text, remedy), numbers in alike.items():
         group, _, words = text.partition(": ")

@@ -49,6 +49,8 @@ FEWEST_TOUCHES = 3
 
 def find_implausible_torque(recording: Recording, sketch: Sketch, robot: Robot | None) -> str | None:
     """The column, evidence and remedy of torque that can hardly be torque; None where it can."""
+    if recording.effort_kind is EffortKind.COMMAND:
+        return None
     if robot is not None and recording.effort_kind is EffortKind.CURRENT:
         fault = _find_missing_constant(robot)
         if fault is not None:

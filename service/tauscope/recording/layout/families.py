@@ -16,6 +16,9 @@ _JOINT = re.compile(r"\[[^\[\]]*\{(?:0|1|name)\}[^\[\]]*\]|\{(?:0|1|name)\}")
 _SEGMENT = re.compile(r"[^/.\[\]:]+")
 _NUMBER = re.compile(r"[0-9]+")
 
+LONGEST_NAME = 200
+"""Characters of a column's name beyond which it belongs to no family: topic, field and joint are shorter together."""
+
 
 @dataclass(frozen=True)
 class Family:
@@ -49,6 +52,7 @@ def words_of(text: str) -> tuple[str, ...]:
 
 def find_families(header: Sequence[str], joint_names: Sequence[str] | None) -> list[Family]:
     """Families of a header: named by the robot's joints, numbered, or named by any word; one joint has no number."""
+    header = [name for name in header if len(name) <= LONGEST_NAME]
     named = _named_by(header, joint_names or ())
     has_one = joint_names is None or len(joint_names) == 1
     single = [Family(name, (name,), is_guessed=True) for name in header if has_one and not _NUMBER.search(name)]

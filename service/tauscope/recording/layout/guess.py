@@ -11,7 +11,7 @@ from tauscope.robot.recording_layout import RecordingLayout, Source
 
 _COMMON_JOINT_COUNTS = (6, 7)
 _PLAIN = re.compile(r"(?!(?:y|n|yes|no|on|off|true|false|null)$)[A-Za-z_][A-Za-z0-9_./-]*", re.IGNORECASE)
-_OPTIONAL = ("qd", "qdd", "qref", "taucmd", "temp", "qlink")
+_OPTIONAL = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt")
 
 Ranking = Callable[[Sequence[str]], tuple[str, int] | None]
 """The group that words of a column mean, and how far they are from the first choice."""
@@ -24,7 +24,7 @@ def guess_layout(
     preset: str | None = None,
     prefers_torque: bool = False,
 ) -> RecordingLayout | None:
-    """The layout of a header; None where positions, efforts or the time are not among its columns.
+    """The layout of a header; None where positions, efforts or commands, or the time are not among them.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def guess_layout(
     """
     found = guess_parts(header, joint_names, preset=preset, prefers_torque=prefers_torque)
     columns = found.columns if isinstance(found.columns, Mapping) else {}
-    return found if {"t", "q"} <= set(columns) and {"tau", "i"} & set(columns) else None
+    return found if {"t", "q"} <= set(columns) and {"tau", "i", "qref"} & set(columns) else None
 
 
 def guess_parts(

@@ -12,6 +12,7 @@ _CORES: Mapping[str, str] = {
     **dict.fromkeys(("qref", "action"), "qref"),
     **dict.fromkeys(("taucmd", "ctrl"), "taucmd"),
     **dict.fromkeys(("temp", "temperature", "temperatures"), "temp"),
+    **dict.fromkeys(("volt", "volts", "voltage", "voltages"), "volt"),
     "qlink": "qlink",
 }
 _COMMANDED = frozenset(

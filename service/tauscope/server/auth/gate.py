@@ -5,6 +5,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import cast
 
 from starlette.datastructures import Headers
@@ -14,7 +15,7 @@ from starlette.types import Scope as AsgiScope
 from tauscope.server.auth.audit_log import AuditTrail
 from tauscope.server.auth.keys import LOCAL, Caller, KeyRing
 from tauscope.server.auth.scopes import find_needed_scope, is_stop
-from tauscope.server.problems import make_problem, problem_answer
+from tauscope.server.problems import ProblemError, make_problem, problem_answer
 
 MOST_CALLERS = 10_000
 """Callers that are remembered; the one that was silent longest is forgotten first."""
@@ -51,6 +52,11 @@ class RateLimit:
             self._buckets.popitem(last=False)
         return wait
 
+    def charge(self, caller: str, amount: float) -> None:
+        """Count what a call has used beyond itself; who used too much waits before the next one."""
+        tokens, then = self._buckets.get(caller, (self._burst, self._clock()))
+        self._buckets[caller] = (tokens - amount, then)
+
 
 CALLER = "tauscope.caller"
 """Where the request's ASGI scope holds its `Caller`."""
@@ -61,11 +67,12 @@ FAILURES_PER_S, FAILURE_BURST = 0.5, 20.0
 
 @dataclass(frozen=True, eq=False)
 class Access:
-    """Who may call, and how often."""
+    """Who may call, how often, and how much they may send [bytes]."""
 
     ring: KeyRing
     rate: RateLimit
     limits_local: bool = False
+    uploads: RateLimit | None = None
     failures: RateLimit = field(default_factory=lambda: RateLimit(FAILURES_PER_S, FAILURE_BURST))
 
 
@@ -136,6 +143,30 @@ def _key(headers: Headers) -> str | None:
     values = headers.getlist("authorization")
     scheme, _, key = values[0].partition(" ") if len(values) == 1 else ("", "", "")
     return key.strip() if scheme.lower() == "bearer" and key.strip() else None
+
+
+def require_upload_quota(scope: AsgiScope) -> Callable[[int], None]:
+    """Refuse an upload of a caller who has sent enough for now.
+
+    Returns
+    -------
+    callable
+        counts what is sent [bytes]
+
+    Raises
+    ------
+    ProblemError
+        if the caller has to wait
+    """
+    access, caller = cast(Access, scope["app"].state.services.access), find_caller(scope)
+    quota, key = access.uploads, caller.key or caller.name
+    if quota is None or (caller.key is None and not access.limits_local):
+        return lambda _: None
+    wait = quota.take(key)
+    if wait:
+        text = f"{caller.name} has sent as much as it may in a day; go on after {math.ceil(wait)} s"
+        raise ProblemError("rate-limited", text, headers={"Retry-After": str(math.ceil(wait))})
+    return partial(quota.charge, key)
 
 
 def _too_often(wait_s: float) -> _Refusal:

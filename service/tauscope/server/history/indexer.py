@@ -4,7 +4,7 @@ import json
 import logging
 import os
 import threading
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -189,6 +189,12 @@ _READERS: Mapping[str, Callable[[Path], ItemMetadata]] = {
 
 _log = logging.getLogger("tauscope.jobs")
 
+BATCH = 200
+"""Items that are indexed at once."""
+
+LONGEST_WAIT_S = 1.0
+"""How long a search waits for what is new; while an old folder is indexed it finds what is indexed until then [s]."""
+
 
 @dataclass(frozen=True)
 class ChangedItem:
@@ -213,6 +219,8 @@ class Indexer:
         self._lock = threading.Lock()
         self._known: dict[str, dict[str, tuple[str, bool]]] = {}
         self._seen_recordings: object = None
+        self._is_whole = False
+        self._is_closing = threading.Event()
 
     def sync(self, *, thorough: bool = False) -> None:
         """Bring the index up to date.
@@ -223,11 +231,29 @@ class Indexer:
             if the database does not answer; the next call goes on where this one ended
         """
         with self._lock:
-            if thorough or not self._known:
+            thorough = thorough or not self._is_whole
+            if thorough:
                 self._known = {kind: self.index.stamps(kind) for kind in self._items}
             for kind, store in self._items.items():
                 self._sync_kind(kind, store, thorough=thorough)
             self._sync_recordings()
+            self._is_whole = not self._is_closing.is_set()
+
+    def close(self) -> None:
+        """Have what is being indexed end after the present item."""
+        self._is_closing.set()
+
+    def refresh(self) -> None:
+        """Bring the index up to date, unless that takes long because somebody else is at it.
+
+        Raises
+        ------
+        StoreError
+            if the database does not answer
+        """
+        if self._lock.acquire(timeout=LONGEST_WAIT_S):
+            self._lock.release()
+            self.sync()
 
     def check(self, *, deep: bool = True) -> list[ChangedItem]:
         """Compare the files of every ended item, and every recording, with the hashes kept of them."""
@@ -258,7 +284,7 @@ class Indexer:
         facts = read_metadata(kind, folder)
         if facts.state == DAMAGED or not deep:
             return [ChangedItem(kind, identifier, "")]
-        self.index.put(facts)
+        self.index.put([facts])
         return []
 
     def _sync_kind(self, kind: str, store: ItemStore, *, thorough: bool) -> None:
@@ -269,25 +295,39 @@ class Indexer:
             self.index.forget(kind, gone)
             for identifier in gone:
                 del known[identifier]
+        found: list[ItemMetadata] = []
         for identifier in reversed(present):
+            if self._is_closing.is_set():
+                break
             indexed = known.get(identifier)
             if indexed is not None and indexed[1] and not thorough:
                 continue
-            self._sync_item(kind, store, identifier, indexed)
+            facts = self._read_changed(kind, store, identifier, indexed)
+            if facts is not None:
+                found.append(facts)
+            if len(found) == BATCH:
+                self._put(kind, found)
+                found = []
+        self._put(kind, found)
 
-    def _sync_item(self, kind: str, store: ItemStore, identifier: str, indexed: tuple[str, bool] | None) -> None:
-        """One item, where its state is another than the indexed one."""
+    def _read_changed(
+        self, kind: str, store: ItemStore, identifier: str, indexed: tuple[str, bool] | None
+    ) -> ItemMetadata | None:
+        """What one item shows, where its state is another than the indexed one."""
         try:
             identifier_time(identifier)
             folder = store.folder(identifier)
         except (NotFoundError, ValueError):
-            return
+            return None
         if indexed is not None and indexed[0] == stamp(kind, folder):
-            return
+            return None
         facts = read_metadata(kind, folder)
-        if folder.is_dir():
-            self.index.put(facts)
-            self._known[kind][identifier] = (facts.stamp, facts.is_final)
+        return facts if folder.is_dir() else None
+
+    def _put(self, kind: str, found: Sequence[ItemMetadata]) -> None:
+        """Index items in one transaction: to wait for the disk once each would take hours for a large folder."""
+        self.index.put(found)
+        self._known[kind] |= {facts.identifier: (facts.stamp, facts.is_final) for facts in found}
 
     def _sync_recordings(self) -> None:
         """The recordings, where any of them changed."""
@@ -298,7 +338,7 @@ class Indexer:
 
 
 def open_index(index: Index, items: Mapping[str, ItemStore], recordings: RecordingStore, label: str) -> Indexer:
-    """Open the index of a data folder, and fill it from the folders; an old folder is upgraded so.
+    """Open the index of a data folder; `Indexer.sync` fills it from the folders, and upgrades an old one so.
 
     Raises
     ------
@@ -306,6 +346,4 @@ def open_index(index: Index, items: Mapping[str, ItemStore], recordings: Recordi
         if the database does not answer
     """
     index.register(label, datetime.now(UTC))
-    keeper = Indexer(index, items, recordings)
-    keeper.sync(thorough=True)
-    return keeper
+    return Indexer(index, items, recordings)

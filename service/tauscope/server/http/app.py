@@ -4,7 +4,7 @@ from collections.abc import AsyncIterator
 from concurrent.futures import Executor
 from contextlib import asynccontextmanager
 
-from fastapi import FastAPI
+from fastapi import Depends, FastAPI
 
 from tauscope.server.auth.audited_requests import AuditedRequests
 from tauscope.server.auth.gate import Gate
@@ -26,6 +26,7 @@ from tauscope.server.http.items import router as items
 from tauscope.server.http.leases.models import LeaseRequest
 from tauscope.server.http.leases.router import router as leases
 from tauscope.server.http.leases.router import stop_router
+from tauscope.server.http.methods import collect_methods
 from tauscope.server.http.openapi import install_openapi
 from tauscope.server.http.problem_handlers import install_problem_handlers
 from tauscope.server.http.protection import BodyLimit, ConcurrencyLimiter, OriginCheck, RequestLog, ResponseProtection
@@ -40,11 +41,12 @@ from tauscope.server.http.schedules import ScheduleRequest
 from tauscope.server.http.schedules import router as schedules
 from tauscope.server.http.services import open_services
 from tauscope.server.http.settings import Settings
+from tauscope.server.http.strict_query import require_known_query
 from tauscope.server.http.tasks.events import EVENT_MODELS
 from tauscope.server.page.router import router as page
 from tauscope.server.problems import Problem
 
-API_VERSION = "1.17.0"
+API_VERSION = "1.19.0"
 """Of the interface, not of the package; a change of tests/server/http/openapi.json goes with a change here."""
 
 PREFIX = "/api/v1"
@@ -98,11 +100,14 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
         description="Every failed request is answered with a problem (RFC 9457). SI units; joint numbers start at 1.",
         version=API_VERSION,
         lifespan=lifespan,
+        generate_unique_id_function=lambda route: route.name,  # generated clients call their functions so
         docs_url=None,
         redoc_url=None,
     )
     for router in VERBS:
-        app.include_router(router, prefix=PREFIX)
+        app.include_router(router, prefix=PREFIX, dependencies=[Depends(require_known_query)])
+    pages_too = [("", router) for router in (health.router, pages.router, page)]
+    app.state.methods = collect_methods([*((PREFIX, router) for router in VERBS), *pages_too])
     app.include_router(health.router)
     app.include_router(pages.router)
     app.include_router(page)

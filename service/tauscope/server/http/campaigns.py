@@ -25,8 +25,8 @@ from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.answers import JobAnswer, damaged_fields, job_fields, require_document, require_success
 from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
 from tauscope.server.http.tasks.routes import ENDINGS, Identifier, collection
-from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request
-from tauscope.server.models import AnswerModel
+from tauscope.server.http.tasks.submission import RobotRequest, keep_robot, receive_request
+from tauscope.server.models import AnswerModel, PageAnswer
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.record import JobState
 from tauscope.tasks.campaign import CampaignOptions
@@ -86,7 +86,7 @@ class CampaignAnswer(JobAnswer):
     links: CampaignLinksAnswer = Field(description="where to go on")
 
 
-class CampaignListAnswer(AnswerModel):
+class CampaignListAnswer(PageAnswer):
     """Campaigns that are kept."""
 
     campaigns: list[CampaignAnswer] = Field(description="the newest first")
@@ -231,28 +231,20 @@ async def submit_campaign(request: Request, services: Services) -> str:
         workspace = CampaignWorkspace(staged)
         await run_in_threadpool(workspace.prepare)
         received = await receive_request(request, CampaignRequest, services.settings, workspace.robot)
-        return await run_in_threadpool(_hand_in, received, services, workspace, request)
-    finally:
-        await run_in_threadpool(items.discard, staged)
-
-
-def _hand_in(
-    received: Received[CampaignRequest], services: Services, workspace: CampaignWorkspace, request: Request
-) -> str:
-    """Check what was received, and begin."""
-    document, robot_file = received.document, keep_robot(received, workspace.robot)
-    robot = read_received_robot(workspace.robot, robot_file)
-    backend = chosen_backend(services.settings, document.backend, robot)
-    permit = permit_of(request, services, backend.device(robot.name))
-    workspace.write_order(
-        CampaignOrder(
+        robot_file = await run_in_threadpool(keep_robot, received, workspace.robot)
+        robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
+        backend = chosen_backend(services.settings, received.document.backend, robot)
+        permit = permit_of(request, services, backend.device(robot.name))
+        order = CampaignOrder(
             robot_file=robot_file,
             robot_name=robot.name,
             backend=backend,
-            **{name: getattr(document, name) for name in CampaignOptions.model_fields},
+            **{name: getattr(received.document, name) for name in CampaignOptions.model_fields},
         )
-    )
-    return services.campaigns.submit(workspace.folder, permit)
+        await run_in_threadpool(workspace.write_order, order)
+        return await run_in_threadpool(services.campaigns.submit, workspace.folder, permit)
+    finally:
+        await run_in_threadpool(items.discard, staged)
 
 
 CAMPAIGNS = Resource(
@@ -277,6 +269,7 @@ router = make_router(CAMPAIGNS)
 
 @router.get(
     "/{identifier}/result",
+    name="get_result_of_campaigns",
     summary="Fetch the result",
     responses=problem_responses(
         "not-found",

@@ -19,7 +19,7 @@ from tauscope.server.http.tasks.answers import JobAnswer, require_document
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import HTML, JobDocument, text_document
 from tauscope.server.http.tasks.submission import Received, RobotRequest
-from tauscope.server.models import AnswerModel
+from tauscope.server.models import AnswerModel, PageAnswer
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.diagnosis import DiagnosisWorkspace
 from tauscope.server.queue.task_job import SAVED_MODEL, TRAJECTORY, OrderedRecording
@@ -114,7 +114,7 @@ class DiagnosisAnswer(JobAnswer):
     links: DiagnosisLinksAnswer = Field(description="where to go on")
 
 
-class DiagnosisListAnswer(AnswerModel):
+class DiagnosisListAnswer(PageAnswer):
     """Diagnoses that are kept."""
 
     diagnoses: list[DiagnosisAnswer] = Field(description="the newest first")

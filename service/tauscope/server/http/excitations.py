@@ -1,10 +1,14 @@
 """Excitations: requests, answers and what is special about this resource."""
 
+from collections.abc import AsyncIterator
 from typing import Annotated, Any, Literal
 
-from fastapi import Query, Response
+from fastapi import Query, Request, Response
+from fastapi.responses import StreamingResponse
 from pydantic import Field
+from starlette.concurrency import run_in_threadpool
 
+from tauscope.server.http.reading import READING
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.server.http.services import ServicesDep
 from tauscope.server.http.tasks.answers import JobAnswer, require_document
@@ -12,10 +16,12 @@ from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import JobDocument
 from tauscope.server.http.tasks.routes import ENDINGS, Identifier
 from tauscope.server.http.tasks.submission import RobotRequest
-from tauscope.server.models import AnswerModel
+from tauscope.server.models import AnswerModel, PageAnswer
 from tauscope.server.problems import problem_responses
-from tauscope.server.queue.excitation import ExcitationWorkspace, read_designed_trajectory
+from tauscope.server.queue.excitation import ExcitationWorkspace, write_trajectory_piece
+from tauscope.server.queue.stored import read_bytes
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
+from tauscope.trajectory.csv_format import PIECE_ROWS
 
 
 class ExcitationRequest(RobotRequest):
@@ -52,7 +58,7 @@ class ExcitationAnswer(JobAnswer):
     links: ExcitationLinks = Field(description="where to go on")
 
 
-class ExcitationListAnswer(AnswerModel):
+class ExcitationListAnswer(PageAnswer):
     """Excitations that are kept."""
 
     excitations: list[ExcitationAnswer] = Field(description="the newest first")
@@ -96,15 +102,34 @@ router = EXCITATIONS.router()
     response_class=Response,
     responses={
         200: {"content": {"application/json": {}, "text/csv": {}}, "description": "the file"},
-        **problem_responses("not-found", *ENDINGS, "excitation", "limit-exceeded", "worker-lost", "internal"),
+        **problem_responses("not-found", *ENDINGS, "excitation", "internal", *READING),
     },
 )
-def get_trajectory(
-    identifier: Identifier, services: ServicesDep, format_: TrajectoryFormat = "json", rate_hz: Rate = 500.0
+async def get_trajectory(
+    request: Request,
+    identifier: Identifier,
+    services: ServicesDep,
+    format_: TrajectoryFormat = "json",
+    rate_hz: Rate = 500.0,
 ) -> Response:
     """The motion for Tauscope itself (json) or for another controller (csv)."""
-    workspace = EXCITATIONS.finished(services, identifier)
-    content = read_designed_trajectory(workspace, None if format_ == "json" else rate_hz)
-    media_type = "application/json" if format_ == "json" else "text/csv"
-    disposition = {"Content-Disposition": f'attachment; filename="trajectory.{format_}"'}
-    return Response(require_document(content, identifier), headers=disposition, media_type=media_type)
+    workspace = await run_in_threadpool(EXCITATIONS.finished, services, identifier)
+    if format_ == "json":
+        content = require_document(await run_in_threadpool(read_bytes, workspace.trajectory), identifier)
+        return Response(content, headers=_name_file("json"), media_type="application/json")
+    # The first piece is made before the answer begins: its problem is the answer's.
+    first = await services.reading.call(request, write_trajectory_piece, workspace, rate_hz, 0)
+
+    async def write_pieces() -> AsyncIterator[bytes]:
+        piece, start = first, 0
+        while piece:
+            yield piece
+            start += PIECE_ROWS
+            piece = await services.reading.call(request, write_trajectory_piece, workspace, rate_hz, start)
+
+    return StreamingResponse(write_pieces(), headers=_name_file("csv"), media_type="text/csv")
+
+
+def _name_file(suffix: str) -> dict[str, str]:
+    """The header by which a browser saves a trajectory."""
+    return {"Content-Disposition": f'attachment; filename="trajectory.{suffix}"'}

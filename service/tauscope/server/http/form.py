@@ -13,6 +13,7 @@ from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import LimitExceededError
 from tauscope.robot.messages import one_line, shown
+from tauscope.server.auth.gate import require_upload_quota
 from tauscope.server.problems import ProblemError
 from tauscope.server.store.files import FILE_NAME_RULE, IncomingFile, KeptFile, is_file_name
 
@@ -59,10 +60,12 @@ async def receive_form(request: Request, rules: Mapping[str, PartRule]) -> Recei
     Raises
     ------
     ProblemError
-        if the body is no form, or has a part that is not foreseen, or a file of a name that is not allowed
+        if the body is no form, or has a part that is not foreseen, or a file of a name that is not allowed; or the
+        caller has sent enough for now
     LimitExceededError
         if a part is too large
     """
+    charge = require_upload_quota(request.scope)
     receiver = _Receiver(rules)
     with _form_errors():
         _, options = parse_options_header(request.headers.get("content-type"))
@@ -70,6 +73,7 @@ async def receive_form(request: Request, rules: Mapping[str, PartRule]) -> Recei
     try:
         async for piece in request.stream():
             if piece:
+                charge(len(piece))
                 await run_in_threadpool(_feed, parser, piece)
         with _form_errors():
             parser.finalize()

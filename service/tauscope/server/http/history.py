@@ -352,5 +352,5 @@ async def _read(request: Request, kind: type[Body], services: Services) -> Body:
 
 def _bring_up_to_date(services: Services) -> None:
     """What ended a moment ago counts already."""
-    services.index.sync()
+    services.index.refresh()
     services.models.judge_new()

@@ -14,7 +14,7 @@ from tauscope.server.http.tasks.answers import JobAnswer
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import HTML, JobDocument, text_document
 from tauscope.server.http.tasks.submission import RobotRequest
-from tauscope.server.models import AnswerModel
+from tauscope.server.models import AnswerModel, PageAnswer
 from tauscope.server.queue.identification import IdentificationWorkspace
 from tauscope.server.queue.task_job import OrderedRecording
 from tauscope.server.store.files import FILE_NAME_PATTERN, FILE_NAME_RULE, is_file_name
@@ -107,7 +107,7 @@ class IdentificationAnswer(JobAnswer):
     links: LinksAnswer = Field(description="where to go on")
 
 
-class IdentificationListAnswer(AnswerModel):
+class IdentificationListAnswer(PageAnswer):
     """Identifications that are kept."""
 
     identifications: list[IdentificationAnswer] = Field(description="the newest first")

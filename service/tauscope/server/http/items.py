@@ -83,7 +83,7 @@ def search_items(
 
     Where several services share a database, those of all data folders are found.
     """
-    services.index.sync()
+    services.index.refresh()
     query = ItemQuery(kind, state, robot, None, recording_sha256, before, limit)
     found = [_answer(entry, services.index.index.site) for entry in services.index.index.search(query)]
     return ItemListAnswer(items=found, before=_next(found, limit))
@@ -92,7 +92,7 @@ def search_items(
 @router.get("/robots", tags=["robots"], summary="List the robots")
 def list_robots(services: ServicesDep) -> RobotListAnswer:
     """Every robot that something is or was kept about; its name is the one in its file."""
-    services.index.sync()
+    services.index.refresh()
     return RobotListAnswer(robots=[KnownRobotAnswer.model_validate(each) for each in services.index.index.robots()])
 
 

@@ -1,6 +1,8 @@
 """The OpenAPI document: bodies that the framework does not see, and models that only they refer to."""
 
 from collections.abc import Mapping, Sequence
+from functools import reduce
+from operator import getitem
 from typing import Any
 
 from fastapi import FastAPI
@@ -58,6 +60,14 @@ def model_reference(model: type[BaseModel]) -> dict[str, str]:
     return {"$ref": _REFERENCE.format(model=model.__name__)}
 
 
+def resolve_reference(document: Mapping[str, Any], node: dict[str, Any]) -> dict[str, Any]:
+    """A part of a document, or that to which it refers."""
+    while "$ref" in node:
+        _, *steps = node["$ref"].split("/")
+        node = reduce(getitem, steps, document)
+    return node
+
+
 def install_openapi(app: FastAPI, models: Sequence[type[BaseModel]]) -> None:
     """Have the application's OpenAPI document hold further models."""
 
@@ -82,7 +92,29 @@ def _document(app: FastAPI, models: Sequence[type[BaseModel]]) -> dict[str, Any]
     for unused in ("HTTPValidationError", "ValidationError"):
         components.pop(unused, None)
     document["components"]["schemas"] = dict(sorted(components.items()))
+    _share_problems(document)
     return document
+
+
+def _share_problems(document: dict[str, Any]) -> None:
+    """Put each problem's example, and each set of problems, into the document once."""
+    examples: dict[str, Any] = {}
+    shared: dict[str, Any] = {}
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            for status, answer in operation["responses"].items():
+                problems = answer.get("content", {}).get(MEDIA_TYPE, {}).get("examples")
+                if problems is None:
+                    continue
+                examples |= problems
+                name = f"problem-{status}-{'-or-'.join(sorted(problems))}"
+                references = {code: {"$ref": f"#/components/examples/{code}"} for code in problems}
+                shared[name] = {
+                    **answer,
+                    "content": {MEDIA_TYPE: {**answer["content"][MEDIA_TYPE], "examples": references}},
+                }
+                operation["responses"][status] = {"$ref": f"#/components/responses/{name}"}
+    document["components"] |= {"examples": dict(sorted(examples.items())), "responses": dict(sorted(shared.items()))}
 
 
 _COMMON = ("bad-request", "host", "origin", "unauthorized", "forbidden", "rate-limited", "internal")

@@ -18,6 +18,7 @@ from markdown_it.token import Token
 
 from tauscope.errors import NotFoundError
 from tauscope.robot.messages import one_line, shown
+from tauscope.server.http.openapi import resolve_reference
 from tauscope.server.problems import KINDS
 
 SECTIONS = ("errors", "how-to")
@@ -139,7 +140,7 @@ def _operations(document: dict[str, Any]) -> list[dict[str, Any]]:
             "parameters": operation.get("parameters", []),
             "bodies": _bodies(document, operation.get("requestBody", {}).get("content", {})),
             "statuses": [
-                (status, HTTPStatus(int(status)).phrase, answer["description"])
+                (status, HTTPStatus(int(status)).phrase, resolve_reference(document, answer)["description"])
                 for status, answer in sorted(operation["responses"].items())
             ],
         }
@@ -153,9 +154,7 @@ def _bodies(document: dict[str, Any], content: dict[str, Any]) -> list[dict[str,
     """Media types of a body, each with its fields and examples."""
     bodies = []
     for media_type, body in content.items():
-        schema = body["schema"]
-        if "$ref" in schema:
-            schema = document["components"]["schemas"][schema["$ref"].rsplit("/", 1)[1]]
+        schema = resolve_reference(document, body["schema"])
         fields = [(name, field.get("description", "")) for name, field in schema.get("properties", {}).items()]
         examples = [(example["summary"], example["value"]) for example in body.get("examples", {}).values()]
         bodies.append({"media_type": media_type, "fields": fields, "examples": examples})

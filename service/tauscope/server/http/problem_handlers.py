@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Mapping
+from http import HTTPStatus
 
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
@@ -12,6 +13,7 @@ from tauscope.errors import TauscopeError
 from tauscope.files import is_disk_full
 from tauscope.server.control.device_claims import BusyError
 from tauscope.server.control.leases import LeasedError, LeaseLostError, LeaseNeededError, NotArmedError
+from tauscope.server.http.methods import find_methods
 from tauscope.server.problems import (
     ProblemError,
     field_errors,
@@ -72,7 +74,10 @@ async def _http_exception(request: Request, error: Exception) -> Response:
         404: f"there is nothing at {path}; see /docs",
         405: f"{request.method} is not known at {path}; see /docs",
     }.get(error.status_code, error.detail)
-    return problem_answer(make_problem(_OF_STATUS.get(error.status_code, "bad-request"), detail, path), error.headers)
+    headers = dict(error.headers or {})
+    if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
+        headers["Allow"] = ", ".join(find_methods(request.app.state.methods, path))
+    return problem_answer(make_problem(_OF_STATUS.get(error.status_code, "bad-request"), detail, path), headers)
 
 
 async def _system_error(request: Request, error: Exception) -> Response:

@@ -1,6 +1,5 @@
 """Runs: requests, answers and what is special about this resource."""
 
-import asyncio
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -37,7 +36,7 @@ from tauscope.server.http.tasks.answers import shown_problem
 from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
 from tauscope.server.http.tasks.routes import Identifier
 from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request
-from tauscope.server.models import AnswerModel
+from tauscope.server.models import AnswerModel, PageAnswer
 from tauscope.server.problems import Problem, ProblemError, make_problem, problem_responses
 from tauscope.server.queue.excitation import ExcitationOrder, ExcitationWorkspace, check_trajectory
 from tauscope.server.queue.task_job import submit_job
@@ -143,7 +142,7 @@ class RunAnswer(AnswerModel):
     links: RunLinks = Field(description="where to go on")
 
 
-class RunListAnswer(AnswerModel):
+class RunListAnswer(PageAnswer):
     """Runs that are kept."""
 
     runs: list[RunAnswer] = Field(description="the newest first")
@@ -307,14 +306,15 @@ async def submit_run(request: Request, services: Services) -> str:
         most = min(LARGEST_TRAJECTORY, services.settings.max_upload_bytes)
         parts = {"trajectory": PartRule(most, workspace.trajectories, default_name="trajectory.json")}
         received = await receive_request(request, RunRequest, services.settings, workspace.robot, parts)
-        wanted = await run_in_threadpool(_prepare, received, services, workspace)
+        robot_file = await run_in_threadpool(_put_robot, received, services, workspace)
+        robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
+        wanted = await run_in_threadpool(_prepare, received, services, workspace, robot_file, robot)
         permit = permit_of(request, services, wanted.backend.device(wanted.robot.name))
         if wanted.uploaded:
-            checked = services.checks.submit(
-                check_trajectory, workspace.trajectories, workspace.robot / wanted.robot_file
+            await services.reading.call(
+                request, check_trajectory, workspace.trajectories, workspace.robot / wanted.robot_file
             )
-            await asyncio.wrap_future(checked)
-        return await run_in_threadpool(_hand_in, wanted, services, workspace, permit)
+        return await run_in_threadpool(_submit, wanted, services, workspace, permit)
     finally:
         await run_in_threadpool(items.discard, staged)
 
@@ -330,17 +330,22 @@ class _Wanted:
     uploaded: bool
 
 
-def _prepare(received: Received[RunRequest], services: Services, workspace: RunWorkspace) -> _Wanted:
-    """Put robot and trajectory into their places, and check the robot."""
+def _put_robot(received: Received[RunRequest], services: Services, workspace: RunWorkspace) -> str:
+    """Put the robot into its place; returns its file's name."""
     document, has_robot = received.document, received.form.file("robot") or received.document.robot
-    if document.excitation is not None and not has_robot:
-        excitation = EXCITATIONS.finished(services, document.excitation)
-        order = excitation.read_order()
-        shutil.copytree(excitation.robot, workspace.robot, dirs_exist_ok=True)
-        robot_file = "robot.yaml" if order is None else order.robot_file
-    else:
-        robot_file = keep_robot(received, workspace.robot)
-    robot = read_received_robot(workspace.robot, robot_file)
+    if document.excitation is None or has_robot:
+        return keep_robot(received, workspace.robot)
+    excitation = EXCITATIONS.finished(services, document.excitation)
+    order = excitation.read_order()
+    shutil.copytree(excitation.robot, workspace.robot, dirs_exist_ok=True)
+    return "robot.yaml" if order is None else order.robot_file
+
+
+def _prepare(
+    received: Received[RunRequest], services: Services, workspace: RunWorkspace, robot_file: str, robot: Robot
+) -> _Wanted:
+    """Put the trajectory into its place."""
+    document = received.document
     uploaded = received.form.file("trajectory") is not None
     if document.trajectory is not None:
         if uploaded:
@@ -356,7 +361,7 @@ def _prepare(received: Received[RunRequest], services: Services, workspace: RunW
     return _Wanted(document, robot_file, robot, backend, uploaded)
 
 
-def _hand_in(wanted: _Wanted, services: Services, workspace: RunWorkspace, permit: Permit) -> str:
+def _submit(wanted: _Wanted, services: Services, workspace: RunWorkspace, permit: Permit) -> str:
     """Settle what is moved, and how, and begin."""
     document, backend = wanted.document, wanted.backend
     device = backend.device(wanted.robot.name)
@@ -447,6 +452,7 @@ add_stopping(
 
 @router.get(
     "/{identifier}/recording",
+    name="get_recording_of_run",
     summary="Fetch the recording of a run",
     response_class=FileResponse,
     responses={

@@ -144,7 +144,7 @@ def remove_schedule(name: Name, services: ServicesDep) -> None:
 @router.get("/{name}/firings", summary="List the firings of a schedule", responses=problem_responses("not-found"))
 def list_firings(name: Name, services: ServicesDep, limit: Limit = 100) -> FiringListAnswer:
     """Every time that it was due, what was started, and why nothing was."""
-    services.index.sync()
+    services.index.refresh()
     return FiringListAnswer(firings=[_firing(each) for each in services.schedules.repository.firings(name, limit)])
 
 

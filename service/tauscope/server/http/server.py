@@ -7,6 +7,7 @@ import socket
 import ssl
 import sys
 from collections.abc import Callable, MutableMapping
+from contextlib import AsyncExitStack
 from typing import Any, TextIO
 
 import structlog
@@ -91,6 +92,7 @@ def serve(settings: Settings, announce: Callable[[str], None]) -> None:
             ssl_certfile=settings.tls_certificate,
             ssl_keyfile=settings.tls_key,
             timeout_graceful_shutdown=GRACE_S,
+            lifespan="off",  # `_Server` opens the services: uvicorn would log a traceback for a foreseen failure
         )
         host, port = listener.getsockname()[:2]
         scheme = "http" if settings.tls_certificate is None else "https"
@@ -98,16 +100,36 @@ def serve(settings: Settings, announce: Callable[[str], None]) -> None:
         # stop too, for a fifth of a second each time.
         gc.collect()
         gc.freeze()
-        announce(f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}")
-        _Server(config, app).run(sockets=[listener])
+        address = f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}"
+        _Server(config, app, lambda: announce(address)).run(sockets=[listener])
 
 
 class _Server(uvicorn.Server):
-    """Stops the arms as soon as it is asked to end, before it waits for open requests."""
+    """Opens the services before it answers, and stops the arms as soon as it is asked to end."""
 
-    def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
+    def __init__(self, config: uvicorn.Config, app: FastAPI, announce: Callable[[], None]) -> None:
         super().__init__(config)
-        self._app = app
+        self._app, self._announce = app, announce
+        self._open = AsyncExitStack()
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Open the services, answer requests, and only then say so.
+
+        Raises
+        ------
+        TauscopeError
+            if the services cannot be opened
+        """
+        await self._open.enter_async_context(self._app.router.lifespan_context(self._app))
+        try:
+            await super().startup(sockets)
+            if self.started:
+                self._announce()
+        except BaseException:
+            await self._open.aclose()
+            raise
+        if not self.started:  # it was asked to end meanwhile
+            await self._open.aclose()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Stop the arms, then everything else."""
@@ -115,6 +137,7 @@ class _Server(uvicorn.Server):
         if services is not None:
             services.begin_to_close()
         await super().shutdown(sockets)
+        await self._open.aclose()
 
 
 def _check_certificate(settings: Settings) -> None:

@@ -1,5 +1,6 @@
 """The services that the routes use: opened with the data folder, and closed in order."""
 
+import logging
 import shutil
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -30,15 +31,19 @@ from tauscope.server.history.model_registry import DriftMonitor, ModelRegistry
 from tauscope.server.history.retention import RetentionRule, RetentionSweeper
 from tauscope.server.http.heartbeat import Heartbeat
 from tauscope.server.http.metrics import Metrics, TimedExecutor
+from tauscope.server.http.readiness import Clock, Readiness, ReadyMetrics, check_database, check_disk
+from tauscope.server.http.reading import WIDTH, ReadingQueue
 from tauscope.server.http.repeated_answers import Answers, MemoryAnswers, StoredAnswers
 from tauscope.server.http.settings import Settings
+from tauscope.server.http.tasks.event_feeds import EventFeeds
 from tauscope.server.queue.cluster_executor import ClusterExecutor
 from tauscope.server.queue.diagnosis import run_diagnosis
 from tauscope.server.queue.excitation import run_excitation
-from tauscope.server.queue.executors import WorkerPool, open_executor
+from tauscope.server.queue.executors import open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
 from tauscope.server.queue.identification import run_identification
 from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.server.schedules.repeater import Repeater
 from tauscope.server.schedules.repository import ScheduleRepository
 from tauscope.server.schedules.scheduler import Scheduler, new_boot
@@ -47,6 +52,8 @@ from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
+
+_log = logging.getLogger("tauscope.jobs")
 
 
 @dataclass(frozen=True)
@@ -61,19 +68,21 @@ class Services:
     jobs: JobQueue
     runs: RunManager
     campaigns: CampaignManager
-    checks: Executor
+    reading: ReadingQueue
     access: Access
     leases: Leases
     audit: AuditTrail
     answers: Answers
     lease_answers: Answers
     metrics: Metrics
+    readiness: Readiness
     heartbeat: Heartbeat
     index: Indexer
     models: ModelRegistry
     schedules: Scheduler
+    closing: threading.Event
+    feeds: EventFeeds
     followers: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(4))
-    closing: threading.Event = field(default_factory=threading.Event)
 
     def begin_to_close(self) -> None:
         """Stop every arm, and let go of whoever follows events; returns at once."""
@@ -94,6 +103,8 @@ ServicesDep = Annotated[Services, Depends(_services_of)]
 PRUNING_S = 3600.0
 """How often what is old is removed, where the operator asked for it [s]."""
 
+DAY_S = 86400.0
+
 REQUESTS_PER_S = 200.0
 """How often a key may call in the long run, where the operator says nothing [1/s]."""
 
@@ -109,7 +120,7 @@ def open_services(
     TauscopeError
         if another service works with the data folder, or its database cannot be used
     """
-    settings.data_folder.mkdir(parents=True, exist_ok=True)
+    settings.data_folder.mkdir(0o700, parents=True, exist_ok=True)
     access = _open_access(settings)
     lock = FolderLock(settings.data_folder)
     try:
@@ -117,13 +128,17 @@ def open_services(
     except BaseException:
         lock.release()
         raise
-    services = _assemble(_Ground(settings, access, database, site), executor, start)
+    readers = open_readers(settings)
+    services = _assemble(_Ground(settings, access, database, site), executor, readers, start)
     drift = DriftMonitor(services.models.history, site)
     _watch(services, drift)
     housekeeping = Housekeeping(
         [services.jobs.settle, services.runs.settle, services.index.sync, services.models.judge_new, drift.look]
     )
     clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
+    filling = threading.Thread(target=_fill_index, args=(services,), name="index", daemon=True)
+    filling.start()
+    filling.join(FILLING_S)
     housekeeping.start()
     pruning = Housekeeping(_retention(services), PRUNING_S)
     pruning.start()
@@ -144,10 +159,25 @@ def open_services(
                 services.audit.note("service", "ended")
     finally:
         services.jobs.close()
-        services.checks.shutdown(wait=True, cancel_futures=True)
+        readers.shutdown(wait=True, cancel_futures=True)
+        services.index.close()
+        filling.join()
         housekeeping.close()
         database.close()
         lock.release()
+
+
+FILLING_S = 1.0
+"""How long a start waits for the index; of a large folder that was never indexed it goes on beside the service [s]."""
+
+
+def _fill_index(services: Services) -> None:
+    """Index what is there, and judge its models; what fails is tried again by the housekeeping."""
+    try:
+        services.index.sync()
+        services.models.judge_new()
+    except (TauscopeError, OSError) as error:
+        _log.warning("the index is not filled: %s; it is tried again", error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,21 +190,24 @@ class _Ground:
     site: str
 
 
-def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | None) -> Services:
+def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, start: StartControl | None) -> Services:
     """Everything that the routes work with; nothing of it moves yet, and unfinished analysis goes on."""
     settings, database, site = ground.settings, ground.database, ground.site
     items, metrics, heartbeat = item_stores(settings.data_folder), Metrics(), Heartbeat()
     recordings = RecordingStore(settings.recordings_folder)
     recordings.tidy()
     identifications, diagnoses, excitations = kinds = _kinds(settings, items)
-    pool = executor or open_executor(settings.workers)
-    timed, most = TimedExecutor(pool, metrics.job_seconds), settings.max_waiting
+    pool = executor or open_executor(settings.workers, deadline_s=settings.job_timeout_s)
+    timed = TimedExecutor(pool, metrics.job_seconds)
+    new_queue = partial(
+        JobQueue, kinds, timed, most_waiting=settings.max_waiting, most_each=settings.max_jobs_per_caller
+    )
     if isinstance(pool, ClusterExecutor):  # it comes and goes, and so do its workers
-        jobs = JobQueue(kinds, timed, slots=lambda: pool.width, most_waiting=most, is_there=pool.is_there)
+        jobs = new_queue(slots=lambda: pool.width, is_there=pool.is_there)
     else:
-        jobs = JobQueue(kinds, timed, slots=settings.workers, most_waiting=most)
+        jobs = new_queue(slots=settings.workers)
     audit = AuditTrail(AuditLog(settings.data_folder))
-    claims = DeviceClaims(settings.max_arms)
+    claims, closing = DeviceClaims(settings.max_arms), threading.Event()
     leases = Leases(claims, settings.data_folder / "lease-number", on_end=partial(_note_end, audit))
     start = start or partial(start_control, sim_socket=settings.sim_socket)
     runs = RunManager(items["run"], recordings, start, claims, heartbeat.is_alive, metrics.run_ended)
@@ -182,7 +215,6 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
     campaigns = CampaignManager(items["campaign"], dependencies)
     models = ModelRegistry(ModelHistory(database), site, items)
     index = open_index(Index(database, site), items, recordings, settings.data_folder.name)
-    models.judge_new()
     # What a schedule moves has no lease: it waits for its next time where somebody has one.
     repeater = Repeater(dependencies, campaigns, partial(leases.permit, token=None, owner="schedule", is_needed=False))
     return Services(
@@ -194,13 +226,16 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
         jobs=jobs,
         runs=runs,
         campaigns=campaigns,
-        checks=executor or WorkerPool(1),
+        reading=ReadingQueue(readers),
         access=ground.access,
         leases=leases,
         audit=audit,
         answers=StoredAnswers(settings.data_folder / "idempotency"),
         lease_answers=MemoryAnswers(),
         metrics=metrics,
+        readiness=Readiness(_collect_checks(ground, jobs, readers, audit, closing)),
+        closing=closing,
+        feeds=EventFeeds(closing),
         heartbeat=heartbeat,
         index=index,
         models=models,
@@ -208,12 +243,38 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
     )
 
 
+def _collect_checks(
+    ground: _Ground, jobs: JobQueue, readers: Executor, audit: AuditTrail, closing: threading.Event
+) -> dict[str, Callable[[], str | None]]:
+    """What `/readyz` asks."""
+
+    def check_workers() -> str | None:
+        if not jobs.can_work():
+            return "the Dask cluster does not answer, and jobs wait for it"
+        return readers.obstacle if isinstance(readers, WorkerPool) else None
+
+    return {
+        "service": lambda: "the service is ending" if closing.is_set() else None,
+        "database": partial(check_database, ground.database.check),
+        "disk": partial(check_disk, ground.settings.data_folder),
+        "workers": check_workers,
+        "clock": Clock().check,
+        "audit log": lambda: f"{audit.lost} entries of the audit log were lost" if audit.lost else None,
+    }
+
+
+def open_readers(settings: Settings) -> Executor:
+    """Processes that read files of strangers; none is started before it is needed."""
+    bounds = {"deadline_s": settings.reading_timeout_s, "memory_bytes": settings.reading_memory_bytes}
+    return WorkerPool(WIDTH, **bounds)
+
+
 def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind, JobKind, JobKind]:
     """Identifications, diagnoses and designed motions."""
     where = {"server_recordings": settings.recordings_folder}
     return (
         JobKind(items["identification"], partial(run_identification, **where)),
-        JobKind(items["diagnosis"], partial(run_diagnosis, **where)),
+        JobKind(items["diagnosis"], partial(run_diagnosis, **where), is_heavy=True),
         JobKind(items["excitation"], run_excitation),
     )
 
@@ -237,7 +298,15 @@ def _retention(services: Services) -> list[Callable[[], object]]:
         services.audit.note("service", "pruned", subject=name, kind=kind)
 
     history = services.models.history
-    return [RetentionSweeper(rule, services.index, history, services.recordings, removers, note).tidy]
+    sweeper = RetentionSweeper(rule, services.index, history, services.recordings, removers, note)
+
+    def prune() -> None:
+        # What was not judged yet may become the active model, which stays.
+        services.index.sync()
+        services.models.judge_new()
+        sweeper.tidy()
+
+    return [prune]
 
 
 def _watch(services: Services, drift: DriftMonitor) -> None:
@@ -245,6 +314,7 @@ def _watch(services: Services, drift: DriftMonitor) -> None:
     metrics, folder = services.metrics, services.settings.data_folder
     metrics.loops.live = services.runs.list_live
     metrics.watch_drift(drift)
+    metrics.registry.register(ReadyMetrics(services.readiness))
     metrics.watch("tauscope_jobs_waiting", "Jobs that wait", services.jobs.waiting)
     metrics.watch("tauscope_leases", "Leases that hold", lambda: len(services.leases.active()))
     metrics.watch("tauscope_audit_lost", "Entries that the audit log did not take", lambda: services.audit.lost)
@@ -263,7 +333,9 @@ def _open_access(settings: Settings) -> Access:
         hint = "make a key first (tauscope key add), or listen at 127.0.0.1"
         raise TauscopeError(f"host {settings.host!r}: others could reach it, and there is no valid API key; {hint}")
     rate = settings.requests_per_s or REQUESTS_PER_S
-    return Access(ring, RateLimit(rate, 2.0 * rate), limits_local=settings.requests_per_s is not None)
+    uploads = RateLimit(settings.max_bytes_per_day / DAY_S, settings.max_bytes_per_day)
+    limits_local = settings.requests_per_s is not None
+    return Access(ring, RateLimit(rate, 2.0 * rate), limits_local=limits_local, uploads=uploads)
 
 
 def require_data_folder(settings: Settings) -> None:
@@ -276,7 +348,7 @@ def require_data_folder(settings: Settings) -> None:
     """
     folder = settings.data_folder
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(0o700, parents=True, exist_ok=True)
         FolderLock(folder).release()
         _open_access(settings)
     except OSError as error:

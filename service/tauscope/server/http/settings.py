@@ -27,10 +27,21 @@ class Settings(BaseModel):
     host: str = Field(default="127.0.0.1", description="address to listen at")
     port: int = Field(default=8000, ge=0, le=65535, description="port to listen at; 0 takes any free one")
     max_upload_bytes: int = Field(default=256 * MEBIBYTE, gt=0, description="largest body of a request [bytes]")
+    max_bytes_per_day: int = Field(
+        default=20 * 1024 * MEBIBYTE, gt=0, description="what one key may send in forms in a day: 80 of the largest"
+    )
     max_document_bytes: int = Field(default=4 * MEBIBYTE, gt=0, description="largest JSON body or part [bytes]")
     max_recordings: int = Field(default=100, gt=0, description="most recordings of one request")
     max_waiting: int = Field(default=100, gt=0, description="most jobs that wait")
     workers: int = Field(default=1, gt=0, description="jobs that are worked on at a time, a process each")
+    reading_timeout_s: float = Field(
+        default=60.0, gt=0, description="how long a file may take to read: about 3 times the largest upload's time [s]"
+    )
+    reading_memory_bytes: int = Field(
+        default=2048 * MEBIBYTE, gt=0, description="memory of a process that reads: 8 times the largest upload [bytes]"
+    )
+    job_timeout_s: float = Field(default=4 * 3600.0, gt=0, description="how long the work of a job may take [s]")
+    max_jobs_per_caller: int = Field(default=50, gt=0, description="jobs of one caller that have not ended")
     max_arms: int = Field(default=4, gt=0, description="arms that may move at a time, a control process each")
     fires_schedules: bool = Field(default=True, description="whether what schedules repeat is started when it is due")
     backend: BackendName = Field(

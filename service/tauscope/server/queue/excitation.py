@@ -6,14 +6,14 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from tauscope.errors import LimitExceededError, TauscopeError
+from tauscope.errors import LimitExceededError, NotFoundError, TauscopeError
 from tauscope.robot import read_robot
 from tauscope.server.queue.record import JobProblem, without_folders
 from tauscope.server.queue.task_job import TRAJECTORY, TaskOrder, TaskWorkspace, perform_job
 from tauscope.tasks import design_excitation
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.trajectory import parse_trajectory_json, read_trajectory
-from tauscope.trajectory.csv_format import trajectory_csv
+from tauscope.trajectory.csv_format import write_trajectory_rows
 
 MOST_ROWS = 2_000_000
 """Rows of the longest CSV that is made on request."""
@@ -48,39 +48,36 @@ def run_excitation(folder: Path) -> JobProblem | None:
     return perform_job(design_excitation, ExcitationWorkspace(folder), folder)
 
 
-def read_designed_trajectory(workspace: TaskWorkspace[Any], rate_hz: float | None) -> bytes | None:
-    """The trajectory of an excitation that succeeded.
+def write_trajectory_piece(workspace: TaskWorkspace[Any], rate_hz: float, start: int) -> bytes:
+    """Rows of the trajectory of an excitation that succeeded, as CSV; empty beyond the last one.
 
     Parameters
     ----------
-    rate_hz : float or None
-        samples a second of a CSV [Hz]; None for the exact document
-
-    Returns
-    -------
-    bytes or None
-        content of the file; None where it is missing
+    rate_hz : float
+        samples a second [Hz]
 
     Raises
     ------
+    NotFoundError
+        if the file is missing
     ExcitationError
         if the file was damaged
     LimitExceededError
         if the CSV would be too long
     """
     try:
-        content = workspace.trajectory.read_bytes()
-        order = workspace.read_order()
+        content, order = workspace.trajectory.read_bytes(), workspace.read_order()
     except OSError:
-        return None
-    if rate_hz is None or order is None:
-        return content if order is not None else None
+        order = None
+    if order is None:
+        raise NotFoundError("files of the excitation are missing or damaged; hand it in again")
     trajectory = parse_trajectory_json(content, "trajectory.json", read_robot(workspace.robot / order.robot_file))
     rows = trajectory.duration_s * rate_hz
     if rows > MOST_ROWS:
         hint = "ask for a lower rate, or for the document"
         raise LimitExceededError(f"{rows:.3g} rows are more than the {MOST_ROWS} that are made here; {hint}")
-    return trajectory_csv(trajectory, rate_hz).encode()
+    is_over = start >= trajectory.count_samples(rate_hz)
+    return b"" if is_over else write_trajectory_rows(trajectory, rate_hz, start).encode()
 
 
 def check_trajectory(folder: Path, robot_file: Path) -> None:

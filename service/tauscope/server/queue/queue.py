@@ -8,7 +8,7 @@ from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from dataclasses import dataclass
 from pathlib import Path
 
-from tauscope.errors import LimitExceededError, NotFoundError
+from tauscope.errors import LimitExceededError, NotFoundError, TauscopeError
 from tauscope.server.queue.cluster_executor import ClusterUnavailableError
 from tauscope.server.queue.record import JobProblem, JobRecord, JobState
 from tauscope.server.queue.workspace import Workspace
@@ -30,10 +30,15 @@ TOO_OFTEN = JobProblem(
 
 @dataclass(frozen=True, eq=False)
 class JobKind:
-    """A kind of job: where its folders lie and what is done with them."""
+    """A kind of job: where its folders lie and what is done with them.
+
+    is_heavy : bool
+        whether its work takes minutes: where there are several slots, one stays free of such work
+    """
 
     items: ItemStore
     work: Work
+    is_heavy: bool = False
 
 
 @dataclass(frozen=True)
@@ -143,6 +148,7 @@ class JobQueue:
         *,
         slots: int | Callable[[], int],
         most_waiting: int,
+        most_each: int | None = None,
         is_there: Callable[[], bool] = lambda: True,
     ) -> None:
         """Make the queue; jobs that an earlier service left unfinished are done again, in their order."""
@@ -150,6 +156,8 @@ class JobQueue:
         self._slots = slots if callable(slots) else lambda: slots
         self._is_there = is_there
         self._most_waiting = most_waiting
+        self._most_each = most_each
+        self._callers: dict[QueuedJob, str] = {}
         self._lock = threading.RLock()
         self._waiting: deque[QueuedJob] = deque()
         self._running: dict[QueuedJob, Future[JobProblem | None]] = {}
@@ -164,22 +172,31 @@ class JobQueue:
             self._waiting.extend(job for _, job in sorted(unfinished, key=lambda pair: pair[0]))
             self._go_on()
 
-    def submit(self, kind: JobKind, staged: Path) -> str:
-        """Take a job.
+    def submit(self, kind: JobKind, staged: Path, caller: str = "") -> str:
+        """Take a job; what campaigns and schedules hand in has no caller.
 
         Raises
         ------
         QueueFullError
-            if too many jobs are waiting; the folder stays staged
+            if too many jobs are waiting, or too many of the caller's; the folder stays staged
         """
         with self._lock:
             if self._is_closed or len(self._waiting) >= self._most_waiting:
                 raise QueueFullError(f"{len(self._waiting)} jobs are waiting already; try again when one has ended")
+            self._require_quota(caller)
             Workspace(staged).write_record(JobRecord(state=JobState.QUEUED, created=kind.items.clock()))
             job = QueuedJob(kind, kind.items.publish(staged))
             self._waiting.append(job)
+            self._callers[job] = caller
             self._go_on()
             return job.identifier
+
+    def _require_quota(self, caller: str) -> None:
+        """Refuse one more job of a caller who has enough of them."""
+        self._callers = {job: who for job, who in self._callers.items() if job in self._running or job in self._waiting}
+        open_jobs = sum(who == caller for who in self._callers.values())
+        if caller and self._most_each is not None and open_jobs >= self._most_each:
+            raise QueueFullError(f"{open_jobs} jobs of {caller} have not ended; try again when one has")
 
     def cancel_or_remove(self, kind: JobKind, identifier: str) -> bool:
         """Cancel a job that has not ended; remove one that has, or whose record is damaged.
@@ -277,11 +294,19 @@ class JobQueue:
 
     def _fill_slots(self) -> None:
         """Hand waiting jobs to the executor while it has room."""
-        while self._waiting and len(self._running) < self._slots() and not self._is_closed and self._is_there():
-            is_wanted = self._waiting[0].move(JobState.RUNNING)
-            job = self._waiting.popleft()
+        while (job := self._find_next()) is not None and not self._is_closed and self._is_there():
+            is_wanted = job.move(JobState.RUNNING)
+            self._waiting.remove(job)
             if is_wanted:  # else it is damaged, or somebody removed it by hand
                 self._hand_over(job)
+
+    def _find_next(self) -> QueuedJob | None:
+        """The job that is begun next: light ones pass heavy ones that fill all slots but one."""
+        slots = self._slots()
+        if len(self._running) >= slots:
+            return None
+        has_room = sum(job.kind.is_heavy for job in self._running) < max(1, slots - 1)
+        return next((job for job in self._waiting if has_room or not job.kind.is_heavy), None)
 
     def _hand_over(self, job: QueuedJob) -> None:
         """Have the executor do a job."""
@@ -321,31 +346,32 @@ class JobQueue:
         """How a job ended by what came of its work."""
         try:
             problem = self._problem_of(job, future)
-        except ClusterUnavailableError as error:
-            return self._end_of_lost(job, error)
+        except (ClusterUnavailableError, BrokenExecutor) as error:
+            return self._end_lost(job, error)
         return _End(JobState.SUCCEEDED if problem is None else JobState.FAILED, problem)
 
-    def _end_of_lost(self, job: QueuedJob, error: ClusterUnavailableError) -> _End:
-        """A job that was lost with its cluster waits again, unless that happened too often: it may be the cause."""
+    def _end_lost(self, job: QueuedJob, error: Exception) -> _End:
+        """A job that was lost with its worker waits again, unless that happened too often: it may be the cause."""
         if job.attempts() >= MOST_ATTEMPTS:
-            _log.error("job %s: lost with its cluster %d times", job.identifier, MOST_ATTEMPTS)
+            _log.error("job %s: lost with its worker %d times", job.identifier, MOST_ATTEMPTS)
             return _End(JobState.FAILED, WORKER_LOST)
         _log.warning("job %s waits again: %s", job.identifier, error)
         return _End(JobState.QUEUED, None)
 
     def _problem_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> JobProblem | None:
-        """Why the work of a job has no result; None where it has one. Raises ClusterUnavailableError."""
+        """Why the work of a job has no result; None where it has one. Raises an error where its worker was lost."""
         try:
             return future.result()
         except ClusterUnavailableError:
             raise
         except CancelledError:
             return INTERRUPTED
+        except TauscopeError as error:  # a bound of the worker's
+            return JobProblem(code=error.code, detail=f"the job {error}")
         except BrokenExecutor:
             if self._is_closed:  # its process was ended with the service
                 return INTERRUPTED
-            _log.error("job %s: its worker process ended unexpectedly", job.identifier)
-            return WORKER_LOST
+            raise
         except Exception:
             _log.exception("job %s failed for an unforeseen reason", job.identifier)
             return INTERNAL

@@ -16,6 +16,7 @@ from server.queue.controls import finish_at_once
 from server.queue.executors import InlineExecutor
 from snapshots import SNAPSHOTS, unpacked
 from tauscope.server.http import Settings, create_app
+from tauscope.server.http.openapi import resolve_reference
 from tauscope.server.http.repeated_requests import is_repeatable
 
 V1 = "/api/v1"
@@ -79,13 +80,15 @@ def client(folder: Path) -> Iterator[TestClient]:
 
 
 def test_every_post_is_done_once_or_needs_not_to_be() -> None:
+    document = json.loads(COMMITTED.read_text(encoding="utf-8"))
     assert set(posts()) == set(REQUESTS) | set(NOT_NEEDED)
     for path, operation in posts().items():
         headers = [each["name"] for each in operation.get("parameters", ()) if each["in"] == "header"]
         assert ("Idempotency-Key" in headers) is is_repeatable(path) is (path in REQUESTS), path
         if path in REQUESTS:
             for status, code in (("409", "not-repeatable"), ("422", "key-reused"), ("507", "storage-full")):
-                assert code in operation["responses"][status]["content"]["application/problem+json"]["examples"], path
+                answer = resolve_reference(document, operation["responses"][status])
+                assert code in answer["content"]["application/problem+json"]["examples"], path
 
 
 @pytest.mark.parametrize("path", REQUESTS)

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from tauscope.recording import EffortKind
 from tauscope.server.http.robots.models import FindingAnswer
-from tauscope.server.models import AnswerModel, Measured
+from tauscope.server.models import AnswerModel, Measured, PageAnswer
 from tauscope.tasks.task import ReadingOptions
 
 
@@ -20,8 +20,8 @@ class RecordingAnswer(AnswerModel):
     is_damaged: bool = Field(description="whether it was sent or recorded, and its bytes are not those any more")
 
 
-class RecordingListAnswer(AnswerModel):
-    """All recordings on the server."""
+class RecordingListAnswer(PageAnswer):
+    """Recordings on the server."""
 
     recordings: list[RecordingAnswer] = Field(description="by name")
 

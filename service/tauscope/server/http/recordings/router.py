@@ -1,8 +1,6 @@
 """Routes about recordings."""
 
-import asyncio
-from concurrent.futures import BrokenExecutor, Future
-from typing import Annotated, TypeVar
+from typing import Annotated
 from urllib.parse import quote
 
 from fastapi import APIRouter, Path, Query, Request, Response
@@ -10,8 +8,10 @@ from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.server.http.documents import JSON, file_answer, media_type, parse_document, refuse_media_type
+from tauscope.server.http.evidence import require_no_evidence
 from tauscope.server.http.form import FORM, PartRule, receive_form
 from tauscope.server.http.openapi import binary_part, form_body, model_reference
+from tauscope.server.http.reading import READING
 from tauscope.server.http.recordings.models import (
     ReadingRequest,
     RecordingAnswer,
@@ -21,6 +21,7 @@ from tauscope.server.http.recordings.models import (
 )
 from tauscope.server.http.robots.files import read_received_robot, robot_part_rules
 from tauscope.server.http.services import ServicesDep
+from tauscope.server.http.tasks.routes import After
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.kept_recordings import check_kept_recording, read_kept_samples, understand_recording
 from tauscope.server.store.recordings import StoredRecording
@@ -31,7 +32,7 @@ Name = Annotated[str, Path(description="name of the recording", examples=["log-2
 JointCount = Annotated[int | None, Query(gt=0, le=1000, description="joints that the recording must have")]
 MostSamples = Annotated[int, Query(ge=2, le=1_000_000, description="samples to return, about")]
 
-Made = TypeVar("Made")
+RecordingLimit = Annotated[int, Query(ge=1, le=10_000, description="most entries of the list")]
 
 _BODY = form_body({"file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database")}, required=["file"])
 
@@ -79,7 +80,7 @@ async def keep_recording(request: Request, response: Response, services: Service
 @router.post(
     "/check",
     summary="Check a recording before it is sent for good",
-    responses=problem_responses("bad-request", "limit-exceeded", "media-type", "robot-file", "worker-lost"),
+    responses=problem_responses("bad-request", "limit-exceeded", "media-type", "robot-file", *READING),
     openapi_extra={"requestBody": {"required": True, "content": _CHECK_BODY}},
 )
 async def check_sent_recording(request: Request, services: ServicesDep) -> UnderstandingAnswer:
@@ -101,16 +102,18 @@ async def check_sent_recording(request: Request, services: ServicesDep) -> Under
             raise ProblemError("invalid-request", "the form has no part file; send the recording as part file")
         options = parse_document(form.texts.get("request", b"{}"), ReadingRequest, within="part request")
         robot = robot_file and await run_in_threadpool(read_received_robot, robots, robot_file.name)
-        work = services.checks.submit(understand_recording, file.path, robot, options.reading)
-        return UnderstandingAnswer.model_validate(await _of_worker(work, file.name))
+        found = await services.reading.call(request, understand_recording, file.path, robot, options.reading)
+        return UnderstandingAnswer.model_validate(found)
     finally:
         await run_in_threadpool(services.recordings.discard, folder)
 
 
 @router.get("", summary="List the recordings on the server")
-def list_recordings(services: ServicesDep) -> RecordingListAnswer:
+def list_recordings(services: ServicesDep, limit: RecordingLimit = 1000, after: After = None) -> RecordingListAnswer:
     """Sent ones, and those that the operator put into the folder."""
-    return RecordingListAnswer(recordings=[_answer(entry) for entry in services.recordings.entries()])
+    entries = [entry for entry in services.recordings.entries() if after is None or entry.name > after]
+    page = [_answer(entry) for entry in entries[:limit]]
+    return RecordingListAnswer(recordings=page, next=page[-1].name if len(entries) > limit else None)
 
 
 @router.get("/{name}", summary="Look a recording up", responses=problem_responses("not-found"))
@@ -122,15 +125,15 @@ def get_recording(name: Name, services: ServicesDep) -> RecordingAnswer:
 @router.get(
     "/{name}/report",
     summary="Check a recording",
-    responses=problem_responses("not-found", "recording", "recording-mismatch", "worker-lost"),
+    responses=problem_responses("not-found", "recording", "recording-mismatch", *READING),
 )
 async def report_on_recording(
-    name: Name, services: ServicesDep, joint_count: JointCount = None
+    request: Request, name: Name, services: ServicesDep, joint_count: JointCount = None
 ) -> RecordingReportAnswer:
     """What it holds, and what to look at before trusting it."""
     path = await run_in_threadpool(services.recordings.path, name)
-    work = services.checks.submit(check_kept_recording, path, joint_count)
-    return RecordingReportAnswer.model_validate(await _of_worker(work, name))
+    report = await services.reading.call(request, check_kept_recording, path, joint_count)
+    return RecordingReportAnswer.model_validate(report)
 
 
 @router.get(
@@ -139,17 +142,17 @@ async def report_on_recording(
     response_class=Response,
     responses={
         200: {"content": {"application/octet-stream": {}}, "description": "columns of 32-bit floats behind a header"},
-        **problem_responses("not-found", "recording", "worker-lost"),
+        **problem_responses("not-found", "recording", *READING),
     },
 )
-async def get_samples(name: Name, services: ServicesDep, most: MostSamples = 100_000) -> Response:
+async def get_samples(request: Request, name: Name, services: ServicesDep, most: MostSamples = 100_000) -> Response:
     """Time, positions and torques; of more samples than asked for, those that keep every column's look.
 
     Length of the header (4 bytes, little-endian), the header (JSON: `columns`, `joint_count`, `effort`, `samples`,
     `shown`), then each column as little-endian 32-bit floats; time counts from the first sample.
     """
     path = await run_in_threadpool(services.recordings.path, name)
-    content = await _of_worker(services.checks.submit(read_kept_samples, path, most), name)
+    content = await services.reading.call(request, read_kept_samples, path, most)
     return Response(content, media_type="application/octet-stream")
 
 
@@ -167,25 +170,17 @@ def get_content(name: Name, services: ServicesDep) -> FileResponse:
     return file_answer(services.recordings.path(name), name)
 
 
-@router.delete("/{name}", status_code=204, summary="Remove a recording", responses=problem_responses("not-found"))
+@router.delete(
+    "/{name}",
+    status_code=204,
+    summary="Remove a recording",
+    responses=problem_responses("not-found", "in-use", "store"),
+)
 def remove_recording(name: Name, services: ServicesDep) -> None:
-    """Identifications that wait for it will fail."""
+    """Identifications that wait for it will fail; one that a model in use rests on stays."""
+    services.recordings.path(name)
+    require_no_evidence(services, name)
     services.recordings.remove(name)
-
-
-async def _of_worker(work: "Future[Made]", name: str) -> Made:
-    """What a worker process makes of a recording.
-
-    Raises
-    ------
-    ProblemError
-        if the process was lost
-    """
-    try:
-        return await asyncio.wrap_future(work)
-    except BrokenExecutor:
-        text = f"{name}: the process that read it ended unexpectedly; is the file damaged, or far too large?"
-        raise ProblemError("worker-lost", text) from None
 
 
 def _answer(recording: StoredRecording) -> RecordingAnswer:

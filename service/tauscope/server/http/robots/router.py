@@ -10,6 +10,7 @@ from starlette.concurrency import run_in_threadpool
 from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
 from tauscope.server.http.form import FORM, receive_form
 from tauscope.server.http.openapi import binary_part, form_body, json_body
+from tauscope.server.http.reading import READING
 from tauscope.server.http.robots.files import check_received_robot, keep_inline_robot, robot_part_rules
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT, RobotCheckRequest, RobotReportAnswer
 from tauscope.server.http.services import ServicesDep
@@ -33,7 +34,7 @@ _BODY = {
     "/check",
     summary="Check a robot file",
     response_model=RobotReportAnswer,
-    responses=problem_responses("bad-request", "limit-exceeded", "media-type", "robot-file", "invalid-request"),
+    responses=problem_responses("bad-request", "media-type", "robot-file", "invalid-request", *READING),
     openapi_extra={"requestBody": {"required": True, "content": _BODY}},
 )
 async def check_robot_file(request: Request, services: ServicesDep) -> RobotReportAnswer:
@@ -41,7 +42,7 @@ async def check_robot_file(request: Request, services: ServicesDep) -> RobotRepo
     folder = Path(await run_in_threadpool(tempfile.mkdtemp, prefix="tauscope-robot-"))
     try:
         file_name = await _receive_robot(request, services, folder)
-        return RobotReportAnswer.of(await run_in_threadpool(check_received_robot, folder, file_name))
+        return RobotReportAnswer.of(await services.reading.call(request, check_received_robot, folder, file_name))
     finally:
         await run_in_threadpool(shutil.rmtree, folder, ignore_errors=True)
 

@@ -9,6 +9,7 @@ from pydantic import BaseModel
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import LimitExceededError
+from tauscope.server.auth.gate import find_caller
 from tauscope.server.http.form import PartRule
 from tauscope.server.http.openapi import Examples
 from tauscope.server.http.robots.files import read_received_robot
@@ -162,21 +163,30 @@ class QueuedTask:
             for part, (folder, limit) in self.further_parts.items():
                 rules[part] = PartRule(limit, workspace.uploads(folder), default_name=f"{part}.json")
             received = await receive_request(request, self.models[0], settings, workspace.robot, rules)
-            return await run_in_threadpool(self._hand_in, received, services, workspace)
+            robot_file = await run_in_threadpool(keep_robot, received, workspace.robot)
+            robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
+            wanted = {"robot_file": robot_file, "robot_name": robot.name}
+            caller = find_caller(request.scope).name
+            return await run_in_threadpool(self._submit, received, services, workspace, wanted, caller)
         finally:
             await run_in_threadpool(items.discard, staged)
 
-    def _hand_in(self, received: Received[Any], services: Services, workspace: TaskWorkspace[Any]) -> str:
-        """Check what was received, and queue it."""
-        robot_file = keep_robot(received, workspace.robot)
-        robot = read_received_robot(workspace.robot, robot_file)
+    def _submit(
+        self,
+        received: Received[Any],
+        services: Services,
+        workspace: TaskWorkspace[Any],
+        wanted: Mapping[str, Any],
+        caller: str,
+    ) -> str:
+        """Check what was received beside the robot, and queue it."""
         recordings = {role: ordered_recordings(role, received, services.recordings) for role in workspace.roles}
         if recordings:
             check_recordings(recordings, services.settings.max_recordings)
-        given: dict[str, Any] = {"robot_file": robot_file, "robot_name": robot.name, **recordings}
+        given: dict[str, Any] = {**wanted, **recordings}
         given |= {"options": received.document.options, **self.further(received, services, workspace)}
         workspace.write_order(workspace.order_type(**given))
-        return services.jobs.submit(self.kind(services), workspace.folder)
+        return services.jobs.submit(self.kind(services), workspace.folder, caller)
 
 
 def ordered_recordings(role: str, received: Received[Any], store: RecordingStore) -> tuple[OrderedRecording, ...]:

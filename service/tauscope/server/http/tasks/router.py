@@ -1,6 +1,7 @@
 """One router for every resource that performs a task: handed in, listed, followed, its outputs fetched, removed."""
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Annotated, Any, Protocol
@@ -14,14 +15,17 @@ from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
+from tauscope.server.http.evidence import require_no_model
 from tauscope.server.http.leases.router import LeaseToken
 from tauscope.server.http.openapi import Examples
+from tauscope.server.http.reading import READING
 from tauscope.server.http.robots.files import check_received_robot
 from tauscope.server.http.robots.models import RobotReportAnswer
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.answers import require_document
-from tauscope.server.http.tasks.events import Told, add_events_route
-from tauscope.server.http.tasks.routes import ENDINGS, MOTION, SUBMISSION, Identifier, Limit, collection
+from tauscope.server.http.tasks.event_feeds import EventSource
+from tauscope.server.http.tasks.events import add_events_route
+from tauscope.server.http.tasks.routes import ENDINGS, MOTION, SUBMISSION, After, Identifier, Limit, collection
 from tauscope.server.http.tasks.submission import RobotRequest, request_body
 from tauscope.server.models import AnswerModel
 from tauscope.server.problems import ProblemError, problem_responses
@@ -85,6 +89,10 @@ class Folder(Protocol):
         """What was asked for; None where that is damaged."""
         ...
 
+    def has_ended(self) -> bool:
+        """Whether nothing more will happen."""
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class Resource:
@@ -108,7 +116,7 @@ class Resource:
     examples: Examples
     items: Callable[[Services], ItemStore]
     find: Callable[[Services, str], Folder]
-    followed: Callable[[Services, str], Told]
+    followed: Callable[[Services, str], EventSource]
     submit: Callable[[Request, Services], Awaitable[str]]
     describe: Callable[[Services, str, str], BaseModel]
     summary: str
@@ -131,6 +139,7 @@ def make_router(resource: Resource) -> APIRouter:
 
     @router.post(
         "",
+        name=f"create_{singular}",
         status_code=202,
         summary=resource.summary,
         description=resource.words,
@@ -146,10 +155,15 @@ def make_router(resource: Resource) -> APIRouter:
         return answer
 
     @router.get("", name=f"list_{plural}", summary=f"List {plural}", response_model=list_model)
-    def list_items(request: Request, services: ServicesDep, limit: Limit = 100) -> BaseModel:
+    def list_items(request: Request, services: ServicesDep, limit: Limit = 100, after: After = None) -> BaseModel:
         """The newest first."""
-        root, identifiers = collection(request, 1), resource.items(services).identifiers()[:limit]
-        return list_model(**{plural: [resource.describe(services, each, root) for each in identifiers]})
+        root, found = collection(request, 1), resource.items(services).identifiers()
+        found = [each for each in found if after is None or each < after]
+        page = []
+        for each in found[:limit]:
+            with suppress(NotFoundError):  # it was removed a moment ago
+                page.append(resource.describe(services, each, root))
+        return list_model(**{plural: page}, next=found[limit - 1] if len(found) > limit else None)
 
     @router.get(
         "/{identifier}",
@@ -166,17 +180,17 @@ def make_router(resource: Resource) -> APIRouter:
         "/{identifier}/robot",
         name=f"get_robot_of_{singular}",
         summary=f"Fetch the robot of {noun}",
-        responses=problem_responses("not-found", "damaged", "robot-file"),
+        responses=problem_responses("not-found", "damaged", "robot-file", *READING),
     )
-    def get_robot(identifier: Identifier, services: ServicesDep) -> JobRobotAnswer:
+    async def get_robot(request: Request, identifier: Identifier, services: ServicesDep) -> JobRobotAnswer:
         """Its joints, limits and frames, and the very files that were sent: they can be handed in again."""
-        workspace = resource.find(services, identifier)
-        folder, order = workspace.robot, workspace.read_order()
+        workspace = await run_in_threadpool(resource.find, services, identifier)
+        folder, order = workspace.robot, await run_in_threadpool(workspace.read_order)
         if order is None:
             raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it has no robot any more")
-        report = RobotReportAnswer.of(check_received_robot(folder, order.robot_file))
-        files = [path for path in sorted(folder.iterdir()) if path.is_file() and not path.is_symlink()]
-        return JobRobotAnswer(report=report, robot_file=order.robot_file, files=[_read(path) for path in files])
+        report = await services.reading.call(request, check_received_robot, folder, order.robot_file)
+        files = await run_in_threadpool(_read_files, folder)
+        return JobRobotAnswer(report=RobotReportAnswer.of(report), robot_file=order.robot_file, files=files)
 
     add_events_route(router, noun, resource.followed)
     return router
@@ -187,12 +201,15 @@ def add_cancelling(router: APIRouter, resource: Resource, kind: Callable[[Servic
 
     @router.delete(
         "/{identifier}",
+        name=f"cancel_or_remove_{resource.singular}",
         summary=f"Cancel or remove {resource.noun}",
         response_model=resource.models[1],
-        responses={204: {"description": "it had ended, and was removed"}, **problem_responses("not-found")},
+        responses={204: {"description": "it had ended, and was removed"}, **problem_responses("not-found", "in-use")},
     )
     def cancel_or_remove(request: Request, identifier: Identifier, services: ServicesDep) -> BaseModel | Response:
-        """One that waits or runs is cancelled; one that has ended is removed with all its files."""
+        """One that waits or runs is cancelled; one that has ended is removed, unless it is a model in use."""
+        if resource.find(services, identifier).has_ended():
+            require_no_model(services, identifier)
         if services.jobs.cancel_or_remove(kind(services), identifier):
             return Response(status_code=204)
         return resource.describe(services, identifier, collection(request, 2))
@@ -250,7 +267,7 @@ def add_document_route(
 
     @router.get(
         f"/{{identifier}}/{document.name}",
-        name=f"get_{document.name.replace('-', '_')}",
+        name=f"get_{document.name.replace('-', '_')}_of_{router.prefix.strip('/')}",
         summary=document.summary,
         description=document.description,
         response_class=Response,
@@ -281,6 +298,7 @@ def add_export_route(
 
     @router.get(
         "/{identifier}/exports/{format}",
+        name=f"get_export_of_{router.prefix.strip('/')}",
         summary="Fetch an export",
         description=words,
         response_class=Response,
@@ -313,8 +331,12 @@ def _lease_header(_lease: LeaseToken = None) -> None:
     """The lease that a request comes with; `permit_of` reads it."""
 
 
-def _read(path: FilePath) -> RobotFileAnswer:
-    """A text file, as far as such a file may be long."""
-    with path.open("rb") as file:
-        content = file.read(max(LARGEST_ROBOT_FILE, LARGEST_XML))
-    return RobotFileAnswer(name=path.name, content=content.decode("utf-8", errors="replace"))
+def _read_files(folder: FilePath) -> list[RobotFileAnswer]:
+    """Text files of a folder, as far as such a file may be long."""
+    answers = []
+    for path in sorted(folder.iterdir()):
+        if path.is_file() and not path.is_symlink():
+            with path.open("rb") as file:
+                content = file.read(max(LARGEST_ROBOT_FILE, LARGEST_XML))
+            answers.append(RobotFileAnswer(name=path.name, content=content.decode("utf-8", errors="replace")))
+    return answers

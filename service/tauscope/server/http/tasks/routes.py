@@ -6,6 +6,7 @@ from fastapi import Path, Query, Request
 
 Identifier = Annotated[str, Path(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])]
 Limit = Annotated[int, Query(ge=1, le=1000, description="most entries of the list")]
+After = Annotated[str | None, Query(max_length=255, description="`next` of the page before; null: the first page")]
 
 ENDINGS = ("not-finished", "cancelled", "interrupted", "damaged", "storage-full")
 """Problems of a job without result, beside those of its work."""

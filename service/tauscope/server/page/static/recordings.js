@@ -7,6 +7,8 @@ import { replay } from "./motion.js";
 import { group, jointStyle, plot, zoomButtons } from "./plots.js";
 import { lowerBound } from "./thinning.js";
 
+const EFFORTS = { tau: ["Torque", "tau", "Nm or N"], i: ["Current or drive units", "i", "drive units"], qref: ["Commanded position", "qref", "rad or m"] };
+
 export async function showRecordings(root, { signal, show }) {
   const { recordings } = await getJson("recordings", signal);
   const said = h("p", { role: "status", class: "note" });
@@ -52,7 +54,7 @@ export async function showRecording(root, { id, signal }) {
       });
       return plot({ label: other && isDifference ? `${label}, difference` : label, onCursor: motion?.seek, x: time, xLabel: "time [s]", yLabel: unit, group: together, tall: true, series });
     };
-    charts = [make("Position", "q", "rad or m"), make(samples.effort === "tau" ? "Torque" : "Current or drive units", samples.effort, samples.effort === "tau" ? "Nm or N" : "drive units")];
+    charts = [make("Position", "q", "rad or m"), make(...EFFORTS[samples.effort])];
     render(curves, zoomButtons(together), charts.map((each) => each.element));
   }
   draw();
@@ -70,7 +72,7 @@ export async function showRecording(root, { id, signal }) {
 
 /** Values that are missing where every sample has one: other columns, such as the period, may stay empty. */
 function missing(report) {
-  return Object.entries(report.missed).filter(([name]) => /^(t|(q|tau|i)\d+)$/.test(name)).reduce((sum, [, count]) => sum + count, 0);
+  return Object.entries(report.missed).filter(([name]) => /^(t|(q|tau|i|qref)\d+)$/.test(name)).reduce((sum, [, count]) => sum + count, 0);
 }
 
 /** The choice of another recording to lay over this one; nothing where there is no other. */

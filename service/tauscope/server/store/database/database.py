@@ -15,6 +15,7 @@ from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url, 
 from sqlalchemy.exc import ArgumentError, DBAPIError, IntegrityError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.orm import Session
+from sqlalchemy.pool import NullPool
 
 from tauscope.errors import StoreError
 from tauscope.robot.messages import one_line
@@ -130,6 +131,10 @@ FILE_NAME = "tauscope.db"
 """Of the SQLite database in a data folder."""
 
 
+_SQLITE_MAGIC = b"SQLite format 3\0"
+_DAMAGE_HINT = "restore a backup, or move it away: the index is made anew, schedules and the choice of models are not"
+
+
 class Database:
     """An open database. Every method may be called from any thread."""
 
@@ -143,8 +148,12 @@ class Database:
         """
         self._engine = open_engine(address)
         try:
+            if isinstance(address, Path) and address.parent.is_dir():
+                address.touch(0o600)  # SQLite gives its further files the same rights
             with self._own_words():
                 upgrade(self._engine)
+                if self._engine.url.get_backend_name() == "sqlite":
+                    _check_file(self._engine.url)
         except BaseException:
             self._engine.dispose()
             raise
@@ -182,6 +191,23 @@ class Database:
             session.connection()  # takes SQLite's lock now, not with the first statement
             yield session
 
+    def check(self) -> None:
+        """Look whether it can be used now.
+
+        Raises
+        ------
+        StoreError
+            if it does not answer, is damaged, or is another one than was opened
+        """
+        with self._own_words():
+            if self._engine.url.get_backend_name() == "sqlite":
+                _check_file(self._engine.url)
+            with self._engine.connect() as connection:
+                present = present_revision(connection)
+        if present != revisions()[-1]:
+            hint = "restore it from a backup, and start the service again"
+            raise StoreError(f"{shown_address(self._engine)}: its tables are gone or were changed; {hint}")
+
     def close(self) -> None:
         """Close every connection."""
         self._engine.dispose()
@@ -197,13 +223,28 @@ class Database:
             raise StoreError(_described(shown_address(self._engine), error)) from error
 
 
+def _check_file(url: URL) -> None:
+    """Read a SQLite file as a new connection sees it: an open one may know pages that are lost on the disk."""
+    path = Path(str(url.database))
+    try:
+        with path.open("rb") as file:
+            is_whole = file.read(len(_SQLITE_MAGIC)) == _SQLITE_MAGIC
+    except OSError:
+        is_whole = False
+    engine = create_engine(url, poolclass=NullPool)
+    if is_whole:
+        with engine.connect() as connection:
+            is_whole = connection.execute(text("PRAGMA quick_check(1)")).scalar() == "ok"
+    if not is_whole:
+        raise StoreError(f"{path}: is damaged; {_DAMAGE_HINT}")
+
+
 def _described(address: str, error: Exception) -> str:
     """What is wrong with a database, and what to do."""
     reason = one_line(str(getattr(error, "orig", None) or error)).strip()
     lower = reason.lower()
     if "not a database" in lower or "malformed" in lower:
-        hint = "restore a backup, or move it away: the index is made anew, schedules and the choice of models are not"
-        return f"{address}: is damaged ({reason}); {hint}"
+        return f"{address}: is damaged ({reason}); {_DAMAGE_HINT}"
     if "locked" in lower or "lock timeout" in lower:
         return f"{address}: another program writes to it for too long ({reason}); try again, or end that program"
     if "full" in lower:

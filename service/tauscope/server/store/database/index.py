@@ -1,10 +1,10 @@
 """The index of items, recordings and robots in the database, and the plain data that it takes and gives out."""
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 
-from sqlalchemy import delete, select, update
+from sqlalchemy import delete, insert, select, update
 from sqlalchemy.orm import Session
 
 from tauscope.server.store.database.database import Database
@@ -127,26 +127,34 @@ class Index:
         with self._database.reading() as session:
             return {identifier: (stamp, is_final) for identifier, stamp, is_final in session.execute(query)}
 
-    def put(self, facts: ItemMetadata) -> None:
-        """Index an item, in place of what was known of it."""
+    def put(self, facts: Sequence[ItemMetadata]) -> None:
+        """Index items of one kind, in place of what was known of them; all of them, or none."""
+        if not facts:
+            return
+        kind, site = facts[0].kind, self.site
+        identifiers = [each.identifier for each in facts]
+        query = select(Item).where(Item.site == site, Item.kind == kind, Item.identifier.in_(identifiers))
         with self._database.writing() as session:
-            row = session.scalar(self._row(facts.kind, facts.identifier))
-            if row is None:
-                row = ITEM_CLASSES[facts.kind](site=self.site, kind=facts.kind, identifier=facts.identifier)
-                session.add(row)
-            else:
-                for table in (Artefact, RecordingUse):
-                    session.execute(delete(table).where(table.item_id == row.id))
-            _fill(row, facts)
-            row.robot_id = None if facts.robot is None else _robot_id(session, facts.robot, facts.created)
+            rows = {row.identifier: row for row in session.scalars(query)}
+            known = [row.id for row in rows.values()]
+            for table in (Artefact, RecordingUse) if known else ():
+                session.execute(delete(table).where(table.item_id.in_(known)))
+            robots = _find_robots(session, facts)
+            for each in facts:
+                row = rows.get(each.identifier)
+                if row is None:
+                    row = ITEM_CLASSES[kind](site=site, kind=kind, identifier=each.identifier)
+                    rows[each.identifier] = row
+                    session.add(row)
+                _fill(row, each)
+                row.robot_id = None if each.robot is None else robots[each.robot]
             session.flush()
-            session.add_all(
-                Artefact(item_id=row.id, path=file.path, size=file.size, sha256=file.sha256) for file in facts.artefacts
-            )
-            session.add_all(
-                RecordingUse(item_id=row.id, role=use.role, name=use.name, origin=use.origin, sha256=use.sha256)
-                for use in facts.recordings
-            )
+            owned = [(rows[each.identifier].id, each) for each in facts]
+            files = [{"item_id": owner, **vars(file)} for owner, each in owned for file in each.artefacts]
+            uses = [{"item_id": owner, **vars(use)} for owner, each in owned for use in each.recordings]
+            for table, values in ((Artefact, files), (RecordingUse, uses)):
+                if values:
+                    session.execute(insert(table), values)
 
     def forget(self, kind: str, identifiers: Collection[str]) -> None:
         """Take items out of the index whose folders are gone."""
@@ -206,6 +214,13 @@ class Index:
             uses = session.execute(query)
             return frozenset(name for kind, identifier, name in uses if (kind, identifier) not in except_by)
 
+    def list_users(self, recording: str) -> frozenset[str]:
+        """Identifiers of the items of this site that were made from or judged by a recording on the server."""
+        query = select(Item.identifier).join(RecordingUse).where(Item.site == self.site)
+        query = query.where(RecordingUse.origin == "server", RecordingUse.name == recording)
+        with self._database.reading() as session:
+            return frozenset(session.scalars(query))
+
     def search(self, query: ItemQuery) -> list[ItemEntry]:
         """Items of all sites, the newest first."""
         statement = select(Item).outerjoin(Robot)
@@ -245,15 +260,21 @@ def _fill(row: Item, facts: ItemMetadata) -> None:
         setattr(row, column, facts.figures.get(column))
 
 
-def _robot_id(session: Session, name: str, seen: datetime) -> int:
-    """The row of a robot, made where it is missing."""
-    row = session.scalar(select(Robot).where(Robot.name == name))
-    if row is None:
-        row = Robot(name=name, first_seen=seen, last_seen=seen)
-        session.add(row)
-        session.flush()
-    row.first_seen, row.last_seen = min(row.first_seen, seen), max(row.last_seen, seen)
-    return row.id
+def _find_robots(session: Session, facts: Sequence[ItemMetadata]) -> dict[str, int]:
+    """The rows of the robots that items are about, made where they are missing."""
+    seen: dict[str, list[datetime]] = {}
+    for each in facts:
+        if each.robot is not None:
+            seen.setdefault(each.robot, []).append(each.created)
+    robots = {row.name: row for row in session.scalars(select(Robot).where(Robot.name.in_(seen)))}
+    for name, times in seen.items():
+        robot = robots.get(name)
+        if robot is None:
+            robot = robots[name] = Robot(name=name, first_seen=min(times), last_seen=max(times))
+            session.add(robot)
+        robot.first_seen, robot.last_seen = min(robot.first_seen, *times), max(robot.last_seen, *times)
+    session.flush()
+    return {name: row.id for name, row in robots.items()}
 
 
 def _entry(row: Item) -> ItemEntry:

@@ -1,0 +1,104 @@
+"""Motion of a recording in the band in which torque of commands is compared with torque of bodies."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.recording.conditioning.filters import smooth
+from tauscope.recording.recording import Recording
+from tauscope.recording.samples import Array, Samples
+
+LONGEST_S = 0.2
+"""Longest delay that is looked for [s]: buses of servos take 1 to 50 ms, a teleoperation loop up to 150 ms."""
+
+BAND_HZ = 10.0
+"""Band of the comparison [Hz]: loops of servos pass no more, and above it steps of an encoder outweigh torque."""
+
+MOST_ROWS = 20_000
+"""Rows of a recording that are compared."""
+
+REST = 0.02
+"""Speed relative to the fastest below which friction has no direction."""
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothMotion:
+    """Motion on a uniform grid.
+
+    time : (N,) float64
+        [s]
+    position, velocity, acceleration : (N, n) float64
+        q, q̇, q̈
+    rate, band : float
+        sampling rate, and band of the comparison [Hz]
+    """
+
+    samples: Samples
+    time: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    rate: float
+    band: float
+
+    @staticmethod
+    def of(recording: Recording) -> "SmoothMotion":
+        """The motion of a recording."""
+        samples = recording.samples(0, MOST_ROWS)
+        rate = 1.0 / float(np.median(np.diff(samples.time)))
+        band = min(BAND_HZ, 0.2 * rate)
+        time = np.arange(samples.time[0], samples.time[-1], 1.0 / rate)
+        raw = np.stack([_onto(samples.time, column, time) for column in samples.position.T], axis=1)
+        position = smooth(raw, rate, 2.0 * band)
+        velocity = np.gradient(position, 1.0 / rate, axis=0)
+        acceleration = np.gradient(velocity, 1.0 / rate, axis=0)
+        return SmoothMotion(samples, time, position, velocity, acceleration, rate, band)
+
+    @property
+    def independent(self) -> float:
+        """Independent rows a row of the band."""
+        return 2.0 * self.band / self.rate
+
+    def onto(self, values: Array) -> Array:
+        """Values of the recording on the grid.
+
+        Parameters
+        ----------
+        values : (M,) float64
+            one a row of the recording; NaN where it was missed
+
+        Returns
+        -------
+        (N,) float64
+        """
+        return _onto(self.samples.time, values, self.time)
+
+    def moves(self, joint: int) -> NDArray[np.bool_]:
+        """Rows in which a joint moves, and every delay has a command, (N,)."""
+        speed = np.abs(self.velocity[:, joint])
+        moving = speed > REST * speed.max()
+        moving[: int(LONGEST_S * self.rate) + 1] = False
+        return moving
+
+    def reduce(self, columns: Array, joint: int) -> Array:
+        """Columns with those of a joint's friction and constant beside them, in the band, where the joint moves.
+
+        Parameters
+        ----------
+        columns : (N, k) float64
+            torque by coefficient
+
+        Returns
+        -------
+        (M, k + 3) float64
+        """
+        speed = self.velocity[:, joint]
+        whole = np.column_stack([columns, speed, np.sign(speed), np.ones(len(speed))])
+        return smooth(whole, self.rate, self.band)[self.moves(joint)]
+
+
+def _onto(time: Array, values: Array, at: Array) -> Array:
+    """Values at other instants; missed ones are bridged."""
+    known = np.isfinite(values)
+    return np.interp(at, time[known], values[known]) if known.any() else np.zeros(len(at))

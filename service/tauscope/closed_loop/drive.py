@@ -1,0 +1,151 @@
+"""Torque of the drives at each step of a rollout: loops on recorded commands, or recorded torque with a stabiliser."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from tauscope.actuation import shift_command
+from tauscope.closed_loop.plant import STEP_S
+from tauscope.recording import Recording
+from tauscope.recording.conditioning.filters import smooth
+from tauscope.recording.recording import Array
+from tauscope.robot import Actuator, Robot
+
+STABILISER_RAD_S = 2.0 * np.pi
+"""Bandwidth of the stabiliser [rad/s]: 1 Hz holds a drift of minutes and leaves the motion itself to the model."""
+
+STATE_BAND_HZ = 15.0
+"""Band of the velocity that restarts begin with, where none was recorded [Hz]: above it are steps of the encoder."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedMotion:
+    """A recording on the steps of a rollout.
+
+    time : (K,) float64
+        of the steps [s]
+    position, velocity : (K, n) float64
+        of the real arm [rad or m, rad/s or m/s]
+    rows : (N,) float64
+        instants of the recording [s]
+    measured : (N, n) float64
+        q at these instants; NaN where it was missed
+    """
+
+    name: str
+    time: Array
+    position: Array
+    velocity: Array
+    rows: Array
+    measured: Array
+
+
+class Drive(Protocol):
+    """Torque of all joints."""
+
+    is_closed: bool
+
+    def torque(self, step: int, position: Array, velocity: Array) -> Array:
+        """Torque at a step, (n,) [Nm or N].
+
+        Parameters
+        ----------
+        position, velocity : (n,) float64
+            q, q̇ of the simulated arm
+        """
+        ...
+
+
+def record_motion(recording: Recording) -> RecordedMotion:
+    """A recording on the steps of a rollout."""
+    samples = recording.samples()
+    time = np.arange(samples.time[0], samples.time[-1] + 0.5 * STEP_S, STEP_S)
+    position = np.stack([_onto(samples.time, column, time) for column in samples.position.T], axis=1)
+    velocity = np.gradient(smooth(position, 1.0 / STEP_S, STATE_BAND_HZ), STEP_S, axis=0)
+    if samples.velocity is not None and np.isfinite(samples.velocity).any(axis=0).all():
+        velocity = np.stack([_onto(samples.time, column, time) for column in samples.velocity.T], axis=1)
+    return RecordedMotion(recording.name, time, position, velocity, samples.time, samples.position)
+
+
+class LoopDrive:
+    """Position or velocity loops on recorded commands."""
+
+    is_closed = True
+
+    def __init__(self, loops: Sequence[Actuator], recording: Recording, time: Array) -> None:
+        """Put the commands, supplies and gains on the steps."""
+        samples = recording.samples()
+        reference = samples.reference if samples.reference is not None else samples.effort
+        self._loops = tuple(loops)
+        self._command = np.empty((len(time), len(self._loops)))
+        for joint, loop in enumerate(self._loops):
+            command = shift_command(samples.time, reference[:, joint], loop.delay or 0.0, loop.rate_hz, time)
+            self._command[:, joint] = command if loop.kind == "position" else np.gradient(command, STEP_S)
+        self._voltage, self._gain, self._temperature = (
+            None if values is None else np.stack([_onto(samples.time, column, time) for column in values.T], axis=1)
+            for values in (samples.voltage, samples.gain, samples.temperature)
+        )
+
+    def torque(self, step: int, position: Array, velocity: Array) -> Array:
+        """Torque at a step, (n,) [Nm or N].
+
+        Parameters
+        ----------
+        position, velocity : (n,) float64
+            q, q̇ of the simulated arm
+        """
+        out = np.empty(len(self._loops))
+        for joint, loop in enumerate(self._loops):
+            measured = position[joint] if loop.kind == "position" else velocity[joint]
+            out[joint] = loop.torque(
+                float(self._command[step, joint] - measured),
+                float(velocity[joint]),
+                None if self._voltage is None else float(self._voltage[step, joint]),
+                None if self._gain is None else float(self._gain[step, joint]),
+                None if self._temperature is None else float(self._temperature[step, joint]),
+            )
+        return out
+
+
+class TorqueDrive:
+    """Recorded torque, and a stabiliser that draws the simulated arm to the real one."""
+
+    is_closed = False
+
+    def __init__(self, robot: Robot, recording: Recording, motion: RecordedMotion, inertia: Array) -> None:
+        """Put the torque on the steps."""
+        samples = recording.samples()
+        effort = samples.effort if samples.effort_command is None else samples.effort_command
+        torque = recording.joint_torque(effort, robot)
+        self._torque = np.stack([_onto(samples.time, column, motion.time) for column in torque.T], axis=1)
+        self._motion = motion
+        self._stiffness, self._damping = inertia * STABILISER_RAD_S**2, 2.0 * inertia * STABILISER_RAD_S
+        self.squares, self.steps = np.zeros(len(inertia)), 0
+
+    def torque(self, step: int, position: Array, velocity: Array) -> Array:
+        """Torque at a step, (n,) [Nm or N].
+
+        Parameters
+        ----------
+        position, velocity : (n,) float64
+            q, q̇ of the simulated arm
+        """
+        motion = self._motion
+        ahead, faster = motion.position[step] - position, motion.velocity[step] - velocity
+        added = self._stiffness * ahead + self._damping * faster
+        self.squares += added**2
+        self.steps += 1
+        return self._torque[step] + added
+
+    @property
+    def stabiliser_rms(self) -> Array:
+        """Rms of the stabiliser's torque so far, (n,) [Nm or N]."""
+        return np.sqrt(self.squares / max(self.steps, 1))
+
+
+def _onto(time: Array, values: Array, at: Array) -> Array:
+    """Values at other instants; missed ones are bridged."""
+    known = np.isfinite(values)
+    return np.interp(at, time[known], values[known]) if known.any() else np.full(len(at), np.nan)

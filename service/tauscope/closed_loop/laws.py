@@ -1,0 +1,105 @@
+"""Torque that an MJCF cannot hold, at one instant: Stribeck and load-dependent friction, constants, and the like."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tauscope.effects import Signals
+from tauscope.export.compensation import JointFriction
+from tauscope.export.model import ExportModel, FoundEffect
+from tauscope.recording.recording import Array
+
+_TWO_OVER_PI = 2.0 / np.pi
+
+RESTING = 1e-4
+"""Speed below which a joint's direction is that of the torque on it [rad/s or m/s]."""
+
+
+class JointLaws:
+    """Dry friction and further torque of all joints at one instant.
+
+    Dry friction is set-valued: a level that holds a joint at rest. An effect is linear in the sign of the velocity; the
+    part with the sign is a level, the rest is torque.
+    """
+
+    def __init__(
+        self, model: ExportModel, effects: tuple[FoundEffect, ...], held: Array, has_offset: tuple[bool, ...]
+    ) -> None:
+        """Take a model.
+
+        Parameters
+        ----------
+        effects : tuple of FoundEffect
+            that the MJCF does not hold and whose torque follows from position, velocity and load
+        held : (n,) float64
+            dry friction that the MJCF's bristles hold [Nm or N]
+        has_offset : tuple of bool
+            joints whose constant torque the MJCF holds
+        """
+        friction: tuple[JointFriction, ...] = model.friction
+        self._stiction = np.array([each.stiction for each in friction])
+        self._stribeck = np.array([each.stribeck for each in friction])
+        self._delta = np.array([each.delta or 0.0 for each in friction])
+        self._offset = np.array([0.0 if has else each.offset for each, has in zip(friction, has_offset, strict=True)])
+        self._held, self._effects = held, effects
+        count = model.robot.joint_count
+        zeros = np.zeros((count, 1))
+        self._signals = Signals(
+            robot=model.robot,
+            rate_hz=1.0,
+            time=np.zeros((1, 1)),
+            recording=0,
+            position=zeros.copy(),
+            velocity=zeros.copy(),
+            acceleration=zeros.copy(),
+            load=zeros.copy(),
+            torque=zeros.copy(),
+            step=zeros.copy(),
+            steepness=np.array([each.k_v for each in friction]),
+            bodies=np.concatenate([link.to_vector() for link in model.links]),
+            links=np.concatenate([link.to_vector() for link in model.links]),
+            periodic=False,
+        )
+
+    def __call__(self, position: Array, velocity: Array, load: Array, drive: Array) -> tuple[Array, Array]:
+        """Levels of dry friction, and torque against the motion beside them.
+
+        Parameters
+        ----------
+        position, velocity : (n,) float64
+            q, q̇
+        load : (n,) float64
+            torque of the rigid body [Nm or N]
+        drive : (n,) float64
+            torque of the drive, which gives a resting joint its direction [Nm or N]
+
+        Returns
+        -------
+        (n,) float64, (n,) float64
+            [Nm or N]
+        """
+        level = self._stiction + self._stribeck * _TWO_OVER_PI * np.arctan(self._delta * np.abs(velocity))
+        torque = self._offset.copy()
+        if self._effects:
+            direction = np.where(np.abs(velocity) > RESTING, np.sign(velocity), np.sign(drive - load))
+            smooth = self._evaluate(position, velocity, load, np.zeros_like(direction))
+            level = level + direction * (self._evaluate(position, velocity, load, direction) - smooth)
+            torque += smooth
+        return np.maximum(level - self._held, 0.0), torque
+
+    def _evaluate(self, position: Array, velocity: Array, load: Array, step: Array) -> Array:
+        """Torque of all effects for a sign of the velocity, (n,)."""
+        now = replace(
+            self._signals,
+            position=position[:, None],
+            velocity=velocity[:, None],
+            load=load[:, None],
+            step=step[:, None],
+            of_motion={},
+            _memory={},
+        )
+        total = np.zeros(len(position))
+        for found in self._effects:
+            (columns,) = found.effect.columns(now, found.shape[None])
+            total[found.effect.joint] += float(found.coefficients @ columns[:, 0, 0])
+        return total

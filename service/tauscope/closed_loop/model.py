@@ -1,0 +1,109 @@
+"""A model that is rolled out: its MJCF, and the laws beside it."""
+
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+
+import numpy as np
+
+from tauscope.closed_loop.laws import JointLaws
+from tauscope.export.compensation import JointFriction
+from tauscope.export.mjcf import to_mjcf
+from tauscope.export.mjcf_findings import IN_THE_MODEL, add_findings
+from tauscope.export.model import ExportModel, Origin
+from tauscope.recording import EffortKind
+from tauscope.robot import LinkInertia, Robot
+
+TRACE_SHARE = 1e-6
+"""Mass added to stated links, relative to the arm's: MuJoCo moves no body without mass, and no rod without width."""
+
+UNUSED_K_V = 1.0
+"""K_v of stated friction [s/rad or s/m]: a rollout takes friction as a step."""
+
+TRACE_RADIUS_M = 0.01
+"""Radius of that mass [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class RolloutModel:
+    """One model of the arm.
+
+    name : str
+        ``stated``, ``identified`` or ``findings``
+    joints : tuple of str
+        names of the driven joints in the MJCF
+    inertia : (n,) float64
+        of each joint at q = 0 with all that it carries [kg m² or kg]
+    left_out : tuple of str
+        findings that the simulation lacks, each with the reason
+    """
+
+    name: str
+    mjcf: str
+    joints: tuple[str, ...]
+    laws: JointLaws
+    inertia: np.ndarray
+    left_out: tuple[str, ...]
+
+
+def stated_model(robot: Robot) -> ExportModel | None:
+    """What the robot file's model block believes; None where it states no links."""
+    stated = robot.model
+    if stated.links is None or not any(link.mass > 0.0 for link in stated.links):
+        return None
+    count = robot.joint_count
+    mass = TRACE_SHARE * sum(link.mass for link in stated.links)
+    trace = LinkInertia(mass, np.zeros(3), mass * TRACE_RADIUS_M**2 * np.eye(3))
+    friction = stated.friction or ()
+    frictions = [
+        JointFriction(
+            friction[joint].stiction if friction else 0.0,
+            friction[joint].stribeck if friction else 0.0,
+            friction[joint].viscous if friction else 0.0,
+            0.0,
+            robot.joints[joint].friction_shape.k_v or UNUSED_K_V,
+            robot.joints[joint].friction_shape.delta,
+        )
+        for joint in range(count)
+    ]
+    return ExportModel(
+        robot=replace(robot, segment_names=()),
+        links=tuple(LinkInertia.from_vector(link.to_vector() + trace.to_vector()) for link in stated.links),
+        friction=tuple(frictions),
+        delivered_friction=tuple(frictions),
+        rotor_inertia=stated.rotor_inertia or (None,) * count,
+        effects=(),
+        origin=Origin((), EffortKind.TORQUE, datetime.now(UTC)),
+    )
+
+
+def rollout_model(name: str, model: ExportModel) -> RolloutModel:
+    """The model as a simulator and the laws beside it take it.
+
+    Raises
+    ------
+    ExportError
+        a link cannot exist
+    """
+    from tauscope.dynamics import mass_matrix
+
+    added = add_findings(model)
+    names = [joint.name for joint in model.robot.joints]
+    beside = tuple(found for found in added.left if found.effect.code and found.effect.joint is not None)
+    left_out = [
+        f"{found.effect.name(names)}: {found.effect.no_code or 'no simulator has it'}"
+        for found in added.left
+        if found not in beside and found.effect.id not in IN_THE_MODEL
+    ]
+    held = np.array([extras.dry_friction for extras in added.joints])
+    laws = JointLaws(model, beside, held, tuple(extras.has_offset for extras in added.joints))
+    parameters = np.concatenate([link.to_vector() for link in added.links])
+    at_zero = np.zeros((1, model.robot.joint_count))
+    rotors = np.array([value or 0.0 for value in model.rotor_inertia])
+    return RolloutModel(
+        name=name,
+        mjcf=to_mjcf(model).text,
+        joints=tuple(model.robot.segment_labels[link] for link in model.robot.own_links),
+        laws=laws,
+        inertia=np.diag(mass_matrix(model.robot, parameters, at_zero)[0]) + rotors,
+        left_out=tuple(left_out),
+    )

@@ -1,0 +1,94 @@
+"""The rollout as a page: real and simulated motion, and their errors."""
+
+import shlex
+
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from tauscope.closed_loop.result import RolloutDocument
+from tauscope.closed_loop.rollout import Rollout, Trace
+from tauscope.closed_loop.tables import MILLI, MODEL_WORDS, recording_table, rollout_sentences, summary_table
+from tauscope.number_text import counted, significant
+from tauscope.report.csv_text import csv_text
+from tauscope.report.decimation import envelope_indices
+from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Section, render
+from tauscope.report.provenance import Provenance
+from tauscope.report.svg import HELD_OUT, MEASURED, PREDICTED, RESIDUAL, draw_svg
+from tauscope.report.tables import input_table
+
+HEIGHT_INCHES = 3.4
+
+MOST_POINTS = 1400
+"""Points a curve; two a pixel."""
+
+COLOURS = {"stated": HELD_OUT, "identified": PREDICTED, "findings": RESIDUAL}
+
+
+def rollout_page(rollout: Rollout, provenance: Provenance) -> str:
+    """A self-contained HTML page on a rollout."""
+    document = rollout.document
+    worst = max(rollout.traces, key=lambda trace: max(trace.entry.models[-1].rms))
+    names = [joint.name for joint in rollout.robot.joints]
+    parts = [_motion(worst, joint, name) for joint, name in enumerate(names)]
+    sections = [
+        Section(
+            "errors", "Position error", [Part(table=summary_table(document)), Part(table=recording_table(document))]
+        ),
+        Section("motion", "Motion where the error is largest", parts, [f"{worst.motion.name}."]),
+        Section(
+            "reproduce",
+            "Reproduce",
+            [Part(table=input_table(provenance)), Part(command=shlex.join(provenance.command))],
+        ),
+    ]
+    created = provenance.created.strftime("%Y-%m-%d %H:%M %Z").strip()
+    counts = f"{counted(len(names), 'joint')} · {counted(len(rollout.traces), 'recording')}"
+    return render(
+        Page(
+            robot=document.robot,
+            subtitle=f"{counts} · closed loop in MuJoCo · {created}",
+            key_figures=_key_figures(document),
+            sentences=list(rollout_sentences(document)),
+            cautions=[warning.sentence for warning in document.warnings],
+            sections=sections,
+            footer=", ".join(f"{name} {version}" for name, version in provenance.versions),
+            kind="rollout",
+        )
+    )
+
+
+def _key_figures(document: RolloutDocument) -> list[KeyFigure]:
+    """Error of each model at its worst joint."""
+    figures = []
+    for entry in document.summary:
+        place = max(range(len(entry.rms)), key=entry.rms.__getitem__)
+        value = f"{significant(MILLI * entry.rms[place], 3)} mrad"
+        figures.append(KeyFigure(MODEL_WORDS[entry.model].capitalize(), value, f"rms at {document.joints[place]}"))
+    return figures
+
+
+def _motion(trace: Trace, joint: int, name: str) -> Part:
+    """Real and simulated position of one joint, and their difference."""
+    time, real = trace.motion.rows, trace.motion.measured[:, joint]
+    curves = {model: positions[:, joint] for model, positions in trace.simulated.items()}
+
+    def draw(figure: Figure) -> None:
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.7, 1.0))
+        kept = envelope_indices(real, MOST_POINTS)
+        above.plot(time[kept], real[kept], color=MEASURED, linewidth=0.9, label="real")
+        for model, curve in curves.items():
+            kept = envelope_indices(curve, MOST_POINTS)
+            above.plot(time[kept], curve[kept], color=COLOURS[model], linewidth=1.0, label=MODEL_WORDS[model])
+            below.plot(time[kept], MILLI * (curve - real)[kept], color=COLOURS[model], linewidth=0.7)
+        above.set_ylabel("position [rad, m]")
+        above.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.0, borderpad=0.2)
+        below.set_ylabel("error [mrad, mm]")
+        below.set_xlabel("time [s]")
+        below.margins(x=0.0)
+
+    svg = Markup(draw_svg(f"motion-{joint + 1}", HEIGHT_INCHES, draw))  # noqa: S704 - our own drawing
+    kept = envelope_indices(real, MOST_POINTS // 2)
+    columns = {"time": time, "real": real, **curves}
+    numbers = Numbers(f"Numbers of {name}", text=csv_text({key: each[kept].tolist() for key, each in columns.items()}))
+    caption = f"{name}: real and simulated position above, simulated less real below."
+    return Part(title=name, figure=Drawing(svg, f"Motion of {name}, real and simulated", caption), numbers=numbers)

@@ -1,0 +1,232 @@
+"""Real recordings against closed-loop simulation with the same commands."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tauscope.actuation import estimate_delays, is_open, require_loops
+from tauscope.closed_loop.drive import Drive, LoopDrive, RecordedMotion, TorqueDrive, record_motion
+from tauscope.closed_loop.measure import lag, reversal_error, rms_error, worst_error
+from tauscope.closed_loop.model import RolloutModel, rollout_model, stated_model
+from tauscope.closed_loop.plant import STEP_S, make_plant
+from tauscope.closed_loop.result import HorizonEntry, ModelEntry, RecordingEntry, RolloutDocument, SummaryEntry
+from tauscope.closed_loop.simulate import simulate_motion
+from tauscope.errors import RecordingMismatchError
+from tauscope.export.model import ExportModel
+from tauscope.recording import EffortKind, Recording
+from tauscope.recording.columns import table_columns
+from tauscope.recording.recording import Array
+from tauscope.recording.table import MemoryTable
+from tauscope.result_warning import ResultWarning
+from tauscope.robot import Actuator, Robot
+
+HORIZONS_S = (0.1, 1.0, 10.0)
+"""Times between restarts at the real state [s]: one command, one move, one task."""
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """One recording and its simulations.
+
+    simulated : dict of str to (N, n) float64
+        positions by model, from one start [rad or m]
+    """
+
+    motion: RecordedMotion
+    simulated: dict[str, Array]
+    entry: RecordingEntry
+
+
+@dataclass(frozen=True, eq=False)
+class Rollout:
+    """All recordings rolled out with all models."""
+
+    robot: Robot
+    is_closed: bool
+    models: tuple[RolloutModel, ...]
+    traces: tuple[Trace, ...]
+    warnings: tuple[ResultWarning, ...]
+
+    @property
+    def document(self) -> RolloutDocument:
+        """The result, typed."""
+        loops = [joint.actuator if self.is_closed else None for joint in self.robot.joints]
+        return RolloutDocument(
+            robot=self.robot.name,
+            joints=[joint.name for joint in self.robot.joints],
+            drive="loop" if self.is_closed else "torque",
+            delay=[None if loop is None else loop.delay for loop in loops],
+            step_s=STEP_S,
+            recordings=[trace.entry for trace in self.traces],
+            summary=[self._summary(place) for place in range(len(self.models))],
+            left_out=list(dict.fromkeys(text for model in self.models for text in model.left_out)),
+            warnings=list(self.warnings),
+        )
+
+    def _summary(self, place: int) -> SummaryEntry:
+        """One model over all recordings."""
+        entries = [trace.entry.models[place] for trace in self.traces]
+        rms, worst = np.array([entry.rms for entry in entries]), np.array([entry.worst for entry in entries])
+        return SummaryEntry(model=entries[0].model, rms=rms.mean(axis=0).tolist(), worst=worst.max(axis=0).tolist())
+
+
+def roll_out(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    exports: Sequence[ExportModel] = (),
+    progress: Progress = lambda step: None,
+) -> Rollout:
+    """Simulate what a recording commanded, without and with the findings of a model.
+
+    Parameters
+    ----------
+    exports : sequence of ExportModel
+        of a model file, as `read_export_models` reads it; empty where the robot file's own model is judged alone
+
+    Raises
+    ------
+    RecordingMismatchError
+        the model is of another arm, or nothing states a model
+    TauscopeError
+        a recording holds neither commands for loops nor torque, or there is no simulator
+    """
+    models = _models(robot, exports)
+    known = exports[-1].robot if exports else None
+    robot, is_closed = _complete_loops(robot, recordings, known)
+    plants = [make_plant(model.mjcf, model.joints) for model in models]
+    traces = []
+    for recording in recordings:
+        progress(f"simulate {recording.name}")
+        motion = record_motion(recording)
+        entries, simulated = [], {}
+        for model, plant in zip(models, plants, strict=True):
+            runs: dict[float | None, Array] = {}
+            stabiliser = None
+            for horizon in (*(h for h in HORIZONS_S if h < motion.time[-1] - motion.time[0]), None):
+                drive = _drive(robot, recording, motion, model, is_closed=is_closed)
+                runs[horizon] = simulate_motion(model, plant, drive, motion, horizon)
+                stabiliser = drive.stabiliser_rms.tolist() if isinstance(drive, TorqueDrive) else None
+            simulated[model.name] = runs[None]
+            entries.append(_entry(model.name, motion, runs, stabiliser))
+        length = float(motion.rows[-1] - motion.rows[0])
+        traces.append(
+            Trace(motion, simulated, RecordingEntry(recording=recording.name, duration_s=length, models=entries))
+        )
+    warnings = tuple(warning for recording in recordings for warning in recording.warnings)
+    return Rollout(robot, is_closed, tuple(models), tuple(traces), (*_warn_drive(is_closed=is_closed), *warnings))
+
+
+def _models(robot: Robot, exports: Sequence[ExportModel]) -> list[RolloutModel]:
+    """What the robot file states, and the model file without and with its findings."""
+    names = [joint.name for joint in robot.joints]
+    for export in exports:
+        others = [joint.name for joint in export.robot.joints]
+        if others != names:
+            raise RecordingMismatchError(
+                f"the model is of joints {', '.join(others)}, robot {robot.name} has {', '.join(names)};"
+                " give the model of this arm"
+            )
+    stated = stated_model(robot)
+    models = [] if stated is None else [rollout_model("stated", stated)]
+    if exports:
+        found = exports[-1]
+        plain = exports[0] if len(exports) > 1 else replace(found, effects=())
+        models.append(rollout_model("identified", plain))
+        if any(each.effect.id != "rotor_inertia" for each in found.effects):
+            models.append(rollout_model("findings", found))
+    if not models:
+        raise RecordingMismatchError(
+            f"robot {robot.name} states no links and no model is given; write one by"
+            " `tauscope identify ... --model MODEL.json`, and give it with --model"
+        )
+    return models
+
+
+def _complete_loops(robot: Robot, recordings: Sequence[Recording], known: Robot | None) -> tuple[Robot, bool]:
+    """The robot with delays of its loops, and whether loops can close: commands of all joints are there."""
+    loops = [joint.actuator for joint in robot.joints]
+    commands = [_as_commands(recording) for recording in recordings]
+    if not all(loop is not None and loop.has_loop for loop in loops) or any(each is None for each in commands):
+        return robot, False
+    others = [None] * len(loops) if known is None else [joint.actuator for joint in known.joints]
+    filled = [
+        loop if loop is None or other is None else _fill(loop, other) for loop, other in zip(loops, others, strict=True)
+    ]
+    joints = [replace(joint, actuator=loop) for joint, loop in zip(robot.joints, filled, strict=True)]
+    robot = replace(robot, joints=tuple(joints))
+    for recording in recordings:
+        require_loops(robot, recording)
+    for number, joint in enumerate(robot.joints, 1):
+        if is_open(joint):
+            place = f"joints[{number - 1}].actuator.torque_per_volt"
+            raise RecordingMismatchError(
+                f"robot {robot.name}: {joint.name}: its loop has no torque per volt; state {place}, or give a model"
+                " that identify made from commands"
+            )
+    delays = estimate_delays(robot, [each for each in commands if each is not None])
+    done = [
+        joint if joint.actuator is None else replace(joint, actuator=replace(joint.actuator, delay=delay.value))
+        for joint, delay in zip(robot.joints, delays, strict=True)
+    ]
+    return replace(robot, joints=tuple(done)), True
+
+
+def _fill(loop: Actuator, known: Actuator) -> Actuator:
+    """A loop with what is not stated as the model's recordings gave it."""
+    return replace(
+        loop,
+        delay=known.delay if loop.delay is None else loop.delay,
+        torque_per_volt=known.torque_per_volt if loop.volt_torque is None else loop.torque_per_volt,
+    )
+
+
+def _as_commands(recording: Recording) -> Recording | None:
+    """The recording with its commands in place of effort; None where a joint has none."""
+    if recording.effort_kind is EffortKind.COMMAND:
+        return recording
+    names, first = recording.table.names, table_columns(recording.joint_count, EffortKind.COMMAND)
+    if not set(first) <= set(names):
+        return None
+    lost = recording.effort_kind.value
+    kept = (*first, *(name for name in names if name not in first and name.rstrip("0123456789") != lost))
+    rows = recording.table.rows(0, len(recording))[:, [names.index(name) for name in kept]]
+    return replace(recording, effort_kind=EffortKind.COMMAND, table=MemoryTable(kept, rows))
+
+
+def _drive(
+    robot: Robot, recording: Recording, motion: RecordedMotion, model: RolloutModel, *, is_closed: bool
+) -> Drive:
+    """Loops where commands are there, else recorded torque."""
+    if is_closed:
+        loops = [joint.actuator for joint in robot.joints if joint.actuator is not None]
+        return LoopDrive(loops, recording, motion.time)
+    return TorqueDrive(robot, recording, motion, model.inertia)
+
+
+def _entry(
+    name: str, motion: RecordedMotion, runs: dict[float | None, Array], stabiliser: list[float] | None
+) -> ModelEntry:
+    """Errors of one model on one recording."""
+    real, free = motion.measured, runs[None]
+    turned = reversal_error(motion.rows, real, free, motion.time, motion.velocity)
+    return ModelEntry(
+        model=name,  # pyright: ignore[reportArgumentType]
+        rms=rms_error(real, free).tolist(),
+        worst=worst_error(real, free).tolist(),
+        reversals=[None if np.isnan(value) else float(value) for value in turned],
+        lag=lag(motion.rows, real, free).tolist(),
+        horizons=[HorizonEntry(horizon_s=at, rms=rms_error(real, run).tolist()) for at, run in runs.items()],
+        stabiliser_rms=stabiliser,
+    )
+
+
+def _warn_drive(*, is_closed: bool) -> tuple[ResultWarning, ...]:
+    """That a stabiliser holds the arm."""
+    if is_closed:
+        return ()
+    text = "no loop is stated, or commands are missing: recorded torque drives the arm, and a stabiliser holds it"
+    remedy = "state joints[].actuator and record qref; compare torque of the stabiliser with that of the joint"
+    return (ResultWarning(code="stabiliser", text=text, remedy=remedy),)

@@ -1,0 +1,90 @@
+"""The result of a rollout as tables and sentences."""
+
+from collections.abc import Iterator
+
+from tauscope.closed_loop.result import RolloutDocument
+from tauscope.number_text import ABSENT, significant
+from tauscope.report.table import Table
+
+MODEL_WORDS = {"stated": "robot file", "identified": "identified", "findings": "with findings"}
+"""Models in words: the identified one is without findings of a diagnosis."""
+
+MILLI = 1e3
+
+
+def summary_table(document: RolloutDocument) -> Table:
+    """Mean rms and largest error of every joint by model, in mrad."""
+    rows = [
+        (
+            joint,
+            MODEL_WORDS[entry.model],
+            significant(MILLI * entry.rms[place], 3),
+            significant(MILLI * entry.worst[place], 3),
+        )
+        for place, joint in enumerate(document.joints)
+        for entry in document.summary
+    ]
+    return Table(("joint", "model", "rms [mrad, mm]", "largest [mrad, mm]"), rows, words=2)
+
+
+def recording_table(document: RolloutDocument) -> Table:
+    """Errors by recording, joint and model: by time between restarts, at reversals, and the lag."""
+    horizons: list[float] = []
+    for recording in document.recordings:
+        for entry in recording.models[0].horizons:
+            if entry.horizon_s is not None and entry.horizon_s not in horizons:
+                horizons.append(entry.horizon_s)
+    rows = []
+    for recording in document.recordings:
+        for place, joint in enumerate(document.joints):
+            for entry in recording.models:
+                by_horizon = {each.horizon_s: each.rms[place] for each in entry.horizons}
+                turned = entry.reversals[place]
+                rows.append(
+                    (
+                        recording.recording,
+                        joint,
+                        MODEL_WORDS[entry.model],
+                        *(_milli(by_horizon.get(horizon)) for horizon in sorted(horizons)),
+                        _milli(entry.rms[place]),
+                        _milli(turned),
+                        significant(MILLI * entry.lag[place], 2),
+                    )
+                )
+    heads = [f"{horizon:g} s" for horizon in sorted(horizons)]
+    return Table(("recording", "joint", "model", *heads, "free", "reversals", "lag [ms]"), rows, words=3)
+
+
+def rollout_sentences(document: RolloutDocument) -> Iterator[str]:
+    """How the motion was driven, what it came to, and what the simulation lacks."""
+    if document.drive == "loop":
+        delays = ", ".join(ABSENT if delay is None else f"{MILLI * delay:.1f}" for delay in document.delay)
+        yield f"MuJoCo gets the recorded commands through the stated loops; delay {delays} ms."
+    else:
+        yield "MuJoCo gets the recorded torque, and a stabiliser of 1 Hz draws it to the recorded motion."
+        largest = [max(values) for values in _stabilisers(document)]
+        if largest:
+            yield f"The stabiliser's torque is at most {significant(max(largest), 2)} Nm or N rms."
+    first, last = document.summary[0], document.summary[-1]
+    if first is not last:
+        before, after = (MILLI * sum(entry.rms) / len(entry.rms) for entry in (first, last))
+        change = "falls" if after < before else "rises"
+        yield (
+            f"From {MODEL_WORDS[first.model]} to {MODEL_WORDS[last.model]} the mean rms error {change} from"
+            f" {significant(before, 3)} to {significant(after, 3)} mrad."
+        )
+    for text in document.left_out:
+        yield f"Not simulated: {text}."
+
+
+def _stabilisers(document: RolloutDocument) -> Iterator[list[float]]:
+    """Torque of the stabiliser of every model and recording."""
+    for recording in document.recordings:
+        for entry in recording.models:
+            if entry.stabiliser_rms:
+                yield entry.stabiliser_rms
+
+
+def _milli(value: float | None) -> str:
+    """A length or an angle in thousandths."""
+    return ABSENT if value is None else significant(MILLI * value, 3)

@@ -1,1 +1,0 @@
-"""Every form of every effect beside a fitted model, each at its own best shape."""

@@ -1,0 +1,176 @@
+"""The drive of a joint: a torque source, or a loop on position or velocity that a command reaches."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Values = float | NDArray[np.float64]
+
+ActuatorKind = Literal["torque", "position", "velocity"]
+GainUnit = Literal["register", "Nm_per_rad"]
+
+
+@dataclass(frozen=True)
+class Servo:
+    """Register conversion of a servo family.
+
+    duty_per_rad : float
+        duty of the bridge per unit of the P register and rad of position error [1/rad]
+    max_duty : float
+        largest duty that the firmware gives, 0 to 1
+    dead_band : float
+        position error below which the bridge is off [rad]
+    torque_per_volt : float or None
+        stall torque over supply voltage in the data sheet [Nm/V]; None where the family has several motors
+    """
+
+    duty_per_rad: float
+    max_duty: float = 1.0
+    dead_band: float = 0.0
+    torque_per_volt: float | None = None
+
+
+COUNT = 2.0 * np.pi / 4096
+"""One encoder count of all these servos but XL-320 [rad]."""
+
+SERVOS = {
+    "dynamixel-x": Servo(1.0 / COUNT / 128 / 885),  # e-manual: K_P = register / 128; 885 is full duty
+    "dynamixel-xl330": Servo(1.0 / COUNT / 256 / 885, torque_per_volt=0.52 / 5.0),  # measured: 0.99 to 1.01 of it
+    "dynamixel-mx": Servo(0.158, max_duty=0.9625),  # protocol 1, by oscilloscope (Duclusaud et al., ICRA 2025)
+    "dynamixel-xl320": Servo(0.0505, torque_per_volt=0.39 / 7.4),  # likewise
+    "feetech-sts3215": Servo(0.166, max_duty=0.97, dead_band=COUNT, torque_per_volt=1.91 / 7.4),  # likewise
+}
+"""Servos by name."""
+
+ASSUMED_SERVO = "dynamixel-xl330"
+"""Servo of register gains without a name."""
+
+ROOM_C = 25.0
+"""Temperature at which torque per volt is stated [°C]."""
+
+DATA_SHEET_STD = 0.2
+"""Relative standard error of torque per volt from a data sheet: stall torque includes friction and a warm winding."""
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """The drive of a joint; its command is the column ``qref``.
+
+    Position: torque = κ clip(kp (qref - q), ±max_duty V) - kd q̇ - κ k_e q̇, in the units of `unit`.
+    Velocity: kp acts on q̇ref - q̇.
+
+    kp : float
+        register value, or Nm/rad, N/m; of a velocity loop Nm s/rad, N s/m
+    kd : float
+        torque per velocity [Nm s/rad or N s/m]; a register's D has no documented unit and acts as viscous friction
+    servo : str or None
+        register conversion, one of `SERVOS`
+    supply_voltage : float or None
+        of the bridge [V]; a column ``volt`` goes before it
+    torque_per_volt : float or None
+        stall torque per volt across the bridge, κ [Nm/V]
+    max_duty : float or None
+        largest share of the supply that the firmware gives, 0 to 1; None: the servo's own
+    back_emf : float
+        k_e at the joint [V s/rad]
+    dead_band : float or None
+        position error below which the bridge is off [rad]; None: the servo's own
+    delay : float or None
+        from the recorded command to its torque [s]; None: estimated
+    rate_hz : float or None
+        rate at which the loop takes commands [Hz]; None: with every sample
+    temperature_slope : float
+        relative loss of torque per volt with the recorded temperature, κ / (1 + slope (T - 25 °C)) [1/K]
+    scale_std : float or None
+        relative standard error of the torque per position error; None: that of a data sheet, or zero in SI
+    """
+
+    kind: ActuatorKind
+    kp: float = 0.0
+    kd: float = 0.0
+    unit: GainUnit = "Nm_per_rad"
+    servo: str | None = None
+    supply_voltage: float | None = None
+    torque_per_volt: float | None = None
+    max_duty: float | None = None
+    back_emf: float = 0.0
+    dead_band: float | None = None
+    delay: float | None = None
+    rate_hz: float | None = None
+    temperature_slope: float = 0.0
+    scale_std: float | None = None
+
+    @property
+    def has_loop(self) -> bool:
+        """Whether its torque follows from commands and motion."""
+        return self.kind != "torque"
+
+    @property
+    def conversion(self) -> Servo:
+        """Register conversion."""
+        return SERVOS[self.servo or ASSUMED_SERVO]
+
+    @property
+    def volt_torque(self) -> float | None:
+        """κ [Nm/V]: as stated, else as in the data sheet."""
+        return self.conversion.torque_per_volt if self.torque_per_volt is None else self.torque_per_volt
+
+    @property
+    def relative_std(self) -> float:
+        """Relative standard error of the scale of its torque."""
+        if self.scale_std is not None:
+            return self.scale_std
+        return DATA_SHEET_STD if self.unit == "register" and self.torque_per_volt is None else 0.0
+
+    @property
+    def stiffness(self) -> float | None:
+        """Torque per position error [Nm/rad or N/m], or per velocity error; None where voltage or κ is not known."""
+        if self.unit == "Nm_per_rad":
+            return self.kp
+        if self.supply_voltage is None or self.volt_torque is None:
+            return None
+        return self.kp * self.conversion.duty_per_rad * self.supply_voltage * self.volt_torque
+
+    @property
+    def damping(self) -> float:
+        """Torque per velocity of a position loop and its back-EMF [Nm s/rad or N s/m]."""
+        own = self.kd if self.unit == "Nm_per_rad" else 0.0
+        return own + self.back_emf * (self.volt_torque or 0.0)
+
+    def torque(
+        self,
+        error: Values,
+        velocity: Values,
+        voltage: Values | None = None,
+        kp: Values | None = None,
+        temperature: Values | None = None,
+    ) -> Values:
+        """Torque at the joint.
+
+        Parameters
+        ----------
+        error : float or (N,) float64
+            command less motion: of position [rad or m], of a velocity loop of velocity [rad/s or m/s]
+        velocity : float or (N,) float64
+            q̇ [rad/s or m/s]
+        voltage : float or (N,) float64 or None
+            supply [V]; None: as stated
+        kp : float or (N,) float64 or None
+            gain in force; None: as stated
+        temperature : float or (N,) float64 or None
+            of the motor [°C]; None or NaN: 25
+        """
+        dead = self.conversion.dead_band if self.dead_band is None and self.unit == "register" else self.dead_band
+        gain = self.kp if kp is None else kp
+        if dead:
+            error = np.where(np.abs(error) > dead, error, 0.0)
+        if self.unit == "Nm_per_rad":
+            return gain * error - self.damping * velocity
+        supply = self.supply_voltage if voltage is None else voltage
+        limit = self.conversion.max_duty if self.max_duty is None else self.max_duty
+        duty = np.clip(gain * self.conversion.duty_per_rad * error, -limit, limit)
+        warmth = 0.0 if temperature is None else np.nan_to_num(np.asarray(temperature) - ROOM_C)
+        volt_torque = (self.volt_torque or 0.0) / (1.0 + self.temperature_slope * warmth)
+        return volt_torque * (0.0 if supply is None else supply) * duty - self.damping * velocity

@@ -1,0 +1,44 @@
+"""Evidence of models: what an active model or a reference rests on is not removed."""
+
+from collections.abc import Collection
+
+from tauscope.server.http.services import Services
+from tauscope.server.problems import ProblemError
+
+
+def require_no_model(services: Services, identifier: str) -> None:
+    """Refuse to remove an identification that is an active model or a reference.
+
+    Raises
+    ------
+    ProblemError
+        if it is one
+    """
+    _judge_new(services)
+    _require_free(services, identifier, {identifier})
+
+
+def require_no_evidence(services: Services, recording: str) -> None:
+    """Refuse to remove a recording that an active model or a reference was made from or judged by.
+
+    Raises
+    ------
+    ProblemError
+        if one was
+    """
+    _judge_new(services)
+    _require_free(services, recording, services.index.index.list_users(recording))
+
+
+def _judge_new(services: Services) -> None:
+    """Judge every identification: one that ended a moment ago may become the active model."""
+    services.index.refresh()
+    services.models.judge_new()
+
+
+def _require_free(services: Services, name: str, users: Collection[str]) -> None:
+    """Refuse to remove something while a model that is in use rests on it."""
+    models = services.models.history.list_protected().intersection(users)
+    if models:
+        hint = "make another model active, and the reference, first; identify again where there is no other"
+        raise ProblemError("in-use", f"{name}: model {min(models)} is in use and rests on it; {hint}")

@@ -1,0 +1,114 @@
+"""Whether the service can work: its database, disk, workers and clock, each asked within a bounded time."""
+
+import os
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+import anyio
+from anyio import CapacityLimiter, to_thread
+from prometheus_client.core import GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from tauscope.errors import StoreError
+
+LEAST_FREE_BYTES = 64 * 2**20
+"""Room on the disk below which no run should begin [bytes]."""
+
+TIMEOUT_S = 2.0
+"""How long each part may take to answer [s]."""
+
+EARLIEST = datetime(2026, 1, 1, tzinfo=UTC)
+"""A clock before this moment was never set: identifiers, leases and schedules would be wrong."""
+
+MOST_SETBACK_S = 60.0
+"""How far the clock may be set back while the service runs: items are sorted by it [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Readiness:
+    """Everything that may stand in the way of work.
+
+    checks : mapping
+        what is asked, by name; each tells an obstacle in a few words, or None, and may hang
+    """
+
+    checks: Mapping[str, Callable[[], str | None]]
+    limiter: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(8))
+
+    async def find_obstacles(self) -> list[str]:
+        """All obstacles; a part that does not answer is one."""
+        found: dict[str, str | None] = {}
+
+        async def ask(name: str, check: Callable[[], str | None]) -> None:
+            found[name] = f"the {name} has not answered within {TIMEOUT_S:g} s"
+            with anyio.move_on_after(TIMEOUT_S):
+                found[name] = await to_thread.run_sync(check, abandon_on_cancel=True, limiter=self.limiter)
+
+        async with anyio.create_task_group() as group:
+            for name, check in self.checks.items():
+                group.start_soon(ask, name, check)
+        return [obstacle for name in self.checks if (obstacle := found[name]) is not None]
+
+
+class ReadyMetrics(Collector):
+    """Whether each part can work, as a gauge."""
+
+    def __init__(self, readiness: Readiness) -> None:
+        self._readiness = readiness
+
+    def collect(self) -> Iterator[Metric]:
+        """Ask every part."""
+        family = GaugeMetricFamily("tauscope_ready", "Whether a part can work: 1, or 0", labels=["part"])
+        for name, check in self._readiness.checks.items():
+            family.add_metric([name], float(check() is None))
+        yield family
+
+
+def check_disk(folder: Path) -> str | None:
+    """What is wrong with the data folder: a file is really written."""
+    try:
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(b"ready?")
+            file.flush()
+            os.fsync(file.fileno())
+        status = os.statvfs(folder)
+    except OSError as error:
+        return f"the data folder cannot be written to ({error.strerror})"
+    free = status.f_bavail * status.f_frsize
+    return None if free >= LEAST_FREE_BYTES else f"the disk has {free // 2**20} MiB left"
+
+
+def check_database(check: Callable[[], None]) -> str | None:
+    """What is wrong with the database."""
+    try:
+        check()
+    except StoreError as error:
+        return f"database: {error}"
+    return None
+
+
+class Clock:
+    """The machine's clock, watched from when the service began."""
+
+    def __init__(self, now: Callable[[], float] = time.time, monotonic: Callable[[], float] = time.monotonic) -> None:
+        self._now, self._monotonic = now, monotonic
+        self._latest = now() - monotonic()
+        self._lock = threading.Lock()
+
+    def check(self) -> str | None:
+        """What is wrong with the clock."""
+        now = self._now()
+        if now < EARLIEST.timestamp():
+            return f"the clock says {datetime.fromtimestamp(now, UTC):%Y-%m-%d}; set it (NTP)"
+        with self._lock:
+            offset = now - self._monotonic()
+            self._latest = max(self._latest, offset)
+            back_s = self._latest - offset
+        if back_s > MOST_SETBACK_S:
+            return f"the clock was set back by {back_s:.0f} s; set it right (NTP), or start the service again"
+        return None

@@ -1,0 +1,251 @@
+"""Worker processes whose work has a deadline and a memory limit, and ends when its future is cancelled."""
+
+import atexit
+import os
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from typing import Any, ParamSpec, TypeVar
+
+from tauscope.errors import LimitExceededError
+from tauscope.server.queue.worker_process import serve_connection
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
+START_S = 120.0
+"""How long a process may take to start on a busy machine [s]."""
+
+_THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_environment = threading.Lock()
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """Work that was handed in."""
+
+    future: "Future[Any]"
+    call: tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
+
+
+class WorkerPool(Executor):
+    """A pool of spawned processes, one BLAS thread each; a process that dies takes its own work with it only.
+
+    A future stays pending while its work goes on: `Future.cancel` succeeds until the end, and kills the process.
+    Work ends with BrokenProcessPool where its process died, with LimitExceededError beyond a bound.
+    """
+
+    def __init__(self, workers: int, *, deadline_s: float | None = None, memory_bytes: int | None = None) -> None:
+        """Make the pool; no process is started before it is needed.
+
+        Parameters
+        ----------
+        deadline_s : float or None
+            how long a call may take [s]
+        memory_bytes : int or None
+            data that a process may hold [bytes]
+        """
+        self._deadline_s, self._memory_bytes = deadline_s, memory_bytes
+        self._condition = threading.Condition()
+        self._waiting: deque[_Task] = deque()
+        self._idle: list[_Worker] = []
+        self._busy: set[_Worker] = set()
+        self._is_closed = False
+        self._threads = [threading.Thread(target=self._serve, daemon=True) for _ in range(workers)]
+        self._has_begun = False
+        self.obstacle: str | None = None
+        """Why the last process that was needed did not start; None where it did."""
+
+    def submit(
+        self, fn: Callable[Arguments, Result], /, *args: Arguments.args, **kwargs: Arguments.kwargs
+    ) -> "Future[Result]":
+        """Have a function called in a process.
+
+        Raises
+        ------
+        RuntimeError
+            after `shutdown`
+        """
+        future: Future[Result] = Future()
+        with self._condition:
+            if self._is_closed:
+                raise RuntimeError("the pool is shut down")
+            if not self._has_begun:
+                self._has_begun = True
+                atexit.register(self._kill_all)  # before multiprocessing waits for its processes
+                for thread in self._threads:
+                    thread.start()
+            self._waiting.append(_Task(future, (fn, args, kwargs)))
+            self._condition.notify()
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes."""
+        with self._condition:
+            self._is_closed = True
+            if cancel_futures:
+                for task in self._waiting:
+                    task.future.cancel()
+                for worker in self._busy:
+                    worker.kill()
+            self._condition.notify_all()
+        if self._has_begun and wait:
+            for thread in self._threads:
+                thread.join()
+            atexit.unregister(self._kill_all)
+
+    def _kill_all(self) -> None:
+        """End every process."""
+        with self._condition:
+            for worker in (*self._busy, *self._idle):
+                worker.kill()
+
+    def _serve(self) -> None:
+        """Do one task after the other; on closing, those that wait still."""
+        while True:
+            with self._condition:
+                self._condition.wait_for(lambda: self._waiting or self._is_closed)
+                if not self._waiting:
+                    break
+                task = self._waiting.popleft()
+            if not task.future.cancelled():
+                self._do(task)
+        with self._condition:
+            idle, self._idle = self._idle, []
+        for worker in idle:
+            worker.close()
+
+    def _do(self, task: _Task) -> None:
+        """Do a task in the process that was used last, or a new one."""
+        try:
+            worker = self._take_worker()
+        except OSError as error:
+            self.obstacle = f"no worker process can be started ({error.strerror})"
+            return _settle(task.future, BrokenProcessPool(self.obstacle))
+        # A cancelled future is done at once: whatever works on it is of no use any more.
+        task.future.add_done_callback(lambda done: worker.kill() if done.cancelled() else None)
+        outcome = self._call(worker, task)
+        is_reusable = outcome.is_clean and not task.future.cancelled()
+        with self._condition:
+            self._busy.discard(worker)
+            if is_reusable:
+                self._idle.append(worker)
+        if not is_reusable:
+            worker.close()
+        _settle(task.future, outcome.error, outcome.result)
+
+    def _take_worker(self) -> "_Worker":
+        """A process that is ready; raises OSError where none can be started."""
+        with self._condition:
+            worker = self._idle.pop() if self._idle else None
+        worker = worker or _Worker(self._memory_bytes)
+        with self._condition:
+            self._busy.add(worker)
+        return worker
+
+    def _call(self, worker: "_Worker", task: _Task) -> "_Outcome":
+        """What comes of a call."""
+        try:
+            worker.begin(task.call)
+        except (OSError, EOFError):
+            self.obstacle = "worker processes end before their work begins"
+            return _Outcome(BrokenProcessPool(self.obstacle), is_clean=False)
+        except Exception as error:  # what cannot be pickled
+            return _Outcome(error)
+        self.obstacle = None
+        try:
+            if not worker.connection.poll(self._deadline_s):
+                text = f"took longer than the {self._deadline_s:g} s that are given to it here; send less at once"
+                return _Outcome(LimitExceededError(text), is_clean=False)
+            has_succeeded, value = worker.connection.recv()
+        except (OSError, EOFError):
+            return _Outcome(BrokenProcessPool("the process ended in the middle of its work"), is_clean=False)
+        except Exception as error:  # what cannot be unpickled
+            return _Outcome(error, is_clean=False)
+        if has_succeeded:
+            return _Outcome(None, value)
+        if isinstance(value, MemoryError) and self._memory_bytes is not None:
+            text = f"needs more than the {self._memory_bytes // 2**20} MiB of memory that are given to it here"
+            return _Outcome(LimitExceededError(f"{text}; send less at once"), is_clean=False)
+        return _Outcome(value)
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """How a call ended; the process can take another one where it ended cleanly."""
+
+    error: BaseException | None
+    result: Any = None
+    is_clean: bool = True
+
+
+def _settle(future: "Future[Any]", error: BaseException | None, result: Any = None) -> None:
+    """Tell a future how its work ended, unless it was cancelled."""
+    if not future.set_running_or_notify_cancel():
+        return
+    if error is not None:
+        future.set_exception(error)
+    else:
+        future.set_result(result)
+
+
+class _Worker:
+    """One process, and the connection to it."""
+
+    def __init__(self, memory_bytes: int | None) -> None:
+        context = get_context("spawn")
+        self.connection: Connection
+        self.connection, theirs = context.Pipe()
+        self._is_ready = False
+        self._process = context.Process(target=serve_connection, args=(theirs, memory_bytes))
+        try:
+            with _limit_threads():
+                self._process.start()
+        finally:
+            theirs.close()  # the process has the only other end: when it dies, the connection does
+
+    def begin(self, call: tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]) -> None:
+        """Have it call a function.
+
+        Raises
+        ------
+        OSError, EOFError
+            if it has ended
+        """
+        if not self._is_ready:
+            if not self.connection.poll(START_S):
+                raise EOFError("the process did not start")
+            self.connection.recv()
+            self._is_ready = True
+        self.connection.send(call)
+
+    def kill(self) -> None:
+        """End it; nothing happens where it has ended."""
+        with suppress(ValueError):  # closed already
+            self._process.kill()
+
+    def close(self) -> None:
+        """End it, and give back what it held."""
+        self.kill()
+        self._process.join()
+        self._process.close()
+        self.connection.close()
+
+
+@contextmanager
+def _limit_threads() -> Iterator[None]:
+    """What processes that are started meanwhile find in their environment; the user's own settings stay."""
+    with _environment:
+        added = [name for name in _THREAD_SETTINGS if name not in os.environ]
+        os.environ.update(dict.fromkeys(added, "1"))
+        try:
+            yield
+        finally:
+            for name in added:
+                del os.environ[name]

@@ -1,0 +1,82 @@
+"""Rollout: how far the simulated arm strays from the real one under the same commands."""
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+from pydantic import Field
+
+from tauscope.closed_loop import Rollout, RolloutDocument, roll_out
+from tauscope.export.model_file import read_export_models
+from tauscope.recording import Recording
+from tauscope.report.provenance import Provenance
+from tauscope.robot import read_robot
+from tauscope.strict_model import StrictModel
+from tauscope.tasks.task import (
+    Files,
+    Outputs,
+    Progress,
+    ReadingOptions,
+    command_words,
+    json_text,
+    read_recordings,
+    record_provenance,
+)
+
+
+class Request(StrictModel):
+    """What is to be rolled out, by the names of its files."""
+
+    robot: str = Field(description="robot file")
+    recordings: tuple[str, ...] = Field(description="recordings with commands, or with torque")
+    model: str | None = Field(default=None, description="model that identify or diagnose saved")
+    options: ReadingOptions = Field(default=ReadingOptions(), description="how the recordings are read")
+
+    @property
+    def command(self) -> tuple[str, ...]:
+        """The command line that does the same."""
+        words = {} if self.model is None else {"model": self.model}
+        return command_words("rollout", self.robot, recordings=self.recordings, **words, **self.options.words)
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What came of it."""
+
+    request: Request
+    files: Files
+    recordings: tuple[Recording, ...]
+    rollout: Rollout
+    document: RolloutDocument
+
+    @property
+    def outputs(self) -> Outputs:
+        """``result.json`` and ``report.html``."""
+        return Outputs({"result.json": partial(json_text, self.document), "report.html": self._report})
+
+    @cached_property
+    def provenance(self) -> Provenance:
+        """What the result was made from, and when."""
+        request = self.request
+        given = {"recordings": request.recordings, "model": () if request.model is None else (request.model,)}
+        return record_provenance(self.files, request.command, self.rollout.robot, given)
+
+    def _report(self) -> str:
+        from tauscope.closed_loop.page import rollout_page
+
+        return rollout_page(self.rollout, self.provenance)
+
+
+def perform(request: Request, files: Files, progress: Progress) -> Result:
+    """Read the files and simulate.
+
+    Raises
+    ------
+    TauscopeError
+        where the data, the robot or the model cannot answer
+    """
+    progress("read robot and recordings")
+    robot = read_robot(files.find("robot", request.robot))
+    exports = () if request.model is None else read_export_models(files.find("model", request.model))
+    recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)
+    found = roll_out(robot, recordings, exports, progress)
+    return Result(request, files, recordings, found, found.document)

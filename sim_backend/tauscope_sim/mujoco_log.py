@@ -1,0 +1,99 @@
+"""A recording of the user's own MuJoCo simulation, for ``tauscope diagnose --against SIM.csv`` and rollouts.
+
+>>> log = MujocoLog(model, data)
+>>> while data.time < 20.0:
+...     data.ctrl[:] = command(data.time)
+...     log.step()
+>>> log.save("sim.csv")
+"""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's extension modules come without type stubs)
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.errors import RecordingError
+
+HINGE_OR_SLIDE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+
+
+class MujocoLog:
+    """Steps a simulation and keeps time, position, velocity, actuator torque and commands of its joints.
+
+    The rows of one step are the state before it and the torque that acts in it.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, joints: Sequence[str] | None = None) -> None:
+        """Take a simulation; nothing of it is changed.
+
+        Parameters
+        ----------
+        joints : sequence of str or None
+            hinges and slides, base first; None: all of them, as the file has them
+
+        Raises
+        ------
+        RecordingError
+            a joint is not there, or is no hinge or slide
+        """
+        every = [model.joint(index).name for index in range(model.njnt) if model.jnt_type[index] in HINGE_OR_SLIDE]
+        self.joints = tuple(every if joints is None else joints)
+        for name in self.joints:
+            if name not in every:
+                raise RecordingError(f"joint {name} is no hinge or slide of the model; they are {', '.join(every)}")
+        places = [model.joint(name).id for name in self.joints]
+        self._model, self._data = model, data
+        self._qpos = np.array([model.jnt_qposadr[place] for place in places])
+        self._dof = np.array([model.jnt_dofadr[place] for place in places])
+        self._actuators = [self._actuator_of(place) for place in places]
+        self._rows: list[NDArray[np.float64]] = []
+
+    def step(self, command: NDArray[np.float64] | None = None) -> None:
+        """Do what ``mujoco.mj_step(model, data)`` does, and keep a row.
+
+        Parameters
+        ----------
+        command : (n,) float64 or None
+            that is kept as ``qref``; None: the actuators' control
+        """
+        data = self._data
+        time, position, velocity = data.time, data.qpos[self._qpos].copy(), data.qvel[self._dof].copy()
+        if command is None:
+            command = np.array([np.nan if each is None else data.ctrl[each] for each in self._actuators])
+        mujoco.mj_step(self._model, data)
+        self._rows.append(np.concatenate([[time], position, data.qfrc_actuator[self._dof], velocity, command]))
+
+    def save(self, path: str | Path, *, with_torque: bool = True) -> None:
+        """Write all rows as CSV.
+
+        Parameters
+        ----------
+        with_torque : bool
+            whether torque is among the columns; a position servo's log has none
+        """
+        rows, count = np.array(self._rows), len(self.joints)
+        groups = ("q", "tau", "qd", "qref") if with_torque else ("q", "qd", "qref")
+        kept = [0, *(1 + count * place + joint for place in self._places(groups) for joint in range(count))]
+        names = ["t", *(f"{group}{joint}" for group in groups for joint in range(1, count + 1))]
+        known = [place for place, column in enumerate(kept) if np.isfinite(rows[:, column]).any()]
+        header = f"# joints: {', '.join(self.joints)}\n" + ",".join(names[place] for place in known)
+        data = rows[:, [kept[place] for place in known]]
+        np.savetxt(path, data, fmt="%.9g", delimiter=",", header=header, comments="", encoding="utf-8")
+
+    @staticmethod
+    def _places(groups: Sequence[str]) -> list[int]:
+        """Where each group stands in a row."""
+        return [("q", "tau", "qd", "qref").index(group) for group in groups]
+
+    def _actuator_of(self, joint: int) -> int | None:
+        """The joint's actuator; None where it has none."""
+        model, on_joint = self._model, int(mujoco.mjtTrn.mjTRN_JOINT)
+        for index in range(model.nu):
+            if model.actuator_trntype[index] == on_joint and model.actuator_trnid[index, 0] == joint:
+                return index
+        return None

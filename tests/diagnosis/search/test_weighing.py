@@ -1,0 +1,125 @@
+"""How probable a finding is among its rivals, and which of them takes its place."""
+
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tauscope.diagnosis.findings.finding import EQUIVALENT, FORMULA_ERROR, equivalent
+from tauscope.diagnosis.model.term import Place, Term
+from tauscope.diagnosis.search.search import Rival, Search, Step, Weighed
+from tauscope.effects import Effect
+from tauscope.effects.cable_force import CableForce
+from tauscope.effects.joint_spring import JointSpring
+from tauscope.effects.rotor_inertia import RotorInertia
+
+NOTHING: Any = None
+ODDS = st.floats(-50.0, 50.0)
+
+
+def term(effect: Effect) -> Term:
+    return Term(effect, np.zeros(len(effect.shapes)), np.ones(len(effect.coefficients)))
+
+
+def rival(log_odds: float, effect: Effect | None = None) -> Rival:
+    return Rival(term(effect or CableForce(0)), NOTHING, log_odds)
+
+
+def weighed(log_odds: float, *rivals: float) -> Weighed:
+    return Weighed((0,), NOTHING, log_odds, tuple(map(rival, rivals)), ())
+
+
+@given(ODDS)
+def test_without_rivals_it_is_the_chance_of_its_odds(log_odds: float) -> None:
+    alone = weighed(log_odds)
+    assert alone.probability == pytest.approx(1.0 / (1.0 + np.exp(-log_odds)))
+    assert alone.lead == -np.inf
+
+
+@given(st.lists(ODDS, min_size=1, max_size=5))
+def test_it_and_its_rivals_and_nothing_share_all_that_is_believed(odds: list[float]) -> None:
+    shares = [weighed(own, *odds[:place], *odds[place + 1 :]).probability for place, own in enumerate(odds)]
+    nothing = 1.0 / (1.0 + np.exp(odds).sum())
+    assert sum(shares) + nothing == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_rivals_that_are_as_probable_share_with_it(count: int) -> None:
+    assert weighed(400.0, *[400.0] * count).probability == pytest.approx(1.0 / (1.0 + count))
+
+
+def test_odds_beyond_any_number_stay_probabilities() -> None:
+    assert weighed(1e6, -1e6).probability == pytest.approx(1.0)
+    assert weighed(-1e6).probability == pytest.approx(0.0)
+
+
+@given(st.floats(1.0, 1e4), st.floats(0.0, 1e4))
+def test_what_the_data_hardly_tell_from_a_finding_is_an_alternative(log_odds: float, behind: float) -> None:
+    """No formula is exact: of stronger effects a larger difference says nothing."""
+    margin = EQUIVALENT + FORMULA_ERROR * log_odds
+    found = equivalent(log_odds, weighed(log_odds, log_odds - behind).rivals)
+    if abs(behind - margin) > 1e-6:
+        assert bool(found) is (behind < margin)
+
+
+@pytest.mark.parametrize(("is_confirmed", "most"), [(True, 1.0), (False, 0.5)])
+def test_what_held_out_motion_contradicts_is_no_likelier_than_not(is_confirmed: bool, most: float) -> None:
+    step = Step(NOTHING, 50.0, (), None, is_confirmed, NOTHING, NOTHING, np.zeros((0, 0)), 50.0)
+    assert step.probability == pytest.approx(most)
+
+
+@dataclass(frozen=True, eq=False)
+class Deciding(Search):
+    """A search whose odds are given: what is in the place of a finding is what held-out motion lets there."""
+
+    odds: dict[Place, float] = field(default_factory=dict)
+    refuted: frozenset[Place] = frozenset()
+
+    def _weigh(self, at: Any, places: tuple[int, ...]) -> Weighed:
+        own = at.model.terms[places[0]]
+        others = [each for each in (JointSpring(0), CableForce(0)) if each.id != own.effect.id]
+        rivals = tuple(rival(self.odds[each.id, 0], each) for each in others)
+        proposals: Any = tuple(SimpleNamespace(term=each.term) for each in rivals)
+        return Weighed(places, NOTHING, self.odds[own.place], rivals, proposals)
+
+    def _try(self, at: Any, proposal: Any, proposals: Any) -> Any:
+        stands = proposal.term.place not in self.refuted
+        step = Step(proposal, self.odds[proposal.term.place], (), None, stands, NOTHING, NOTHING, np.zeros((0, 0)), 0.0)
+        return step, holding(proposal.term.effect)
+
+
+def holding(*effects: Effect) -> Any:
+    return SimpleNamespace(model=SimpleNamespace(terms=[term(each) for each in effects]))
+
+
+@pytest.mark.parametrize("refuted", [False, True])
+def test_a_more_probable_rival_takes_the_place_where_held_out_motion_lets_it(refuted: bool) -> None:
+    odds: dict[Place, float] = {("joint_spring", 0): 20.0, ("cable_force", 0): 60.0}
+    asked = Deciding(NOTHING, NOTHING, None, odds, frozenset({("cable_force", 0)}) if refuted else frozenset[Place]())
+    at, (found,) = asked._exchange(holding(JointSpring(0)))
+    assert at.model.terms[0].effect.id == ("joint_spring" if refuted else "cable_force")
+    assert bool(found.rivals) is not refuted, "one that is refuted is no alternative"
+    if not refuted:
+        assert found.log_odds == 60.0
+        assert found.rivals[0].term.effect.id == "joint_spring"
+
+
+def test_the_more_probable_of_two_stays() -> None:
+    odds: dict[Place, float] = {("joint_spring", 0): 60.0, ("cable_force", 0): 20.0}
+    at, (found,) = Deciding(NOTHING, NOTHING, None, odds)._exchange(holding(JointSpring(0)))
+    assert at.model.terms[0].effect.id == "joint_spring"
+    assert found.rivals[0].log_odds == 20.0
+
+
+@pytest.mark.parametrize(("log_odds", "named"), [(2.0, False), (4.0, True)])
+def test_what_every_geared_joint_has_must_stand_out_to_be_a_finding(log_odds: float, named: bool) -> None:
+    odds: dict[Place, float] = {("rotor_inertia", 0): log_odds, ("joint_spring", 0): -9.0, ("cable_force", 0): -9.0}
+    _, found = Deciding(NOTHING, NOTHING, None, odds)._exchange(holding(RotorInertia(0)))
+    assert bool(found) is named
+    odds = {("joint_spring", 0): log_odds, ("cable_force", 0): -9.0}
+    _, found = Deciding(NOTHING, NOTHING, None, odds)._exchange(holding(JointSpring(0)))
+    assert found
