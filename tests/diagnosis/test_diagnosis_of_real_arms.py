@@ -88,14 +88,16 @@ def test_the_tx40_is_predicted_better_than_by_the_readme() -> None:
 
 
 @pytest.mark.slow
-def test_nothing_is_named_where_the_plain_model_predicts_better() -> None:
-    """The LWR4+ excited poorly: free parameters explain one motion, and a possible body's predict the other better."""
+def test_where_training_leaves_torque_open_nothing_is_named_and_no_verdict_turns() -> None:
+    """The LWR4+ excited poorly: what its last joint lacks is seen, what joints 5 and 6 lack may be parameters."""
     found = told("kuka-lwr4")
-    assert found.findings == []
     assert found.verdict == "inconclusive"
+    open_joints = {each.joint for each in found.warnings if each.code == "extrapolation" and "uncertain" in each.text}
+    assert open_joints == {"lwr_4_joint", "lwr_5_joint"}
+    assert open_joints.isdisjoint(each.joint for each in found.findings)
     assert {"lwr_1_joint", "lwr_3_joint"} <= {each.joint for each in found.warnings if each.code == "extrapolation"}
     assert "poor-excitation" in {each.code for each in found.warnings}
     assert found.next_experiment is not None
     assert "lwr_1_joint: it moves from -0.85 to 0.85 rad, in training from -0.57 to 0.57" in found.next_experiment.why
-    # What it then predicts with is that body: 4.3 % is the README's best, 8.4 % what its free parameters leave.
-    assert relative_error(diagnosed("kuka-lwr4"), recordings("kuka-lwr4", "held-out"), 8.0) < 0.043
+    # 4.3 % is the README's best, 8.4 % what its free parameters leave.
+    assert relative_error(diagnosed("kuka-lwr4"), recordings("kuka-lwr4", "held-out"), 8.0) < 0.035

@@ -68,6 +68,8 @@ def test_a_model_that_predicts_nothing_is_not_consistent() -> None:
         (Evidence(0, True, True, True, predicts=False), Verdict.UNEXPLAINED),
         (Evidence(0, False, False, True, predicts=True, extrapolates=True), Verdict.CONSISTENT),
         (Evidence(1, True, False, True, predicts=False, extrapolates=True), Verdict.EXPLAINED),
+        (Evidence(1, True, False, True, predicts=False, undetermined=True), Verdict.INCONCLUSIVE),
+        (Evidence(1, True, False, True, predicts=True, undetermined=True), Verdict.EXPLAINED),
     ],
 )
 def test_motion_beyond_training_decides_only_what_is_badly_predicted_and_has_no_name(

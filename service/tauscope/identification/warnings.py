@@ -151,11 +151,19 @@ def extrapolations(result: Identification) -> dict[int, str]:
             )
         if other.highest[joint] - other.lowest[joint] > BEYOND * (own.highest[joint] - own.lowest[joint]):
             reasons.append(f"it moves from {_range(other, joint)} {unit}, in training from {_range(own, joint)}")
-        if result.extrapolation[joint] > UNSEEN and result.uncertainty_growth[joint] > BEYOND:
+        if joint in undetermined(result):
             reasons.append(f"training leaves {100 * result.extrapolation[joint]:.2g} % of its torque uncertain")
         if reasons:
             found[joint] = "; ".join(reasons)
     return found
+
+
+def undetermined(result: Identification) -> frozenset[int]:
+    """Joints whose held-out torque the parameters leave open that training does not tell."""
+    if result.extrapolation is None or result.uncertainty_growth is None:
+        return frozenset()
+    pairs = zip(result.extrapolation, result.uncertainty_growth, strict=True)
+    return frozenset(joint for joint, (share, growth) in enumerate(pairs) if share > UNSEEN and growth > BEYOND)
 
 
 def _range(motion: Excitation, joint: int) -> str:

@@ -17,7 +17,7 @@ from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.effects import ArmContext
 from tauscope.identification import Identification
-from tauscope.identification.warnings import extrapolations
+from tauscope.identification.warnings import extrapolations, undetermined
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -104,6 +104,7 @@ class Diagnosis:
                 self.constancy.holds,
                 self.predicts,
                 bool(extrapolations(self.identification)),
+                bool(undetermined(self.identification)),
                 bool(self.differences),
             )
         )

@@ -25,6 +25,8 @@ class Evidence:
 
     extrapolates : bool
         whether held-out motion is beyond what training excites
+    undetermined : bool
+        whether training leaves a part of its torque open
     wrong_values : bool
         whether a model that the recordings are compared with states wrong values
     """
@@ -35,15 +37,18 @@ class Evidence:
     parameters_hold: bool
     predicts: bool = True
     extrapolates: bool = False
+    undetermined: bool = False
     wrong_values: bool = False
 
 
 def verdict(evidence: Evidence) -> Verdict:
     """The verdict on some evidence.
 
-    Where held-out motion is neither predicted nor like training, and nothing has a name, the error may be physics or
-    parameters that training leaves open: no misfit decides that.
+    Where held-out motion is not predicted, and training leaves its torque open, the error may be physics or parameters:
+    no misfit decides that. Where training leaves less open, only names do.
     """
+    if evidence.undetermined and not evidence.predicts:
+        return Verdict.INCONCLUSIVE
     if evidence.findings:
         return Verdict.PARTLY_EXPLAINED if evidence.misfit_after else Verdict.EXPLAINED
     if evidence.extrapolates and not evidence.predicts:

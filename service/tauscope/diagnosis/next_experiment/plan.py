@@ -74,7 +74,7 @@ def plan_experiment(diagnosis: Diagnosis, progress: Callable[[str], None] = lamb
 
     def judged(primitive: Primitive) -> _Judged:
         motion = played(primitive.trajectory, diagnosis.fitter.observations, nominal, diagnosis.cutoff_hz)
-        added = tuple(equations(model, motion.fitter, others) for model, others in judge.tasks)
+        added = tuple(equations(each.model, motion.fitter, each.others, each.absent) for each in judge.tasks)
         return _Judged(primitive, added, judge.value(added))
 
     # What no explanation is known of may be anywhere that the recordings have not been.
@@ -124,13 +124,20 @@ class _Judged:
 
 
 @dataclass(frozen=True, eq=False)
+class _Task:
+    """A model whose columns are asked for, others beside it, and the nominal parameter that it does not have."""
+
+    model: ExtendedModel
+    others: tuple[ExtendedModel, ...] = ()
+    absent: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class _Judge:
     """What a motion is worth beside the recordings that there are.
 
     separates : tuple of (str, int or None)
         what is told apart
-    tasks : tuple of (ExtendedModel, tuple of ExtendedModel)
-        models whose columns are asked for, and others beside them
     known : tuple of (r, p + o) float64
         the same of the recordings
     wanted : (k,) int
@@ -138,7 +145,7 @@ class _Judge:
     """
 
     separates: tuple[tuple[str, int | None], ...]
-    tasks: tuple[tuple[ExtendedModel, tuple[ExtendedModel, ...]], ...]
+    tasks: tuple[_Task, ...]
     known: tuple[Array, ...]
     wanted: Array
     inflation: float
@@ -150,10 +157,9 @@ class _Judge:
             repeated = [np.sqrt(times) * rows for rows in added]  # as many equal rows count as one, so much larger
             stacked = [np.concatenate(pair) for pair in zip(self.known, repeated, strict=True)]
         if self.separates:
-            return min(
-                float(separations(model, rows).min()) for (model, _), rows in zip(self.tasks, stacked, strict=True)
-            )
-        return -float(log_variances(self.tasks[0][0], stacked[0])[self.wanted.astype(int)].mean())
+            pairs = zip(self.tasks, stacked, strict=True)
+            return min(float(separations(each.model, rows).min()) for each, rows in pairs)
+        return -float(log_variances(self.tasks[0].model, stacked[0])[self.wanted.astype(int)].mean())
 
     def times_wanted(self, motion: _Judged, most: int) -> int:
         """How often a motion is played: λ grows with its rows, and `SETTLING` of it is wanted."""
@@ -174,10 +180,13 @@ def _judge(diagnosis: Diagnosis) -> _Judge:
         if finding.alternatives:
             options = finding.alternatives[: MOST_OPTIONS - 1]
             places = (finding.place, *((each.term.effect.id, each.term.effect.joint) for each in options))
-            models = (final, *(each.model for each in options))
-            tasks = tuple((model, tuple(other for other in models if other is not model)) for model in models)
-            known = tuple(equations(model, diagnosis.fitter, others) for model, others in tasks)
+            models = ((final, None), *((each.model, each.absent) for each in options))
+            tasks = tuple(
+                _Task(model, tuple(other for other, _ in models if other is not model), absent)
+                for model, absent in models
+            )
+            known = tuple(equations(each.model, diagnosis.fitter, each.others, each.absent) for each in tasks)
             return _Judge(places, tasks, known, np.zeros(0), diagnosis.inflation)
     moved = sorted({move.parameter for move in diagnosis.constancy.moves})
     wanted = np.array(moved or range(final.structure.size), dtype=float)
-    return _Judge((), ((final, ()),), (equations(final, diagnosis.fitter),), wanted, diagnosis.inflation)
+    return _Judge((), (_Task(final),), (equations(final, diagnosis.fitter),), wanted, diagnosis.inflation)

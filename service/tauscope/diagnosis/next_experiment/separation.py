@@ -64,8 +64,16 @@ def _measured(position: Array, noises: Sequence[PositionNoise], rate_hz: float) 
     return np.where(rounds, np.rint(noisy / divisor) * divisor, noisy)
 
 
-def equations(model: ExtendedModel, fitter: Fitter, others: Sequence[ExtendedModel] = ()) -> Array:
-    """A model's whitened columns, and beside them the differences to other models' torque, as few rows, (r, p + o)."""
+def equations(
+    model: ExtendedModel, fitter: Fitter, others: Sequence[ExtendedModel] = (), absent: int | None = None
+) -> Array:
+    """A model's whitened columns, and beside them the differences to other models' torque, as few rows, (r, p + o).
+
+    Parameters
+    ----------
+    absent : int, optional
+        a parameter that the model does not have; its column is zero
+    """
     own = fitter.white_residual(model)
     differences = [
         [mine - theirs for mine, theirs in zip(own, fitter.white_residual(other), strict=True)] for other in others
@@ -78,7 +86,10 @@ def equations(model: ExtendedModel, fitter: Fitter, others: Sequence[ExtendedMod
         block[:, columns.index] = triangle[:, : len(columns.index)]
         block[:, model.size :] = triangle[:, len(columns.index) :]
         blocks.append(block)
-    return np.concatenate(blocks)
+    found = np.concatenate(blocks)
+    if absent is not None:
+        found[:, absent] = 0.0
+    return found
 
 
 def separations(model: ExtendedModel, stacked: Array) -> Array:

@@ -26,7 +26,7 @@ def weigh_constant(searched: Searched, joint: int) -> tuple[float, tuple[Rival, 
     beside = laboratory.tune(laboratory.under(without, final.dependence, [joint]), [joint])
     effects = [each for each in searched.effects if each.joint == joint]
     proposals = Proposer(laboratory, effects).propose(without, lambda effect: not effect.is_expected)
-    return final.log_evidence - beside.log_evidence, _rivals(laboratory, without, proposals)
+    return final.log_evidence - beside.log_evidence, _rivals(laboratory, without, proposals, place)
 
 
 def _hold(laboratory: Laboratory, place: int) -> Laboratory:
@@ -36,10 +36,12 @@ def _hold(laboratory: Laboratory, place: int) -> Laboratory:
     return replace(laboratory, prior=replace(laboratory.prior, friction=friction))
 
 
-def _rivals(laboratory: Laboratory, without: Hypothesis, proposals: Sequence[Proposal]) -> tuple[Rival, ...]:
+def _rivals(
+    laboratory: Laboratory, without: Hypothesis, proposals: Sequence[Proposal], absent: int
+) -> tuple[Rival, ...]:
     found = []
     for proposal in proposals:
         painted = laboratory.paint(without, proposal.found)
         model = laboratory.approach(laboratory.with_term(painted, proposal.term, proposal.size)).model
-        found.append(Rival(model.terms[-1], model, proposal.log_factor))
+        found.append(Rival(model.terms[-1], model, proposal.log_factor, absent))
     return tuple(sorted(found, key=lambda each: -each.log_odds))

@@ -21,6 +21,7 @@ from tauscope.diagnosis.search.search import Found, Search
 from tauscope.effects import ArmContext, Effect, farther_effects, possible_effects
 from tauscope.effects.rotor_inertia import RotorInertia
 from tauscope.identification import Identification
+from tauscope.identification.warnings import undetermined
 from tauscope.recording.conditioning import Conditioner
 from tauscope.recording.recording import Recording
 
@@ -84,11 +85,12 @@ def search(
     confirming = None if unseen is None else HeldOut(unseen.with_noise(white_noise(unseen, model)))
     farther = tuple(farther_effects(setting))
     near, far = Proposer(laboratory, effects), Proposer(laboratory, [*effects, *farther])
-    found = Search(laboratory, near, confirming, farther).run(nominal)
+    search_near = Search(laboratory, near, confirming, farther, undetermined(identification))
+    found = search_near.run(nominal)
     named = any(not term.effect.is_expected for term in found.hypothesis.model.terms)
     if not named and is_left(found.hypothesis, white, pure_error=repeated is not None):
         progress("look farther")
-        found = Search(laboratory, far, confirming).run(nominal, found)
+        found = replace(search_near, proposer=far, farther=()).run(nominal, found)
     return Searched(found, laboratory, effects, setting, white, unseen, deflections, cutoff, repeated is not None)
 
 

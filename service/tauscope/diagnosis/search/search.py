@@ -71,11 +71,14 @@ class Rival:
 
     log_odds : float
         posterior, against neither
+    absent : int or None
+        parameter of the nominal model in whose place it is
     """
 
     term: Term
     model: ExtendedModel
     log_odds: float
+    absent: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,12 +135,19 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """A search among effects on the same rows."""
+    """A search among effects on the same rows.
+
+    farther : sequence of Effect
+        forms that say more than what they refine
+    undetermined : frozenset of int
+        joints whose held-out torque training leaves open: it confirms no effect there
+    """
 
     laboratory: Laboratory
     proposer: Proposer
     held_out: HeldOut | None
     farther: Sequence[Effect] = ()
+    undetermined: frozenset[int] = frozenset()
 
     def run(self, nominal: Hypothesis, before: Found | None = None) -> Found:
         """Add what makes the data most probable and held-out motion no worse, to what was found before."""
@@ -309,10 +319,15 @@ class Search:
             log_odds = min(log_odds, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
         log_odds += 0.0 if change is None else change.log_odds()
         confirmed = log_odds > NAMED and _is_possible(found.model)
-        confirmed &= change is None or _agrees(change, proposal.term.effect, touched)
+        confirmed &= change is None or self._agrees(change, proposal.term.effect, touched)
         covariance = found.posterior.covariance
         trained = self._log_odds(proposal)
         return Step(proposal, log_odds, rivals, change, confirmed, at.model, found.model, covariance, trained), found
+
+    def _agrees(self, change: HeldOutChange, effect: Effect, touched: Sequence[int]) -> bool:
+        """Whether held-out motion shows an effect; a window in time is of its own recording, and has to do no harm."""
+        is_shown = isinstance(effect, TimeLocalEffect) or change.log_odds(touched) > NAMED
+        return change.harm <= 0.0 and is_shown and effect.joint not in self.undetermined
 
     def _settle(self, at: Hypothesis, touched: Sequence[int]) -> Hypothesis:
         """The most probable parameters; the edges of a window, of which each has several, are looked for once more."""
@@ -402,11 +417,6 @@ def _is_possible(model: ExtendedModel) -> bool:
         and term.effect.is_consistent(term.coefficients, term.shape)
         for term, joint in pairs
     )
-
-
-def _agrees(change: HeldOutChange, effect: Effect, touched: Sequence[int]) -> bool:
-    """Whether held-out motion shows an effect; a window in time is of its own recording, and has only to do no harm."""
-    return change.harm <= 0.0 and (isinstance(effect, TimeLocalEffect) or change.log_odds(touched) > NAMED)
 
 
 @dataclass(frozen=True)
