@@ -16,15 +16,18 @@ const power = (fit) => percent(1 - fit.relative_error ** 2);
 
 export async function showIdentification(root, { id, signal, show }) {
   const job = await getJson(`identifications/${id}`, signal);
-  const head = [h("p", { class: "eyebrow", text: "Identification" }), h("h1", { text: job.robot ?? id }), h("p", { class: "meta", text: moment(job.created) })];
+  const of = [...(job.recordings ?? []), ...(job.held_out ?? [])].map((each) => each.name).join(", ");
+  const eyebrow = h("p", { class: "eyebrow" }, "Identification · ", job.robot ? h("a", { href: `#/robots/${encodeURIComponent(job.robot)}`, text: job.robot }) : id);
+  const meta = h("p", { class: "meta", text: `${moment(job.created)} · ${of}` });
+  const head = [eyebrow, h("h1", { text: job.robot ?? id }), meta];
   if (job.state !== "succeeded") return waiting(root, head, job, signal, show);
   const [result, plots] = await Promise.all([getJson(job.links.result, signal), getJson(job.links.plots, signal)]);
   const { train, held_out: heldOut } = result.fit;
   const ratios = (heldOut ?? train).rms.map((rms, place) => rms / result.noise_std[place]);
   const worst = ratios.indexOf(Math.max(...ratios));
   const words = CONDITION.find(([most]) => result.condition_number < most)[1];
-  render(root, ...head,
-    h("p", { class: "headline", text: heldOut ? `The model explains ${power(heldOut)} of the torque's power on motion that it was not made from.` : `The model explains ${power(train)} of the torque's power on its own motion.` }),
+  render(root, eyebrow,
+    h("h1", { class: "headline", text: `The model explains ${power(heldOut ?? train)} of the power of ${heldOut ? "held-out torque" : "its own recordings' torque"}.` }), meta,
     figures([
       ["Relative error", percent((heldOut ?? train).relative_error), heldOut ? `held out; ${percent(train.relative_error)} on its own` : "on its own recordings"],
       ["Residual / noise", number(ratios[worst], 3), `${result.joints[worst]}, the largest`],
