@@ -91,7 +91,7 @@ def assets() -> Mapping[str, Asset]:
 def _drivers_script() -> bytes:
     """The registered drivers as a module of the page: title, and whether each is a simulation."""
     drivers = [find_driver(name) for name in driver_names()]
-    content = {one.name: {"title": one.titles["en"], "is_simulated": one.is_simulated} for one in drivers}
+    content = {one.name: {"title": one.title, "is_simulated": one.is_simulated} for one in drivers}
     return f"export const DRIVERS = {json.dumps(content, ensure_ascii=False)};\n".encode()
 
 
