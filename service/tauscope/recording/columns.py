@@ -69,7 +69,7 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
         named = [name for name in header if name]
         if reading.columns is not None or isinstance(error, RecordingMismatchError) or len(set(named)) < len(named):
             raise
-        guess = _guess_sound(header, reading, file)
+        guess = suggest_layout(header, reading, file)
         if guess is None and _is_ours(header):
             raise
         if guess is None:
@@ -83,7 +83,7 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
         raise RecordingError(f"{text}; if this maps them, give it as --columns FILE.yaml: {layout}") from error
 
 
-def _guess_sound(header: Sequence[str], reading: Reading, file: str) -> RecordingLayout | None:
+def suggest_layout(header: Sequence[str], reading: Reading, file: str) -> RecordingLayout | None:
     """The mapping that the header suggests, None where a file with it would be refused again."""
     guess = guess_layout(header, reading.joint_names, prefers_torque=reading.prefers_torque)
     if guess is None:

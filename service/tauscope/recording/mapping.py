@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tauscope.errors import RecordingError
-from tauscope.recording.columns import find_layout, is_column
+from tauscope.recording.columns import find_layout, is_column, suggest_layout
 from tauscope.recording.layout.guess import guess_parts
 from tauscope.recording.layout.rename import rename_columns
 from tauscope.recording.reading import read_header
@@ -54,7 +54,7 @@ def find_mapping(path: Path, robot: Robot | None = None, reading: Reading = SI) 
 def _suggest(header: Sequence[str], reading: Reading) -> ColumnMapping:
     """As much as was stated, or else as the names of the columns suggest."""
     if reading.columns is None:
-        guess = guess_parts(header, reading.joint_names, prefers_torque=reading.prefers_torque)
+        guess = suggest_layout(header, reading, "") or guess_parts(header, reading.joint_names)
         reading = replace(reading, columns=guess.columns, units={**guess.units, **reading.units})
     try:
         renamed = rename_columns(header, reading, "")
