@@ -290,6 +290,7 @@ def rollout(
     recordings: Recordings,
     *,
     model: str | Path | None = None,
+    refine: Recordings = (),
     progress: Callable[[str], None] = _ignore,
 ) -> "RolloutResult":
     """Close the loop in MuJoCo on a recording's commands, and compare real and simulated motion.
@@ -298,6 +299,8 @@ def rollout(
     ----------
     model : path or None
         what ``tauscope identify`` or ``diagnose`` wrote with ``--model``: rolled out without and with its findings
+    refine : recordings
+        with commands, by which the model without findings is refined; the other recordings judge it
 
     Raises
     ------
@@ -312,7 +315,7 @@ def rollout(
 
     arm = _robot(robot)
     exports = () if model is None else read_export_models(Path(model))
-    return RolloutResult(roll_out(arm, _recordings(recordings, arm), exports, progress))
+    return RolloutResult(roll_out(arm, _recordings(recordings, arm), exports, progress, _recordings(refine, arm)))
 
 
 def _robot(source: RobotSource) -> "Robot":

@@ -20,7 +20,7 @@ class MujocoPlant:
     Joint limits are off: the real arm kept within them, and an error must not be hidden by a stop.
     """
 
-    def __init__(self, mjcf: str, joints: Sequence[str], step_s: float) -> None:
+    def __init__(self, mjcf: str, joints: Sequence[str], step_s: float, damping: Array) -> None:
         """Compile the file.
 
         Parameters
@@ -29,6 +29,8 @@ class MujocoPlant:
             names of the driven joints, base first
         step_s : float
             [s]
+        damping : (n,) float64
+            added to that of the file [Nm s/rad or N s/m]
         """
         model = mujoco.MjModel.from_xml_string(mjcf)
         model.opt.timestep = step_s
@@ -37,6 +39,7 @@ class MujocoPlant:
         places = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in joints]
         self._qpos = np.array([model.jnt_qposadr[place] for place in places])
         self._dof = np.array([model.jnt_dofadr[place] for place in places])
+        model.dof_damping[self._dof] += damping
         self._followers = [
             (int(model.eq_obj1id[e]), int(model.eq_obj2id[e]), model.eq_data[e, :5].copy())
             for e in range(model.neq)

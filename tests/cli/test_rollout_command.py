@@ -31,6 +31,15 @@ def test_a_robot_without_a_model_is_refused(run: Run, files: SimulatedFiles) -> 
     assert "--model MODEL.json" in ended.err
 
 
+def test_a_refinement_without_commands_is_refused(run: Run, files: SimulatedFiles, tmp_path: Path) -> None:
+    model = tmp_path / "model.json"
+    assert run("identify", files.robot, *files.train, "--model", model).status == 0
+    ended = run("rollout", files.robot, files.held_out[0], "--model", model, "--refine", *files.train)
+    assert ended.status == 1
+    assert "a refinement needs commands" in ended.err
+    assert len(ended.err.splitlines()) == 1
+
+
 def test_standard_output_holds_json_alone(run: Run, files: SimulatedFiles, tmp_path: Path) -> None:
     model = tmp_path / "model.json"
     assert run("identify", files.robot, *files.train, "--model", model).status == 0

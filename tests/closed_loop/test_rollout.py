@@ -3,6 +3,7 @@
 # pyright: reportAttributeAccessIssue=false
 
 from dataclasses import replace
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -14,6 +15,7 @@ from tauscope.closed_loop.model import rollout_model, stated_model
 from tauscope.effects.joint_spring import JointSpring
 from tauscope.effects.load_dependent_friction import LoadDependentFriction
 from tauscope.errors import RecordingMismatchError, TauscopeError
+from tauscope.export.actuators import ActuatorChoice, ActuatorKind
 from tauscope.export.compensation import JointFriction
 from tauscope.export.mjcf import to_mjcf
 from tauscope.export.model import ExportModel, FoundEffect
@@ -47,9 +49,9 @@ def _command(time: np.ndarray) -> np.ndarray:
     return np.stack([sum(a * np.sin(w * time) for a, w in own) for own in waves], axis=1)
 
 
-def _record(model: ExportModel, seconds: float = 4.0) -> Recording:
-    """An exported MJCF, pasted: the loop is the test's own."""
-    mj = mujoco.MjModel.from_xml_string(to_mjcf(model).text)
+def _record(model: ExportModel, seconds: float = 4.0, actuator: ActuatorKind = ActuatorKind.MOTOR) -> Recording:
+    """An exported MJCF, pasted: with motors the loop is the test's own, with position servos MuJoCo's."""
+    mj = mujoco.MjModel.from_xml_string(to_mjcf(model, ActuatorChoice(actuator)).text)
     mj.opt.timestep, mj.opt.integrator = STEP_S, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     data = mujoco.MjData(mj)
     time = np.arange(0.0, seconds, STEP_S)
@@ -57,16 +59,20 @@ def _record(model: ExportModel, seconds: float = 4.0) -> Recording:
     positions, velocities, torques = (np.empty_like(command) for _ in range(3))
     for step in range(len(time)):
         positions[step], velocities[step] = data.qpos, data.qvel
-        data.ctrl[:] = np.array(KP) * (command[step] - data.qpos) - np.array(KD) * data.qvel
-        torques[step] = data.ctrl
+        torques[step] = np.array(KP) * (command[step] - data.qpos) - np.array(KD) * data.qvel
+        data.ctrl[:] = torques[step] if actuator is ActuatorKind.MOTOR else command[step]
         mujoco.mj_step(mj, data)
     return Recording.from_arrays("real", time, positions, torques, velocity=velocities, reference=command)
 
 
-def test_a_pasted_mjcf_gives_the_same_motion() -> None:
+@pytest.mark.parametrize("actuator", [ActuatorKind.MOTOR, ActuatorKind.POSITION])
+def test_a_pasted_mjcf_gives_the_same_motion(actuator: ActuatorKind) -> None:
+    """Within 1e-6 rad of the rollout, in plain MuJoCo with 1 ms and implicitfast."""
     robot = _robot()
+    if actuator is ActuatorKind.POSITION:  # the loop is that of the user's MJCF
+        robot = replace(robot, mjcf=Path("arm.xml"))
     model = _model(robot)
-    found = roll_out(robot, [_record(model)], [model])
+    found = roll_out(robot, [_record(model, actuator=actuator)], [model])
     entry = found.document.recordings[0].models[-1]
     assert found.document.drive == "loop"
     assert entry.model == "identified"

@@ -19,6 +19,9 @@ STEP_S = 2e-3
 FOUND_STD_S = 0.02
 """Standard error above which a joint takes the delay of the others [s]."""
 
+SEEN = 3.0
+"""Standard errors above which a delay is taken: a loop in step with its log has none."""
+
 
 @dataclass(frozen=True)
 class Delay:
@@ -127,7 +130,7 @@ def _least(grid: Array, squares: Array, rows: float) -> Delay:
         return Delay(float(grid[place]), LONGEST_S)
     value = grid[middle] + 0.5 * STEP_S * (before - after) / (before - 2.0 * at + after)
     std = float(np.sqrt(2.0 * squares[place] / max(rows, 1.0) / curvature))
-    return Delay(float(np.clip(value, 0.0, LONGEST_S)), std)
+    return Delay(min(float(value), LONGEST_S) if value > SEEN * std else 0.0, std)
 
 
 def _unexplained(robot: Robot, recording: Recording, joints: Sequence[int], grid: Array) -> tuple[Array, float]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion
 
 from tauscope.recording.conditioning.filters import smooth
 from tauscope.recording.recording import Recording
@@ -75,9 +76,13 @@ class SmoothMotion:
         return _onto(self.samples.time, values, self.time)
 
     def moves(self, joint: int) -> NDArray[np.bool_]:
-        """Rows in which a joint moves, and every delay has a command, (N,)."""
+        """Rows in which a joint moves, and every delay has a command, (N,).
+
+        The filter spreads friction at rest over half a period of its band: rows nearer to rest are left out.
+        """
         speed = np.abs(self.velocity[:, joint])
-        moving = speed > REST * speed.max()
+        reach = 2 * int(0.5 * self.rate / self.band) + 1
+        moving = binary_erosion(speed > REST * speed.max(), [True] * reach, border_value=1)
         moving[: int(LONGEST_S * self.rate) + 1] = False
         return moving
 

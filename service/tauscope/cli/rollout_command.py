@@ -41,6 +41,16 @@ def rollout(
             help="Model that identify or diagnose wrote with --model: rolled out without and with its findings.",
         ),
     ] = None,
+    refine: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="RECORDING...",
+            exists=True,
+            help="Recordings with commands by which the model is refined; the others judge it. All files up to the"
+            " next option, or up to --, belong to it.",
+            show_default=False,
+        ),
+    ] = None,
     units: Units = None,
     rate: Rate = None,
     trust_units: TrustUnits = False,
@@ -76,10 +86,11 @@ def rollout(
     request = task.Request(
         robot=str(robot),
         recordings=tuple(map(str, recordings)),
+        refine=tuple(map(str, refine or ())),
         model=None if model is None else str(model),
         options=options,
     )
     outputs = [(json, "result.json"), (report, "report.html")]
     shown = str(json) == "-"
-    inputs = (*recordings, *([] if model is None else [model]))
+    inputs = (*recordings, *(refine or ()), *([] if model is None else [model]))
     run_task(task, request, outputs, inputs, None if shown else lambda result: show_rollout(output(), result.document))

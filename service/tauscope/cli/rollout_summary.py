@@ -4,7 +4,7 @@ from rich.console import Console
 
 from tauscope.cli.terminal import plain, table
 from tauscope.closed_loop import RolloutDocument
-from tauscope.closed_loop.tables import recording_table, rollout_sentences, summary_table
+from tauscope.closed_loop.tables import recording_table, refinement_table, rollout_sentences, summary_table
 from tauscope.number_text import counted
 
 
@@ -16,5 +16,7 @@ def show_rollout(console: Console, document: RolloutDocument) -> None:
         console.print(plain(f"! {warning.sentence}"), soft_wrap=True)
     console.print(table("Position error, real against simulated motion", summary_table(document)))
     console.print(table("Error by time between restarts [mrad, mm]", recording_table(document)))
+    if document.refinement is not None:
+        console.print(table("Refined parameters", refinement_table(document.refinement)))
     for sentence in rollout_sentences(document):
         console.print(plain(sentence), soft_wrap=True)

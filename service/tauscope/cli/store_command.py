@@ -33,6 +33,7 @@ class Kind(StrEnum):
     RUN = "run"
     IDENTIFICATION = "identification"
     DIAGNOSIS = "diagnosis"
+    ROLLOUT = "rollout"
     CAMPAIGN = "campaign"
 
 

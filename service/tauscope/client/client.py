@@ -18,6 +18,7 @@ from tauscope.server.http.identifications import IdentificationAnswer
 from tauscope.server.http.leases.models import LeaseAnswer, StopAllAnswer
 from tauscope.server.http.recordings.models import RecordingAnswer
 from tauscope.server.http.robots.models import RobotReportAnswer
+from tauscope.server.http.rollouts import RolloutAnswer
 from tauscope.server.http.runs import RunAnswer, StopAnswer
 
 PREFIX = "/api/v1"
@@ -34,7 +35,7 @@ SETTLING_S = 10.0
 
 Model = TypeVar("Model", bound=BaseModel)
 Followed = TypeVar(
-    "Followed", RunAnswer, CampaignAnswer, IdentificationAnswer, DiagnosisAnswer, ExcitationAnswer
+    "Followed", RunAnswer, CampaignAnswer, IdentificationAnswer, DiagnosisAnswer, RolloutAnswer, ExcitationAnswer
 )  # what has a state
 
 
@@ -80,6 +81,14 @@ class Client:
         """Hand in a diagnosis."""
         files = [("robot", robot), *(("recordings", path) for path in recordings)]
         return self._create("diagnoses", DiagnosisAnswer, form_content(request, files))
+
+    def rollout(
+        self, robot: Path, recordings: Sequence[Path], model: Path | None = None, **request: Any
+    ) -> RolloutAnswer:
+        """Hand in a rollout."""
+        files = [("robot", robot), *(("recordings", path) for path in recordings)]
+        files += [("model", model)] if model else []
+        return self._create("rollouts", RolloutAnswer, form_content(request, files))
 
     def excite(self, robot: Path, **request: Any) -> ExcitationAnswer:
         """Have a motion designed."""

@@ -69,21 +69,33 @@ def record_motion(recording: Recording) -> RecordedMotion:
     return RecordedMotion(recording.name, time, position, velocity, samples.time, samples.position)
 
 
+def loop_damping(loops: Sequence[Actuator]) -> Array:
+    """Torque per velocity of each loop, (n,) [Nm s/rad or N s/m]."""
+    return np.array([loop.damping for loop in loops])
+
+
 class LoopDrive:
     """Position or velocity loops on recorded commands."""
 
     is_closed = True
 
-    def __init__(self, loops: Sequence[Actuator], recording: Recording, time: Array) -> None:
-        """Put the commands, supplies and gains on the steps."""
+    def __init__(self, loops: Sequence[Actuator], recording: Recording, time: Array, *, is_damped: bool) -> None:
+        """Put the commands, supplies and gains on the steps.
+
+        Parameters
+        ----------
+        is_damped : bool
+            whether torque includes the loops' damping; where not, the plant has it
+        """
+        self._damped = 1.0 if is_damped else 0.0
         samples = recording.samples()
         reference = samples.reference if samples.reference is not None else samples.effort
         self._loops = tuple(loops)
-        self._command = np.empty((len(time), len(self._loops)))
+        self.command = np.empty((len(time), len(self._loops)))
         for joint, loop in enumerate(self._loops):
             command = shift_command(samples.time, reference[:, joint], loop.delay or 0.0, loop.rate_hz, time)
-            self._command[:, joint] = command if loop.kind == "position" else np.gradient(command, STEP_S)
-        self._voltage, self._gain, self._temperature = (
+            self.command[:, joint] = command if loop.kind == "position" else np.gradient(command, STEP_S)
+        self.voltage, self.gain, self.temperature = (
             None if values is None else np.stack([_onto(samples.time, column, time) for column in values.T], axis=1)
             for values in (samples.voltage, samples.gain, samples.temperature)
         )
@@ -100,11 +112,11 @@ class LoopDrive:
         for joint, loop in enumerate(self._loops):
             measured = position[joint] if loop.kind == "position" else velocity[joint]
             out[joint] = loop.torque(
-                float(self._command[step, joint] - measured),
-                float(velocity[joint]),
-                None if self._voltage is None else float(self._voltage[step, joint]),
-                None if self._gain is None else float(self._gain[step, joint]),
-                None if self._temperature is None else float(self._temperature[step, joint]),
+                float(self.command[step, joint] - measured),
+                self._damped * float(velocity[joint]),
+                None if self.voltage is None else float(self.voltage[step, joint]),
+                None if self.gain is None else float(self.gain[step, joint]),
+                None if self.temperature is None else float(self.temperature[step, joint]),
             )
         return out
 

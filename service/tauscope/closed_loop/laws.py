@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from tauscope.closed_loop.load_friction import LoadFriction
 from tauscope.effects import Signals
 from tauscope.export.compensation import JointFriction
 from tauscope.export.model import ExportModel, FoundEffect
@@ -23,7 +24,12 @@ class JointLaws:
     """
 
     def __init__(
-        self, model: ExportModel, effects: tuple[FoundEffect, ...], held: Array, has_offset: tuple[bool, ...]
+        self,
+        model: ExportModel,
+        effects: tuple[FoundEffect, ...],
+        held: Array,
+        has_offset: tuple[bool, ...],
+        friction_by_load: LoadFriction | None = None,
     ) -> None:
         """Take a model.
 
@@ -35,13 +41,15 @@ class JointLaws:
             dry friction that the MJCF's bristles hold [Nm or N]
         has_offset : tuple of bool
             joints whose constant torque the MJCF holds
+        friction_by_load : LoadFriction or None
+            of a refinement
         """
         friction: tuple[JointFriction, ...] = model.friction
         self._stiction = np.array([each.stiction for each in friction])
         self._stribeck = np.array([each.stribeck for each in friction])
         self._delta = np.array([each.delta or 0.0 for each in friction])
         self._offset = np.array([0.0 if has else each.offset for each, has in zip(friction, has_offset, strict=True)])
-        self._held, self._effects = held, effects
+        self._held, self._effects, self._by_load = held, effects, friction_by_load
         count = model.robot.joint_count
         zeros = np.zeros((count, 1))
         self._signals = Signals(
@@ -80,8 +88,10 @@ class JointLaws:
         """
         level = self._stiction + self._stribeck * _TWO_OVER_PI * np.arctan(self._delta * np.abs(velocity))
         torque = self._offset.copy()
+        direction = np.where(np.abs(velocity) > RESTING, np.sign(velocity), np.sign(drive - load))
+        if self._by_load is not None:
+            level = level + self._by_load.level(load, direction)
         if self._effects:
-            direction = np.where(np.abs(velocity) > RESTING, np.sign(velocity), np.sign(drive - load))
             smooth = self._evaluate(position, velocity, load, np.zeros_like(direction))
             level = level + direction * (self._evaluate(position, velocity, load, direction) - smooth)
             torque += smooth

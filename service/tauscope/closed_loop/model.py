@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from tauscope.closed_loop.laws import JointLaws
+from tauscope.closed_loop.load_friction import LoadFriction
 from tauscope.export.compensation import JointFriction
 from tauscope.export.mjcf import to_mjcf
 from tauscope.export.mjcf_findings import IN_THE_MODEL, add_findings
@@ -76,7 +77,7 @@ def stated_model(robot: Robot) -> ExportModel | None:
     )
 
 
-def rollout_model(name: str, model: ExportModel) -> RolloutModel:
+def rollout_model(name: str, model: ExportModel, friction_by_load: LoadFriction | None = None) -> RolloutModel:
     """The model as a simulator and the laws beside it take it.
 
     Raises
@@ -95,7 +96,7 @@ def rollout_model(name: str, model: ExportModel) -> RolloutModel:
         if found not in beside and found.effect.id not in IN_THE_MODEL
     ]
     held = np.array([extras.dry_friction for extras in added.joints])
-    laws = JointLaws(model, beside, held, tuple(extras.has_offset for extras in added.joints))
+    laws = JointLaws(model, beside, held, tuple(extras.has_offset for extras in added.joints), friction_by_load)
     parameters = np.concatenate([link.to_vector() for link in added.links])
     at_zero = np.zeros((1, model.robot.joint_count))
     rotors = np.array([value or 0.0 for value in model.rotor_inertia])

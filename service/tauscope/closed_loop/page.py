@@ -7,13 +7,20 @@ from matplotlib.figure import Figure
 
 from tauscope.closed_loop.result import RolloutDocument
 from tauscope.closed_loop.rollout import Rollout, Trace
-from tauscope.closed_loop.tables import MILLI, MODEL_WORDS, recording_table, rollout_sentences, summary_table
+from tauscope.closed_loop.tables import (
+    MILLI,
+    MODEL_WORDS,
+    recording_table,
+    refinement_table,
+    rollout_sentences,
+    summary_table,
+)
 from tauscope.number_text import counted, significant
 from tauscope.report.csv_text import csv_text
 from tauscope.report.decimation import envelope_indices
 from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.provenance import Provenance
-from tauscope.report.svg import HELD_OUT, MEASURED, PREDICTED, RESIDUAL, draw_svg
+from tauscope.report.svg import HELD_OUT, INK, MEASURED, PREDICTED, RESIDUAL, draw_svg
 from tauscope.report.tables import input_table
 
 HEIGHT_INCHES = 3.4
@@ -21,7 +28,7 @@ HEIGHT_INCHES = 3.4
 MOST_POINTS = 1400
 """Points a curve; two a pixel."""
 
-COLOURS = {"stated": HELD_OUT, "identified": PREDICTED, "findings": RESIDUAL}
+COLOURS = {"stated": HELD_OUT, "identified": PREDICTED, "findings": RESIDUAL, "refined": INK}
 
 
 def rollout_page(rollout: Rollout, provenance: Provenance) -> str:
@@ -30,10 +37,14 @@ def rollout_page(rollout: Rollout, provenance: Provenance) -> str:
     worst = max(rollout.traces, key=lambda trace: max(trace.entry.models[-1].rms))
     names = [joint.name for joint in rollout.robot.joints]
     parts = [_motion(worst, joint, name) for joint, name in enumerate(names)]
+    entry = document.refinement
+    tables = [] if entry is None else [Part(table=refinement_table(entry))]
+    refinement = [Section("refinement", "Refined parameters", tables)] if tables else []
     sections = [
         Section(
             "errors", "Position error", [Part(table=summary_table(document)), Part(table=recording_table(document))]
         ),
+        *refinement,
         Section("motion", "Motion where the error is largest", parts, [f"{worst.motion.name}."]),
         Section(
             "reproduce",

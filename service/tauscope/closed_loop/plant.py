@@ -44,13 +44,19 @@ class Plant(Protocol):
 class PlantMaker(Protocol):
     """Compiles an MJCF to a plant."""
 
-    def __call__(self, mjcf: str, joints: Sequence[str], step_s: float) -> Plant:
-        """The plant with these driven joints, base first."""
+    def __call__(self, mjcf: str, joints: Sequence[str], step_s: float, damping: Array) -> Plant:
+        """The plant with these driven joints, base first; damping is that of their loops (n,)."""
         ...
 
 
-def make_plant(mjcf: str, joints: Sequence[str]) -> Plant:
+def make_plant(mjcf: str, joints: Sequence[str], damping: Array) -> Plant:
     """The plant of an MJCF.
+
+    Parameters
+    ----------
+    damping : (n,) float64
+        torque per velocity of the loops, which MuJoCo integrates implicitly as it does an actuator's kv
+        [Nm s/rad or N s/m]
 
     Raises
     ------
@@ -62,5 +68,5 @@ def make_plant(mjcf: str, joints: Sequence[str]) -> Plant:
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         with require_extra("tauscope rollout"):
             maker = cast("PlantMaker", entry.load())
-        return maker(mjcf, joints, STEP_S)
+        return maker(mjcf, joints, STEP_S, damping)
     raise TauscopeError("no simulator for rollouts is registered; install tauscope again, with its sim extra")

@@ -7,7 +7,7 @@ from pydantic import Field
 from tauscope.result_warning import ResultWarning
 from tauscope.strict_model import ResultModel
 
-ModelName = Literal["stated", "identified", "findings"]
+ModelName = Literal["stated", "identified", "findings", "refined"]
 
 
 class HorizonEntry(ResultModel):
@@ -21,7 +21,8 @@ class ModelEntry(ResultModel):
     """One model on one recording."""
 
     model: ModelName = Field(
-        description="stated: the robot file's model; identified: without findings; findings: with them"
+        description="stated: the robot file's model; identified: without findings; findings: with them; refined:"
+        " without findings, refined by shooting segments"
     )
     rms: list[float] = Field(description="position error per joint, one start [rad or m]")
     worst: list[float] = Field(description="largest position error per joint [rad or m]")
@@ -49,6 +50,27 @@ class SummaryEntry(ResultModel):
     worst: list[float] = Field(description="largest error per joint [rad or m]")
 
 
+class RefinedEntry(ResultModel):
+    """A parameter of the refined model."""
+
+    name: str = Field(description="of the parameter, and of its link or joint")
+    value: float = Field(description="after the refinement")
+    std: float = Field(description="its standard error")
+    unit: str = Field(description="of both")
+    p_value: float | None = Field(description="of no such term; null for parameters that every model has")
+
+
+class RefinementEntry(ResultModel):
+    """The refinement."""
+
+    segments: int = Field(description="pieces of 0.3 s of the training recordings")
+    rms_before: float = Field(description="position error of the segments before [rad or m]")
+    rms_after: float = Field(description="position error of the segments after [rad or m]")
+    is_better: bool = Field(description="whether its error on the judging recordings is below that of each other model")
+    parameters: list[RefinedEntry] = Field(description="what was refined")
+    left_out: list[str] = Field(description="terms that are not significant, in their order")
+
+
 class RolloutDocument(ResultModel):
     """A rollout."""
 
@@ -60,5 +82,6 @@ class RolloutDocument(ResultModel):
     step_s: float = Field(description="step of the simulation [s]")
     recordings: list[RecordingEntry] = Field(description="by recording")
     summary: list[SummaryEntry] = Field(description="by model")
+    refinement: RefinementEntry | None = Field(description="null where none was asked for")
     left_out: list[str] = Field(description="findings that no simulator has, each with the reason")
     warnings: list[ResultWarning] = Field(description="to know before the numbers")

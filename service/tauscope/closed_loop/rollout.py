@@ -6,11 +6,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauscope.actuation import estimate_delays, is_open, require_loops
-from tauscope.closed_loop.drive import Drive, LoopDrive, RecordedMotion, TorqueDrive, record_motion
+from tauscope.closed_loop.drive import Drive, LoopDrive, RecordedMotion, TorqueDrive, loop_damping, record_motion
 from tauscope.closed_loop.measure import lag, reversal_error, rms_error, worst_error
 from tauscope.closed_loop.model import RolloutModel, rollout_model, stated_model
 from tauscope.closed_loop.plant import STEP_S, make_plant
-from tauscope.closed_loop.result import HorizonEntry, ModelEntry, RecordingEntry, RolloutDocument, SummaryEntry
+from tauscope.closed_loop.refine import Refined, refine_model
+from tauscope.closed_loop.result import (
+    HorizonEntry,
+    ModelEntry,
+    RecordingEntry,
+    RefinedEntry,
+    RefinementEntry,
+    RolloutDocument,
+    SummaryEntry,
+)
 from tauscope.closed_loop.simulate import simulate_motion
 from tauscope.errors import RecordingMismatchError
 from tauscope.export.model import ExportModel
@@ -49,6 +58,7 @@ class Rollout:
     models: tuple[RolloutModel, ...]
     traces: tuple[Trace, ...]
     warnings: tuple[ResultWarning, ...]
+    refined: Refined | None = None
 
     @property
     def document(self) -> RolloutDocument:
@@ -63,7 +73,29 @@ class Rollout:
             recordings=[trace.entry for trace in self.traces],
             summary=[self._summary(place) for place in range(len(self.models))],
             left_out=list(dict.fromkeys(text for model in self.models for text in model.left_out)),
+            refinement=None if self.refined is None else self._refinement(self.refined),
             warnings=list(self.warnings),
+        )
+
+    def _refinement(self, refined: Refined) -> RefinementEntry:
+        """Parameters of the refined model, and whether its mean error over joints is below that of each other model."""
+        *others, own = (np.mean(self._summary(place).rms) for place in range(len(self.models)))
+        return RefinementEntry(
+            segments=refined.count,
+            rms_before=refined.before,
+            rms_after=refined.after,
+            is_better=bool(own < min(others)),
+            parameters=[
+                RefinedEntry(
+                    name=each.term.name,
+                    value=each.value,
+                    std=each.std,
+                    unit=each.term.unit,
+                    p_value=each.p_value,
+                )
+                for each in refined.terms
+            ],
+            left_out=list(refined.left_out),
         )
 
     def _summary(self, place: int) -> SummaryEntry:
@@ -78,6 +110,7 @@ def roll_out(
     recordings: Sequence[Recording],
     exports: Sequence[ExportModel] = (),
     progress: Progress = lambda step: None,
+    training: Sequence[Recording] = (),
 ) -> Rollout:
     """Simulate what a recording commanded, without and with the findings of a model.
 
@@ -85,6 +118,8 @@ def roll_out(
     ----------
     exports : sequence of ExportModel
         of a model file, as `read_export_models` reads it; empty where the robot file's own model is judged alone
+    training : sequence of Recording
+        with commands, by which the model without findings is refined; the other recordings judge it
 
     Raises
     ------
@@ -96,7 +131,14 @@ def roll_out(
     models = _models(robot, exports)
     known = exports[-1].robot if exports else None
     robot, is_closed = _complete_loops(robot, recordings, known)
-    plants = [make_plant(model.mjcf, model.joints) for model in models]
+    loops = tuple(joint.actuator for joint in robot.joints if joint.actuator is not None) if is_closed else ()
+    refined = None
+    if training:
+        refined = _refine(_plain_model(robot, exports), loops, training, progress)
+        models.append(rollout_model("refined", refined.model, refined.friction))
+    # MuJoCo integrates an actuator's damping implicitly; a servo computes it of the velocity that it has measured.
+    damping = loop_damping(loops) if loops and robot.mjcf is not None else np.zeros(robot.joint_count)
+    plants = [make_plant(model.mjcf, model.joints, damping) for model in models]
     traces = []
     for recording in recordings:
         progress(f"simulate {recording.name}")
@@ -106,7 +148,8 @@ def roll_out(
             runs: dict[float | None, Array] = {}
             stabiliser = None
             for horizon in (*(h for h in HORIZONS_S if h < motion.time[-1] - motion.time[0]), None):
-                drive = _drive(robot, recording, motion, model, is_closed=is_closed)
+                own = loops if refined is None or model.name != "refined" else refined.loops
+                drive = _drive(robot, recording, motion, model, own)
                 runs[horizon] = simulate_motion(model, plant, drive, motion, horizon)
                 stabiliser = drive.stabiliser_rms.tolist() if isinstance(drive, TorqueDrive) else None
             simulated[model.name] = runs[None]
@@ -115,8 +158,8 @@ def roll_out(
         traces.append(
             Trace(motion, simulated, RecordingEntry(recording=recording.name, duration_s=length, models=entries))
         )
-    warnings = tuple(warning for recording in recordings for warning in recording.warnings)
-    return Rollout(robot, is_closed, tuple(models), tuple(traces), (*_warn_drive(is_closed=is_closed), *warnings))
+    warnings = (*_warn_drive(is_closed=is_closed), *(w for recording in recordings for w in recording.warnings))
+    return Rollout(robot, is_closed, tuple(models), tuple(traces), warnings, refined)
 
 
 def _models(robot: Robot, exports: Sequence[ExportModel]) -> list[RolloutModel]:
@@ -132,9 +175,8 @@ def _models(robot: Robot, exports: Sequence[ExportModel]) -> list[RolloutModel]:
     stated = stated_model(robot)
     models = [] if stated is None else [rollout_model("stated", stated)]
     if exports:
-        found = exports[-1]
-        plain = exports[0] if len(exports) > 1 else replace(found, effects=())
-        models.append(rollout_model("identified", plain))
+        found, plain = exports[-1], _plain_model(robot, exports)
+        models += [] if plain is None else [rollout_model("identified", plain)]
         if any(each.effect.id != "rotor_inertia" for each in found.effects):
             models.append(rollout_model("findings", found))
     if not models:
@@ -197,13 +239,39 @@ def _as_commands(recording: Recording) -> Recording | None:
 
 
 def _drive(
-    robot: Robot, recording: Recording, motion: RecordedMotion, model: RolloutModel, *, is_closed: bool
+    robot: Robot, recording: Recording, motion: RecordedMotion, model: RolloutModel, loops: tuple[Actuator, ...]
 ) -> Drive:
     """Loops where commands are there, else recorded torque."""
-    if is_closed:
-        loops = [joint.actuator for joint in robot.joints if joint.actuator is not None]
-        return LoopDrive(loops, recording, motion.time)
+    if loops:
+        return LoopDrive(loops, recording, motion.time, is_damped=robot.mjcf is None)
     return TorqueDrive(robot, recording, motion, model.inertia)
+
+
+def _plain_model(robot: Robot, exports: Sequence[ExportModel]) -> ExportModel | None:
+    """The model without findings."""
+    if not exports:
+        return stated_model(robot)
+    return exports[0] if len(exports) > 1 else replace(exports[-1], effects=())
+
+
+def _refine(
+    model: ExportModel | None, loops: tuple[Actuator, ...], training: Sequence[Recording], progress: Progress
+) -> Refined:
+    """The refined model.
+
+    Raises
+    ------
+    RecordingMismatchError
+        no commands reach loops
+    """
+    commands = [_as_commands(recording) for recording in training]
+    lacking = [recording.name for recording, each in zip(training, commands, strict=True) if each is None]
+    if not loops or model is None or lacking:
+        raise RecordingMismatchError(
+            f"{', '.join(lacking) or training[0].name}: a refinement needs commands through loops; record qref, state"
+            " joints[].actuator in the robot file, or roll out without --refine"
+        )
+    return refine_model(model, loops, [each for each in commands if each is not None], progress)
 
 
 def _entry(

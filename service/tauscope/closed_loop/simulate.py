@@ -3,6 +3,7 @@
 import numpy as np
 
 from tauscope.closed_loop.drive import Drive, RecordedMotion
+from tauscope.closed_loop.load_friction import RELAXED
 from tauscope.closed_loop.model import RolloutModel
 from tauscope.closed_loop.plant import STEP_S, Plant
 from tauscope.errors import TauscopeError
@@ -46,5 +47,5 @@ def simulate_motion(
             raise TauscopeError(f"{motion.name}: no torque and no command at t = {motion.time[step]:.4g} s")
         dry, against = model.laws(position, velocity, load, torque)
         plant.advance(torque - against, dry)
-        load = plant.load
+        load = (1.0 - RELAXED) * load + RELAXED * plant.load
     return np.stack([np.interp(motion.rows, motion.time, column) for column in found.T], axis=1)

@@ -2,14 +2,17 @@
 
 from collections.abc import Iterator
 
-from tauscope.closed_loop.result import RolloutDocument
+from tauscope.closed_loop.result import RefinementEntry, RolloutDocument
 from tauscope.number_text import ABSENT, significant
 from tauscope.report.table import Table
 
-MODEL_WORDS = {"stated": "robot file", "identified": "identified", "findings": "with findings"}
+MODEL_WORDS = {"stated": "robot file", "identified": "identified", "findings": "with findings", "refined": "refined"}
 """Models in words: the identified one is without findings of a diagnosis."""
 
 MILLI = 1e3
+
+LEAST_P = 1e-3
+"""p below which its size says nothing."""
 
 
 def summary_table(document: RolloutDocument) -> Table:
@@ -55,6 +58,21 @@ def recording_table(document: RolloutDocument) -> Table:
     return Table(("recording", "joint", "model", *heads, "free", "reversals", "lag [ms]"), rows, words=3)
 
 
+def refinement_table(entry: RefinementEntry) -> Table:
+    """Refined parameters with their standard errors, and p of no such term."""
+    rows = [
+        (
+            each.name,
+            significant(each.value, 3),
+            significant(each.std, 2),
+            each.unit,
+            ABSENT if each.p_value is None else "< 0.001" if each.p_value < LEAST_P else f"{each.p_value:.3f}",
+        )
+        for each in entry.parameters
+    ]
+    return Table(("parameter", "value", "± std", "unit", "p"), rows, words=1)
+
+
 def rollout_sentences(document: RolloutDocument) -> Iterator[str]:
     """How the motion was driven, what it came to, and what the simulation lacks."""
     if document.drive == "loop":
@@ -73,8 +91,22 @@ def rollout_sentences(document: RolloutDocument) -> Iterator[str]:
             f"From {MODEL_WORDS[first.model]} to {MODEL_WORDS[last.model]} the mean rms error {change} from"
             f" {significant(before, 3)} to {significant(after, 3)} mrad."
         )
+    if document.refinement is not None:
+        yield from _refinement_sentences(document.refinement)
     for text in document.left_out:
         yield f"Not simulated: {text}."
+
+
+def _refinement_sentences(entry: RefinementEntry) -> Iterator[str]:
+    """How the refinement went, and whether to use it."""
+    before, after = (significant(MILLI * value, 3) for value in (entry.rms_before, entry.rms_after))
+    yield f"The refinement lowers the error of {entry.segments} segments of 0.3 s from {before} to {after} mrad."
+    if entry.left_out:
+        yield f"Not significant, left out: {', '.join(entry.left_out)}."
+    if entry.is_better:
+        yield "On the judging recordings the refined model is the best: use it."
+    else:
+        yield "On the judging recordings another model is better: do not use the refined one."
 
 
 def _stabilisers(document: RolloutDocument) -> Iterator[list[float]]:

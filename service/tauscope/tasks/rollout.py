@@ -28,6 +28,7 @@ class Request(StrictModel):
 
     robot: str = Field(description="robot file")
     recordings: tuple[str, ...] = Field(description="recordings with commands, or with torque")
+    refine: tuple[str, ...] = Field(default=(), description="recordings by which the model is refined")
     model: str | None = Field(default=None, description="model that identify or diagnose saved")
     options: ReadingOptions = Field(default=ReadingOptions(), description="how the recordings are read")
 
@@ -35,7 +36,9 @@ class Request(StrictModel):
     def command(self) -> tuple[str, ...]:
         """The command line that does the same."""
         words = {} if self.model is None else {"model": self.model}
-        return command_words("rollout", self.robot, recordings=self.recordings, **words, **self.options.words)
+        return command_words(
+            "rollout", self.robot, recordings=self.recordings, refine=self.refine, **words, **self.options.words
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +60,8 @@ class Result:
     def provenance(self) -> Provenance:
         """What the result was made from, and when."""
         request = self.request
-        given = {"recordings": request.recordings, "model": () if request.model is None else (request.model,)}
+        model = () if request.model is None else (request.model,)
+        given = {"recordings": request.recordings, "refine": request.refine, "model": model}
         return record_provenance(self.files, request.command, self.rollout.robot, given)
 
     def _report(self) -> str:
@@ -78,5 +82,6 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     robot = read_robot(files.find("robot", request.robot))
     exports = () if request.model is None else read_export_models(files.find("model", request.model))
     recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)
-    found = roll_out(robot, recordings, exports, progress)
+    training = read_recordings(files, "refine", request.refine, robot, request.options)
+    found = roll_out(robot, recordings, exports, progress, training)
     return Result(request, files, recordings, found, found.document)

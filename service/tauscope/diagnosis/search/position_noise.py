@@ -34,7 +34,13 @@ MOST = 1.0 / 3.0
 def is_position_noise(
     effect: Effect, shape: Array, model: ExtendedModel, observations: Observations, signals: Sequence[Signals]
 ) -> bool:
-    """Whether noise of the positions accounts for more than `MOST` of what an effect that swings explains."""
+    """Whether noise of the positions accounts for more than `MOST` of what an effect that swings explains.
+
+    Parameters
+    ----------
+    shape : (k,) float64
+        values of its shape parameters
+    """
     white = WhiteColumns(observations)
     beside = project(white.all(model), white.residual(model), model.size)
     plain = white_columns(observations, effect, shape[None], signals)

@@ -161,7 +161,15 @@ class Proposer:
     def zoom(
         self, effect: Effect, shape: Array, size: Array, at: Hypothesis, signals: Sequence[Signals]
     ) -> tuple[Array, Array]:
-        """One shape parameter after the other: a free one between neighbours on the grid, a window's kind in turn."""
+        """One shape parameter after the other: a free one between neighbours on the grid, a window's kind in turn.
+
+        Parameters
+        ----------
+        shape : (k,) float64
+            where it begins
+        size : (c,) float64
+            standard deviation believed of the coefficients there
+        """
         scorer = Scorer(self.rows, at)
 
         def choose(values: Array, place: int) -> int | None:

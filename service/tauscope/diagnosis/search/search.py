@@ -30,6 +30,9 @@ MOST_EFFECTS = 12
 NAMED = 3.0
 """Log odds from which an effect is named, and those of its joints' held-out motion alone: nineteen in twenty."""
 
+UNREFUTED = 18.0
+"""…and a window in time, three standard errors of what its stretches agree on: no other motion can refute it."""
+
 CATALOGUED = 3.0
 """Log odds before the data that torque which is left out has a name: one in twenty laws is in no catalogue."""
 
@@ -315,10 +318,11 @@ class Search:
         change = None if self.held_out is None else self.held_out.change(at, found)
         rivals = tuple(each for each in proposals if each is not proposal)
         log_odds = self._log_odds(proposal)
-        if isinstance(proposal.term.effect, TimeLocalEffect):
+        lasts = not isinstance(proposal.term.effect, TimeLocalEffect)
+        if not lasts:
             log_odds = min(log_odds, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
         log_odds += 0.0 if change is None else change.log_odds()
-        confirmed = log_odds > NAMED and _is_possible(found.model)
+        confirmed = log_odds > (NAMED if lasts else UNREFUTED) and _is_possible(found.model)
         confirmed &= change is None or self._agrees(change, proposal.term.effect, touched)
         covariance = found.posterior.covariance
         trained = self._log_odds(proposal)

@@ -39,7 +39,7 @@ def parse_scope(text: str) -> Scope:
 
 
 _ITEM = r"[^/]+"
-_ANALYSES = "(identifications|diagnoses|excitations)"
+_ANALYSES = "(identifications|diagnoses|excitations|rollouts)"
 
 # Of requests that are no plain reading: the first rule that fits decides.
 _RULES: tuple[tuple[str, re.Pattern[str], Scope], ...] = tuple(

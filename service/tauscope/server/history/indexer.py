@@ -17,6 +17,7 @@ from tauscope.server.queue.diagnosis import DiagnosisWorkspace
 from tauscope.server.queue.excitation import ExcitationWorkspace
 from tauscope.server.queue.identification import IdentificationWorkspace
 from tauscope.server.queue.record import JobState
+from tauscope.server.queue.rollout import RolloutWorkspace
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.database.index import FileMetadata, Index, ItemMetadata, RecordingRole
 from tauscope.server.store.files import hash_file, identifier_time
@@ -24,7 +25,7 @@ from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 
 DAMAGED = "damaged"
-_ROLES = ("recordings", "held_out", "simulated")
+_ROLES = ("recordings", "held_out", "simulated", "refine")
 _LIVING = {"state.json", "events.jsonl", "progress", "cancel", "run.json", "stop", "control.log"}
 """Files that may still change when an item has ended, or that say nothing of its result."""
 
@@ -152,6 +153,11 @@ def _diagnosis(folder: Path) -> ItemMetadata:
     return _job("diagnosis", workspace, workspace.read_order(), workspace.read_result)
 
 
+def _rollout(folder: Path) -> ItemMetadata:
+    workspace = RolloutWorkspace(folder)
+    return _job("rollout", workspace, workspace.read_order(), workspace.read_result)
+
+
 def _campaign(folder: Path) -> ItemMetadata:
     workspace = CampaignWorkspace(folder)
     return _job("campaign", workspace, workspace.read_order(), None)
@@ -183,6 +189,7 @@ _READERS: Mapping[str, Callable[[Path], ItemMetadata]] = {
     "run": _run,
     "identification": _identification,
     "diagnosis": _diagnosis,
+    "rollout": _rollout,
     "campaign": _campaign,
 }
 

@@ -35,6 +35,8 @@ from tauscope.server.http.recordings.router import router as recordings
 from tauscope.server.http.repeated_requests import IdempotentRequests
 from tauscope.server.http.robots.models import RobotCheckRequest
 from tauscope.server.http.robots.router import router as robots
+from tauscope.server.http.rollouts import RolloutRequest
+from tauscope.server.http.rollouts import router as rollouts
 from tauscope.server.http.runs import RunRequest
 from tauscope.server.http.runs import router as runs
 from tauscope.server.http.schedules import ScheduleRequest
@@ -46,7 +48,7 @@ from tauscope.server.http.tasks.events import EVENT_MODELS
 from tauscope.server.page.router import router as page
 from tauscope.server.problems import Problem
 
-API_VERSION = "1.19.0"
+API_VERSION = "1.20.0"
 """Of the interface, not of the package; a change of tests/server/http/openapi.json goes with a change here."""
 
 PREFIX = "/api/v1"
@@ -59,6 +61,7 @@ VERBS = (
     recordings,
     identifications,
     diagnoses,
+    rollouts,
     robots,
     items,
     history,
@@ -71,6 +74,7 @@ VERBS = (
 REQUESTS = (
     IdentificationRequest,
     DiagnosisRequest,
+    RolloutRequest,
     ExcitationRequest,
     RunRequest,
     CampaignRequest,

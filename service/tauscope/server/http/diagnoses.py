@@ -1,6 +1,5 @@
 """Diagnoses: requests, answers and what is special about this resource."""
 
-from pathlib import Path
 from typing import Any, Self
 
 from pydantic import Field, model_validator
@@ -8,12 +7,11 @@ from pydantic import Field, model_validator
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.plots import DiagnosisPlots
 from tauscope.diagnosis.extended_model.saved import LARGEST_FILE
-from tauscope.errors import IdentificationError
 from tauscope.export.model_file import ModelFile
-from tauscope.server.http.documents import to_json_text
 from tauscope.server.http.identifications import Names, require_listed_once
 from tauscope.server.http.openapi import binary_part, binary_parts
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.saved_models import MODEL_FILE, keep_model
 from tauscope.server.http.services import Services
 from tauscope.server.http.tasks.answers import JobAnswer, require_document
 from tauscope.server.http.tasks.queued import QueuedTask
@@ -121,7 +119,6 @@ class DiagnosisListAnswer(PageAnswer):
 
 
 YAML = "application/yaml"
-MODEL_FILE = "model.json"
 
 
 def compared_model(received: Received[DiagnosisRequest], services: Services, workspace: Any) -> dict[str, str | None]:
@@ -142,20 +139,11 @@ def compared_model(received: Received[DiagnosisRequest], services: Services, wor
     if (against == "saved") != (file is not None or document.model is not None):
         text = "options.against: saved and a model belong together; send both or neither"
         raise ProblemError("invalid-request", text)
-    if file is not None and document.model is not None:
-        raise ProblemError("invalid-request", "the model came twice, as part model and in part request; send it once")
-    if file is not None or document.model is None:
-        return {"model": None if file is None else file.name}
-    folder: Path = workspace.uploads(SAVED_MODEL)
-    if isinstance(document.model, str):
-        content = DIAGNOSES.finished(services, document.model).read_output(MODEL_FILE)
-        (folder / MODEL_FILE).write_bytes(require_document(content, document.model))
-    else:
-        text = to_json_text(document.model)
-        if text is None:
-            raise IdentificationError("model: holds NaN, infinity or text that is not Unicode; write plain numbers")
-        (folder / MODEL_FILE).write_text(text, encoding="utf-8")
-    return {"model": MODEL_FILE}
+
+    def read(identifier: str) -> bytes:
+        return require_document(DIAGNOSES.finished(services, identifier).read_output(MODEL_FILE), identifier)
+
+    return {"model": keep_model(document.model, file, workspace, read)}
 
 
 DIAGNOSES = QueuedTask(

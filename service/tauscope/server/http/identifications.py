@@ -6,10 +6,12 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from tauscope.export.model_file import ModelFile
 from tauscope.identification import IdentificationDocument
 from tauscope.report.identification_plots import IdentificationPlots
 from tauscope.server.http.openapi import binary_parts
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.saved_models import MODEL_FILE
 from tauscope.server.http.tasks.answers import JobAnswer
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import HTML, JobDocument, text_document
@@ -91,6 +93,7 @@ class LinksAnswer(AnswerModel):
     result: str | None = Field(default=None, description="its result, once it succeeded")
     plots: str | None = Field(default=None, description="data of its figures, once it succeeded")
     report: str | None = Field(default=None, description="its report as a page, once it succeeded")
+    model: str | None = Field(default=None, description="the identified model, once it succeeded")
     exports: dict[str, str] = Field(default={}, description="its exports by format, once it succeeded")
 
 
@@ -144,6 +147,14 @@ IDENTIFICATIONS = QueuedTask(
                 "model": IdentificationPlots,
                 "description": "torque over time and friction over velocity, joint by joint",
             },
+        ),
+        JobDocument(
+            "model",
+            MODEL_FILE,
+            "Fetch the model",
+            "The identified model, for a rollout.",
+            {"model": ModelFile, "description": "the same document as `tauscope identify --model`"},
+            missing="an earlier version identified this and kept no model; hand it in again",
         ),
         text_document(
             "report",

@@ -17,7 +17,7 @@ from tauscope.server.store.database.index import ItemEntry, ItemQuery
 class ItemAnswer(AnswerModel):
     """Something that is kept, as a search finds it."""
 
-    kind: str = Field(description="excitation, run, identification, diagnosis or campaign", examples=["run"])
+    kind: str = Field(description="excitation, run, identification, diagnosis, rollout or campaign", examples=["run"])
     id: str = Field(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])
     site: str = Field(description="identifier of the data folder that holds it")
     is_here: bool = Field(description="whether that is this service's own; only then `link` leads to it")
@@ -57,7 +57,8 @@ class RobotListAnswer(AnswerModel):
 router = APIRouter(tags=["items"], responses=problem_responses("invalid-request", "store"))
 
 Kind = Annotated[
-    Literal["excitation", "run", "identification", "diagnosis", "campaign"] | None, Query(description="kind of item")
+    Literal["excitation", "run", "identification", "diagnosis", "rollout", "campaign"] | None,
+    Query(description="kind of item"),
 ]
 State = Annotated[str | None, Query(max_length=40, description="where it stands", examples=["succeeded", "damaged"])]
 RobotName = Annotated[str | None, Query(max_length=1000, description="name of the robot")]
@@ -79,7 +80,7 @@ def search_items(
     before: Before = None,
     limit: Limit = 100,
 ) -> ItemListAnswer:
-    """Excitations, runs, identifications, diagnoses and campaigns of every robot, damaged ones too.
+    """Excitations, runs, identifications, diagnoses, rollouts and campaigns of every robot, damaged ones too.
 
     Where several services share a database, those of all data folders are found.
     """

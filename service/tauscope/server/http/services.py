@@ -43,6 +43,7 @@ from tauscope.server.queue.executors import open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
 from tauscope.server.queue.identification import run_identification
 from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.queue.rollout import run_rollout
 from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.server.schedules.repeater import Repeater
 from tauscope.server.schedules.repository import ScheduleRepository
@@ -64,6 +65,7 @@ class Services:
     recordings: RecordingStore
     identifications: JobKind
     diagnoses: JobKind
+    rollouts: JobKind
     excitations: JobKind
     jobs: JobQueue
     runs: RunManager
@@ -196,7 +198,7 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
     items, metrics, heartbeat = item_stores(settings.data_folder), Metrics(), Heartbeat()
     recordings = RecordingStore(settings.recordings_folder)
     recordings.tidy()
-    identifications, diagnoses, excitations = kinds = _kinds(settings, items)
+    identifications, diagnoses, excitations, rollouts = kinds = _kinds(settings, items)
     pool = executor or open_executor(settings.workers, deadline_s=settings.job_timeout_s)
     timed = TimedExecutor(pool, metrics.job_seconds)
     new_queue = partial(
@@ -222,6 +224,7 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
         recordings=recordings,
         identifications=identifications,
         diagnoses=diagnoses,
+        rollouts=rollouts,
         excitations=excitations,
         jobs=jobs,
         runs=runs,
@@ -269,13 +272,14 @@ def open_readers(settings: Settings) -> Executor:
     return WorkerPool(WIDTH, **bounds)
 
 
-def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind, JobKind, JobKind]:
-    """Identifications, diagnoses and designed motions."""
+def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind, JobKind, JobKind, JobKind]:
+    """Identifications, diagnoses, designed motions and rollouts."""
     where = {"server_recordings": settings.recordings_folder}
     return (
         JobKind(items["identification"], partial(run_identification, **where)),
         JobKind(items["diagnosis"], partial(run_diagnosis, **where), is_heavy=True),
         JobKind(items["excitation"], run_excitation),
+        JobKind(items["rollout"], partial(run_rollout, **where), is_heavy=True),
     )
 
 
@@ -289,6 +293,7 @@ def _retention(services: Services) -> list[Callable[[], object]]:
     removers: dict[str, Callable[[str], object]] = {
         "identification": partial(jobs.cancel_or_remove, services.identifications),
         "diagnosis": partial(jobs.cancel_or_remove, services.diagnoses),
+        "rollout": partial(jobs.cancel_or_remove, services.rollouts),
         "excitation": partial(jobs.cancel_or_remove, services.excitations),
         "run": services.runs.remove,
         "campaign": services.campaigns.remove,

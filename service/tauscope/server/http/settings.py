@@ -62,7 +62,7 @@ class Settings(BaseModel):
     prune_older_than_days: float | None = Field(
         default=None, ge=0, description="what ended longer ago is removed, hour after hour [days]; null: nothing is"
     )
-    prune_kinds: tuple[Literal["excitation", "run", "identification", "diagnosis", "campaign"], ...] = Field(
+    prune_kinds: tuple[Literal["excitation", "run", "identification", "diagnosis", "rollout", "campaign"], ...] = Field(
         default=(), description="kinds of items that it is said of; empty: every kind"
     )
     prune_recordings: bool = Field(

@@ -39,6 +39,7 @@ class IdentificationWorkspace(TaskWorkspace[IdentificationOrder]):
     noun = "identification"
     roles = ("recordings", "held_out")
     outputs: ClassVar[Mapping[str, str | None]] = {
+        "model.json": "tauscope.model/1",
         "plots.json": "tauscope.identification-plots/1",
         "report.html": None,
         "result.json": "tauscope.identification/1",

@@ -15,6 +15,7 @@ FOLDERS = {
     "run": "runs",
     "identification": "identifications",
     "diagnosis": "diagnoses",
+    "rollout": "rollouts",
     "campaign": "campaigns",
 }
 """The folder of each kind of item, below the data folder; its collection has the same name at the API."""

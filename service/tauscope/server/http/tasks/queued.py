@@ -31,7 +31,7 @@ from tauscope.server.queue.task_job import OrderedRecording, TaskWorkspace
 from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import RecordingStore
 
-_SHOWN = ("recordings", "held_out", "simulated", "options")
+_SHOWN = ("recordings", "held_out", "simulated", "refine", "options")
 """Fields of an order that its answer shows, where it has them."""
 
 

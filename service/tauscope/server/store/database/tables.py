@@ -149,6 +149,12 @@ class Diagnosis(Item):
     headline: Mapped[str | None] = mapped_column(nullable=True)
 
 
+class Rollout(Item):
+    """A rollout."""
+
+    __mapper_args__ = {"polymorphic_identity": "rollout"}  # noqa: RUF012
+
+
 class Campaign(Item):
     """A campaign."""
 
@@ -160,6 +166,7 @@ ITEM_CLASSES: dict[str, type[Item]] = {
     "run": Run,
     "identification": Identification,
     "diagnosis": Diagnosis,
+    "rollout": Rollout,
     "campaign": Campaign,
 }
 """The table class of each kind of item."""

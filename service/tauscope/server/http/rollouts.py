@@ -1,0 +1,144 @@
+"""Rollouts: requests, answers and what is special about this resource."""
+
+from typing import Any, Self
+
+from pydantic import Field, model_validator
+
+from tauscope.closed_loop import RolloutDocument
+from tauscope.diagnosis.extended_model.saved import LARGEST_FILE
+from tauscope.errors import NotFoundError
+from tauscope.server.http.diagnoses import DIAGNOSES
+from tauscope.server.http.identifications import IDENTIFICATIONS, Names, require_listed_once
+from tauscope.server.http.openapi import binary_part, binary_parts
+from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.saved_models import MODEL_FILE, keep_model
+from tauscope.server.http.services import Services
+from tauscope.server.http.tasks.answers import JobAnswer, require_document
+from tauscope.server.http.tasks.queued import QueuedTask
+from tauscope.server.http.tasks.router import HTML, JobDocument, text_document
+from tauscope.server.http.tasks.submission import Received, RobotRequest
+from tauscope.server.models import AnswerModel, PageAnswer
+from tauscope.server.queue.rollout import RolloutWorkspace
+from tauscope.server.queue.task_job import SAVED_MODEL, OrderedRecording
+from tauscope.tasks.task import ReadingOptions
+
+
+class RolloutRequest(RobotRequest):
+    """What is to be rolled out."""
+
+    recordings: Names | None = Field(
+        default=None,
+        description="names of recordings with commands, or with torque: files of this form, or on the server; null: all"
+        " files sent as part `recordings`",
+    )
+    refine: Names | None = Field(
+        default=None,
+        description="names of recordings with commands by which the model is refined; null: all files sent as part"
+        " `refine`",
+    )
+    model: str | dict[str, Any] | None = Field(
+        default=None,
+        description="model to roll out without and with its findings: a model document, or the identifier of an"
+        " identification or a diagnosis that succeeded; in a form, the part `model` may hold the file instead",
+    )
+    options: ReadingOptions = Field(default=ReadingOptions(), description="how the recordings are read")
+
+    @model_validator(mode="after")
+    def _check_once(self) -> Self:
+        """A recording counts once."""
+        require_listed_once(self.recordings, self.refine)
+        return self
+
+
+EXAMPLES: dict[str, tuple[str, Any]] = {
+    "identified": (
+        "A recording on the server, and the model of an identification",
+        {"robot": EXAMPLE_ROBOT, "recordings": ["wednesday.mcap"], "model": "20261103T101502Z-1f2e3d4c"},
+    ),
+}
+
+
+class RolloutLinksAnswer(AnswerModel):
+    """Where to go on from a rollout."""
+
+    self_: str = Field(alias="self", description="its state")
+    events: str = Field(description="what happens to it, as server-sent events")
+    result: str | None = Field(default=None, description="its result, once it succeeded")
+    report: str | None = Field(default=None, description="its report as a page, once it succeeded")
+
+
+class RolloutAnswer(JobAnswer):
+    """The state of a rollout."""
+
+    robot: str | None = Field(default=None, description="name of the robot")
+    recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what is rolled out")
+    refine: tuple[OrderedRecording, ...] = Field(default=(), description="what the model is refined by")
+    options: ReadingOptions | None = Field(default=None, description="how the recordings are read")
+    links: RolloutLinksAnswer = Field(description="where to go on")
+
+
+class RolloutListAnswer(PageAnswer):
+    """Rollouts that are kept."""
+
+    rollouts: list[RolloutAnswer] = Field(description="the newest first")
+
+
+def rolled_out_model(received: Received[RolloutRequest], services: Services, workspace: Any) -> dict[str, str | None]:
+    """Put the model into its place.
+
+    Raises
+    ------
+    ProblemError
+        where it came twice, or what is named has not succeeded
+    NotFoundError
+        if there is neither an identification nor a diagnosis of that identifier
+    """
+
+    def read(identifier: str) -> bytes:
+        try:
+            found = IDENTIFICATIONS.finished(services, identifier)
+        except NotFoundError:
+            found = DIAGNOSES.finished(services, identifier)
+        return require_document(found.read_output(MODEL_FILE), identifier)
+
+    return {"model": keep_model(received.document.model, received.form.file("model"), workspace, read)}
+
+
+ROLLOUTS = QueuedTask(
+    noun="a rollout",
+    plural="rollouts",
+    kind=lambda services: services.rollouts,
+    workspace=RolloutWorkspace,
+    models=(RolloutRequest, RolloutAnswer, RolloutListAnswer),
+    examples=EXAMPLES,
+    summary="Hand in a rollout",
+    words="The robot is checked at once, MuJoCo gets the commands of the recordings in the job: follow `Location` until"
+    " it has ended.",
+    parts={
+        "recordings": binary_parts("recordings with commands, or with torque"),
+        "refine": binary_parts("recordings with commands by which the model is refined"),
+        "model": binary_part("a model that identify or diagnose saved"),
+    },
+    further=rolled_out_model,
+    further_parts={"model": (SAVED_MODEL, LARGEST_FILE)},
+    work_problems=("robot-file", "recording", "recording-mismatch", "identification", "export", "invalid-request"),
+    documents=(
+        JobDocument(
+            "result",
+            "result.json",
+            "Fetch the result",
+            "The result of a rollout that succeeded; else the problem that it ended in.",
+            {"model": RolloutDocument, "description": "the same document as `tauscope rollout --json`"},
+        ),
+        text_document(
+            "report",
+            "report.html",
+            HTML,
+            "Fetch the report",
+            "The report as one page: no script, no request to anywhere, ready to print.",
+            "page as `tauscope rollout --report`",
+        ),
+    ),
+)
+
+router = ROLLOUTS.router()
