@@ -173,7 +173,7 @@ def test_files_of_another_tool_are_dropped_and_a_column_is_mended(
     read(page)
     expect(page.get_by_text("Guessed from the names")).to_be_visible()
     expect(page.get_by_text("Not used: notes.md")).to_be_visible()
-    with page.expect_response("**/recordings/check"):
+    with page.expect_response("**/mappings/check"):
         page.get_by_label("Position of shoulder").select_option("pos_2")
     read(page)
     expect(page.get_by_label("Position of elbow")).to_have_value("pos_1")
@@ -201,7 +201,7 @@ def test_a_unit_is_mended_with_one_click_and_a_folder_is_taken_whole(visit: Visi
     expect(page.get_by_role("alert").filter(has_text="beyond its limits")).to_be_visible()
     expect(page.get_by_role("button", name="Diagnose", exact=True)).to_be_disabled()
     visit.keep("page-refused", tmp_path)
-    with page.expect_response("**/recordings/check"):
+    with page.expect_response("**/mappings/check"):
         page.get_by_role("button", name="Read q in deg").click()
     read(page)
     expect(page.get_by_label("Unit of position")).to_have_value("deg")

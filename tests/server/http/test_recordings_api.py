@@ -216,6 +216,7 @@ def test_nothing_else_is_fetched(name: str, module_client: TestClient) -> None:
     assert_problem(module_client.get(f"{RECORDINGS}/{name}/content"), "not-found", 404)
 
 
+CHECK = "/api/v1/mappings/check"
 FOREIGN = b"timestamp,actual_q_0,target_moment_0\n" + b"".join(
     b"%.2f,%.3f,%.1f\n" % (0.01 * k, 0.1 * (k % 7), k % 3) for k in range(50)
 )
@@ -223,7 +224,7 @@ FOREIGN = b"timestamp,actual_q_0,target_moment_0\n" + b"".join(
 
 def check(client: TestClient, content: bytes, request: dict[str, object] | None = None) -> dict[str, Any]:
     files = {"file": ("log.csv", content), "request": (None, json.dumps(request or {}), "application/json")}
-    answer = client.post(f"{RECORDINGS}/check", files=files)
+    answer = client.post(CHECK, files=files)
     assert answer.status_code == 200, answer.text
     return answer.json()
 
@@ -257,6 +258,6 @@ def test_what_is_refused_comes_with_its_columns_and_the_reason(client: TestClien
 
 
 def test_no_recording_and_a_wrong_request_are_refused(client: TestClient) -> None:
-    assert_problem(client.post(f"{RECORDINGS}/check", files={"request": (None, "{}")}), "invalid-request", 422)
+    assert_problem(client.post(CHECK, files={"request": (None, "{}")}), "invalid-request", 422)
     files = {"file": ("log.csv", CSV), "request": (None, '{"units": {"t": "weeks"}}')}
-    assert_problem(client.post(f"{RECORDINGS}/check", files=files), "invalid-request", 422)
+    assert_problem(client.post(CHECK, files=files), "invalid-request", 422)

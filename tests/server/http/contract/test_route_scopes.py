@@ -29,7 +29,7 @@ CHANGING: dict[str, Scope] = {
     f"POST {V1}/campaigns/{{identifier}}/stop": READ,
     f"POST {V1}/robots/check": ANALYSE,
     f"POST {V1}/recordings": ANALYSE,
-    f"POST {V1}/recordings/check": ANALYSE,
+    f"POST {V1}/mappings/check": ANALYSE,
     f"POST {V1}/identifications": ANALYSE,
     f"POST {V1}/diagnoses": ANALYSE,
     f"POST {V1}/excitations": ANALYSE,

@@ -7,23 +7,16 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.server.http.documents import JSON, file_answer, media_type, parse_document, refuse_media_type
+from tauscope.server.http.documents import file_answer, media_type, refuse_media_type
 from tauscope.server.http.evidence import require_no_evidence
 from tauscope.server.http.form import FORM, PartRule, receive_form
-from tauscope.server.http.openapi import binary_part, form_body, model_reference
+from tauscope.server.http.openapi import binary_part, form_body
 from tauscope.server.http.reading import READING
-from tauscope.server.http.recordings.models import (
-    ReadingRequest,
-    RecordingAnswer,
-    RecordingListAnswer,
-    RecordingReportAnswer,
-    UnderstandingAnswer,
-)
-from tauscope.server.http.robots.files import read_received_robot, robot_part_rules
+from tauscope.server.http.recordings.models import RecordingAnswer, RecordingListAnswer, RecordingReportAnswer
 from tauscope.server.http.services import ServicesDep
 from tauscope.server.http.tasks.routes import After
 from tauscope.server.problems import ProblemError, problem_responses
-from tauscope.server.queue.kept_recordings import check_kept_recording, read_kept_samples, understand_recording
+from tauscope.server.queue.kept_recordings import check_kept_recording, read_kept_samples
 from tauscope.server.store.recordings import StoredRecording
 
 router = APIRouter(prefix="/recordings", tags=["recordings"], responses=problem_responses("invalid-request"))
@@ -35,17 +28,6 @@ MostSamples = Annotated[int, Query(ge=2, le=1_000_000, description="samples to r
 RecordingLimit = Annotated[int, Query(ge=1, le=10_000, description="most entries of the list")]
 
 _BODY = form_body({"file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database")}, required=["file"])
-
-_CHECK_BODY = form_body(
-    {
-        "file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database"),
-        "robot": binary_part("the robot file, whose joints, limits and layout it is read by"),
-        "urdf": binary_part("the URDF that the robot file names, by its bare name"),
-        "request": model_reference(ReadingRequest),
-    },
-    required=["file"],
-    encoding={"request": {"contentType": JSON}},
-)
 
 
 @router.post(
@@ -75,37 +57,6 @@ async def keep_recording(request: Request, response: Response, services: Service
     response.status_code = 201 if is_new else 200
     response.headers["Location"] = f"{request.url.path}/{quote(kept.name)}"
     return _answer(kept)
-
-
-@router.post(
-    "/check",
-    summary="Check a recording before it is sent for good",
-    responses=problem_responses("bad-request", "limit-exceeded", "media-type", "robot-file", *READING),
-    openapi_extra={"requestBody": {"required": True, "content": _CHECK_BODY}},
-)
-async def check_sent_recording(request: Request, services: ServicesDep) -> UnderstandingAnswer:
-    """Its columns and units as they are understood, and what it holds when it is read so; nothing is kept."""
-    if media_type(request) != FORM:
-        raise refuse_media_type(request, FORM)
-    folder = await run_in_threadpool(services.recordings.stage)
-    try:
-        settings, robots = services.settings, folder / "robot"
-        await run_in_threadpool(robots.mkdir)
-        rules = {
-            "request": PartRule(settings.max_document_bytes),
-            "file": PartRule(settings.max_upload_bytes, folder),
-            **robot_part_rules(robots),
-        }
-        form = await receive_form(request, rules)
-        file, robot_file = form.file("file"), form.file("robot")
-        if file is None:
-            raise ProblemError("invalid-request", "the form has no part file; send the recording as part file")
-        options = parse_document(form.texts.get("request", b"{}"), ReadingRequest, within="part request")
-        robot = robot_file and await run_in_threadpool(read_received_robot, robots, robot_file.name)
-        found = await services.reading.call(request, understand_recording, file.path, robot, options.reading)
-        return UnderstandingAnswer.model_validate(found)
-    finally:
-        await run_in_threadpool(services.recordings.discard, folder)
 
 
 @router.get("", summary="List the recordings on the server")

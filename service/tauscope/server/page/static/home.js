@@ -112,7 +112,7 @@ async function understand(file) {
   form.append("request", new Blob([JSON.stringify(dropped.reading)], { type: "application/json" }));
   form.append("file", file, file.name);
   try {
-    return await post("recordings/check", form);
+    return await post("mappings/check", form);
   } catch (error) { return { mapping: null, report: null, problem: error.message }; }
 }
 
