@@ -58,8 +58,8 @@ class Driver(ABC):
 
     name: str
     """As ``--backend`` calls it: the name of the entry point."""
-    titles: Mapping[str, str]
-    """What the page calls it, by language: ``en`` at least."""
+    title: str
+    """What the page calls it."""
     is_simulated: bool = False
     options: tuple[Option, ...] = ()
     file_keys: tuple[str, ...] = ()

@@ -19,7 +19,7 @@ class SimulatedDriver(Driver):
     """The simulated arm: in virtual time within this process, in real time in one of its own."""
 
     name = "sim"
-    titles = {"en": "simulated arm", "de": "simulierter Arm"}  # noqa: RUF012 - never changed
+    title = "simulated arm"
     is_simulated = True
     options = (
         Option("time", "virtual: as fast as it computes; real: by the clock", "virtual"),

@@ -41,7 +41,8 @@ def views_of(campaign: dict[str, Any]) -> dict[str, str]:
         name: f"/{link.removeprefix('/api/v1/')}" for name, link in campaign["links"].items() if isinstance(link, str)
     }
     return {
-        "campaigns": "/",
+        "home": "/",
+        "campaigns": "/campaigns",
         "campaign": f"/campaigns/{campaign['id']}",
         "new campaign": f"/new?robot=campaigns/{campaign['id']}",
         "robots": "/robots",

@@ -1,11 +1,10 @@
-"""Every view of the page, after a campaign: nothing jumps, nobody is kept out, in both languages and both schemes."""
+"""Every view of the page, after a campaign: nothing jumps, nobody is kept out, in both schemes."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from browser.campaign import ROBOT, make_campaign, views_of
 from browser.conftest import Visit
@@ -39,16 +38,6 @@ UNTIL_IT_SHIFTS = """
 def campaign(service: Served) -> dict[str, Any]:
     """What the service says of a campaign that has ended."""
     return make_campaign(service)
-
-
-@pytest.fixture
-def german(chromium: Browser, service: Served, campaign: dict[str, Any]) -> Iterator[Page]:
-    """The page in a browser whose user reads German."""
-    context = chromium.new_context(viewport={"width": 1280, "height": 860}, locale="de-DE")
-    page = context.new_page()
-    page.goto(f"{str(service.client.base_url).rstrip('/')}/#{views_of(campaign)['diagnosis']}")
-    yield page
-    context.close()
 
 
 def settle(page: Page) -> None:
@@ -90,31 +79,13 @@ def test_no_view_keeps_anybody_out(visit: Visit, campaign: dict[str, Any], schem
         assert visit.barriers() == [], name
 
 
-def test_every_view_fits_a_phone_in_german_too(german: Page, campaign: dict[str, Any]) -> None:
-    german.set_viewport_size({"width": 320, "height": 720})
+def test_every_view_fits_a_phone(visit: Visit, campaign: dict[str, Any]) -> None:
+    visit.page.set_viewport_size({"width": 320, "height": 720})
     for name, path in views_of(campaign).items():
-        german.evaluate("(path) => { location.hash = path }", path)
-        settle(german)
-        assert german.evaluate("document.documentElement.scrollWidth <= window.innerWidth"), name
-        expect(german.get_by_role("button", name="Stopp", exact=True)).to_be_in_viewport()
-
-
-def test_it_speaks_the_reader_s_language_and_the_one_that_is_chosen(german: Page, tmp_path: Path) -> None:
-    headings = german.get_by_role("heading", level=2)
-    expect(headings.first).to_have_text("Wo")
-    assert headings.all_inner_texts()[:5] == ["Wo", "Was", "Wie viel", "Der Nachweis", "Wie weiter"]
-    expect(german.get_by_role("heading", name="Gelenkfeder an joint1")).to_be_visible()
-    assert german.locator("html").get_attribute("lang") == "de"
-    statement = german.locator(".card").get_by_text("spring is missing")
-    assert statement.get_attribute("lang") == "en"  # what the service says is English, and said to be
-    visit = Visit("", german.context, german)
-    assert visit.barriers() == []
-    visit.keep("page-german", tmp_path)
-    german.get_by_role("button", name="English").click()
-    expect(headings.first).to_have_text("Where")
-    german.reload()
-    expect(headings.first).to_have_text("Where")
-    expect(german.get_by_role("button", name="Deutsch")).to_be_visible()
+        visit.go(path)
+        settle(visit.page)
+        assert visit.page.evaluate("document.documentElement.scrollWidth <= window.innerWidth"), name
+        expect(visit.page.get_by_role("button", name="Stop", exact=True)).to_be_in_viewport()
 
 
 def test_a_robot_is_found_with_its_chain_and_what_is_known_of_it(

@@ -90,10 +90,10 @@ def test_a_key_is_asked_for_in_a_panel_that_leaves_stop_within_reach(visit: Visi
     expect(panel).to_contain_text("the API key is not known, or was revoked")
     enter(page, "read")
     expect(panel).to_be_hidden()
-    expect(page.get_by_text("No campaign yet")).to_be_visible()
+    expect(page.get_by_text("None yet")).to_be_visible()
     expect(page.locator("#link-state")).to_have_text("Connected")
     page.reload()
-    expect(page.get_by_text("No campaign yet")).to_be_visible()
+    expect(page.get_by_text("None yet")).to_be_visible()
     expect(panel).to_be_hidden()
 
 

@@ -89,6 +89,6 @@ def test_a_drift_is_taken_note_of_and_stop_stays_within_reach(visit: Visit, serv
     page.get_by_role("button", name="Stop").click()
     expect(page.get_by_text("Nothing was moving.")).to_be_visible()
     event.get_by_role("button", name="Take note").click()
-    expect(page.get_by_text("No drift that nobody has taken note of.")).to_be_visible()
+    expect(page.get_by_text("No open drift alerts.")).to_be_visible()
     (kept,) = service.client.get("/api/v1/events").json()["events"]
     assert (kept["parameter"], kept["note"]) == (MOVED, "gear oil changed")

@@ -39,7 +39,7 @@ def test_from_a_robot_file_to_the_report_in_hand(
 
 def begin_a_campaign(visit: Visit, tmp_path: Path) -> None:
     page = visit.page
-    visit.go("/")
+    visit.go("/campaigns")
     expect(page.get_by_text("No campaign yet")).to_be_visible()
     page.get_by_role("link", name="New campaign").click()
     page.get_by_label("Robot file").set_input_files(PAPER_ROBOT)
@@ -58,7 +58,7 @@ def watch_it_to_its_end(visit: Visit, tmp_path: Path) -> None:
     expect(page.get_by_text("Waiting for the arm").or_(page.get_by_text(" of ").first).first).to_be_visible(
         timeout=CAMPAIGN_MS
     )
-    expect(page.get_by_text("The findings explain all that the model left.")).to_be_visible(timeout=CAMPAIGN_MS)
+    expect(page.get_by_text("The findings explain the whole residual.")).to_be_visible(timeout=CAMPAIGN_MS)
     expect(page.get_by_text("Joint spring at joint1")).to_be_visible()
     steps = page.locator(".steps li")
     expect(steps).to_have_count(6)
@@ -71,8 +71,17 @@ def read_the_diagnosis(visit: Visit, tmp_path: Path) -> None:
     page = visit.page
     page.get_by_role("link", name="Read the diagnosis").click()
     headings = page.get_by_role("heading", level=2)
-    expect(headings.first).to_have_text("Where")
-    assert headings.all_inner_texts()[:5] == ["Where", "What", "How much", "The proof", "What next"]
+    expect(headings.first).to_have_text("Residual over the motion")
+    sections = [
+        "Residual over the motion",
+        "Confirmed findings",
+        "Next experiment",
+        "Residual by state",
+        "Proof",
+        "Residual and parameters",
+    ]
+    assert [text for text in headings.all_inner_texts() if text != "Tentative findings"][:6] == sections
+    expect(page.get_by_role("heading", level=1)).to_contain_text("spring is missing at joint1")
     expect(page.locator(".canvas canvas").first).to_be_visible()
     assert visit.barriers() == []
     visit.keep("page-diagnosis", tmp_path)
@@ -86,14 +95,20 @@ def read_the_diagnosis(visit: Visit, tmp_path: Path) -> None:
 
 
 def run_the_next_experiment(visit: Visit, service: Served, tmp_path: Path) -> None:
-    """One click, and the arm that was diagnosed plays the planned motion: with what it conceals."""
+    """One click: the arm that was diagnosed plays the planned motion, and is diagnosed again."""
     page = visit.page
     expect(page.locator("#next").get_by_text(re.compile("^Planned: "))).to_be_visible()
-    page.get_by_role("button", name="Run it on the simulated arm").click()
+    page.get_by_role("button", name="Run it on the simulated arm, and diagnose again").click()
     page.wait_for_url("**/#/runs/*")
-    expect(page.get_by_role("link", name="Look at the recording")).to_be_visible(timeout=CAMPAIGN_MS)
+    run = service.client.get(f"/api/v1/runs/{page.url.rsplit('/', 1)[1].partition('?')[0]}").json()
+    page.wait_for_url("**/#/diagnoses/*before=*", timeout=CAMPAIGN_MS)
+    expect(page.get_by_text("Since the experiment")).to_be_visible(timeout=CAMPAIGN_MS)
+    expect(page.locator(".change")).to_contain_text("Joint spring at joint1: ")
+    visit.keep("page-change", tmp_path)
+    visit.go(f"/runs/{run['id']}")
+    expect(page.get_by_role("link", name="Look at the recording")).to_be_visible()
     visit.keep("page-run", tmp_path)
-    run = service.client.get(f"/api/v1/runs/{page.url.rsplit('/', 1)[1]}").json()
+    run = service.client.get(f"/api/v1/runs/{run['id']}").json()
     (effect,) = run["backend"]["scenario"]["effects"]
     assert (run["state"], effect["effect"], run["recording"]["partial"]) == ("finished", "joint_spring", False)
     page.get_by_role("link", name="Look at the recording").click()
@@ -142,7 +157,7 @@ def test_every_screen_holds_it_without_a_sideways_scroll(
 
 def test_it_is_worked_by_keyboard_alone(visit: Visit, address: dict[str, str]) -> None:
     page = visit.page
-    visit.go("/")
+    visit.go("/campaigns")
     expect(page.get_by_role("link", name="New campaign")).to_be_visible()
     page.keyboard.press("Tab")
     expect(page.get_by_role("link", name="Skip to the content")).to_be_focused()

@@ -26,7 +26,6 @@ class QuadraticSpring(Effect):
     """An effect as a plugin brings one: τ = k q |q|."""
 
     id = "quadratic_spring"
-    german = "quadratische Feder"
     arguments = frozenset({"position"})
     equation = "tau = k q |q|"
     meaning = "an elastic torque grows with the square of the angle"
@@ -65,8 +64,8 @@ def sized(form: Effect) -> tuple[Array, Array]:
 def test_an_effect_states_its_law_and_its_words(kind: type[Effect]) -> None:
     assert re.fullmatch(r"[a-z]+(_[a-z]+)*", kind.id)
     assert [each.id for each in catalogue()].count(kind.id) == (kind is not QuadraticSpring)
-    assert all([kind.equation, kind.meaning, kind.remedy, kind.revealing_motion, kind.german, kind.coefficients])
-    assert "\n" not in "".join([kind.equation, kind.meaning, kind.remedy, kind.revealing_motion, kind.german])
+    assert all([kind.equation, kind.meaning, kind.remedy, kind.revealing_motion, kind.coefficients])
+    assert "\n" not in "".join([kind.equation, kind.meaning, kind.remedy, kind.revealing_motion])
     arguments = {"position", "velocity", "acceleration", "load", "time", "others"}
     assert kind.arguments is None or kind.arguments <= arguments
 

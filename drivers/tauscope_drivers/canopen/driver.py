@@ -13,7 +13,7 @@ class CanopenDriver(BusDriver):
     """Implements `BusDriver`."""
 
     name = "canopen"
-    titles = {"en": "CANopen drives", "de": "CANopen-Antriebe"}  # noqa: RUF012 - never changed
+    title = "CANopen drives"
     options = (
         Option("interface", "interface of python-can, in place of the robot file's"),
         Option("channel", "its channel, in place of the robot file's"),

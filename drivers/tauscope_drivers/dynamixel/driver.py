@@ -13,7 +13,7 @@ class DynamixelDriver(BusDriver):
     """Implements `BusDriver`."""
 
     name = "dynamixel"
-    titles = {"en": "Dynamixel servos", "de": "Dynamixel-Servos"}  # noqa: RUF012 - never changed
+    title = "Dynamixel servos"
     options = (
         Option("port", "serial device, in place of the robot file's"),
         PATIENCE,

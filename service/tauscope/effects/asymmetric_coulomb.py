@@ -18,7 +18,6 @@ class AsymmetricCoulomb(Effect):
     of_motion_and_step = True
     id = "asymmetric_coulomb"
     rank = 10
-    german = "richtungsabhängige coulombsche Reibung"
     arguments = frozenset({"velocity"})
     equation = "tau = a |sgn(qd)|, sgn smoothed: Coulomb friction F_c + a forwards, F_c - a backwards"
     meaning = "Coulomb friction differs with the direction of motion"

@@ -17,7 +17,6 @@ class AsymmetricViscous(Effect):
     of_motion_alone = True
     id = "asymmetric_viscous"
     rank = 20
-    german = "richtungsabhängige viskose Reibung"
     arguments = frozenset({"velocity"})
     equation = "tau = b |qd|: viscous friction F_v + b forwards, F_v - b backwards"
     meaning = "viscous friction differs with the direction of motion"

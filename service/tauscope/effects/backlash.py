@@ -150,7 +150,6 @@ class Backlash(Deflection):
 
     id = "backlash"
     rank = 120
-    german = "Spiel"
     equation = "q_link = q - delta, delta = +-b/2 under load, I d2(delta)/dt2 = tau_rb in between"
     meaning = "the transmission has play when the load changes sign"
     remedy = "take up the play, or model a dead zone"

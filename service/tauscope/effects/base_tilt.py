@@ -32,7 +32,6 @@ class BaseTilt(Effect):
 
     id = "base_tilt"
     rank = 200
-    german = "geneigte Basis"
     arguments = frozenset({"position", "others"})
     equation = "tau = dtau/dg (|g| (alpha_1 e_1 + alpha_2 e_2)), e_1 and e_2 across gravity"
     meaning = "gravity points elsewhere in the base frame than the robot file says"

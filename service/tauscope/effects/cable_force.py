@@ -24,7 +24,6 @@ class CableForce(Effect):
     of_motion_alone = True
     id = "cable_force"
     rank = 190
-    german = "Kabelkraft"
     arguments = frozenset({"position"})
     equation = "tau = +-k max(+-(q - q_t), 0)^p"
     meaning = "a one-sided elastic torque sets in past an angle"

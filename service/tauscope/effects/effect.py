@@ -109,7 +109,7 @@ class Effect(ABC):
     `code` is the torque as an expression that C and Python share: q, v and load are position, velocity and rigid-body
     torque of the joint, {c[0]} and {s[0]} the first coefficient and shape, {step} the smooth sign of v, {effect} the
     object. Without it, `no_code` is the reason. `no_scenario` is the reason where a scenario cannot hold the effect.
-    `rank` is its place in the catalogue and in documents, `german` its name on the German page.
+    `rank` is its place in the catalogue and in documents.
     One that `is_variant` is a form of the effect of the same id and stands in no catalogue itself.
     Every geared joint may have one that `is_expected`: it counts towards no limit, and nothing is doubted beside it.
     One that `has_constant` of its own shows it as the nominal model's offset.
@@ -120,7 +120,6 @@ class Effect(ABC):
     meaning: ClassVar[str]
     remedy: ClassVar[str]
     revealing_motion: ClassVar[str]
-    german: ClassVar[str] = ""
     code: ClassVar[str] = ""
     no_code: ClassVar[str] = ""
     no_scenario: ClassVar[str] = ""

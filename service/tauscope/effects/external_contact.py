@@ -36,7 +36,6 @@ class ExternalContact(TimeLocalEffect):
     of_motion_alone = True
     id = "external_contact"
     rank = 220
-    german = "Kontakt von außen"
     arguments = frozenset({"time"})
     equation = "tau = J(q)^T F w(t), or tau_j = c w(t); w = 1 or a half sine from t_0 to t_1"
     meaning = "the arm touches something for a while"

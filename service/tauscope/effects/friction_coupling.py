@@ -22,7 +22,6 @@ class FrictionCoupling(Effect):
     of_motion_alone = True
     id = "friction_coupling"
     rank = 90
-    german = "gekoppelte Reibung"
     arguments = frozenset({"velocity", "others"})
     equation = "tau_j = f sgn(v) + w v, tau_k = +-tau_j, v = qd_j +- qd_k"
     meaning = "two joints share friction on the sum or difference of their motion"

@@ -42,7 +42,6 @@ class FrictionDrift(Effect):
     has_step = True
     id = "friction_drift"
     rank = 80
-    german = "Drift der Reibung"
     arguments = frozenset({"velocity", "time"})
     equation = "tau = (f sgn(qd) + w qd) h, T dh/dt = p / (1 - exp(-D/T)) - h, p = 1 or friction's own power / 1 W"
     meaning = "friction changes over time, as in a warm-up"

@@ -67,7 +67,6 @@ class JointElasticity(Deflection):
 
     id = "joint_elasticity"
     rank = 130
-    german = "Gelenkelastizität"
     equation = "q_link = q - c tau_rb, c = 1/stiffness"
     meaning = "the transmission gives way under load"
     remedy = "model the joint as two masses with a stiffness between them"

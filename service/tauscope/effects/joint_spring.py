@@ -18,7 +18,6 @@ class JointSpring(Effect):
     has_constant = True
     id = "joint_spring"
     rank = 180
-    german = "Gelenkfeder"
     arguments = frozenset({"position"})
     equation = "tau = k (q - q_0)"
     meaning = "an elastic torque grows linearly with the angle"

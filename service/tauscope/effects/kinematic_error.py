@@ -26,7 +26,6 @@ class KinematicError(Effect):
 
     id = "kinematic_error"
     rank = 230
-    german = "Kinematikfehler"
     arguments = frozenset({"position", "velocity", "acceleration", "others"})
     equation = "tau = dtau/dd d, d the displacement of one link's frame along one of its axes"
     meaning = "a link length or frame is wrong"

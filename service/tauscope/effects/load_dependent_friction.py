@@ -16,7 +16,6 @@ class LoadDependentFriction(Effect):
     has_step = True
     id = "load_dependent_friction"
     rank = 40
-    german = "lastabhängige Reibung"
     arguments = frozenset({"load", "velocity"})
     equation = "tau = mu |tau_rb| sgn(qd)"
     meaning = "friction grows with the transmitted torque"

@@ -23,7 +23,6 @@ class NonlinearViscous(Effect):
     of_motion_alone = True
     id = "nonlinear_viscous"
     rank = 30
-    german = "nichtlineare viskose Reibung"
     arguments = frozenset({"velocity"})
     equation = "tau = c sgn(qd) |qd|^p"
     meaning = "friction grows with a power of speed other than one"

@@ -19,7 +19,6 @@ class Payload(Effect):
     of_motion_alone = True
     id = "payload"
     rank = 240
-    german = "Nutzlast"
     arguments = frozenset({"position", "velocity", "acceleration", "others"})
     equation = "tau = m Phi_body(q, qd, qdd; r)"
     meaning = "a mass is fixed to the tool that the model does not have"

@@ -24,7 +24,6 @@ class PayloadChange(TimeLocalEffect):
     of_motion_alone = True
     id = "payload_change"
     rank = 210
-    german = "wechselnde Nutzlast"
     arguments = frozenset({"position", "velocity", "acceleration", "others", "time"})
     equation = "tau = m Phi_body(q, qd, qdd; r) w(t), w = 1 from t_on to t_off"
     meaning = "a mass at the tool is picked up or dropped"

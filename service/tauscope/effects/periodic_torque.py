@@ -217,7 +217,6 @@ class Cogging(_Periodic):
     of_motion_alone = True
     id = "cogging"
     rank = 100
-    german = "Rastmoment"
     arguments = frozenset({"position"})
     equation = "tau = sum a sin(k q + phi)"
     meaning = "torque repeats with the angle, whatever the load"
@@ -241,7 +240,6 @@ class TorqueRipple(_Periodic):
 
     id = "torque_ripple"
     rank = 110
-    german = "Drehmomentwelligkeit"
     arguments = frozenset({"position", "load"})
     equation = "tau = tau_rb sum a sin(k q + phi)"
     meaning = "torque repeats with the angle, in proportion to the load"

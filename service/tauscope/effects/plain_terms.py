@@ -33,7 +33,6 @@ class ViscousFriction(PlainTerm):
 
     id = "viscous_friction"
     rank = 270
-    german = "viskose Reibung"
     arguments = frozenset({"velocity"})
     term = "viscous"
     equation = "tau = c qd"
@@ -57,7 +56,6 @@ class CoulombFriction(PlainTerm):
 
     id = "coulomb_friction"
     rank = 260
-    german = "coulombsche Reibung"
     arguments = frozenset({"velocity"})
     term = "stiction"
     equation = "tau = f sgn(qd)"
@@ -81,7 +79,6 @@ class TorqueOffset(PlainTerm):
 
     id = "torque_offset"
     rank = 250
-    german = "Drehmomentversatz"
     arguments = frozenset()
     term = "offset"
     equation = "tau = c"

@@ -26,7 +26,6 @@ class PositionDependentFriction(Effect):
     of_motion_and_step = True
     id = "position_dependent_friction"
     rank = 50
-    german = "stellungsabhängige Reibung"
     arguments = frozenset({"position", "velocity"})
     equation = "tau = sgn(qd) (a cos kq + b sin kq)"
     meaning = "the friction level varies with the joint's position"

@@ -61,7 +61,6 @@ class PreslidingHysteresis(Effect):
     of_motion_and_step = True
     id = "presliding_hysteresis"
     rank = 70
-    german = "Hysterese vor dem Gleiten"
     arguments = frozenset({"position", "velocity"})
     equation = "tau = F (z - sgn(qd)), dz/dt = qd/x_s - |qd| z/x_s"
     meaning = "friction rises over a distance after each reversal instead of stepping"

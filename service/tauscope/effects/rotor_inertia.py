@@ -15,7 +15,6 @@ class RotorInertia(Effect):
     is_expected = True
     id = "rotor_inertia"
     rank = 140
-    german = "Rotorträgheit"
     arguments = frozenset({"acceleration"})
     equation = "tau = I_a qdd"
     meaning = "the motor's reflected inertia is left out"

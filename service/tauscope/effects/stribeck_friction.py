@@ -26,7 +26,6 @@ class StribeckFriction(Effect):
     of_motion_and_step = True
     id = "stribeck_friction"
     rank = 60
-    german = "Stribeck-Reibung"
     arguments = frozenset({"velocity"})
     equation = "tau = s sgn(qd) exp(-(|qd|/v_s)^alpha)"
     meaning = "friction rises towards zero velocity more than the model's curve"

@@ -28,7 +28,6 @@ class LateTorque(Effect):
 
     id = "time_delay"
     rank = 170
-    german = "Zeitversatz"
     equation = "tau_recorded(t) = tau(t - d)"
     meaning = "the torque channel is late against the positions (early where d is negative)"
     remedy = "shift the torque channel by d"

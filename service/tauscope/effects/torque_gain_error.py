@@ -17,7 +17,6 @@ class TorqueGainError(Effect):
 
     id = "torque_gain_error"
     rank = 150
-    german = "falscher Drehmomentfaktor"
     equation = "tau_recorded = (1 + g) tau"
     meaning = "the recorded torque is scaled: the torque constant is wrong"
     remedy = "correct the joint's torque_constant by 1 + g"

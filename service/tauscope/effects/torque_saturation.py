@@ -26,7 +26,6 @@ class Saturation(Effect):
 
     id = "torque_saturation"
     rank = 160
-    german = "Drehmomentsättigung"
     equation = "tau_recorded = tau - a (tau - c tanh(tau/c)); clipped: tau - a (tau - clip(tau, +-c))"
     meaning = "the recorded torque is compressed or clipped at high load"
     remedy = "record within the sensor's or the drive's linear range"

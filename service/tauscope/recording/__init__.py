@@ -4,11 +4,13 @@ from tauscope.recording.checks import RecordingReport, check_recording, report_r
 from tauscope.recording.convert import Conversion, convert_recording, write_recording
 from tauscope.recording.examination import examine_recording, open_recording
 from tauscope.recording.layout.guess import flow_text
+from tauscope.recording.mapping import ColumnMapping, find_mapping
 from tauscope.recording.reading import read_recording
 from tauscope.recording.recording import EffortKind, Recording, Samples
 from tauscope.recording.units import Reading, parse_units
 
 __all__ = [
+    "ColumnMapping",
     "Conversion",
     "EffortKind",
     "Reading",
@@ -18,6 +20,7 @@ __all__ = [
     "check_recording",
     "convert_recording",
     "examine_recording",
+    "find_mapping",
     "flow_text",
     "open_recording",
     "parse_units",

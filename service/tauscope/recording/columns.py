@@ -45,6 +45,11 @@ def table_columns(joint_count: int, effort_kind: EffortKind, groups: Sequence[st
     return (*names, "period") if "period" in groups else tuple(names)
 
 
+def is_column(name: str) -> bool:
+    """Whether a name is one of CONTRACT.md's."""
+    return name in ("t", "period") or _JOINT_COLUMN.fullmatch(name) is not None
+
+
 def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLayout:
     """Find the columns of CONTRACT.md in a file's header, as its mapping, its preset or their own names say.
 
@@ -64,7 +69,7 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
         named = [name for name in header if name]
         if reading.columns is not None or isinstance(error, RecordingMismatchError) or len(set(named)) < len(named):
             raise
-        guess = _guess_sound(header, reading, file)
+        guess = suggest_layout(header, reading, file)
         if guess is None and _is_ours(header):
             raise
         if guess is None:
@@ -78,7 +83,7 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
         raise RecordingError(f"{text}; if this maps them, give it as --columns FILE.yaml: {layout}") from error
 
 
-def _guess_sound(header: Sequence[str], reading: Reading, file: str) -> RecordingLayout | None:
+def suggest_layout(header: Sequence[str], reading: Reading, file: str) -> RecordingLayout | None:
     """The mapping that the header suggests, None where a file with it would be refused again."""
     guess = guess_layout(header, reading.joint_names, prefers_torque=reading.prefers_torque)
     if guess is None:

@@ -1,5 +1,6 @@
 """The history of models on both databases: who is active, who stays, and what is told."""
 
+import json
 import threading
 from dataclasses import replace
 from datetime import timedelta
@@ -62,6 +63,27 @@ def test_one_that_does_not_pass_changes_nothing(history: ModelHistory) -> None:
     consider(history, 4, viscous(9.0).model_copy(update={"undetermined": ["Iyy1"]}))
     assert states(history) == ["refused", "active", "refused", "refused"]
     assert history.events("arm", only_open=False, limit=10) == []
+
+
+def diagnosis(after: float, shift_in_std: float, *effects: str) -> bytes:
+    """A diagnosis of the same recordings: its findings move the viscous friction from 1."""
+    shift = {"parameter": "viscous shoulder", "before": 1.0, "after": after, "shift_in_std": shift_in_std}
+    findings = [{"effect": effect, "joint": "shoulder", "probability": 0.9} for effect in effects]
+    return json.dumps({"verdict": "explained", "findings": findings, "parameter_shifts": [shift]}).encode()
+
+
+def test_one_that_its_own_diagnosis_contradicts_is_neither_active_nor_the_reference(history: ModelHistory) -> None:
+    contradicted = consider(history, 1, viscous(1.0), diagnosis=diagnosis(0.2, -80.0, "joint_spring"))
+    assert (contradicted.state, contradicted.is_reference) == ("refused", False)
+    (closed,) = [gate for gate in contradicted.gates if not gate.passed]
+    assert closed.name == "diagnosis"
+    assert "joint_spring at shoulder, which moves viscous shoulder by 80 standard errors" in closed.reason
+    assert history.active("arm") is None
+    small = consider(history, 2, viscous(1.0), diagnosis=diagnosis(1.02, 80.0, "joint_spring"))
+    assert (small.state, small.is_reference) == ("active", True)  # far in standard errors, and little in size
+    assert consider(history, 3, viscous(1.0), diagnosis=diagnosis(0.2, -3.0, "joint_spring")).state == "active"
+    assert consider(history, 4, viscous(1.0), diagnosis=diagnosis(0.2, -80.0)).state == "active"
+    assert consider(history, 5, viscous(1.0), diagnosis=b"{}").state == "active"  # of another version
 
 
 def test_an_older_one_and_a_simulated_one_never_replace_what_an_arm_said(history: ModelHistory) -> None:

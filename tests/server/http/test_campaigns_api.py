@@ -51,6 +51,15 @@ def ended(client: TestClient, campaign: dict[str, Any]) -> dict[str, Any]:
     return client.get(here).json()
 
 
+def test_a_simulated_arm_without_a_model_is_refused_before_its_motion_is_designed(waiting_arm: TestClient) -> None:
+    robot = {key: value for key, value in ROBOT.items() if key != "model"}
+    for path in (CAMPAIGNS, RUNS):
+        answer = waiting_arm.post(path, json={"robot": robot, "backend": {"name": "sim"}})
+        assert "all 2 links; state model.links" in assert_problem(answer, "robot-file", 422)["detail"]
+    for path in ("campaigns", "runs", "excitations"):
+        assert waiting_arm.get(f"/api/v1/{path}").json()[path] == []
+
+
 def test_a_campaign_all_the_way(
     arm: TestClient, controls: HandControls, paper_robot: bytes, paper_recordings: tuple[bytes, bytes]
 ) -> None:

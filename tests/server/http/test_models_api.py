@@ -5,11 +5,16 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from identified import NOON
 from server.conftest import IDENTIFICATIONS, RECORDINGS, connected
 from server.http.problem_check import assert_problem
 from server.queue.executors import InlineExecutor
 from snapshots import SNAPSHOTS, unpacked
+from tauscope.server.control.campaign import CampaignLinks, CampaignWorkspace
+from tauscope.server.history.model_judgement import Candidate
 from tauscope.server.http import Settings, create_app
+from tauscope.server.http.services import Services
+from tauscope.server.queue.record import JobRecord, JobState
 
 MODELS, ROBOT = "/api/v1/models", "paper-arm"
 
@@ -60,6 +65,30 @@ def test_evidence_of_a_model_in_use_is_not_removed(paper: TestClient) -> None:
     assert paper.delete(f"{IDENTIFICATIONS}/{second['id']}").status_code == 204
     assert paper.delete(f"{RECORDINGS}/b.csv").status_code == 204
     assert_problem(paper.delete(f"{RECORDINGS}/a.csv"), "in-use", 409)
+
+
+def test_a_model_waits_for_its_campaign_and_is_judged_by_its_diagnosis(
+    paper: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    services: Services = paper.app.state.services  # pyright: ignore[reportAttributeAccessIssue]
+    keeper, identifier = services.models, models(paper)[0]["id"]
+    diagnoses, campaigns = services.diagnoses.items, services.campaigns.items
+    content = b'{"schema": "tauscope.diagnosis/1", "verdict": "explained"}'
+    folder = diagnoses.stage()
+    (folder / "result.json").write_bytes(content)
+    made = CampaignLinks(identification=identifier, diagnosis=diagnoses.publish(folder))
+    folder, record = campaigns.stage(), JobRecord(state=JobState.RUNNING, created=NOON)
+    CampaignWorkspace(folder).write_made(made)
+    CampaignWorkspace(folder).write_record(record)
+    campaign = CampaignWorkspace(campaigns.folder(campaigns.publish(folder)))
+    judged: list[Candidate] = []
+    monkeypatch.setattr(keeper.history, "list_unjudged", lambda _site: [identifier])
+    monkeypatch.setattr(keeper.history, "consider", lambda candidate, _now: judged.append(candidate) or entry)
+    entry = keeper.history.find(identifier)
+    assert keeper.judge_new() == judged == []
+    campaign.write_record(record.moved(JobState.SUCCEEDED, NOON))
+    assert keeper.judge_new() == [entry]
+    assert [each.diagnosis for each in judged] == [content]
 
 
 def test_a_choice_by_hand_with_its_reason(paper: TestClient) -> None:

@@ -1,10 +1,12 @@
 """Recordings over HTTP: sent, listed, checked, removed."""
 
 import hashlib
+import json
 import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
@@ -212,3 +214,50 @@ def test_a_recording_is_fetched_as_it_was_sent(name: str, kind: str, client: Tes
 @pytest.mark.parametrize("name", ["nothing.csv", ".sha256", "..", "%2e%2e%2f.lock"])
 def test_nothing_else_is_fetched(name: str, module_client: TestClient) -> None:
     assert_problem(module_client.get(f"{RECORDINGS}/{name}/content"), "not-found", 404)
+
+
+CHECK = "/api/v1/mappings/check"
+FOREIGN = b"timestamp,actual_q_0,target_moment_0\n" + b"".join(
+    b"%.2f,%.3f,%.1f\n" % (0.01 * k, 0.1 * (k % 7), k % 3) for k in range(50)
+)
+
+
+def check(client: TestClient, content: bytes, request: dict[str, object] | None = None) -> dict[str, Any]:
+    files = {"file": ("log.csv", content), "request": (None, json.dumps(request or {}), "application/json")}
+    answer = client.post(CHECK, files=files)
+    assert answer.status_code == 200, answer.text
+    return answer.json()
+
+
+def test_a_recording_is_understood_and_nothing_of_it_is_kept(client: TestClient, settings: Settings) -> None:
+    found = check(client, CSV)
+    assert found["mapping"]["columns"] == {"t": "t", "q1": "q1", "tau1": "tau1"}
+    assert found["mapping"]["units"] == {"t": "s", "q": "rad", "qd": "rad", "tau": "Nm"}
+    assert (found["mapping"]["is_guessed"], found["report"]["samples"], found["problem"]) == (False, 50, None)
+    assert client.get(RECORDINGS).json()["recordings"] == []
+    assert [path.name for path in settings.recordings_folder.iterdir() if path.name != ".sha256"] == []
+
+
+def test_a_mapping_is_guessed_from_other_names_and_a_stated_one_is_used(client: TestClient) -> None:
+    found = check(client, FOREIGN)
+    assert found["mapping"]["columns"] == {"t": "timestamp", "q1": "actual_q_0", "tau1": "target_moment_0"}
+    assert (found["mapping"]["is_guessed"], found["report"]["samples"]) == (True, 50)
+    columns = {"t": "timestamp", "q1": "target_moment_0", "tau1": "actual_q_0"}
+    stated = check(client, FOREIGN, {"columns": columns, "units": {"t": "ms"}})
+    assert (stated["mapping"]["columns"], stated["mapping"]["units"]["t"]) == (columns, "ms")
+    assert (stated["mapping"]["is_guessed"], stated["report"]["duration_s"]) == (False, pytest.approx(0.49e-3))
+
+
+def test_what_is_refused_comes_with_its_columns_and_the_reason(client: TestClient) -> None:
+    found = check(client, b"time,angle,torque\n0,1,2\n1,x,3\n")
+    assert found["report"] is None
+    assert found["problem"] == "log.csv: line 3, column q1: 'x' is not a number"
+    partial = check(client, b"time,angle,humidity\n0,1,2\n1,2,3\n")
+    assert partial["mapping"]["columns"] == {"t": "time", "q1": "angle"}
+    assert partial["problem"].startswith("log.csv: ")
+
+
+def test_no_recording_and_a_wrong_request_are_refused(client: TestClient) -> None:
+    assert_problem(client.post(CHECK, files={"request": (None, "{}")}), "invalid-request", 422)
+    files = {"file": ("log.csv", CSV), "request": (None, '{"units": {"t": "weeks"}}')}
+    assert_problem(client.post(CHECK, files=files), "invalid-request", 422)

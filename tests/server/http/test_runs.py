@@ -281,7 +281,8 @@ def test_requests_that_are_refused(
 
 
 def test_a_trajectory_of_another_robot(arm: TestClient) -> None:
-    robot = {"name": "one", "kinematics": {"dh": [{"theta": 0.0, "d": 0.0, "a": 0.5, "alpha": 0.0}]}}
+    kinematics = {"dh": [{"theta": 0.0, "d": 0.0, "a": 0.5, "alpha": 0.0}]}
+    robot = {"name": "one", "kinematics": kinematics, "model": {"links": ROBOT["model"]["links"][:1]}}
     answer = arm.post(RUNS, json={"robot": robot, "trajectory": move_document()})
     assert "2 joints" in assert_problem(answer, "excitation", 422)["detail"]
 

@@ -48,7 +48,7 @@ _RULES: tuple[tuple[str, re.Pattern[str], Scope], ...] = tuple(
         # Whoever may see an arm move may stop it.
         ("POST", "stop", Scope.READ),
         ("POST", f"(runs|campaigns)/{_ITEM}/stop", Scope.READ),
-        ("POST", "robots/check", Scope.ANALYSE),
+        ("POST", "(robots|mappings)/check", Scope.ANALYSE),
         ("POST", "recordings", Scope.ANALYSE),
         ("POST", _ANALYSES, Scope.ANALYSE),
         ("DELETE", f"{_ANALYSES}/{_ITEM}", Scope.ANALYSE),

@@ -118,8 +118,8 @@ def _roles(order: Any) -> Iterator[RecordingRole]:
 def _figures(kind: str, document: Mapping[str, Any]) -> dict[str, str | float | None]:
     """What a search shows of a result; what a result of another version lacks stays open."""
     if kind == "diagnosis":
-        verdict = document.get("verdict")
-        return {"verdict": verdict if isinstance(verdict, str) else None}
+        words = {name: document.get(name) for name in ("verdict", "headline")}
+        return {name: word if isinstance(word, str) and word else None for name, word in words.items()}
     if kind != "identification":
         return {}
     fit = document.get("fit")

@@ -1,11 +1,13 @@
 """Judging one identification within a transaction: its gates, its place, and what has drifted since the reference."""
 
 import json
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime, timedelta
+from typing import TypeVar
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from sqlalchemy import select
 from sqlalchemy.orm import Session, undefer
 
@@ -14,6 +16,32 @@ from tauscope.server.history.drift import Drift, compute_drift, describe_drift, 
 from tauscope.server.history.gates import Gate, ModelPolicy, check_gates, passes
 from tauscope.server.store.database.tables import Model, ModelChoice, ModelEvent, Robot
 
+Document = TypeVar("Document", bound=BaseModel)
+
+
+class NamedFinding(BaseModel):
+    """A finding of a diagnosis."""
+
+    effect: str
+    joint: str | None
+
+
+class ParameterShift(BaseModel):
+    """The change of a parameter when the findings are added, values in SI."""
+
+    parameter: str
+    before: float
+    after: float
+    shift_in_std: float
+
+
+class OwnDiagnosis(BaseModel):
+    """As much of a diagnosis as a model is judged by."""
+
+    verdict: str
+    findings: list[NamedFinding]
+    parameter_shifts: list[ParameterShift]
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -21,6 +49,8 @@ class Candidate:
 
     result : bytes or None
         its document; None where it cannot be read
+    diagnosis : bytes or None
+        document of the diagnosis of the same recordings; None where there is none
     """
 
     identifier: str
@@ -29,11 +59,12 @@ class Candidate:
     created: datetime
     source: str
     result: bytes | None
+    diagnosis: bytes | None = None
 
 
 def judge(session: Session, robot: Robot, candidate: Candidate, policy: ModelPolicy, now: datetime) -> Model:
     """Judge an identification, and write down what came of it."""
-    document = _parse(candidate.result)
+    document = _parse(candidate.result, IdentificationDocument)
     active, reference = _current(session, robot, is_active=True), _current(session, robot, is_active=False)
     model = Model(
         robot=robot,
@@ -51,6 +82,7 @@ def judge(session: Session, robot: Robot, candidate: Candidate, policy: ModelPol
     session.add(model)
     if document is not None:
         gates = (*check_gates(document, policy, _document(active)), *_check_place(candidate, active))
+        gates += tuple(_check_diagnosis(candidate.diagnosis, document, policy))
         model.gates, model.state = [asdict(gate) for gate in gates], "refused"
         if passes(gates):
             choose(session, model, "active", "all gates passed", now)
@@ -98,6 +130,33 @@ def _check_place(candidate: Candidate, active: Model | None) -> Sequence[Gate]:
     return gates
 
 
+def _check_diagnosis(content: bytes | None, document: IdentificationDocument, policy: ModelPolicy) -> Iterator[Gate]:
+    """A model whose parameters hold without the physics that its own diagnosis names.
+
+    A parameter that the findings move by as much as counts as drift is wrong in the model.
+    """
+    diagnosis = _parse(content, OwnDiagnosis)
+    if diagnosis is None:
+        return
+    scales = {parameter.name: parameter.scale for parameter in extract_parameters(document)}
+    moved = [
+        shift
+        for shift in diagnosis.parameter_shifts
+        if abs(shift.shift_in_std) > policy.drift_std
+        and abs(shift.after - shift.before) > policy.drift_share * scales.get(shift.parameter, math.inf)
+    ]
+    if not diagnosis.findings or not moved:
+        yield Gate("diagnosis", True, f"its diagnosis is {diagnosis.verdict}, and moves no parameter beyond its bounds")
+        return
+    worst, finding = max(moved, key=lambda shift: abs(shift.shift_in_std)), diagnosis.findings[0]
+    place = f" at {finding.joint}" if finding.joint else ""
+    reason = (
+        f"its diagnosis names {finding.effect}{place}, which moves {worst.parameter} by"
+        f" {abs(worst.shift_in_std):.0f} standard errors; add it to the model, or activate this one by hand"
+    )
+    yield Gate("diagnosis", False, reason)
+
+
 def _raise_drift_events(
     session: Session,
     reference: Model,
@@ -143,9 +202,9 @@ def _document(model: Model | None) -> IdentificationDocument | None:
     return None if model is None or model.document is None else IdentificationDocument.model_validate(model.document)
 
 
-def _parse(result: bytes | None) -> IdentificationDocument | None:
+def _parse(result: bytes | None, kind: type[Document]) -> Document | None:
     """The document of a result; None where it is none."""
     try:
-        return None if result is None else IdentificationDocument.model_validate_json(result)
+        return None if result is None else kind.model_validate_json(result)
     except ValidationError:
         return None

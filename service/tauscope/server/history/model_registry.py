@@ -3,6 +3,7 @@
 import logging
 from collections import Counter
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -10,10 +11,12 @@ from sqlalchemy.exc import IntegrityError
 
 from tauscope.errors import NotFoundError
 from tauscope.runtime.drivers import driver_names, find_driver
+from tauscope.server.control.campaign import CampaignWorkspace
 from tauscope.server.control.run import RunWorkspace
 from tauscope.server.history.drift import Drift
 from tauscope.server.history.model_history import ModelEntry, ModelHistory
 from tauscope.server.history.model_judgement import Candidate, compare_models
+from tauscope.server.queue.diagnosis import DiagnosisWorkspace
 from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace
 from tauscope.server.store.items import ItemStore
 
@@ -27,7 +30,7 @@ class ModelRegistry:
         self.history = history
         self._site = site
         self._identifications = items["identification"]
-        self._runs = items["run"]
+        self._diagnoses, self._campaigns, self._runs = items["diagnosis"], items["campaign"], items["run"]
         self._failed: set[str] = set()
 
     def judge_new(self) -> list[ModelEntry]:
@@ -41,13 +44,14 @@ class ModelRegistry:
         return [entry for identifier in self.history.list_unjudged(self._site) if (entry := self._consider(identifier))]
 
     def _consider(self, identifier: str) -> ModelEntry | None:
-        """Judge one identification; None where it was removed or judged meanwhile, or names an unknown robot."""
+        """Judge one identification; None where it was judged, waits for its diagnosis, or names an unknown robot."""
         try:
             workspace = IdentificationWorkspace(self._identifications.folder(identifier))
         except NotFoundError:
             return None
         order, record = workspace.read_order(), workspace.read_record()
-        if order is None or record is None:
+        campaign = self._campaign(identifier)
+        if order is None or record is None or (campaign is not None and not campaign.has_ended()):
             return None
         candidate = Candidate(
             identifier=identifier,
@@ -56,6 +60,7 @@ class ModelRegistry:
             created=record.created,
             source=self._source(order),
             result=workspace.read_result(),
+            diagnosis=None if campaign is None else self._diagnosis(campaign.read_made().diagnosis),
         )
         try:
             entry = self.history.consider(candidate, datetime.now(UTC))
@@ -68,6 +73,21 @@ class ModelRegistry:
             return None
         _log.info("model %s of %s is %s", identifier, entry.robot, entry.state)
         return entry
+
+    def _campaign(self, identification: str) -> CampaignWorkspace | None:
+        """The campaign that an identification is of."""
+        for name in self._campaigns.identifiers():
+            with suppress(NotFoundError):
+                workspace = CampaignWorkspace(self._campaigns.folder(name))
+                if workspace.read_made().identification == identification:
+                    return workspace
+        return None
+
+    def _diagnosis(self, identifier: str | None) -> bytes | None:
+        """The result of a diagnosis; None where it has none."""
+        with suppress(NotFoundError):
+            return None if identifier is None else DiagnosisWorkspace(self._diagnoses.folder(identifier)).read_result()
+        return None
 
     def _source(self, order: IdentificationOrder) -> str:
         """What was measured: one simulated recording makes all of it simulated."""

@@ -30,6 +30,8 @@ from tauscope.server.http.methods import collect_methods
 from tauscope.server.http.openapi import install_openapi
 from tauscope.server.http.problem_handlers import install_problem_handlers
 from tauscope.server.http.protection import BodyLimit, ConcurrencyLimiter, OriginCheck, RequestLog, ResponseProtection
+from tauscope.server.http.recordings.mappings import router as mappings
+from tauscope.server.http.recordings.models import ReadingRequest
 from tauscope.server.http.recordings.router import router as recordings
 from tauscope.server.http.repeated_requests import IdempotentRequests
 from tauscope.server.http.robots.models import RobotCheckRequest
@@ -58,6 +60,7 @@ VERBS = (
     excitations,
     runs,
     recordings,
+    mappings,
     identifications,
     diagnoses,
     rollouts,
@@ -78,6 +81,7 @@ REQUESTS = (
     RunRequest,
     CampaignRequest,
     RobotCheckRequest,
+    ReadingRequest,
     LeaseRequest,
     ReasonRequest,
     ModelPolicy,

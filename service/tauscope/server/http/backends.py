@@ -44,12 +44,19 @@ def chosen_backend(settings: Settings, request: BackendRequest, robot: Robot) ->
     ScenarioError
         if the scenario is no plain data
     RobotFileError
-        if a drive block names a file that the driver would open: no path of the server is opened for a client
+        if a drive block names a file that the driver would open: no path of the server is opened for a client; or if
+        an arm without a model is to be simulated
     """
     if request.scenario is not None and to_json_text(request.scenario) is None:
         raise ScenarioError("scenario: holds NaN, infinity or text that is not Unicode; write plain numbers and text")
     name = request.name or settings.backend
-    _refuse_files(robot, find_driver(name).file_keys)
+    driver = find_driver(name)
+    _refuse_files(robot, driver.file_keys)
+    if driver.is_simulated and len(robot.model.links or ()) != robot.link_count:
+        raise RobotFileError(
+            f"{robot.name}: the {name} backend needs a model: mass, first_moment and inertia of all {robot.link_count}"
+            " links; state model.links, give a URDF with inertials, or take the improved robot of a diagnosis"
+        )
     return BackendChoice(
         name=name,
         time=request.time or settings.sim_time,

@@ -28,7 +28,8 @@ class ItemAnswer(AnswerModel):
     ended: datetime | None = Field(description="when it ended, UTC")
     problem: str | None = Field(description="one line: why it has no result")
     figures: dict[str, str | float | None] = Field(
-        description="of an identification relative_error and held_out_error, of a diagnosis verdict, of a run backend"
+        description="of an identification relative_error and held_out_error, of a diagnosis verdict and headline, of"
+        " a run backend"
     )
 
 

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from fastapi import APIRouter, Request, Response
 
-from tauscope.effects import catalogue
-from tauscope.errors import IdentificationError, NotFoundError
+from tauscope.errors import NotFoundError
 from tauscope.robot.messages import one_line, shown
 from tauscope.runtime.drivers import driver_names, find_driver
+from tauscope.server.page.example import example_files
 
 router = APIRouter(include_in_schema=False)
 
@@ -68,6 +68,15 @@ def _answer(request: Request, name: str) -> Response:
     return Response(asset.content, media_type=asset.media_type, headers=headers)
 
 
+@router.get("/example/{name}")
+def show_example(name: str) -> Response:
+    """A file of the example, for the page to fetch."""
+    content = example_files().get(name)
+    if content is None:
+        raise NotFoundError(one_line(f"the example has no file {shown(name)}; it has {', '.join(example_files())}"))
+    return Response(content, media_type="application/octet-stream", headers=HEADERS)
+
+
 @cache
 def assets() -> Mapping[str, Asset]:
     """All files of the page by name: ours, the plotting library's, and the list of drivers."""
@@ -75,24 +84,15 @@ def assets() -> Mapping[str, Asset]:
     paths = {path.name: path for path in sorted(STATIC.iterdir()) if path.suffix in MEDIA_TYPES}
     paths |= {name: Path(str(package.locate_file(file))) for name, file in PLOT_LIBRARY.items()}
     contents = {name: path.read_bytes() for name, path in paths.items()}
-    contents |= {"drivers.js": _drivers_script(), "effects.js": _effects_script()}
+    contents["drivers.js"] = _drivers_script()
     return {name: _asset(name, content) for name, content in contents.items()}
 
 
 def _drivers_script() -> bytes:
-    """The registered drivers as a module of the page: title by language, and whether each is a simulation."""
+    """The registered drivers as a module of the page: title, and whether each is a simulation."""
     drivers = [find_driver(name) for name in driver_names()]
-    content = {one.name: {"titles": dict(one.titles), "is_simulated": one.is_simulated} for one in drivers}
+    content = {one.name: {"title": one.title, "is_simulated": one.is_simulated} for one in drivers}
     return f"export const DRIVERS = {json.dumps(content, ensure_ascii=False)};\n".encode()
-
-
-def _effects_script() -> bytes:
-    """German names of the effects as a module of the page; none if a plugin is broken, so that the page still loads."""
-    try:
-        names = {each.id: each.german for each in catalogue() if each.german}
-    except IdentificationError:
-        names = {}
-    return f"export const EFFECTS = {json.dumps(names, ensure_ascii=False)};\n".encode()
 
 
 def _asset(name: str, content: bytes) -> Asset:

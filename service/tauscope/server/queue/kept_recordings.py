@@ -1,16 +1,25 @@
 """Recordings of the store as a worker process reads them: a hostile file harms that process at most."""
 
 import json
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.errors import RecordingError
-from tauscope.recording import RecordingReport, check_recording, read_recording
+from tauscope.recording import (
+    ColumnMapping,
+    Reading,
+    RecordingReport,
+    check_recording,
+    find_mapping,
+    read_recording,
+)
 from tauscope.recording.recording import Array
 from tauscope.report.decimation import envelope_indices
+from tauscope.robot import Robot
 from tauscope.server.queue.record import without_folders
 
 
@@ -32,6 +41,40 @@ def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport
     except RecordingError as error:
         raise type(error)(without_folders(str(error), path.parent)) from None
     return replace(report, name=path.name)
+
+
+@dataclass(frozen=True)
+class Understanding:
+    """How a file is understood before anything is computed from it.
+
+    mapping : ColumnMapping or None
+        None for a log, which names its joints itself
+    report : RecordingReport or None
+        None where the file is refused
+    problem : str or None
+        why it is refused
+    """
+
+    mapping: ColumnMapping | None
+    report: RecordingReport | None
+    problem: str | None
+
+
+def understand_recording(path: Path, robot: Robot | None, reading: Reading) -> Understanding:
+    """Find a file's columns and units, and report what it holds when it is read so.
+
+    A mapping that its column names suggest is used like one that was stated.
+    """
+    mapping = None
+    with suppress(RecordingError):  # a log, or a file that the check refuses, too
+        mapping = find_mapping(path, robot, reading)
+    if mapping is not None and mapping.is_guessed and reading.columns is None:
+        reading = replace(reading, columns=mapping.columns, units={**mapping.units, **reading.units})
+    try:
+        report = check_recording(path, None, robot, reading)
+    except RecordingError as error:
+        return Understanding(mapping, None, without_folders(str(error), path.parent))
+    return Understanding(mapping, replace(report, name=path.name), None)
 
 
 def read_kept_samples(path: Path, most: int) -> bytes:

@@ -30,6 +30,7 @@ CHANGING: dict[str, Scope] = {
     f"POST {V1}/campaigns/{{identifier}}/stop": READ,
     f"POST {V1}/robots/check": ANALYSE,
     f"POST {V1}/recordings": ANALYSE,
+    f"POST {V1}/mappings/check": ANALYSE,
     f"POST {V1}/identifications": ANALYSE,
     f"POST {V1}/diagnoses": ANALYSE,
     f"POST {V1}/excitations": ANALYSE,
@@ -64,6 +65,7 @@ UNDOCUMENTED: set[str] = {
     "GET /docs/errors/{code}",
     "GET /docs/how-to/{name}",
     "GET /docs/pages.css",
+    "GET /example/{name}",
     "GET /openapi.json",
     "GET /page/{name}",
 }

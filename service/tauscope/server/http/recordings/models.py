@@ -7,6 +7,7 @@ from pydantic import Field
 from tauscope.recording import EffortKind
 from tauscope.server.http.robots.models import FindingAnswer
 from tauscope.server.models import AnswerModel, Measured, PageAnswer
+from tauscope.tasks.task import ReadingOptions
 
 
 class RecordingAnswer(AnswerModel):
@@ -80,3 +81,24 @@ class RecordingReportAnswer(AnswerModel):
     periods: PeriodsAnswer | None = Field(description="repeats of the excitation, where they are marked")
     joints: tuple[ChannelsAnswer, ...] = Field(description="one a joint")
     findings: tuple[FindingAnswer, ...] = Field(description="warnings first")
+
+
+class ReadingRequest(ReadingOptions):
+    """How a recording is to be read."""
+
+
+class MappingAnswer(AnswerModel):
+    """Which columns of a file are read as which."""
+
+    header: tuple[str, ...] = Field(description="names of the file's columns; numbers from 1 where it has no names")
+    columns: dict[str, str] = Field(description="the file's column for t, q1, tau1, …; only those that were found")
+    units: dict[str, str] = Field(description="of t, q, qd and tau")
+    is_guessed: bool = Field(description="whether only the words of the column names suggest it")
+
+
+class UnderstandingAnswer(AnswerModel):
+    """How a recording is understood; nothing of it is kept."""
+
+    mapping: MappingAnswer | None = Field(description="its columns and units; null for a log, which names its joints")
+    report: RecordingReportAnswer | None = Field(description="what it holds, read so; null where it is refused")
+    problem: str | None = Field(description="why it is refused, and what to do")

@@ -20,6 +20,20 @@ EXAMPLE_ROBOT: dict[str, Any] = {
         {"name": "joint1", "limits": {"position": [-2.9, 2.9], "velocity": 2.0}},
         {"name": "joint2", "limits": {"position": [-2.9, 2.9], "velocity": 2.0}},
     ],
+    "model": {
+        "links": [
+            {
+                "mass": 2.0,
+                "first_moment": [0.0, 0.0, 0.0],
+                "inertia": {"xx": 0.02, "yy": 0.02, "zz": 0.02, "xy": 0.0, "xz": 0.0, "yz": 0.0},
+            },
+            {
+                "mass": 1.0,
+                "first_moment": [-0.25, 0.0, 0.0],
+                "inertia": {"xx": 0.01, "yy": 0.09, "zz": 0.09, "xy": 0.0, "xz": 0.0, "yz": 0.0},
+            },
+        ]
+    },
 }
 
 

@@ -41,7 +41,13 @@ export function url(path) {
 }
 
 export async function fetchRaw(path, options = {}) {
-  return answered(await fetch(url(path), { ...options, headers: headers(options.headers) }));
+  let response;
+  try {
+    response = await fetch(url(path), { ...options, headers: headers(options.headers) });
+  } catch (error) {
+    throw error instanceof TypeError ? new Problem(undefined, "The service does not answer. Check the connection, and try again.") : error;
+  }
+  return answered(response);
 }
 
 export async function getJson(path, signal) {

@@ -1,7 +1,6 @@
-// The kinematic chain as a drawing that turns: joints along their axes, links between them, in any pose.
+// The kinematic chain in space, drawn by a projection of our own: nearest last, in any pose, from any side.
 
-import { h, s } from "./dom.js";
-import { named, t } from "./words.js";
+import { h, named, s } from "./dom.js";
 
 const multiply = (a, b) => Array.from({ length: 16 }, (_, k) => {
   const row = k >> 2;
@@ -36,64 +35,126 @@ export function chain(joints, q) {
   return { points, axes };
 }
 
-/** A drawing of an arm; `pose(q)` moves it. */
+const WIDTH = 400;
+const HEIGHT = 320;
+const DISTANCE = 6; // of the eye, in radii of what is seen: a gentle perspective
+const THICKNESS = 0.09; // half the length of a joint's body, in radii of what is seen
+const STEP = 0.12; // a key turns the view by [rad]
+const GRID = 4; // lines of the ground to each side
+
+/** Rows of the rotation that turns a direction upright; the identity without one. */
+function rotationTo(up) {
+  const size = Math.hypot(...up);
+  const [x, y, z] = size ? up.map((value) => value / size) : [0, 0, 1];
+  if (z < -0.999999) return [[1, 0, 0], [0, -1, 0], [0, 0, -1]];
+  const share = 1 / (1 + z);
+  return [[1 - share * x * x, -share * x * y, -x], [-share * x * y, 1 - share * y * y, -y], [x, y, z]];
+}
+
+/** A drawing of an arm in space: `pose(q)` moves it, `show(q, levels)` colours its joints too, `trace(points)` draws a path. */
 export function armDrawing(report) {
   const joints = report.joints;
-  let azimuth = 0.7;
-  let q = joints.map(() => 0);
-  const svg = s("svg", { viewBox: "0 0 400 320", class: "arm", role: "img", tabindex: "0",
-    "aria-label": t`Kinematic chain of ${report.name}: ${joints.length} joints. Arrow keys turn it.` });
-
+  const view = { azimuth: 0.7, elevation: 0.42, q: joints.map(() => 0), levels: null, path: [] };
+  const svg = s("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: "arm", role: "img", tabindex: "0",
+    "aria-label": `Kinematic chain of ${report.name}: ${joints.length} joints. Arrow keys turn it.` });
   const reach = Math.max(0.1, joints.reduce((sum, joint) =>
     sum + Math.hypot(joint.before[3], joint.before[7], joint.before[11]) + Math.hypot(joint.after[3], joint.after[7], joint.after[11]), 0));
+  const upright = rotationTo(report.gravity.map((value) => -value));
+  const raised = (point) => upright.map((row) => row[0] * point[0] + row[1] * point[1] + row[2] * point[2]);
+  const rest = chain(joints, view.q).points.map(raised);
+  const middle = [0, 1, 2].map((k) => (Math.max(...rest.map((p) => p[k])) + Math.min(...rest.map((p) => p[k]))) / 2);
+  let radius = 0.2 * reach; // of what has to be seen around the middle; it grows with the motion
+
+  /** Place on the paper, and depth: greater is nearer. */
+  function project(point) {
+    const [x, y, z] = raised(point).map((value, k) => (value - middle[k]) / radius);
+    const [ca, sa, ce, se] = [Math.cos(view.azimuth), Math.sin(view.azimuth), Math.cos(view.elevation), Math.sin(view.elevation)];
+    const across = x * ca - y * sa;
+    const away = x * sa + y * ca;
+    const depth = z * se - away * ce;
+    const scale = (0.4 * HEIGHT * DISTANCE) / (DISTANCE - depth);
+    return { x: WIDTH / 2 + scale * across, y: HEIGHT / 2 - scale * (z * ce + away * se), depth, scale };
+  }
+
+  const pathOf = (points) => points.map((p, k) => `${k ? "L" : "M"}${p.x.toFixed(1)} ${p.y.toFixed(1)}`).join("");
+  const stroke = (name, [a, b], width) => s("path", { class: name, d: pathOf([a, b]), "stroke-width": width.toFixed(1) });
+
+  /** A solid along an axis: its far end, its body, and the end that is seen. */
+  function cylinder(one, other, width, half) {
+    const [far, near] = one.depth < other.depth ? [one, other] : [other, one];
+    const tilt = Math.min(Math.abs(far.depth - near.depth) / (2 * half), 1);
+    const angle = (Math.atan2(near.y - far.y, near.x - far.x) * 180) / Math.PI;
+    const end = (name, at, more) => s("ellipse", { class: name, rx: (tilt * width + more) / 2, ry: (width + more) / 2, transform: `translate(${at.x.toFixed(1)} ${at.y.toFixed(1)}) rotate(${angle.toFixed(1)})` });
+    return [end("joint-edge", far, 2), end("joint-edge", near, 2), stroke("joint-shadow", [far, near], width + 2), end("joint-end", far, 0), stroke("joint-body", [far, near], width), end("joint-end", near, 0)];
+  }
+
+  function ground() {
+    const lines = [];
+    const end = 1.1 * radius;
+    for (let k = -GRID; k <= GRID; k += 1) {
+      const at = (k / GRID) * end;
+      lines.push([[at, -end, 0], [at, end, 0]], [[-end, at, 0], [end, at, 0]]);
+    }
+    const lowered = (point) => [0, 1, 2].map((k) => upright[0][k] * point[0] + upright[1][k] * point[1] + upright[2][k] * point[2]);
+    return s("path", { class: "ground", d: lines.map((line) => pathOf(line.map((point) => project(lowered(point))))).join("") });
+  }
 
   function draw() {
-    const c = Math.cos(azimuth);
-    const n = Math.sin(azimuth);
-    const flat = ([x, y, z]) => [x * c - y * n, 0.42 * (x * n + y * c) - 0.9 * z];
-    const { points, axes } = chain(joints, q);
-    const size = 0.055 * reach;
-    const shown = points.map(flat);
-    const xs = shown.map((p) => p[0]);
-    const ys = shown.map((p) => p[1]);
-    const span = Math.max(Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys), 0.4 * reach) + 4 * size;
-    const scale = Math.min(380 / span, 280 / span);
-    const middle = [(Math.max(...xs) + Math.min(...xs)) / 2, (Math.max(...ys) + Math.min(...ys)) / 2];
-    const place = (p) => { const [u, v] = flat(p); return [200 + scale * (u - middle[0]), 160 + scale * (v - middle[1])]; };
-    const path = points.map((p, k) => `${k ? "L" : "M"}${place(p).map((v) => v.toFixed(1)).join(" ")}`).join("");
-    const base = place([0, 0, 0]);
-    const ends = place(points[points.length - 1]);
+    const { points, axes } = chain(joints, view.q);
+    for (const point of [...points, ...view.path]) radius = Math.max(radius, Math.hypot(...raised(point).map((value, k) => value - middle[k])));
+    const places = points.map(project);
+    const size = THICKNESS * radius;
+    const solids = [];
+    for (let k = 1; k < places.length; k += 1) {
+      const ends = [places[k - 1], places[k]];
+      if (Math.hypot(...points[k].map((value, axis) => value - points[k - 1][axis])) < 1e-6 * reach) continue;
+      const width = 0.85 * THICKNESS * ((ends[0].scale + ends[1].scale) / 2);
+      const lit = ends.map((end) => ({ x: end.x - 0.16 * width, y: end.y - 0.16 * width }));
+      solids.push({ depth: (ends[0].depth + ends[1].depth) / 2, element: s("g", {}, stroke("link-shadow", ends, width + 3), stroke("link", ends, width), stroke("link-light", lit, 0.34 * width)) });
+    }
+    axes.forEach(({ at, along, type }, place) => {
+      const tip = (sign) => project(at.map((value, k) => value + sign * size * along[k]));
+      const centre = project(at);
+      const width = 1.5 * THICKNESS * centre.scale;
+      const level = view.levels ? ` h${view.levels[place]}` : "";
+      solids.push({ depth: centre.depth + 0.01, element: s("g", { class: `joint ${type}${level}`, "data-joint": place + 1 },
+        cylinder(tip(-1), tip(1), width, THICKNESS)) });
+    });
     // Joints that sit in one place share a label.
     const labels = [];
     axes.forEach(({ at }, number) => {
-      const [x, y] = place(at);
+      const { x, y } = project(at);
       const near = labels.find((each) => Math.hypot(each.x - x, each.y - y) < 16);
       if (near) near.text += ` · ${number + 1}`;
       else labels.push({ x, y, text: `${number + 1}` });
     });
+    const tool = places[places.length - 1];
     svg.replaceChildren(
-      s("ellipse", { class: "ground", cx: base[0], cy: base[1], rx: scale * 2.6 * size, ry: scale * 1.1 * size }),
-      s("path", { class: "link-shadow", d: path }), s("path", { class: "link", d: path }),
-      ...axes.map(({ at, along, type }) => {
-        const tip = (sign) => place(at.map((v, k) => v + sign * size * along[k]));
-        const [a, b, centre] = [tip(-1), tip(1), place(at)];
-        return s("g", { class: `joint ${type}` },
-          s("line", { x1: a[0], y1: a[1], x2: b[0], y2: b[1] }),
-          s("circle", { cx: centre[0], cy: centre[1], r: 3.2 }));
-      }),
-      ...labels.map(({ x, y, text }) => s("text", { class: "label", x: x + 24, y: y + 5, text })),
-      s("circle", { class: "tool", cx: ends[0], cy: ends[1], r: 5 }));
+      ground(), view.path.length ? s("path", { class: "trace", d: pathOf(view.path.map(project)) }) : s("g"),
+      ...solids.sort((a, b) => a.depth - b.depth).map((each) => each.element),
+      ...labels.map(({ x, y, text }) => s("text", { class: "label", x: x + 22, y: y + 5, text })),
+      s("circle", { class: "tool", cx: tool.x, cy: tool.y, r: 5 }));
   }
 
-  const turn = (angle) => { azimuth += angle; draw(); };
+  function turn(about, up) {
+    view.azimuth += about;
+    view.elevation = Math.min(Math.max(view.elevation + up, -0.2), 1.5);
+    draw();
+  }
   svg.addEventListener("keydown", (event) => {
-    const angle = { ArrowLeft: -0.15, ArrowRight: 0.15 }[event.key];
-    if (angle) { event.preventDefault(); turn(angle); }
+    const by = { ArrowLeft: [-STEP, 0], ArrowRight: [STEP, 0], ArrowUp: [0, STEP], ArrowDown: [0, -STEP] }[event.key];
+    if (by) { event.preventDefault(); turn(...by); }
   });
   svg.addEventListener("pointerdown", (event) => svg.setPointerCapture(event.pointerId));
-  svg.addEventListener("pointermove", (event) => { if (event.buttons) turn(0.012 * event.movementX); });
+  svg.addEventListener("pointermove", (event) => { if (event.buttons) turn(0.012 * event.movementX, 0.01 * event.movementY); });
   draw();
-  return { element: h("figure", { class: "arm-figure" }, svg), pose(values) { q = values.map((v) => v ?? 0); draw(); } };
+  const change = (more) => { Object.assign(view, more); draw(); };
+  return {
+    element: h("figure", { class: "arm-figure" }, svg),
+    pose(values) { change({ q: values.map((v) => v ?? 0) }); },
+    show(values, levels) { change({ q: values, levels }); },
+    trace(path) { change({ path }); },
+  };
 }
 
 /** Joints and their limits as rows. */

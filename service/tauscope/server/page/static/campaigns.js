@@ -1,27 +1,27 @@
 // Campaigns: begun from a robot file, followed step by step, and read.
 
-import { follow, getJson, post } from "./api.js";
-import { cautions, explained, h, moment, render, section, state, title } from "./dom.js";
+import { fetchRaw, follow, getJson, post } from "./api.js";
+import { cautions, explained, h, moment, render, section, state, title, verdict } from "./dom.js";
 import { HEADLINES, appendRobot } from "./diagnoses.js";
 import { DRIVERS } from "./drivers.js";
 import { move } from "./leases.js";
-import { items } from "./lists.js";
+import { figuresOf, outcome, searchable } from "./lists.js";
 import { robotSheet } from "./robots.js";
 import { liveMonitor } from "./runs.js";
-import { language, t } from "./words.js";
 
-const STEPS = { design: t`Design the motion`, run: t`Run it`, "held-out design": t`Design a second one`, "held-out run": t`Run that`, identify: t`Identify`, diagnose: t`Diagnose` };
+const STEPS = { design: "Design motion", run: "Run motion", "held-out design": "Design held-out motion", "held-out run": "Run held-out motion", identify: "Identify", diagnose: "Diagnose" };
 const ENDS = ["succeeded", "failed", "cancelled", "interrupted", "damaged"];
 const ROBOT_OF = /^(campaigns|runs|identifications|diagnoses)\/[\w-]+$/; // where the robot of a new campaign may be taken from
 const RUN_ENDS = ["finished", "degraded", "stopped", "failed", "interrupted", "damaged", "waiting"];
 
 export async function showCampaigns(root, { signal }) {
-  const { campaigns } = await getJson("campaigns?limit=200", signal);
-  render(root, h("h1", { text: t`Campaigns` }),
-    h("p", { class: "lead", text: t`Design a motion, drive the arm, identify it, and say what its model leaves out.` }),
-    h("div", { class: "row" }, h("a", { class: "button primary", href: "#/new", text: t`New campaign` })),
-    items(campaigns.map((each) => ({ href: `#/campaigns/${each.id}`, name: each.robot ?? each.id, detail: each.backend?.name, state: each.state, when: moment(each.created) })),
-      t`No campaign yet. Begin with a robot file.`));
+  const [{ campaigns }, verdicts] = await Promise.all([getJson("campaigns?limit=1000", signal), figuresOf("diagnosis", signal)]);
+  const outcomeFor = (each) => outcome(each, verdicts.get(each.links.diagnosis?.split("/").pop()));
+  render(root, h("h1", { text: "Campaigns" }),
+    h("p", { class: "lead", text: "Design a motion, drive the arm, identify it, and diagnose its model." }),
+    h("div", { class: "row" }, h("a", { class: "button primary", href: "#/new", text: "New campaign" })),
+    searchable(campaigns.map((each) => ({ href: `#/campaigns/${each.id}`, name: each.robot ?? each.id, detail: each.backend?.name, outcome: outcomeFor(each), created: each.created })),
+      "No campaign yet. Begin with a robot file."));
 }
 
 export async function showCampaign(root, { id, signal, show }) {
@@ -31,10 +31,10 @@ export async function showCampaign(root, { id, signal, show }) {
   const result = campaign.state === "succeeded" ? await getJson(campaign.links.result, signal) : null;
   const steps = h("ol", { class: "steps" });
   const status = h("p", { role: "status" });
-  const arm = h("div", {}, report ? section("arm", t`The arm`, robotSheet(report)) : null);
+  const arm = h("div", {}, report ? section("arm", "The arm", robotSheet(report)) : null);
   const live = h("div", {});
   const outcome = h("div", {}, result ? outcomeOf(campaign, result) : null);
-  render(root, h("p", { class: "eyebrow", text: t`Campaign · ${campaign.backend?.name ?? ""}` }), h("h1", { text: campaign.robot ?? id }), h("p", { class: "meta", text: moment(campaign.created) }),
+  render(root, h("p", { class: "eyebrow", text: `Campaign · ${campaign.backend?.name ?? ""}` }), h("h1", { text: campaign.robot ?? id }), h("p", { class: "meta", text: moment(campaign.created) }),
     status, steps, outcome, live, arm);
   let watched = null;
   let leaving = null;
@@ -72,14 +72,15 @@ const linked = (path) => `#/${path.replace(/^\/api\/v1\//, "")}`;
 function outcomeOf(campaign, { diagnosis }) {
   const id = (path) => path.split("/").pop();
   return [
-    h("p", { class: "headline", text: diagnosis ? HEADLINES[diagnosis.verdict] : t`The arm is identified.` }),
-    diagnosis?.findings.map((each) => h("p", {}, h("strong", { text: each.joint ? t`${title(each.effect)} at ${each.joint}` : title(each.effect) }), ". ", h("span", { lang: "en", text: each.statement }))),
+    h("p", { class: "headline", text: diagnosis ? diagnosis.headline || HEADLINES[diagnosis.verdict] : "The arm is identified." }),
+    diagnosis ? h("p", { class: "verdict" }, verdict(diagnosis.verdict), ` · ${HEADLINES[diagnosis.verdict]}`) : null,
+    diagnosis?.findings.map((each) => h("p", {}, h("strong", { text: each.joint ? `${title(each.effect)} at ${each.joint}` : title(each.effect) }), ". ", h("span", { text: each.statement }))),
     h("div", { class: "row" },
-      campaign.links.diagnosis ? h("a", { class: "button primary", href: `#/diagnoses/${id(campaign.links.diagnosis)}`, text: t`Read the diagnosis` }) : null,
-      h("a", { class: "button", href: `#/identifications/${id(campaign.links.identification)}`, text: t`Read the identification` }),
-      campaign.links.recordings.map((path) => h("a", { class: "button", href: linked(path), text: t`Recording` })),
-      campaign.links.held_out.map((path) => h("a", { class: "button", href: linked(path), text: t`Held-out recording` })),
-      h("a", { class: "button", href: `#/new?robot=campaigns/${campaign.id}`, text: t`Once more` })),
+      campaign.links.diagnosis ? h("a", { class: "button primary", href: `#/diagnoses/${id(campaign.links.diagnosis)}`, text: "Read the diagnosis" }) : null,
+      h("a", { class: "button", href: `#/identifications/${id(campaign.links.identification)}`, text: "Read the identification" }),
+      campaign.links.recordings.map((path) => h("a", { class: "button", href: linked(path), text: "Recording" })),
+      campaign.links.held_out.map((path) => h("a", { class: "button", href: linked(path), text: "Held-out recording" })),
+      h("a", { class: "button", href: `#/new?robot=campaigns/${campaign.id}`, text: "Once more" })),
   ];
 }
 
@@ -92,7 +93,7 @@ const CONCEALED = {
 };
 
 const CONCEALED_WORDS = {
-  nothing: t`nothing`, spring: t`a spring`, load: t`friction that grows with the load`, bristles: t`bristles: friction that rises over a distance`,
+  nothing: "nothing", spring: "a spring", load: "friction that grows with the load", bristles: "bristles: friction that rises over a distance",
 };
 
 /** How long the arm moves: what is asked of the design. */
@@ -102,9 +103,9 @@ const LENGTHS = {
   thorough: { excitation: { periods: 10, slow_postures: 6 }, held_out: { periods: 4 } },
 };
 
-const LENGTH_WORDS = { usual: t`usual`, short: t`short`, thorough: t`thorough` };
-const BACKENDS = Object.fromEntries(Object.entries(DRIVERS).map(([name, { titles }]) => [name, titles[language] ?? titles.en]));
-const TIMES = { virtual: t`as fast as it computes`, real: t`by the clock` };
+const LENGTH_WORDS = { usual: "usual", short: "short", thorough: "thorough" };
+const BACKENDS = Object.fromEntries(Object.entries(DRIVERS).map(([name, { title: words }]) => [name, words]));
+const TIMES = { virtual: "as fast as it computes", real: "by the clock" };
 
 /** A choice among words, each with what it stands for. */
 const choice = (id, words) => h("select", { id }, Object.entries(words).map(([value, text]) => h("option", { value, text })));
@@ -114,11 +115,11 @@ export async function showNewCampaign(root, { signal }) {
   const chosen = { files: null, report: null };
   const sheet = h("div", {});
   const said = h("p", { role: "status", class: "note" });
-  const begin = h("button", { type: "submit", class: "primary", disabled: true, text: t`Begin` });
+  const begin = h("button", { type: "submit", class: "primary", disabled: true, text: "Begin" });
   const input = h("input", { type: "file", id: "robot", multiple: true, accept: ".yaml,.yml,.json,.urdf,.xml", onchange: () => take([...input.files]) });
   const drop = h("div", { class: "drop", ondragover: (event) => { event.preventDefault(); drop.classList.add("over"); }, ondragleave: () => drop.classList.remove("over"),
     ondrop: (event) => { event.preventDefault(); drop.classList.remove("over"); take([...event.dataTransfer.files]); } },
-  h("label", { for: "robot" }, t`Robot file (YAML), and its URDF if it names one`, input));
+  h("label", { for: "robot" }, "Robot file: URDF, MJCF or YAML, with the URDF that it names", input));
 
   async function take(files) {
     const robot = files.find((file) => /\.(ya?ml|json)$/i.test(file.name)) ?? files[0];
@@ -126,15 +127,15 @@ export async function showNewCampaign(root, { signal }) {
     const form = new FormData();
     form.append("robot", robot);
     if (urdf) form.append("urdf", urdf);
-    said.textContent = t`Checking …`;
+    said.textContent = "Checking …";
     begin.disabled = true;
     try {
       const report = await post("robots/check", form);
       chosen.files = [robot, urdf];
       chosen.report = report;
       said.textContent = "";
-      begin.disabled = false;
       render(sheet, h("h2", { text: report.name }), robotSheet(report), cautions(report.findings));
+      await offerModel();
       render(joints, ...report.joints.map((joint) => h("option", { value: joint.number, text: joint.name })));
     } catch (error) {
       render(sheet);
@@ -142,13 +143,34 @@ export async function showNewCampaign(root, { signal }) {
     }
   }
 
+  /** A simulated arm needs a model: say so before anything begins, and offer the last one that was found. */
+  async function offerModel() {
+    const isMissing = chosen.report?.total_mass === null && DRIVERS[backend.value].is_simulated;
+    begin.disabled = !chosen.report || isMissing;
+    render(lacking);
+    if (!isMissing) return;
+    const found = await getJson(`items?kind=diagnosis&state=succeeded&robot=${encodeURIComponent(chosen.report.name)}&limit=1`, signal);
+    const last = found.items.find((each) => each.is_here);
+    render(lacking, h("p", { text: "The robot file states no model: the simulated arm needs mass, first moment and inertia of every link." }),
+      last ? h("p", {}, h("button", { type: "button", text: `Use the model of its diagnosis of ${moment(last.created)}`, onclick: () => useModelOf(last.id) })) : null);
+  }
+
+  async function useModelOf(id) {
+    try {
+      const [text, robot] = await Promise.all([fetchRaw(`diagnoses/${id}/improved-robot`).then((answer) => answer.text()), getJson(`diagnoses/${id}/robot`)]);
+      const beside = robot.files.filter((file) => file.name !== robot.robot_file).map((file) => new File([file.content], file.name));
+      await take([new File([text], "improved-robot.yaml"), ...beside]);
+    } catch (error) { render(said, explained(error)); }
+  }
+
+  const lacking = h("div", { class: "lacking", role: "status" });
   const backend = choice("backend", BACKENDS);
   const time = choice("time", TIMES);
   const conceal = choice("conceal", CONCEALED_WORDS);
   const joints = h("select", { id: "conceal-joint" });
   const length = choice("length", LENGTH_WORDS);
   const clear = h("input", { type: "checkbox", id: "clear" });
-  const clearLabel = h("label", { class: "check", for: "clear", hidden: true }, clear, t`The arm's whole reach is clear, and the emergency stop is at hand.`);
+  const clearLabel = h("label", { class: "check", for: "clear", hidden: true }, clear, "The arm's whole reach is clear, and the emergency stop is at hand.");
   const plan = h("input", { type: "checkbox", id: "plan" });
   const simulated = [time, conceal, joints];
   backend.onchange = () => {
@@ -156,11 +178,12 @@ export async function showNewCampaign(root, { signal }) {
     clearLabel.hidden = !real;
     clear.required = real;
     simulated.forEach((each) => { each.disabled = real; });
+    offerModel();
   };
   const form = h("form", { class: "sheet", onsubmit: async (event) => {
     event.preventDefault();
     begin.disabled = true;
-    said.textContent = t`Handing in …`;
+    said.textContent = "Handing in …";
     const isSim = DRIVERS[backend.value].is_simulated;
     const concealed = isSim ? CONCEALED[conceal.value](Number(joints.value)) : null;
     const request = { backend: { name: backend.value, ...(isSim ? { time: time.value } : {}), ...(concealed ? { scenario: { torque_noise_std: 0.1, seed: 1, effects: [concealed] } } : {}) }, diagnosis: { next_trajectory: plan.checked }, ...LENGTHS[length.value] };
@@ -174,14 +197,14 @@ export async function showNewCampaign(root, { signal }) {
       location.hash = `#/campaigns/${campaign.id}`;
     } catch (error) { render(said, explained(error)); begin.disabled = false; }
   } },
-  h("label", { for: "backend" }, t`Arm`, backend), h("label", { for: "length" }, t`Motion`, length), h("label", { for: "time" }, t`Time of the simulated arm`, time),
-  h("label", { for: "conceal" }, t`The simulated arm conceals`, conceal), h("label", { for: "conceal-joint" }, t`at joint`, joints),
-  h("label", { class: "check", for: "plan" }, plan, t`Plan a further motion even where the diagnosis leaves nothing open.`), clearLabel, h("div", { class: "row" }, begin));
+  h("label", { for: "backend" }, "Arm", backend), h("label", { for: "length" }, "Motion", length), h("label", { for: "time" }, "Time of the simulated arm", time),
+  h("label", { for: "conceal" }, "The simulated arm conceals", conceal), h("label", { for: "conceal-joint" }, "at joint", joints),
+  h("label", { class: "check", for: "plan" }, plan, "Plan a further motion even where the diagnosis leaves nothing open."), clearLabel, h("div", { class: "row" }, begin));
   if (ROBOT_OF.test(again)) {
     const robot = await getJson(`${again}/robot`, signal);
     const parts = new FormData();
     appendRobot(parts, robot);
     await take([parts.get("robot"), parts.get("urdf")].filter(Boolean));
   }
-  render(root, h("h1", { text: t`New campaign` }), h("p", { class: "lead", text: t`A motion is designed, driven twice, and the arm identified and diagnosed. Stop, above, ends it at any moment.` }), drop, said, sheet, form);
+  render(root, h("h1", { text: "New campaign" }), h("p", { class: "lead", text: "A motion is designed, driven twice, and the arm identified and diagnosed. Stop, above, ends it at any moment." }), drop, said, sheet, lacking, form);
 }

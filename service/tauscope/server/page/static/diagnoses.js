@@ -1,53 +1,59 @@
 // A diagnosis as a story: where, what, how much, the proof, what next.
 
-import { download, getJson } from "./api.js";
-import { chance, explained, figures, h, moment, number, percent, render, s, section, table, tabs, title, unit, unitsOf, withError } from "./dom.js";
+import { download, getJson, post } from "./api.js";
+import { chance, explained, figures, h, moment, named, number, parameterName, percent, render, s, section, table, tabs, title, unit, unitsOf, verdict, withError } from "./dom.js";
 import { VARIABLES, heatMap } from "./heat.js";
 import { waiting } from "./identifications.js";
 import { move } from "./leases.js";
 import { jobList } from "./lists.js";
+import { motionSection } from "./motion.js";
 import { group, plot, zoomButtons } from "./plots.js";
-import { named, t } from "./words.js";
 
-export const showDiagnoses = jobList("diagnoses", t`Diagnoses`, t`What a model leaves out, and how sure that is.`,
+export const showDiagnoses = jobList("diagnoses", "diagnosis", "Diagnoses", "Physics that models lack, and how certain each finding is.",
   (each) => (each.recordings ?? []).map((entry) => entry.name).join(", "));
 
 export const HEADLINES = {
-  consistent: t`The model explains the recordings: nothing but noise is left.`,
-  explained: t`The findings explain all that the model left.`,
-  partly_explained: t`The findings explain part of what the model left; something remains.`,
-  unexplained: t`Something is missing that nothing in the catalogue explains.`,
-  inconclusive: t`These recordings cannot decide it.`,
-  wrong_values: t`No physics is missing, but stated values are wrong.`,
+  consistent: "The model explains the recordings: only noise is left.",
+  explained: "The findings explain the whole residual.",
+  partly_explained: "The findings explain a part of the residual; a significant rest remains.",
+  unexplained: "The model misses something that no effect of the catalogue explains.",
+  inconclusive: "These recordings cannot decide.",
+  wrong_values: "No physics is missing, but stated values are wrong.",
 };
-const AGAINST = { identified: t`compared with the best model that the data allow`, model: t`compared with the robot file's model`, simulation: t`compared with the simulator's recordings` };
-const CONFIRMED = new Map([[true, t`confirmed`], [false, t`not confirmed`], [null, t`no recording was held out`]]);
+const AGAINST = { identified: "compared with the best model that the data allow", model: "compared with the robot file's model", simulation: "compared with the simulator's recordings" };
+const CONFIRMED = new Map([[true, "confirmed"], [false, "not confirmed"], [null, "no recording was held out"]]);
 
 /** Findings before a fold. */
 const MOST_FINDINGS = 5;
 
 export async function showDiagnosis(root, { id, signal, show }) {
   const job = await getJson(`diagnoses/${id}`, signal);
-  const head = [h("p", { class: "eyebrow", text: t`Diagnosis` }), h("h1", { text: job.robot ?? id }), h("p", { class: "meta", text: moment(job.created) })];
+  const of = [...(job.recordings ?? []), ...(job.held_out ?? [])].map((each) => each.name).join(", ");
+  const robot = job.robot ? h("a", { href: `#/robots/${encodeURIComponent(job.robot)}`, text: job.robot }) : id;
+  const eyebrow = h("p", { class: "eyebrow" }, "Diagnosis · ", robot);
+  const meta = h("p", { class: "meta", text: `${moment(job.created)} · ${of}` });
+  const head = [eyebrow, h("h1", { text: job.robot ?? id }), meta];
   if (job.state !== "succeeded") return waiting(root, head, job, signal, show);
-  const [result, plots] = await Promise.all([getJson(job.links.result, signal), getJson(job.links.plots, signal)]);
+  const [result, plots, report] = await Promise.all([getJson(job.links.result, signal), getJson(job.links.plots, signal), getJson(`diagnoses/${id}/robot`, signal).then((robot) => robot.report, () => null)]);
+  const earlier = new URLSearchParams(location.hash.split("?")[1] ?? "").get("before");
+  const previous = earlier && (await getJson(`diagnoses/${encodeURIComponent(earlier)}/result`, signal).catch(() => null));
   const fit = result.fit.held_out ?? result.fit.train;
   const ratio = (values) => values.map((rms, place) => rms / result.noise_std[place]);
   const [before, after] = [ratio(fit.rms_before), ratio(fit.rms_after)];
   const most = before.indexOf(Math.max(...before));
-  render(root, ...head,
-    result.headline ? h("p", { class: "headline", lang: "en", text: result.headline }) : null,
-    h("p", { class: "lead", text: HEADLINES[result.verdict] }),
+  render(root, eyebrow, h("h1", { class: "headline", text: unbroken(result.headline) || HEADLINES[result.verdict] }),
+    h("p", { class: "verdict" }, verdict(result.verdict), ` · ${HEADLINES[result.verdict]}`), meta,
+    previous ? changeList(previous, result) : null,
+    warningList(result.warnings ?? []),
     figures([
-      [t`Verdict`, named(result.verdict), AGAINST[result.against]],
-      [t`Findings`, `${result.findings.length}`, [...new Set(result.findings.map((each) => title(each.effect)))].join(", ") || t`nothing is named`],
-      [t`Residual / noise`, `${number(before[most], 3)} → ${number(after[most], 3)}`, result.fit.held_out ? t`${result.joints[most]}, held-out motion` : t`${result.joints[most]}, its own motion`],
-      [t`Noise known from`, result.noise_method === "periods" ? t`repetition` : t`the residual`, t`band ${number(result.cutoff_hz, 3)} Hz`],
+      ["Findings", `${result.findings.length}`, result.tentative?.length ? `and ${result.tentative.length} tentative` : AGAINST[result.against]],
+      ["Residual / noise", `${number(before[most], 3)} → ${number(after[most], 3)}`, result.fit.held_out ? `${result.joints[most]}, held-out motion` : `${result.joints[most]}, its own motion`],
+      ["Noise known from", result.noise_method === "periods" ? "repetition" : "the residual", `band ${number(result.cutoff_hz, 3)} Hz`],
     ]),
-    h("div", { class: "row" }, h("button", { type: "button", class: "primary", onclick: () => download(job.links.report, `diagnosis-${id}.html`), text: t`Download the proof` }),
-      h("button", { type: "button", onclick: () => download(job.links.model, `model-${id}.json`), text: t`Model with findings` }),
+    h("div", { class: "row" }, h("button", { type: "button", class: "primary", onclick: () => download(job.links.report, `diagnosis-${id}.html`), text: "Download the proof" }),
+      h("button", { type: "button", onclick: () => download(job.links.model, `model-${id}.json`), text: "Model with findings" }),
       h("button", { type: "button", onclick: () => download(job.links.result, `diagnosis-${id}.json`), text: "JSON" })),
-    whereSection(result, plots), whatSection(result), howMuchSection(result), proofSection(plots), nextSection(job, result, signal), detectableSection(result));
+    report ? motionSection(report, result, plots) : null, findingsSection(result), nextSection(job, result, signal), whereSection(result, plots), proofSection(plots), howMuchSection(result), detectableSection(result));
   return null;
 }
 
@@ -72,7 +78,7 @@ function whereSection(result, plots) {
   };
   function look(bin = null) {
     const own = plots.histograms.find((each) => each.joint === joint.value && each.variable === variable.value);
-    if (!own) { render(place, h("p", { class: "note", text: t`It does not vary there.` })); return; }
+    if (!own) { render(place, h("p", { class: "note", text: "It does not vary there." })); return; }
     const middle = own.before.map((_, k) => (own.edges[k] + own.edges[k + 1]) / 2);
     const curve = plots.curves.find((each) => each.joint === joint.value);
     const units = unitsOf(plots.joint_types?.[joint.value]);
@@ -81,29 +87,29 @@ function whereSection(result, plots) {
       const value = variable.value === "time" ? curve.time[k] : curve.states[variable.value]?.[k];
       return range !== null && value >= range[0] && value <= range[1];
     };
-    const series = [{ label: t`without the findings`, values: curve.before, colour: "--before" }, { label: t`with them`, values: curve.after, colour: "--after" }];
+    const series = [{ label: "without the findings", values: curve.before, colour: "--before" }, { label: "with them", values: curve.after, colour: "--after" }];
     if (range) series.push({ label: `${named(variable.value)} ${number(range[0], 3)} … ${number(range[1], 3)}`, values: curve.before.map((value, k) => (inside(k) ? value : null)), colour: "--c4", points: true });
     render(place, 
-      plot({ label: t`Rms of the residual of ${joint.value} by ${named(variable.value)}`, raw: true, x: middle, xLabel: `${named(variable.value)} [${units[variable.value]}]`, yLabel: units.torque, series: [
-        { label: t`without the findings`, values: own.before, colour: "--before", width: 2 }, { label: t`with them`, values: own.after, colour: "--after", width: 2 },
-        { label: t`noise`, values: own.before.map(() => own.noise), colour: "--muted", dash: [5, 4] }] }).element,
-      plot({ label: range ? t`Residual of ${joint.value} over time, the chosen part marked` : t`Residual of ${joint.value} over time`, raw: true, x: curve.time, xLabel: t`time in ${curve.recording} [s]`, yLabel: units.torque, noise: 2 * own.noise, series }).element);
+      plot({ label: `Rms of the residual of ${joint.value} by ${named(variable.value)}`, raw: true, x: middle, xLabel: `${named(variable.value)} [${units[variable.value]}]`, yLabel: units.torque, series: [
+        { label: "without the findings", values: own.before, colour: "--before", width: 2 }, { label: "with them", values: own.after, colour: "--after", width: 2 },
+        { label: "noise", values: own.before.map(() => own.noise), colour: "--muted", dash: [5, 4] }] }).element,
+      plot({ label: range ? `Residual of ${joint.value} over time, the chosen part marked` : `Residual of ${joint.value} over time`, raw: true, x: curve.time, xLabel: `time in ${curve.recording} [s]`, yLabel: units.torque, noise: 2 * own.noise, series }).element);
   }
   joint.onchange = variable.onchange = () => { told.textContent = ""; look(); };
   draw("before");
   look();
   const significant = result.mismatch.filter((each) => each.significant);
-  return section("where", t`Where`,
-    significant.length ? h("ul", { class: "plain" }, significant.map((each) => h("li", { text: located(each, unitsOf(plots.joint_types?.[each.joint])) }))) : h("p", { text: t`At no joint is there more than noise.` }),
-    result.findings.length ? tabs(t`Map`, [t`Without the findings`, t`With them`], 0, (chosen) => draw(chosen ? "after" : "before")) : null,
-    map, told, h("p", { class: "note", text: t`Each cell holds as many samples as any other of its row and group. Click one, or go there with the arrow keys, to see the residual there; or choose:` }),
-    h("form", { class: "sheet" }, h("label", { for: "where-joint" }, t`Joint`, joint), h("label", { for: "where-state" }, t`State`, variable)), place);
+  return section("where", "Residual by state",
+    significant.length ? h("ul", { class: "plain" }, significant.map((each) => h("li", { text: located(each, unitsOf(plots.joint_types?.[each.joint])) }))) : h("p", { text: "At no joint is there more than noise." }),
+    result.findings.length ? tabs("Map", ["Without the findings", "With them"], 0, (chosen) => draw(chosen ? "after" : "before")) : null,
+    map, told, h("p", { class: "note", text: "Each cell holds as many samples as any other of its row and group. Click one, or go there with the arrow keys, to see the residual there; or choose:" }),
+    h("form", { class: "sheet" }, h("label", { for: "where-joint" }, "Joint", joint), h("label", { for: "where-state" }, "State", variable)), place);
 }
 
 function located(entry, units) {
-  const where = entry.where ? t`, ${(100 * entry.where.share).toFixed(0)} % of it at a ${named(entry.where.variable)} of ${number(entry.where.range[0], 2)} to ${number(entry.where.range[1], 2)}${unitBehind(units, entry.where.variable)}` : "";
-  const when = entry.time ? t`, ${(100 * entry.time.share).toFixed(0)} % between ${number(entry.time.range[0], 3)} and ${number(entry.time.range[1], 3)} s` : "";
-  return t`${entry.joint}: ${number(entry.excess_rms, 3)} ${units.torque} rms beyond the noise${where}${when}.`;
+  const where = entry.where ? `, ${(100 * entry.where.share).toFixed(0)} % of it at a ${named(entry.where.variable)} of ${number(entry.where.range[0], 2)} to ${number(entry.where.range[1], 2)}${unitBehind(units, entry.where.variable)}` : "";
+  const when = entry.time ? `, ${(100 * entry.time.share).toFixed(0)} % between ${number(entry.time.range[0], 3)} and ${number(entry.time.range[1], 3)} s` : "";
+  return `${entry.joint}: ${number(entry.excess_rms, 3)} ${units.torque} rms beyond the noise${where}${when}.`;
 }
 
 const unitBehind = (units, variable) => (units[variable] ? ` ${units[variable]}` : "");
@@ -111,28 +117,72 @@ const unitBehind = (units, variable) => (units[variable] ? ` ${units[variable]}`
 /** An effect and its place, such as cable_force@joint1, in words. */
 function placed(name) {
   const at = name.indexOf("@");
-  return at < 0 ? title(name) : t`${title(name.slice(0, at))} at ${name.slice(at + 1)}`;
+  return at < 0 ? title(name) : `${title(name.slice(0, at))} at ${name.slice(at + 1)}`;
 }
 
-function whatSection(result) {
-  const cards = result.findings.map((each, place) => findingCard(each, place, result.joints));
-  const tentative = (result.tentative ?? []).map((each, place) => findingCard(each, place, result.joints));
-  return section("what", t`What`, cards.length ? null : h("p", { text: t`No effect of the catalogue is named.` }),
-    cards.slice(0, MOST_FINDINGS),
-    cards.length > MOST_FINDINGS ? h("details", {}, h("summary", { text: t`${cards.length - MOST_FINDINGS} more` }), cards.slice(MOST_FINDINGS)) : null,
-    tentative.length ? h("details", {}, h("summary", { text: t`Tentative: held-out motion does not confirm these (${tentative.length})` }), tentative) : null);
+/** A sentence whose numbers stay with their units. */
+const unbroken = (text) => text?.replace(/(\d) (?=[A-Za-zµ°%])/g, "$1\u00a0");
+
+/** What to know of the robot file and the recordings before the findings are trusted. */
+function warningList(warnings) {
+  if (!warnings.length) return null;
+  const entries = warnings.map((each) => h("li", {}, each.joint ? `${each.joint}: ` : "", `${each.text}; ${each.remedy}.`));
+  return h("details", { class: "cautions" }, h("summary", { text: entries.length === 1 ? "1 warning" : `${entries.length} warnings` }), h("ul", { class: "plain" }, entries));
 }
 
-function findingCard(each, place, joints) {
-  return h("article", { class: "card" },
+/** What has changed since the diagnosis before the last experiment. */
+function changeList(before, result) {
+  const place = (each) => (each.joint ? `${title(each.effect)} at ${each.joint}` : title(each.effect));
+  const chances = (found) => new Map(found.findings.map((each) => [place(each), chance(each.probability)]));
+  const [old, now] = [chances(before), chances(result)];
+  const lines = [...new Set([...old.keys(), ...now.keys()])].map((name) => {
+    if (!now.has(name)) return `${name}: no longer found`;
+    return old.has(name) ? `${name}: ${old.get(name)} → ${now.get(name)}` : `${name}: new, ${now.get(name)}`;
+  });
+  return h("div", { class: "change" }, h("p", {}, h("strong", { text: "Since the experiment" }), `: ${named(before.verdict)} → ${named(result.verdict)}`),
+    lines.length ? h("ul", { class: "plain" }, lines.map((text) => h("li", { text }))) : null);
+}
+
+/** Diagnose again with a run that was made for a diagnosis; all other recordings have to lie on the service. */
+export async function diagnoseAgain(id, recording) {
+  const [job, robot] = await Promise.all([getJson(`diagnoses/${encodeURIComponent(id)}`), getJson(`diagnoses/${encodeURIComponent(id)}/robot`)]);
+  const kept = (role) => job[role].filter((each) => each.origin === "server").map((each) => each.name);
+  const form = new FormData();
+  const request = { recordings: [...kept("recordings"), recording], held_out: kept("held_out"), options: { ...job.options, next_trajectory: false } };
+  form.append("request", new Blob([JSON.stringify(request)], { type: "application/json" }));
+  appendRobot(form, robot);
+  return post("diagnoses", form);
+}
+
+/** What held-out motion confirms, and apart from it what is tentative. */
+function findingsSection(result) {
+  const cards = (findings, kind) => findings.map((each, place) => findingCard(each, place, result.joints, kind));
+  const confirmed = cards(result.findings, "");
+  const tentative = cards(result.tentative ?? [], "tentative");
+  const isJudged = Boolean(result.fit.held_out);
+  return [
+    section("findings", isJudged ? "Confirmed findings" : "Findings",
+      confirmed.length ? null : h("p", { text: isJudged ? "Held-out motion confirms no effect of the catalogue." : "No effect of the catalogue is named." }),
+      confirmed.length && !isJudged ? h("p", { class: "note", text: "No recording was held out: add one to confirm these." }) : null, folded(confirmed)),
+    tentative.length ? section("tentative", "Tentative findings", h("p", { class: "note", text: "These would explain a part of the residual. Held-out motion does not confirm them." }), folded(tentative)) : null,
+  ];
+}
+
+/** The first cards, and the rest behind a fold. */
+function folded(cards) {
+  return [cards.slice(0, MOST_FINDINGS), cards.length > MOST_FINDINGS ? h("details", {}, h("summary", { text: `${cards.length - MOST_FINDINGS} more` }), cards.slice(MOST_FINDINGS)) : null];
+}
+
+function findingCard(each, place, joints, kind) {
+  return h("article", { class: `card ${kind}` },
     h("p", { class: "rank", "aria-hidden": "true", text: `${place + 1}` }),
-    h("div", {}, h("h3", {}, title(each.effect), h("span", { text: each.joint ? t` at ${each.joint}` : t` of the whole arm` })), h("p", { lang: "en", text: each.statement }),
+    h("div", {}, h("h3", {}, title(each.effect), h("span", { text: each.joint ? ` at ${each.joint}` : " of the whole arm" })), h("p", { text: each.statement }),
       h("dl", {}, each.parameters.flatMap((q) => [h("dt", { text: q.name }), h("dd", { text: `${withError(q.value, 1.96 * q.std)}${unit(q.unit)} (95 %)` })]),
-        each.equation ? [h("dt", { text: t`Torque` }), h("dd", { text: each.equation })] : null,
-        Number.isFinite(each.share) ? [h("dt", { text: t`Explains` }), h("dd", { text: t`${percent(each.share)} of the explained energy there` })] : null,
-        h("dt", { text: t`Held out` }), h("dd", { text: heldOut(each, joints) }),
-        h("dt", { text: t`Could also be` }), h("dd", { text: each.equivalent.map(placed).join(", ") || t`No competing explanation` }))),
-    h("div", { class: "chance" }, h("strong", { text: chance(each.probability) }), t`probable`, h("div", { class: "meter", "aria-hidden": "true" }, h("span", { "width%": 100 * each.probability }))));
+        each.equation ? [h("dt", { text: "Torque" }), h("dd", { text: each.equation })] : null,
+        Number.isFinite(each.share) ? [h("dt", { text: "Explains" }), h("dd", { text: `${percent(each.share)} of the explained energy there` })] : null,
+        h("dt", { text: "Held out" }), h("dd", { text: heldOut(each, joints) }),
+        h("dt", { text: "Could also be" }), h("dd", { text: each.equivalent.map(placed).join(", ") || "No competing explanation" }))),
+    h("div", { class: "chance" }, h("strong", { text: chance(each.probability) }), "probable", h("div", { class: "meter", "aria-hidden": "true" }, h("span", { "width%": 100 * each.probability }))));
 }
 
 /** Whether held-out motion confirms a finding, and the change at its joint, or where it is largest. */
@@ -141,21 +191,21 @@ function heldOut(each, joints) {
   if (!change) return CONFIRMED.get(each.confirmed);
   const sizes = change.relative.map(Math.abs);
   const at = each.joint ? joints.indexOf(each.joint) : sizes.indexOf(Math.max(...sizes));
-  const changes = t`the rms of ${joints[at]} changes by ${withError(100 * change.relative[at], 196 * (change.std[at] ?? 0))} % (95 %)`;
+  const changes = `the rms of ${joints[at]} changes by ${withError(100 * change.relative[at], 196 * (change.std[at] ?? 0))} % (95 %)`;
   return each.confirmed === null ? changes : `${CONFIRMED.get(each.confirmed)}: ${changes}`;
 }
 
 function howMuchSection(result) {
   const { train, held_out: heldOut } = result.fit;
-  const columns = [t`joint`, t`without the findings`, t`with them`, ...(heldOut ? [t`held out, without`, t`held out, with`] : [])];
+  const columns = ["joint", "without the findings", "with them", ...(heldOut ? ["held out, without", "held out, with"] : [])];
   const rows = result.joints.map((name, place) => [name, ...[train.rms_before, train.rms_after, ...(heldOut ? [heldOut.rms_before, heldOut.rms_after] : [])].map((each) => number(each[place], 3))]);
   const p = result.constancy.p_value;
-  return section("how-much", t`How much`,
-    h("h3", { text: t`Residual rms at the recorded rate` }), table(t`Residual rms`, columns, rows),
-    result.parameter_differences.length ? [h("h3", { text: t`What the simulation has wrong` }), h("ul", { class: "plain", lang: "en" }, (result.wrong_values ?? []).map((each) => h("li", { text: `${each}.` }))), bars(result.parameter_differences.map((each) => [each.parameter, each.difference_in_std, `${number(each.simulation)} → ${number(each.real)}`]))] : null,
-    result.parameter_shifts.length ? [h("h3", { text: t`What had been absorbed where` }), h("p", { class: "note", text: t`How far estimates moved when the findings were added, in standard errors; within the shaded part nothing has moved.` }),
+  return section("how-much", "Residual and parameters",
+    h("h3", { text: "Residual rms at the recorded rate" }), table("Residual rms", columns, rows),
+    result.parameter_differences.length ? [h("h3", { text: "Wrong values of the simulation" }), h("ul", { class: "plain" }, (result.wrong_values ?? []).map((each) => h("li", { text: `${each}.` }))), bars(result.parameter_differences.map((each) => [each.parameter, each.difference_in_std, `${number(each.simulation)} → ${number(each.real)}`]))] : null,
+    result.parameter_shifts.length ? [h("h3", { text: "Parameter shifts" }), h("p", { class: "note", text: "How far estimates moved when the findings were added, in standard errors; within the shaded part nothing has moved." }),
       bars(result.parameter_shifts.slice(0, 14).map((each) => [each.parameter, each.shift_in_std, `${number(each.before)} → ${number(each.after)}`]))] : null,
-    h("p", { class: "note", text: result.constancy.moved.length ? t`Parameters do not all hold from one recording to the next: ${result.constancy.moved.map((each) => each.parameter).join(", ")} (p = ${number(p, 2)}).` : t`The parameters hold from one recording to the next (p = ${number(p, 2)}).` }));
+    h("p", { class: "note", text: result.constancy.moved.length ? `Parameters do not all hold from one recording to the next: ${result.constancy.moved.map((each) => each.parameter).join(", ")} (p = ${number(p, 2)}).` : `The parameters hold from one recording to the next (p = ${number(p, 2)}).` }));
 }
 
 /** Standard errors as bars on a logarithmic axis to both sides. */
@@ -163,8 +213,8 @@ function bars(entries) {
   const scale = (value) => Math.sign(value) * Math.log1p(Math.abs(value));
   const reach = Math.max(...entries.map(([, value]) => Math.abs(scale(value))), scale(4));
   const at = (value) => 100 + (98 * scale(value)) / reach;
-  return h("div", { class: "bars" }, entries.map(([name, value, words]) => [h("span", { text: name }),
-    s("svg", { viewBox: "0 0 200 16", preserveAspectRatio: "none", role: "img", "aria-label": t`${number(value, 3)} standard errors, ${words}` },
+  return h("div", { class: "bars" }, entries.map(([name, value, words]) => [h("span", {}, parameterName(name)),
+    s("svg", { viewBox: "0 0 200 16", preserveAspectRatio: "none", role: "img", "aria-label": `${number(value, 3)} standard errors, ${words}` },
       s("rect", { class: "zone", x: at(-1.96), width: at(1.96) - at(-1.96), y: 0, height: 16 }),
       s("rect", { x: Math.min(at(value), 100), width: Math.abs(at(value) - 100), y: 4, height: 8 }), s("title", { text: words })), h("span", { text: number(value, 3) })]));
 }
@@ -178,40 +228,42 @@ function proofSection(plots) {
     const units = unitsOf(plots.joint_types?.[curve.joint]);
     const left = (values) => curve.measured.map((value, k) => value - values[k]);
     render(place, zoomButtons(together),
-      plot({ label: t`Torque of ${curve.joint}`, x: curve.time, xLabel: t`time [s]`, yLabel: units.torque, group: together, tall: true, series: [
-        { label: t`measured`, values: curve.measured, colour: "--measured", width: 4 }, { label: t`model without the findings`, values: curve.before, colour: "--before" }, { label: t`with them`, values: curve.after, colour: "--after" }] }).element,
-      plot({ label: t`Residual`, x: curve.time, xLabel: t`time [s]`, yLabel: units.torque, group: together, noise: 2 * curve.noise, series: [
-        { label: t`without the findings`, values: left(curve.before), colour: "--before" }, { label: t`with them`, values: left(curve.after), colour: "--after" }] }).element,
-      spectrum ? plot({ label: t`Spectrum of the residual`, raw: true, log: true, x: spectrum.frequency, xLabel: t`frequency [Hz]`, yLabel: units.spectrum, series: [
-        { label: t`without the findings`, values: spectrum.before, colour: "--before" }, { label: t`with them`, values: spectrum.after, colour: "--after" }, { label: t`noise`, values: spectrum.noise, colour: "--muted", dash: [5, 4] }] }).element : null);
+      plot({ label: `Torque of ${curve.joint}`, x: curve.time, xLabel: "time [s]", yLabel: units.torque, group: together, tall: true, series: [
+        { label: "measured", values: curve.measured, colour: "--measured", width: 4 }, { label: "model without the findings", values: curve.before, colour: "--before" }, { label: "with them", values: curve.after, colour: "--after" }] }).element,
+      plot({ label: "Residual", x: curve.time, xLabel: "time [s]", yLabel: units.torque, group: together, noise: 2 * curve.noise, series: [
+        { label: "without the findings", values: left(curve.before), colour: "--before" }, { label: "with them", values: left(curve.after), colour: "--after" }] }).element,
+      spectrum ? plot({ label: "Spectrum of the residual", raw: true, log: true, x: spectrum.frequency, xLabel: "frequency [Hz]", yLabel: units.spectrum, series: [
+        { label: "without the findings", values: spectrum.before, colour: "--before" }, { label: "with them", values: spectrum.after, colour: "--after" }, { label: "noise", values: spectrum.noise, colour: "--muted", dash: [5, 4] }] }).element : null);
   }
-  if (!plots.overlays.length) return section("proof", t`The proof`, h("p", { text: t`This diagnosis was made before proofs were kept.` }));
+  if (!plots.overlays.length) return section("proof", "Proof", h("p", { text: "This diagnosis was made before proofs were kept." }));
   const gains = plots.overlays.map((curve) => curve.measured.reduce((sum, value, k) => sum + (value - curve.before[k]) ** 2 - (value - curve.after[k]) ** 2, 0) / curve.noise ** 2);
   const best = gains.indexOf(Math.max(...gains));
   choose(best);
   const unseen = plots.overlays[0].held_out;
-  return section("proof", t`The proof`, h("p", { class: "lead", text: unseen ? t`On held-out motion, from which neither model was made; the stretch in which the findings help most.` : t`No recording was held out: this is the motion that the models were made from.` }),
-    tabs(t`Joint`, plots.overlays.map((each) => each.joint), best, choose), place);
+  return section("proof", "Proof", h("p", { class: "lead", text: unseen ? "On held-out motion, from which neither model was made; the stretch in which the findings help most." : "No recording was held out: this is the motion that the models were made from." }),
+    tabs("Joint", plots.overlays.map((each) => each.joint), best, choose), place);
 }
 
 function nextSection(job, result, signal) {
   const next = result.next_experiment;
-  if (!next) return section("next", t`What next`, h("p", { text: t`Nothing is open that another motion would decide.` }));
+  if (!next) return section("next", "Next experiment", h("p", { text: "No question is open that another motion would decide." }));
   const place = h("div", {});
   const said = h("p", { role: "status", class: "note" });
-  const button = h("button", { type: "button", class: "primary", text: t`Run it on the simulated arm`, onclick: async () => {
+  // Files that came with the request alone cannot be named in another one.
+  const isRepeatable = ["identified", "model"].includes(job.options.against) && [...job.recordings, ...job.held_out].every((each) => each.origin === "server");
+  const button = h("button", { type: "button", class: "primary", text: isRepeatable ? "Run it on the simulated arm, and diagnose again" : "Run it on the simulated arm", onclick: async () => {
     button.disabled = true;
     try {
       const run = await move("runs", await nextRun(job), job.robot, "sim");
-      location.hash = `#/runs/${run.id}`;
+      location.hash = `#/runs/${run.id}${isRepeatable ? `?after=${job.id}` : ""}`;
     } catch (error) { render(said, explained(error)); button.disabled = false; }
   } });
   if (job.links.next_trajectory) {
-    getJson(job.links.next_trajectory, signal).then((trajectory) => render(place, h("p", { class: "note", text: t`Planned: ${(trajectory.segments ?? []).length} segments, within the robot file's limits.` }))).catch(() => {});
+    getJson(job.links.next_trajectory, signal).then((trajectory) => render(place, h("p", { class: "note", text: `Planned: ${(trajectory.segments ?? []).length} segments, within the robot file's limits.` }))).catch(() => {});
   }
-  return section("next", t`What next`, h("p", { lang: "en", text: `${next.why.charAt(0).toUpperCase()}${next.why.slice(1)}.` }),
-    next.separates.length ? h("p", { text: t`It tells apart: ${next.separates.map(placed).join(", ")}.` }) : null, place,
-    job.links.next_trajectory ? h("div", { class: "row" }, button, h("button", { type: "button", onclick: () => download(job.links.next_trajectory, `next-${job.id}.json`), text: t`Save the motion` })) : null, said);
+  return section("next", "Next experiment", h("p", { text: `${next.why.charAt(0).toUpperCase()}${next.why.slice(1)}.` }),
+    next.separates.length ? h("p", { text: `It separates: ${next.separates.map(placed).join(", ")}.` }) : null, place,
+    job.links.next_trajectory ? h("div", { class: "row" }, button, h("button", { type: "button", onclick: () => download(job.links.next_trajectory, `next-${job.id}.json`), text: "Save the motion" })) : null, said);
 }
 
 /** How the simulated arm was run that the recordings are of, with what it conceals; a plain one where they are of none. */
@@ -245,6 +297,6 @@ function detectableSection(result) {
     const own = places.map((name) => result.detectable.find((each) => each.effect === effect && each.joint === name));
     return [title(effect), [...new Set(own.filter(Boolean).map((each) => each.unit))].join(", "), ...own.map((each) => (each ? number(each.minimum, 2) : ""))];
   });
-  return section("detectable", t`What would have been seen`, h("p", { class: "lead", text: t`The smallest size of each effect that nine of ten such data sets would have shown. What is smaller may be there and not be named.` }),
-    table(t`Smallest visible size`, [t`effect`, t`unit`, ...places.map((name) => name ?? t`whole arm`)], rows, 2));
+  return section("detectable", "Detection limits", h("p", { class: "lead", text: "The smallest size of each effect that nine of ten such data sets show. A smaller effect may exist unnamed." }),
+    table("Smallest visible size", ["effect", "unit", ...places.map((name) => name ?? "whole arm")], rows, 2));
 }

@@ -1,7 +1,5 @@
 // Elements made from text only: whatever a name holds, it is never read as markup.
 
-import { language, named, t } from "./words.js";
-
 const LONG = 60; // letters of a cell that may fill several lines
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -56,7 +54,19 @@ const PRISMATIC = { ...OF_ANY, position: "m", velocity: "m/s", acceleration: "m/
 export function unitsOf(type) {
   if (type === "prismatic") return PRISMATIC;
   if (type === "revolute") return REVOLUTE;
-  return Object.fromEntries(Object.entries(REVOLUTE).map(([name, own]) => [name, own === PRISMATIC[name] ? own : t`${own} or ${PRISMATIC[name]}`]));
+  return Object.fromEntries(Object.entries(REVOLUTE).map(([name, own]) => [name, own === PRISMATIC[name] ? own : `${own} or ${PRISMATIC[name]}`]));
+}
+
+const QUANTITIES = { m: "mass", ms: "first moment", I: "inertia" };
+
+/** A base parameter by its leading term, such as "first moment x of link 2"; the whole expression on demand. */
+export function parameterName(name) {
+  const terms = name.split(/ [+-] /);
+  const [, quantity, axes, link] = /^(?:[\d.e-]+\*)?(ms|m|I)([xyz]*)(\d+)$/.exec(terms[0]) ?? [];
+  if (!quantity) return name;
+  const lead = `${QUANTITIES[quantity]}${axes ? ` ${axes}` : ""} of link ${link}`;
+  if (terms.length === 1) return h("span", { title: name, text: lead });
+  return h("details", { class: "parameter" }, h("summary", { text: `${lead}, and ${terms.length - 1} more` }), h("code", { text: name }));
 }
 
 /** A value and its standard error, to the error's second digit. */
@@ -78,13 +88,16 @@ export function percent(share) {
 }
 
 // English in the reader's own manner, as of Britain or of America.
-const LOCALE = navigator.languages.find((each) => each.startsWith(language)) ?? language;
+const LOCALE = navigator.languages.find((each) => each.startsWith("en")) ?? "en";
 
 /** A moment as people say it. */
 export function moment(text) {
   if (!text) return "–";
   return new Date(text).toLocaleString(LOCALE, { dateStyle: "medium", timeStyle: "short" });
 }
+
+/** An id of the service, such as load_dependent_friction, as words. */
+export const named = (id) => id.replaceAll("_", " ");
 
 /** An id such as load_dependent_friction as a heading. */
 export function title(id) {
@@ -113,18 +126,24 @@ export function state(name) {
   return h("span", { class: `state ${kind}` }, h("span", { "aria-hidden": "true" }, marks[name] ?? "◐"), ` ${named(name)}`);
 }
 
+/** A verdict as a word with a mark of its own shape. */
+export function verdict(name) {
+  const [mark, kind] = { consistent: ["●", "good"], explained: ["◆", "good"], partly_explained: ["◈", "live"], unexplained: ["✕", "bad"], inconclusive: ["?", "muted"], wrong_values: ["≠", "bad"] }[name] ?? ["–", "muted"];
+  return h("span", { class: `state ${kind}` }, h("span", { "aria-hidden": "true" }, mark), ` ${named(`${name ?? "no verdict"}`)}`);
+}
+
 /** What went wrong, and the page that explains its code: in a tab of its own, since this one may be watching an arm. */
 export function explained(problem) {
   const { code } = problem;
-  const other = code === "forbidden" ? [" · ", h("button", { type: "button", class: "link", text: t`Use another key`, onclick: () => window.dispatchEvent(new CustomEvent("tauscope:ask-key", { detail: problem })) })] : null;
-  const more = code ? h("a", { href: `/docs/errors/${encodeURIComponent(code)}`, target: "_blank", rel: "noopener", text: t`What ${code} means` }) : null;
-  return [h("span", { lang: "en", text: problem.detail ?? problem.message }), more ? [" · ", more] : null, other];
+  const other = code === "forbidden" ? [" · ", h("button", { type: "button", class: "link", text: "Use another key", onclick: () => window.dispatchEvent(new CustomEvent("tauscope:ask-key", { detail: problem })) })] : null;
+  const more = code ? h("a", { href: `/docs/errors/${encodeURIComponent(code)}`, target: "_blank", rel: "noopener", text: `What ${code} means` }) : null;
+  return [h("span", { text: problem.detail ?? problem.message }), more ? [" · ", more] : null, other];
 }
 
 /** What the service doubts in a file; nothing where that is little. */
 export function cautions(findings) {
   const doubts = findings.filter((each) => each.severity !== "info");
-  return doubts.length ? h("ul", { class: "cautions" }, doubts.map((each) => h("li", { lang: "en", text: `${each.where}: ${each.text}` }))) : null;
+  return doubts.length ? h("ul", { class: "cautions" }, doubts.map((each) => h("li", { text: `${each.where}: ${each.text}` }))) : null;
 }
 
 /** Large numbers at the top of a page. */

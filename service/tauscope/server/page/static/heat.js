@@ -1,17 +1,18 @@
 // Where the residual is: joints × state, each cell the residual in it as a multiple of the noise.
 
-import { h, number, s } from "./dom.js";
-import { named, t } from "./words.js";
+import { h, named, number, s } from "./dom.js";
 
 const LEVELS = [1.1, 1.3, 1.6, 2, 3, 5, 10];
 export const VARIABLES = ["velocity", "position", "load", "acceleration", "time"];
+export const LEVEL_WORDS = ["noise", ...LEVELS.map((edge) => `> ${edge} ×`)];
 const ROW = 24;
 const LABELS = 96;
 const GAP = 14;
 const WIDTH = 960;
 const TOP = 24;
 
-const level = (ratio) => LEVELS.filter((edge) => ratio > edge).length;
+/** Level of a residual, given as a multiple of the noise. */
+export const level = (ratio) => LEVELS.filter((edge) => ratio > edge).length;
 
 /** The map; `choose(joint, variable, bin, words)` is told which cell was clicked, or reached with the arrow keys. */
 export function heatMap(plots, joints, key, choose) {
@@ -29,7 +30,7 @@ export function heatMap(plots, joints, key, choose) {
   VARIABLES.forEach((variable, place) => {
     const left = LABELS + place * (group + GAP);
     parts.push(s("text", { x: left, y: TOP - 8, text: named(variable) }));
-    const words = variable === "time" ? [t`start`, t`end`] : [t`lowest`, t`highest`];
+    const words = variable === "time" ? ["start", "end"] : ["lowest", "highest"];
     parts.push(s("text", { class: "small", x: left, y: height - 26, text: words[0] }));
     parts.push(s("text", { class: "small", x: left + group, y: height - 26, "text-anchor": "end", text: words[1] }));
     joints.forEach((joint, row) => {
@@ -38,7 +39,7 @@ export function heatMap(plots, joints, key, choose) {
       const step = group / own[key].length;
       own[key].forEach((value, bin) => {
         const ratio = value / own.noise;
-        const words = t`${joint}, ${named(variable)} ${number(own.edges[bin], 3)} … ${number(own.edges[bin + 1], 3)}: ${number(ratio, 3)} × noise`;
+        const words = `${joint}, ${named(variable)} ${number(own.edges[bin], 3)} … ${number(own.edges[bin + 1], 3)}: ${number(ratio, 3)} × noise`;
         const cell = { row, place: rows[row].length, variable, bin, words };
         cell.element = s("rect", { class: `h${level(ratio)}`, x: left + bin * step, y: TOP + row * ROW, width: step, height: ROW - 3,
           "data-cell": `${row}-${variable}-${bin}`, onclick: () => take(cell) }, s("title", { text: words }));
@@ -48,12 +49,12 @@ export function heatMap(plots, joints, key, choose) {
     });
   });
   joints.forEach((joint, row) => parts.push(s("text", { x: 0, y: TOP + row * ROW + 15, text: joint.length > 14 ? `${joint.slice(0, 13)}…` : joint })));
-  [t`noise`, ...LEVELS.map((edge) => `> ${edge} ×`)].forEach((word, place) => {
+  LEVEL_WORDS.forEach((word, place) => {
     const x = LABELS + 84 * place;
     parts.push(s("rect", { class: `h${place}`, x, y: height - 14, width: 16, height: 11 }));
     parts.push(s("text", { class: "small", x: x + 21, y: height - 5, text: word }));
   });
-  const label = key === "before" ? t`Residual by joint and state as a multiple of the noise, without the findings` : t`Residual by joint and state as a multiple of the noise, with the findings`;
+  const label = key === "before" ? "Residual by joint and state as a multiple of the noise, without the findings" : "Residual by joint and state as a multiple of the noise, with the findings";
   return h("div", { class: "wide", tabindex: "0", role: "region", "aria-label": label, onkeydown: (event) => {
     const next = neighbour(rows, chosen, event.key);
     if (!next) return;

@@ -1,12 +1,11 @@
 // A robot over time: which model is in use, how its parameters move, and what somebody should know.
 
 import { getJson, post } from "./api.js";
-import { explained, h, moment, number, percent, render, section, table, tabs } from "./dom.js";
+import { explained, h, moment, named, number, percent, render, section, table, tabs } from "./dom.js";
 import { plot } from "./plots.js";
 import { scheduleSection } from "./schedules.js";
-import { named, t } from "./words.js";
 
-const STATES = { active: t`in use`, kept: t`was in use`, refused: t`refused`, unreadable: t`damaged` };
+const STATES = { active: "in use", kept: "was in use", refused: "refused", unreadable: "damaged" };
 const DAY_MS = 86_400_000;
 
 export async function showHistory(root, { signal, show }) {
@@ -16,10 +15,10 @@ export async function showHistory(root, { signal, show }) {
   const place = h("div", {});
   const choose = (chosen) => showRobot(place, robots[chosen], models.filter((each) => each.robot === robots[chosen]), signal);
   if (robots.length) await choose(0);
-  render(root, h("h1", { text: t`Over time` }), h("p", { class: "lead", text: t`Models that were judged, the drift of their parameters, and what is done by itself.` }),
-    events.length ? h("ul", { class: "cautions" }, events.map((event) => noteForm(event, show))) : h("p", { class: "note", text: t`No drift that nobody has taken note of.` }),
-    robots.length > 1 ? tabs(t`Robot`, robots, 0, choose) : null, place, schedules);
-  if (!robots.length) render(place, h("p", { class: "lead", text: t`No model has been judged yet: identify an arm first.` }));
+  render(root, h("h1", { text: "Over time" }), h("p", { class: "lead", text: "Models and their gates, the drift of their parameters, and schedules." }),
+    events.length ? h("ul", { class: "cautions" }, events.map((event) => noteForm(event, show))) : h("p", { class: "note", text: "No open drift alerts." }),
+    robots.length > 1 ? tabs("Robot", robots, 0, choose) : null, place, schedules);
+  if (!robots.length) render(place, h("p", { class: "lead", text: "No model has been judged yet: identify an arm first." }));
 }
 
 /** An event, and where its cause is written down: in the page, so that Stop stays within reach. */
@@ -32,8 +31,8 @@ function noteForm(event, show) {
       await post(`events/${event.number}/acknowledge`, { reason: reason.value });
       show();
     } catch (error) { render(said, explained(error)); }
-  } }, h("label", { for: reason.id }, t`What is it about? Kept with the event`, reason), h("button", { type: "submit", text: t`Take note` }), said);
-  return h("li", {}, h("span", { lang: "en", text: `${event.robot}: ${event.text}` }), form);
+  } }, h("label", { for: reason.id }, "What is it about? Kept with the event", reason), h("button", { type: "submit", text: "Take note" }), said);
+  return h("li", {}, h("span", { text: `${event.robot}: ${event.text}` }), form);
 }
 
 async function showRobot(place, robot, models, signal) {
@@ -43,25 +42,25 @@ async function showRobot(place, robot, models, signal) {
   const moved = [...parameters].sort((a, b) => Math.abs(b.line?.in_std ?? 0) - Math.abs(a.line?.in_std ?? 0));
   const select = h("select", { id: "trend", onchange: () => draw() }, moved.map((each) => h("option", { value: each.name, text: each.name })));
   const draw = () => render(drawn, trendOf(moved.find((each) => each.name === select.value), reference));
-  render(place, section("models", t`Models of ${robot}`,
-    table(t`Models`, [t`model`, t`state`, t`source`, t`judged`, t`why`], models.map((each) => [
-      h("a", { href: `#/identifications/${encodeURIComponent(each.id)}`, text: moment(each.created) }), each.is_reference ? t`${STATES[each.state] ?? each.state}, reference` : STATES[each.state] ?? each.state, named(each.source), moment(each.considered),
-      each.gates.filter((gate) => !gate.passed).map((gate) => gate.reason).join("; ") || t`passed every gate`]), 5)),
-  moved.length ? section("trend-of", t`Parameters`, h("form", { class: "sheet" }, h("label", { for: "trend" }, t`Parameter, the most moved first`, select)), drawn) : null);
+  render(place, section("models", `Models of ${robot}`,
+    table("Models", ["model", "state", "source", "judged", "why"], models.map((each) => [
+      h("a", { href: `#/identifications/${encodeURIComponent(each.id)}`, text: moment(each.created) }), each.is_reference ? `${STATES[each.state] ?? each.state}, reference` : STATES[each.state] ?? each.state, named(each.source), moment(each.considered),
+      each.gates.filter((gate) => !gate.passed).map((gate) => gate.reason).join("; ") || "passed every gate"]), 5)),
+  moved.length ? section("trend-of", "Parameters", h("form", { class: "sheet" }, h("label", { for: "trend" }, "Parameter, the most moved first", select)), drawn) : null);
   if (moved.length) draw();
 }
 
 /** A parameter in every model that was in use, and what the line through it says. */
 function trendOf({ name, points, line }, reference) {
-  if (points.length < 2) return h("p", { class: "note", text: t`Drawn from two models on.` });
+  if (points.length < 2) return h("p", { class: "note", text: "Drawn from two models on." });
   const start = Date.parse(points[0].time);
   const end = (sign) => points.map((each) => each.value + sign * 1.96 * each.std);
   return [
-    plot({ label: name, raw: true, tall: true, x: points.map((each) => (Date.parse(each.time) - start) / DAY_MS), xLabel: t`days since ${moment(points[0].time)}`, yLabel: "SI", bands: [{ series: [1, 2] }], series: [
-      { label: t`high`, values: end(1), colour: "--band", hidden: true }, { label: t`low`, values: end(-1), colour: "--band", hidden: true },
-      { label: t`estimate, with its 95 % band`, values: points.map((each) => each.value), colour: "--after", width: 2, marks: true }] }).element,
+    plot({ label: name, raw: true, tall: true, x: points.map((each) => (Date.parse(each.time) - start) / DAY_MS), xLabel: `days since ${moment(points[0].time)}`, yLabel: "SI", bands: [{ series: [1, 2] }], series: [
+      { label: "high", values: end(1), colour: "--band", hidden: true }, { label: "low", values: end(-1), colour: "--band", hidden: true },
+      { label: "estimate, with its 95 % band", values: points.map((each) => each.value), colour: "--after", width: 2, marks: true }] }).element,
     h("p", { id: "trend-words", text: changeOf(points, reference) }),
-    line ? h("p", { class: "note", text: t`The line through all ${line.count}: ${number(line.slope, 3)} ± ${number(line.slope_std, 2)} a week, ${number(Math.abs(line.in_std), 3)} standard errors from standing still.` }) : null,
+    line ? h("p", { class: "note", text: `The line through all ${line.count}: ${number(line.slope, 3)} ± ${number(line.slope_std, 2)} a week, ${number(Math.abs(line.in_std), 3)} standard errors from standing still.` }) : null,
   ];
 }
 
@@ -71,5 +70,5 @@ function changeOf(points, reference) {
   const to = points[points.length - 1];
   const std = Math.hypot(from.std, to.std);
   const share = from.value ? ` (${to.value > from.value ? "+" : "−"}${percent(Math.abs((to.value - from.value) / from.value))})` : "";
-  return t`From ${number(from.value, 3)} to ${number(to.value, 3)}${share} since the reference: ${number(Math.abs(to.value - from.value) / std, 2)} standard errors of the difference.`;
+  return `From ${number(from.value, 3)} to ${number(to.value, 3)}${share} since the reference: ${number(Math.abs(to.value - from.value) / std, 2)} standard errors of the difference.`;
 }

@@ -1,54 +1,82 @@
 // Identifications: how well the model explains the torque, its parameters, and its friction.
 
-import { download, follow, getJson } from "./api.js";
-import { explained, figures, h, moment, number, percent, render, s, section, state, table, tabs, unitsOf, withError } from "./dom.js";
+import { download, follow, getJson, remove } from "./api.js";
+import { explained, figures, h, moment, number, parameterName, percent, render, s, section, state, table, tabs, unitsOf, withError } from "./dom.js";
 import { jobList } from "./lists.js";
 import { group, plot, zoomButtons } from "./plots.js";
-import { t } from "./words.js";
 
-export const showIdentifications = jobList("identifications", t`Identifications`, t`Parameters and friction from recordings.`,
+export const showIdentifications = jobList("identifications", "identification", "Identifications", "Parameters and friction from recordings.",
   (each) => (each.recordings ?? []).map((entry) => entry.name).join(", "));
 
-const CONDITION = [[30, t`well excited`], [100, t`acceptable`], [1000, t`poor: some parameters lean on few samples`], [Infinity, t`very poor: excite the joints more`]];
+const ENDS = ["failed", "cancelled", "interrupted", "damaged"];
+const CONDITION = [[30, "well excited"], [100, "acceptable"], [1000, "poor: some parameters lean on few samples"], [Infinity, "very poor: excite the joints more"]];
 
 /** Share of the torque's power that a model explains. */
 const power = (fit) => percent(1 - fit.relative_error ** 2);
 
 export async function showIdentification(root, { id, signal, show }) {
   const job = await getJson(`identifications/${id}`, signal);
-  const head = [h("p", { class: "eyebrow", text: t`Identification` }), h("h1", { text: job.robot ?? id }), h("p", { class: "meta", text: moment(job.created) })];
+  const of = [...(job.recordings ?? []), ...(job.held_out ?? [])].map((each) => each.name).join(", ");
+  const eyebrow = h("p", { class: "eyebrow" }, "Identification · ", job.robot ? h("a", { href: `#/robots/${encodeURIComponent(job.robot)}`, text: job.robot }) : id);
+  const meta = h("p", { class: "meta", text: `${moment(job.created)} · ${of}` });
+  const head = [eyebrow, h("h1", { text: job.robot ?? id }), meta];
   if (job.state !== "succeeded") return waiting(root, head, job, signal, show);
   const [result, plots] = await Promise.all([getJson(job.links.result, signal), getJson(job.links.plots, signal)]);
   const { train, held_out: heldOut } = result.fit;
   const ratios = (heldOut ?? train).rms.map((rms, place) => rms / result.noise_std[place]);
   const worst = ratios.indexOf(Math.max(...ratios));
   const words = CONDITION.find(([most]) => result.condition_number < most)[1];
-  render(root, ...head,
-    h("p", { class: "headline", text: heldOut ? t`The model explains ${power(heldOut)} of the torque's power on motion that it was not made from.` : t`The model explains ${power(train)} of the torque's power on its own motion.` }),
+  render(root, eyebrow,
+    h("h1", { class: "headline", text: `The model explains ${power(heldOut ?? train)} of the power of ${heldOut ? "held-out torque" : "its own recordings' torque"}.` }), meta,
     figures([
-      [t`Relative error`, percent((heldOut ?? train).relative_error), heldOut ? t`held out; ${percent(train.relative_error)} on its own` : t`on its own recordings`],
-      [t`Residual / noise`, number(ratios[worst], 3), t`${result.joints[worst]}, the largest`],
-      [t`Condition number`, number(result.condition_number, 3), words],
-      [t`Noise known from`, result.noise_method === "periods" ? t`repetition` : t`the residual`, result.joints.map((name, place) => `${name} ${number(result.noise_std[place], 2)}`).join(", ")],
+      ["Relative error", percent((heldOut ?? train).relative_error), heldOut ? `held out; ${percent(train.relative_error)} on its own` : "on its own recordings"],
+      ["Residual / noise", number(ratios[worst], 3), `${result.joints[worst]}, the largest`],
+      ["Condition number", number(result.condition_number, 3), words],
+      ["Noise known from", result.noise_method === "periods" ? "repetition" : "the residual", result.joints.map((name, place) => `${name} ${number(result.noise_std[place], 2)}`).join(", ")],
     ]),
-    h("div", { class: "row" }, h("button", { type: "button", class: "primary", onclick: () => download(job.links.report, `identification-${id}.html`), text: t`Download the report` }),
+    h("div", { class: "row" }, h("button", { type: "button", class: "primary", onclick: () => download(job.links.report, `identification-${id}.html`), text: "Download the report" }),
       Object.entries(job.links.exports).map(([format, path]) => h("button", { type: "button", onclick: () => download(path, exportName(result.robot, format)), text: EXPORT_WORDS[format] ?? format }))),
-    result.unidentifiable?.length ? h("p", { class: "note", text: t`No motion of this arm shows ${result.unidentifiable.join(", ")}.` }) : null,
+    result.unidentifiable?.length ? h("p", { class: "note", text: `No motion of this arm shows ${result.unidentifiable.join(", ")}.` }) : null,
     torqueSection(result, plots), frictionSection(plots), parameterSection(result));
   return null;
 }
 
+/** A job that has not succeeded: its steps and its time as it goes on, and the way to cancel it; or its problem. */
 export function waiting(root, head, job, signal, show) {
-  const said = h("p", { role: "status" }, state(job.state), job.step ? h("span", { lang: "en", text: ` ${job.step}` }) : "");
-  render(root, ...head, said, job.problem ? h("p", { role: "alert" }, explained(job.problem)) : null);
-  if (job.problem || ["failed", "cancelled", "interrupted", "damaged"].includes(job.state)) return null;
+  const isOver = job.problem || ENDS.includes(job.state);
+  const now = h("p", { role: "status" }, state(job.state));
+  if (isOver) {
+    render(root, ...head, now, job.problem ? h("p", { role: "alert" }, explained(job.problem)) : null);
+    return null;
+  }
+  const elapsed = h("span", { class: "note" });
+  const steps = h("ol", { class: "plain done" });
+  const said = h("span", { role: "alert" });
+  const begun = Date.parse(job.started ?? job.created);
+  const tick = () => { elapsed.textContent = `${Math.max(0, Math.round((Date.now() - begun) / 1000))} s`; };
+  const timer = setInterval(tick, 1000);
+  signal.addEventListener("abort", () => clearInterval(timer), { once: true });
+  tick();
+  let step = null; // as the events tell it, from the first one on
+  const readable = (words) => words.replaceAll("_", " ").replace("@", " at ");
+  const draw = (name, words) => render(now, state(name), words ? ` ${readable(words)}` : "");
+  draw(job.state, job.step);
+  const cancel = h("button", { type: "button", class: "quiet", text: "Cancel", onclick: async () => {
+    cancel.disabled = true;
+    try { await remove(job.links.self); } catch (error) { render(said, explained(error)); cancel.disabled = false; }
+  } });
+  render(root, ...head, now, h("progress", { "aria-label": "Progress" }), h("div", { class: "row" }, elapsed, cancel, said), steps);
   return follow(job.links.events, signal, (event) => {
-    if (event.step) render(said, state("running"), h("span", { lang: "en", text: ` ${event.step}` }));
+    if (event.step && event.step !== step) {
+      if (step) steps.prepend(h("li", { text: `✓ ${readable(step)}` }));
+      step = event.step;
+      draw("running", step);
+    }
     if (event.kind === "ended") show();
   });
 }
 
-const EXPORT_WORDS = { json: "JSON", yaml: "YAML", c: t`C header`, python: t`Python module`, urdf: "URDF", mjcf: "MJCF" };
+const EXPORT_WORDS = { json: "JSON", yaml: "YAML", c: "C header", python: "Python module", urdf: "URDF", mjcf: "MJCF" };
 const exportName = (robot, format) => `${robot}.${{ json: "json", yaml: "yaml", c: "h", python: "py", urdf: "urdf", mjcf: "xml" }[format] ?? format}`;
 
 function torqueSection(result, plots) {
@@ -59,15 +87,15 @@ function torqueSection(result, plots) {
     const units = unitsOf(plots.joint_types?.[curve.joint]);
     const measured = curve.measured.map((value) => value ?? NaN);
     render(place, zoomButtons(together),
-      plot({ label: t`Torque of ${curve.joint}`, x: curve.time, xLabel: t`time [s]`, yLabel: units.torque, group: together, tall: true, series: [
-        { label: t`measured`, values: measured, colour: "--measured", width: 2.2 }, { label: t`model`, values: curve.predicted, colour: "--after" }] }).element,
-      plot({ label: t`Residual`, x: curve.time, xLabel: t`time [s]`, yLabel: units.torque, group: together, noise: 2 * result.noise_std[joint],
-        series: [{ label: t`measured − model`, values: measured.map((value, k) => value - curve.predicted[k]), colour: "--before" }] }).element);
+      plot({ label: `Torque of ${curve.joint}`, x: curve.time, xLabel: "time [s]", yLabel: units.torque, group: together, tall: true, series: [
+        { label: "measured", values: measured, colour: "--measured", width: 2.2 }, { label: "model", values: curve.predicted, colour: "--after" }] }).element,
+      plot({ label: "Residual", x: curve.time, xLabel: "time [s]", yLabel: units.torque, group: together, noise: 2 * result.noise_std[joint],
+        series: [{ label: "measured − model", values: measured.map((value, k) => value - curve.predicted[k]), colour: "--before" }] }).element);
   }
   choose(0);
   const shown = plots.torque[0];
-  return section("torque", t`Measured and predicted torque`, h("p", { class: "lead", text: shown.held_out ? t`${shown.recording}, held out: the model was not made from it.` : t`${shown.recording}, one of the model's own recordings.` }),
-    tabs(t`Joint`, result.joints, 0, choose), place);
+  return section("torque", "Measured and predicted torque", h("p", { class: "lead", text: shown.held_out ? `${shown.recording}, held out: the model was not made from it.` : `${shown.recording}, one of the model's own recordings.` }),
+    tabs("Joint", result.joints, 0, choose), place);
 }
 
 function frictionSection(plots) {
@@ -82,15 +110,15 @@ function frictionSection(plots) {
     const low = curve.friction.map((value, k) => value - 1.96 * curve.std[k]);
     // Every curve on one axis: where a curve has no point of its own, it is carried on between its neighbours.
     const carried = (values) => order.map((k) => (k < curve.velocity.length ? values[k] : interpolated(curve.velocity, values, velocity[k])));
-    render(place, plot({ label: t`Friction of ${curve.joint}`, raw: true, tall: true, x: order.map((k) => velocity[k]), xLabel: t`velocity [${units.velocity}]`, yLabel: units.torque,
+    render(place, plot({ label: `Friction of ${curve.joint}`, raw: true, tall: true, x: order.map((k) => velocity[k]), xLabel: `velocity [${units.velocity}]`, yLabel: units.torque,
       bands: [{ series: [1, 2] }], series: [
-        { label: t`95 % high`, values: carried(high), colour: "--band", hidden: true }, { label: t`95 % low`, values: carried(low), colour: "--band", hidden: true },
-        { label: t`model, with its 95 % band`, values: carried(curve.friction), colour: "--after", width: 2 },
-        { label: t`measured less rigid body, mean a bin`, values: spread(curve.measured_friction, curve.velocity.length), colour: "--measured", points: true }] }).element,
-    h("p", { class: "note", text: t`The recordings reach from ${number(curve.seen[0], 3)} to ${number(curve.seen[1], 3)}; beyond, nothing was seen.` }));
+        { label: "95 % high", values: carried(high), colour: "--band", hidden: true }, { label: "95 % low", values: carried(low), colour: "--band", hidden: true },
+        { label: "model, with its 95 % band", values: carried(curve.friction), colour: "--after", width: 2 },
+        { label: "measured less rigid body, mean a bin", values: spread(curve.measured_friction, curve.velocity.length), colour: "--measured", points: true }] }).element,
+    h("p", { class: "note", text: `The recordings reach from ${number(curve.seen[0], 3)} to ${number(curve.seen[1], 3)}; beyond, nothing was seen.` }));
   }
   choose(0);
-  return section("friction", t`Friction`, tabs(t`Joint`, plots.friction.map((each) => each.joint), 0, choose), place);
+  return section("friction", "Friction", tabs("Joint", plots.friction.map((each) => each.joint), 0, choose), place);
 }
 
 function interpolated(x, y, at) {
@@ -104,7 +132,7 @@ function interpolated(x, y, at) {
 function interval(value, std, low, high) {
   const at = (each) => 4 + (192 * (each - low)) / (high - low || 1);
   const reach = 1.96 * (std ?? 0);
-  return s("svg", { class: "interval", viewBox: "0 0 200 16", role: "img", "aria-label": t`${number(value - reach)} to ${number(value + reach)}` },
+  return s("svg", { class: "interval", viewBox: "0 0 200 16", role: "img", "aria-label": `${number(value - reach)} to ${number(value + reach)}` },
     s("line", { class: "axis", x1: at(0), x2: at(0), y1: 0, y2: 16 }),
     s("line", { x1: at(value - reach), x2: at(value + reach), y1: 8, y2: 8 }), s("circle", { cx: at(value), cy: 8, r: 3 }));
 }
@@ -118,10 +146,13 @@ function parameterSection(result) {
     const [low, high] = ends[unit(entry)] ?? [0, 0];
     ends[unit(entry)] = [Math.min(low, entry.value - reach), Math.max(high, entry.value + reach)];
   }
-  return section("parameters", t`Parameters`,
-    h("h3", { text: t`Friction` }),
-    table(t`Friction coefficients`, [t`joint`, t`stiction`, "Stribeck", t`viscous`, t`offset`], result.friction.map((entry) => [entry.joint, ...["stiction", "stribeck", "viscous", "offset"].map((name) => coefficient(entry, name))])),
-    h("h3", { text: t`Base parameters` }),
-    table(t`Base parameters`, [t`parameter`, t`value ± standard error`, t`unit`, t`95 % interval, one axis a unit`], result.base_parameters.map((entry) =>
-      [entry.name, withError(entry.value, entry.std ?? NaN), unit(entry), interval(entry.value, entry.std, ...ends[unit(entry)])])));
+  return section("parameters", "Parameters",
+    h("h3", { text: "Friction" }),
+    table("Friction coefficients", ["joint", "stiction", "Stribeck", "viscous", "offset"], result.friction.map((entry) => [entry.joint, ...["stiction", "stribeck", "viscous", "offset"].map((name) => coefficient(entry, name))])),
+    h("h3", { text: "Base parameters" }),
+    table("Base parameters", ["parameter", "value ± standard error", "unit", "95 % interval, one axis a unit"], [...result.base_parameters].sort((a, b) => linkOf(a) - linkOf(b)).map((entry) =>
+      [parameterName(entry.name), withError(entry.value, entry.std ?? NaN), unit(entry), interval(entry.value, entry.std, ...ends[unit(entry)])])));
 }
+
+/** Number of the link of a parameter's leading term. */
+const linkOf = (entry) => Number(/\d+$/.exec(Object.keys(entry.terms)[0])?.[0] ?? 0);

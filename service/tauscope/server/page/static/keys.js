@@ -2,7 +2,6 @@
 
 import { explained, h, render } from "./dom.js";
 import { hasKey, useKey } from "./api.js";
-import { t } from "./words.js";
 
 let panel = null;
 
@@ -15,11 +14,11 @@ export function askForKey(problem, go) {
   const input = h("input", { type: "password", autocomplete: "off", required: true, autofocus: true, id: "key" });
   const close = () => { panel.remove(); panel = null; };
   panel = h("dialog", { "aria-labelledby": "key-title" },
-    h("h2", { id: "key-title", text: t`An API key is needed` }), h("p", { class: "note" }, explained(problem)),
+    h("h2", { id: "key-title", text: "An API key is needed" }), h("p", { class: "note" }, explained(problem)),
     h("form", { onsubmit: (event) => { event.preventDefault(); useKey(input.value.trim()); close(); go(); } },
-      h("label", { for: "key" }, t`Key`, input), h("p", { class: "note", text: t`It is kept until this tab is closed, and nowhere else.` }),
-      h("div", { class: "row" }, h("button", { type: "submit", class: "primary", text: t`Go on` }),
-        hasKey() ? h("button", { type: "button", text: t`Keep the one I have`, onclick: close }) : null)));
+      h("label", { for: "key" }, "Key", input), h("p", { class: "note", text: "It is kept until this tab is closed, and nowhere else." }),
+      h("div", { class: "row" }, h("button", { type: "submit", class: "primary", text: "Go on" }),
+        hasKey() ? h("button", { type: "button", text: "Keep the one I have", onclick: close }) : null)));
   document.getElementById("content").before(panel); // below what is said of a stop, and never over it
   panel.show(); // not as a modal: nothing may shut Stop away
   panel.scrollIntoView({ block: "nearest" });
@@ -27,7 +26,7 @@ export function askForKey(problem, go) {
 
 /** The button in the foot of the page by which another key is entered. */
 export function keyButton(place, change) {
-  const draw = () => render(place, hasKey() ? h("button", { type: "button", class: "link", text: t`Use another key`, onclick: change }) : null);
+  const draw = () => render(place, hasKey() ? h("button", { type: "button", class: "link", text: "Use another key", onclick: change }) : null);
   window.addEventListener("tauscope:key", draw);
   draw();
 }

@@ -1,7 +1,6 @@
 // The lease of an arm, where the service wants one: taken and armed by whoever begins a motion here, kept as long as this tab lives, given back at its end.
 
 import { getJson, post, remove } from "./api.js";
-import { t } from "./words.js";
 
 const STORE = "tauscope-leases";
 const TTL_S = 10;
@@ -69,6 +68,6 @@ async function beat(lease, tell) {
   } catch (error) {
     if (error.code !== "lease-lost" || !held.includes(lease)) return; // the next beat may come through
     keep(held.filter((each) => each !== lease));
-    tell(arms(), t`The lease of ${lease.arm} is lost, and what moved by it was stopped. Look at the arm before you begin again.`);
+    tell(arms(), `The lease of ${lease.arm} is lost, and its run was stopped. Look at the arm before you begin again.`);
   }
 }

@@ -7,23 +7,23 @@ import { showCampaign, showCampaigns, showNewCampaign } from "./campaigns.js";
 import { showDiagnoses, showDiagnosis } from "./diagnoses.js";
 import { askForKey, isAsked, keyButton } from "./keys.js";
 import { keepLeases } from "./leases.js";
+import { showHome } from "./home.js";
 import { showHistory } from "./history.js";
 import { showIdentification, showIdentifications } from "./identifications.js";
 import { showRecording, showRecordings } from "./recordings.js";
 import { showRobot, showRobots } from "./robots.js";
 import { showRun, showRuns } from "./runs.js";
 import { stopEverything } from "./stop.js";
-import { LANGUAGES, language, speak, t } from "./words.js";
 
 const VIEWS = [
-  [/^\/$/, showCampaigns], [/^\/new$/, showNewCampaign], [/^\/campaigns\/([^/]+)$/, showCampaign],
+  [/^\/$/, showHome], [/^\/campaigns$/, showCampaigns], [/^\/new$/, showNewCampaign], [/^\/campaigns\/([^/]+)$/, showCampaign],
   [/^\/robots$/, showRobots], [/^\/robots\/([^/]+)$/, showRobot],
   [/^\/runs$/, showRuns], [/^\/runs\/([^/]+)$/, showRun],
   [/^\/recordings$/, showRecordings], [/^\/recordings\/([^/]+)$/, showRecording],
   [/^\/identifications$/, showIdentifications], [/^\/identifications\/([^/]+)$/, showIdentification],
   [/^\/history$/, showHistory], [/^\/diagnoses$/, showDiagnoses], [/^\/diagnoses\/([^/]+)$/, showDiagnosis],
 ];
-const MENU = [["/", t`Campaigns`], ["/robots", t`Robots`], ["/runs", t`Runs`], ["/recordings", t`Recordings`], ["/identifications", t`Identifications`], ["/diagnoses", t`Diagnoses`], ["/history", t`Over time`]];
+const MENU = [["/", "Home"], ["/campaigns", "Campaigns"], ["/robots", "Robots"], ["/runs", "Runs"], ["/recordings", "Recordings"], ["/identifications", "Identifications"], ["/diagnoses", "Diagnoses"], ["/history", "Over time"]];
 const PULSE_MS = 2000;
 const THEMES = ["auto", "light", "dark"];
 
@@ -40,7 +40,7 @@ async function show() {
   const path = location.hash.slice(1).split("?")[0] || "/";
   for (const link of document.querySelectorAll("#navigation a")) {
     const target = link.getAttribute("href").slice(1);
-    const here = target === "/" ? ["/", "/new"].includes(path) || path.startsWith("/campaigns") : path.startsWith(target);
+    const here = target === "/" ? path === "/" : path.startsWith(target) || (target === "/campaigns" && path === "/new");
     if (here) {
       link.setAttribute("aria-current", "page");
       link.scrollIntoView({ block: "nearest", inline: "nearest" }); // on a narrow screen the menu is longer than its line
@@ -49,7 +49,7 @@ async function show() {
   const found = VIEWS.map(([pattern, view]) => [pattern.exec(path), view]).find(([match]) => match);
   render(content, h("div", { class: "placeholder", "aria-busy": "true" }));
   if (!found) {
-    render(content, h("h1", { text: t`There is no such page` }), h("p", {}, h("a", { href: "#/", text: t`Go to the campaigns` })));
+    render(content, h("h1", { text: "There is no such page" }), h("p", {}, h("a", { href: "#/", text: "Go home" })));
     return;
   }
   try {
@@ -57,8 +57,8 @@ async function show() {
   } catch (error) {
     if (signal.aborted) return;
     if (error.status === 401) needKey(error);
-    else render(content, h("h1", { text: t`This cannot be shown` }), h("p", { role: "alert" }, explained(error)),
-      h("button", { type: "button", onclick: show, text: t`Try again` }));
+    else render(content, h("h1", { text: "This cannot be shown" }), h("p", { role: "alert" }, explained(error)),
+      h("button", { type: "button", onclick: show, text: "Try again" }));
   }
 }
 
@@ -89,9 +89,9 @@ function connection(now) {
   const shown = document.getElementById("link-state");
   const moving = live.runs.length + live.campaigns.length;
   shown.classList.toggle("lost", !now);
-  shown.textContent = now ? (moving ? t`An arm is in use` : t`Connected`) : t`Not connected`;
+  shown.textContent = now ? (moving ? "An arm is in use" : "Connected") : "Not connected";
   if (now !== reached) {
-    notice(now ? "" : t`The connection to the service is lost. What is shown may be old. Stop is tried again and again when pressed; to be sure, use the arm's own emergency stop.`);
+    notice(now ? "" : "The connection to the service is lost. The page may show old values. Stop is tried again and again when pressed; to be sure, use the arm's own emergency stop.");
     reached = now;
     if (now) window.dispatchEvent(new Event("tauscope:back"));
   }
@@ -103,11 +103,11 @@ function notice(text) {
 
 async function stopAll() {
   stopButton.classList.add("pressed");
-  stopButton.textContent = t`Stopping`;
+  stopButton.textContent = "Stopping";
   const known = [...live.campaigns, ...live.runs].map((each) => each.links.stop);
   const refused = await stopEverything(known, notice);
   stopButton.classList.remove("pressed");
-  stopButton.textContent = t`Stop`;
+  stopButton.textContent = "Stop";
   if (refused?.status === 401) needKey(refused);
   if (!refused) setTimeout(() => { if (reached) notice(""); }, 6000);
 }
@@ -115,19 +115,8 @@ async function stopAll() {
 /** Which arms this tab has, and that they stop with it. */
 function tellLeases(arms, lost) {
   const shown = document.getElementById("lease");
-  shown.textContent = arms.length ? t`This tab has the lease of ${arms.join(t` and `)}: where it is closed, or its connection is gone for ten seconds, the arm stops.` : "";
+  shown.textContent = arms.length ? `This tab has the lease of ${arms.join(" and ")}: where it is closed, or its connection is gone for ten seconds, the arm stops.` : "";
   if (lost) notice(lost);
-}
-
-/** Put what stands in index.html into the reader's language, and offer the other one. */
-function readIn(tongue) {
-  document.documentElement.lang = tongue;
-  document.querySelector(".skip").textContent = t`Skip to the content`;
-  document.getElementById("navigation").setAttribute("aria-label", t`Main`);
-  document.getElementById("interface").textContent = t`REST interface`;
-  stopButton.textContent = t`Stop`;
-  const others = Object.entries(LANGUAGES).filter(([name]) => name !== tongue);
-  document.getElementById("languages").append(...others.map(([name, word]) => h("button", { type: "button", class: "link", lang: name, text: word, onclick: () => speak(name) })));
 }
 
 function theme(choice) {
@@ -135,14 +124,13 @@ function theme(choice) {
   if (choice === "auto") delete document.documentElement.dataset.theme;
   else document.documentElement.dataset.theme = choice;
   const button = document.getElementById("theme");
-  const [mark, word] = { auto: ["◐", t`Auto`], light: ["○", t`Light`], dark: ["●", t`Dark`] }[choice];
+  const [mark, word] = { auto: ["◐", "Auto"], light: ["○", "Light"], dark: ["●", "Dark"] }[choice];
   render(button, mark, h("span", { class: "word", text: ` ${word}` }));
-  button.setAttribute("aria-label", t`Colours: ${word}`);
+  button.setAttribute("aria-label", `Colours: ${word}`);
   recolour();
 }
 
 document.getElementById("navigation").append(...MENU.map(([path, name]) => h("a", { href: `#${path}`, text: name })));
-readIn(language);
 document.getElementById("theme").addEventListener("click", () => {
   theme(THEMES[(THEMES.indexOf(localStorage.getItem("tauscope-theme") ?? "auto") + 1) % THEMES.length]);
 });
@@ -151,7 +139,7 @@ stopButton.addEventListener("click", stopAll);
 window.addEventListener("hashchange", async () => { await show(); content.focus({ preventScroll: true }); window.scrollTo(0, 0); });
 window.addEventListener("tauscope:back", show);
 window.addEventListener("tauscope:ask-key", (event) => needKey(event.detail));
-keyButton(document.getElementById("key-change"), () => needKey({ message: t`The key of this tab is replaced.` }));
+keyButton(document.getElementById("key-change"), () => needKey({ message: "The key of this tab is replaced." }));
 keepLeases(tellLeases);
 theme(localStorage.getItem("tauscope-theme") ?? "auto");
 getJson("/healthz").then(({ version }) => { document.getElementById("version").textContent = `Tauscope ${version}`; }).catch(() => {});

@@ -1,7 +1,8 @@
 // Plots over uPlot: many samples thinned to what a screen shows, zoomed by mouse, keys or buttons, in step with each other.
 
-import { h } from "./dom.js";
-import { t } from "./words.js";
+import { h, number } from "./dom.js";
+import { csvText, fileName, pngBlob, saveAs, svgText } from "./figure_files.js";
+import { nearest, thinned } from "./thinning.js";
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const alive = new Set();
@@ -11,65 +12,22 @@ export function recolour() {
   for (const plot of alive) plot.redraw(false, true);
 }
 
-/** First index whose value is not below `value`, of an increasing column. */
-function lowerBound(column, value) {
-  let low = 0;
-  let high = column.length;
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (column[middle] < value) low = middle + 1;
-    else high = middle;
-  }
-  return low;
-}
-
-/** Least and greatest value of every column in each of `buckets` stretches between two instants. */
-export function thinned(time, columns, from, to, buckets) {
-  const first = Math.max(lowerBound(time, from) - 1, 0);
-  const last = Math.min(lowerBound(time, to) + 1, time.length);
-  const count = last - first;
-  if (count <= 2 * buckets) {
-    return [Array.from(time.subarray ? time.subarray(first, last) : time.slice(first, last)),
-      ...columns.map((column) => Array.from(column.slice(first, last), (v) => (Number.isFinite(v) ? v : null)))];
-  }
-  const x = new Array(2 * buckets);
-  const out = columns.map(() => new Array(2 * buckets));
-  for (let bucket = 0; bucket < buckets; bucket += 1) {
-    const start = first + Math.floor((bucket * count) / buckets);
-    const stop = first + Math.floor(((bucket + 1) * count) / buckets);
-    x[2 * bucket] = time[start];
-    x[2 * bucket + 1] = time[Math.max(stop - 1, start)];
-    columns.forEach((column, place) => {
-      let low = Infinity;
-      let high = -Infinity;
-      for (let row = start; row < stop; row += 1) {
-        const value = column[row];
-        if (value < low) low = value;
-        if (value > high) high = value;
-      }
-      const empty = low === Infinity;
-      out[place][2 * bucket] = empty ? null : low;
-      out[place][2 * bucket + 1] = empty ? null : high;
-    });
-  }
-  return [x, ...out];
-}
-
 /**
  * A plot over a common axis.
  *
  * spec: { label, x: column, xLabel, yLabel, height, group, log, band: [low, high],
- *         series: [{ label, values, colour, width, dash, points: in place of a line, marks: on the line }] }
+ *         onCursor: told the instant under the mouse, series: [{ label, values, colour, width, dash, points: in place of a line, marks: on the line }] }
  */
 export function plot(spec) {
-  const holder = h("div", { class: `canvas ${spec.tall ? "tall" : ""}`, tabindex: "0", role: "group", "aria-label": t`${spec.label}. Arrow keys move, plus and minus zoom, zero shows everything.` });
+  const holder = h("div", { class: `canvas ${spec.tall ? "tall" : ""}`, tabindex: "0", role: "group", "aria-label": `${spec.label}. Arrow keys move, plus and minus zoom, zero shows everything.` });
   const legend = h("div", { class: "legend" });
-  const box = h("figure", { class: "plot" }, h("figcaption", {}, h("span", { text: spec.label }), legend), holder);
-  const time = spec.x;
+  const box = h("figure", { class: "plot" }, h("figcaption", {}, h("span", { text: spec.label }), legend, files()), holder);
+  let time = spec.x;
   const columns = spec.series.map((each) => each.values);
   const full = [time[0], time[time.length - 1]];
   let chart = null;
   let pending = null;
+  let isPointed = false; // whether the cursor is put there by the page, not by the reader
 
   const width = () => Math.max(Math.floor(holder.clientWidth), 60);
   const height = () => Math.max(Math.floor(holder.clientHeight), 80);
@@ -106,8 +64,16 @@ export function plot(spec) {
       if (chart) later(min, max);
     },
     replace(x, values) {
+      time = x;
       spec.series.forEach((each, place) => { columns[place] = values[place]; });
       chart?.setData([x, ...values]);
+    },
+    /** Put the cursor at an instant. */
+    point(at) {
+      if (!chart) return;
+      isPointed = true;
+      chart.setCursor({ left: chart.valToPos(at, "x"), top: 0 });
+      isPointed = false;
     },
     redraw: (...args) => chart?.redraw(...args),
     zoom,
@@ -115,6 +81,29 @@ export function plot(spec) {
     full: () => zoom(...full),
   };
   spec.group?.members.add(api);
+
+  const readings = spec.series.map(() => h("output", { class: "reading" }));
+  const instant = h("span", { class: "key instant" });
+
+  /** Values at the cursor, of the samples themselves; nothing where it is away. */
+  function read(u) {
+    const isThere = u.cursor.left >= 0 && u.cursor.idx !== null;
+    const row = isThere ? nearest(time, u.posToVal(u.cursor.left, "x")) : -1;
+    readings.forEach((each, place) => { each.textContent = isThere ? number(columns[place][row] ?? NaN, 4) : ""; });
+    if (isThere && !isPointed) spec.onCursor?.(time[row]);
+    instant.textContent = isThere ? `at ${number(time[row], 5)}` : "";
+  }
+
+  /** The plot as a file. */
+  function files() {
+    const save = {
+      PNG: async () => saveAs(await pngBlob(chart, spec, css), "image/png", `${fileName(spec.label)}.png`),
+      SVG: () => saveAs(svgText(chart, spec, css), "image/svg+xml", `${fileName(spec.label)}.svg`),
+      CSV: () => saveAs(csvText(spec.xLabel, spec.series, time, columns, api.range()), "text/csv", `${fileName(spec.label)}.csv`),
+    };
+    return h("span", { class: "files", role: "group", "aria-label": `Save ${spec.label}` },
+      Object.entries(save).map(([name, write]) => h("button", { type: "button", class: "link", text: name, onclick: () => { if (chart) write(); } })));
+  }
 
   /** Marks of an axis, written as all other numbers are: not in the manner of the browser's language. */
   const marks = (_, values) => values.map((value) => (value === null ? "" : `${Number(value.toPrecision(10))}`.replace("-", "−")));
@@ -127,7 +116,7 @@ export function plot(spec) {
     });
     chart = new window.uPlot({
       width: width(), height: height(), legend: { show: false }, padding: [8, 8, 0, 0],
-      cursor: { drag: { x: true, y: false, setScale: false }, points: { show: false }, sync: spec.group ? { key: spec.group.key, setSeries: false } : undefined },
+      cursor: { y: false, drag: { x: true, y: false, setScale: false }, points: { show: false }, sync: spec.group ? { key: spec.group.key, setSeries: false } : undefined },
       scales: { x: { time: false, range: spec.xRange }, y: spec.log ? { distr: 3 } : { range: spec.yRange } },
       axes: [axis(spec.xLabel, { size: 2.8 * text, space: 5 * text }), axis(spec.yLabel, { size: 4.8 * text })],
       series: [{ label: spec.xLabel }, ...spec.series.map((each) => ({
@@ -144,6 +133,7 @@ export function plot(spec) {
           u.ctx.fillStyle = css("--band");
           u.ctx.fillRect(u.bbox.left, Math.max(top, u.bbox.top), u.bbox.width, Math.min(bottom, u.bbox.top + u.bbox.height) - Math.max(top, u.bbox.top));
         }],
+        setCursor: [read],
         setSelect: [(u) => {
           if (u.select.width < 4) return;
           zoom(u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x"));
@@ -175,15 +165,16 @@ export function plot(spec) {
   spec.series.forEach((each, place) => {
     if (each.hidden) return;
     const swatch = h("span", { class: `swatch ${each.points ? "dot" : each.dash ? "dashed" : ""} ${each.colour.slice(2)}`, "aria-hidden": "true" });
-    if (spec.series.length === 1) { legend.append(h("span", { class: "key" }, swatch, each.label)); return; }
+    if (spec.series.length === 1) { legend.append(h("span", { class: "key" }, swatch, each.label, readings[place])); return; }
     const button = h("button", { type: "button", class: "key", "aria-pressed": each.show === false ? "false" : "true", onclick: () => {
       const on = button.getAttribute("aria-pressed") !== "true";
       button.setAttribute("aria-pressed", on ? "true" : "false");
       chart?.setSeries(place + 1, { show: on });
-    } }, swatch, each.label);
+    } }, swatch, each.label, readings[place]);
     legend.append(button);
   });
-  if (spec.noise) legend.append(h("span", { class: "key" }, h("span", { class: "swatch band", "aria-hidden": "true" }), t`± 2 σ of the noise`));
+  if (spec.noise) legend.append(h("span", { class: "key" }, h("span", { class: "swatch band", "aria-hidden": "true" }), "± 2 σ of the noise"));
+  legend.append(instant);
   requestAnimationFrame(() => { if (holder.isConnected && window.uPlot && time.length > 1) begin(); });
   return api;
 }
@@ -196,11 +187,11 @@ export function zoomButtons(group) {
     const middle = (min + max) / 2;
     any().zoom(middle - (factor * (max - min)) / 2, middle + (factor * (max - min)) / 2);
   };
-  return h("div", { class: "zoom", role: "group", "aria-label": t`Zoom` },
-    h("button", { type: "button", class: "quiet", onclick: by(0.5), "aria-label": t`Zoom in`, text: "+" }),
-    h("button", { type: "button", class: "quiet", onclick: by(2), "aria-label": t`Zoom out`, text: "−" }),
-    h("button", { type: "button", class: "quiet", onclick: () => any().full(), text: t`All` }),
-    h("span", { class: "hint", text: t`Drag to zoom, double-click for everything.` }));
+  return h("div", { class: "zoom", role: "group", "aria-label": "Zoom" },
+    h("button", { type: "button", class: "quiet", onclick: by(0.5), "aria-label": "Zoom in", text: "+" }),
+    h("button", { type: "button", class: "quiet", onclick: by(2), "aria-label": "Zoom out", text: "−" }),
+    h("button", { type: "button", class: "quiet", onclick: () => any().full(), text: "All" }),
+    h("span", { class: "hint", text: "Drag to zoom, double-click for everything." }));
 }
 
 let groups = 0;

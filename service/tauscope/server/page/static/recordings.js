@@ -2,9 +2,12 @@
 
 import { download, getJson, getSamples, post } from "./api.js";
 import { bytes, cautions, explained, figures, h, moment, number, render, section, table } from "./dom.js";
-import { items } from "./lists.js";
+import { searchable } from "./lists.js";
+import { replay } from "./motion.js";
 import { group, jointStyle, plot, zoomButtons } from "./plots.js";
-import { t } from "./words.js";
+import { lowerBound } from "./thinning.js";
+
+const EFFORTS = { tau: ["Torque", "tau", "Nm or N"], i: ["Current or drive units", "i", "drive units"], qref: ["Commanded position", "qref", "rad or m"] };
 
 export async function showRecordings(root, { signal, show }) {
   const { recordings } = await getJson("recordings", signal);
@@ -12,38 +15,91 @@ export async function showRecordings(root, { signal, show }) {
   const input = h("input", { type: "file", id: "upload", accept: ".csv,.parquet,.mcap,.db3", onchange: async () => {
     const form = new FormData();
     form.append("file", input.files[0]);
-    said.textContent = t`Sending …`;
+    said.textContent = "Sending …";
     try {
       await post("recordings", form);
       show();
     } catch (error) { render(said, explained(error)); }
   } });
   const newest = [...recordings].sort((a, b) => b.modified.localeCompare(a.modified));
-  render(root, h("h1", { text: t`Recordings` }), h("p", { class: "lead", text: t`CSV, Parquet or MCAP; each one continuous motion.` }),
-    h("form", { class: "sheet" }, h("label", { for: "upload" }, t`Keep a recording on the server`, input)), said,
-    items(newest.map((each) => ({ href: `#/recordings/${encodeURIComponent(each.name)}`, name: each.name, middle: bytes(each.size), when: moment(each.modified) })), t`Nothing yet.`));
+  render(root, h("h1", { text: "Recordings" }), h("p", { class: "lead", text: "CSV, Parquet or MCAP; each one continuous motion." }),
+    h("form", { class: "sheet" }, h("label", { for: "upload" }, "Keep a recording on the server", input)), said,
+    searchable(newest.map((each) => ({ href: `#/recordings/${encodeURIComponent(each.name)}`, name: each.name, path: `recordings/${encodeURIComponent(each.name)}`, middle: bytes(each.size), created: each.modified })), "Nothing yet."));
 }
 
 export async function showRecording(root, { id, signal }) {
   const path = `recordings/${encodeURIComponent(id)}`;
-  const head = [h("p", { class: "eyebrow", text: t`Recording` }), h("h1", { text: id }),
-    h("div", { class: "row" }, h("button", { type: "button", onclick: () => download(`${path}/content`, id), text: t`Download` }))];
+  const head = [h("p", { class: "eyebrow", text: "Recording" }), h("h1", { text: id }),
+    h("div", { class: "row" }, h("button", { type: "button", onclick: () => download(`${path}/content`, id), text: "Download" }))];
   render(root, ...head, h("div", { class: "placeholder", "aria-busy": "true" }));
-  const [report, samples] = await Promise.all([getJson(`${path}/report`, signal), getSamples(id, signal)]);
-  const together = group();
+  const run = /^run-(.+)\.csv$/.exec(id)?.[1]; // only of runs it is known what moved
+  const [report, samples, robot, { recordings }] = await Promise.all([getJson(`${path}/report`, signal), getSamples(id, signal),
+    run ? getJson(`runs/${encodeURIComponent(run)}/robot`, signal).then((answer) => answer.report, () => null) : null, getJson("recordings", signal)]);
   const time = samples.columns.t;
   const joints = Array.from({ length: samples.joint_count }, (_, place) => place + 1);
-  const make = (label, prefix, unit) => plot({ label, x: time, xLabel: t`time [s]`, yLabel: unit, group: together, tall: true,
-    series: joints.map((joint) => ({ label: `${prefix}${joint}`, values: samples.columns[`${prefix}${joint}`], ...jointStyle(joint - 1) })) });
+  const motion = robot?.joints.length === joints.length ? replay(robot, time, joints.map((joint) => samples.columns[`q${joint}`]), null, (row, isPlayed) => { if (isPlayed) charts.forEach((each) => each.point(time[row])); }) : null;
+  const curves = h("div", {});
+  let charts = [];
+
+  /** The curves; beside them those of another recording, or what is left without them. */
+  function draw(other = null, isDifference = false) {
+    const together = group();
+    const make = (label, prefix, unit) => {
+      const own = (joint) => samples.columns[`${prefix}${joint}`];
+      const theirs = other && joints.map((joint) => resampled(other.columns.t, other.columns[`${prefix}${joint}`], time));
+      const series = joints.flatMap((joint) => {
+        const [name, style] = [`${prefix}${joint}`, jointStyle(joint - 1)];
+        if (theirs && isDifference) return [{ label: name, values: own(joint).map((value, row) => value - theirs[joint - 1][row]), ...style }];
+        return [{ label: name, values: own(joint), ...style }, ...(theirs ? [{ label: `${name}, other`, values: theirs[joint - 1], colour: style.colour, dash: [6, 4] }] : [])];
+      });
+      return plot({ label: other && isDifference ? `${label}, difference` : label, onCursor: motion?.seek, x: time, xLabel: "time [s]", yLabel: unit, group: together, tall: true, series });
+    };
+    charts = [make("Position", "q", "rad or m"), make(...EFFORTS[samples.effort])];
+    render(curves, zoomButtons(together), charts.map((each) => each.element));
+  }
+  draw();
   render(root, ...head,
-    figures([[t`Samples`, `${report.samples}`, `${number(report.duration_s, 4)} s`], [t`Rate`, `${number(report.rate_hz, 4)} Hz`, t`${report.gaps.count} gaps`],
-      [t`Periods`, report.periods ? `${report.periods.count}` : "–", report.periods ? t`repeated motion` : t`none marked`],
-      [t`Missed`, `${Object.values(report.missed).reduce((sum, each) => sum + each, 0)}`, t`values`]]),
+    figures([["Samples", `${report.samples}`, `${number(report.duration_s, 4)} s`], ["Rate", `${number(report.rate_hz, 4)} Hz`, `${report.gaps.count} gaps`],
+      ["Periods", report.periods ? `${report.periods.count}` : "–", report.periods ? "repeated motion" : "none marked"],
+      ["Missing", `${missing(report)}`, "of time, position and effort"]]),
     cautions(report.findings),
-    zoomButtons(together),
-    make(t`Position`, "q", t`rad or m`).element,
-    make(...{ tau: [t`Torque`, "tau", t`Nm or N`], i: [t`Current or drive units`, "i", t`drive units`], qref: [t`Commanded position`, "qref", t`rad or m`] }[samples.effort]).element,
-    samples.shown < samples.samples ? h("p", { class: "note", text: t`${samples.shown} of ${samples.samples} samples are shown: those that keep every curve's peaks.` }) : null,
-    section("channels", t`Channels`, table(t`Channels`, [t`joint`, t`position from`, t`to`, t`effort from`, t`to`], report.joints.map((each, place) =>
+    motion ? section("replay", "Replay", motion.element) : null,
+    overlayForm(samples, recordings.map((each) => each.name).filter((name) => name !== id), draw, signal), curves,
+    samples.shown < samples.samples ? h("p", { class: "note", text: `${samples.shown} of ${samples.samples} samples are shown: those that keep every curve's peaks.` }) : null,
+    section("channels", "Channels", table("Channels", ["joint", "position from", "to", "effort from", "to"], report.joints.map((each, place) =>
       [`${place + 1}`, ...each.position.map((v) => number(v, 4)), ...each.effort.map((v) => number(v, 4))]))));
+}
+
+/** Values that are missing where every sample has one: other columns, such as the period, may stay empty. */
+function missing(report) {
+  return Object.entries(report.missed).filter(([name]) => /^(t|(q|tau|i|qref)\d+)$/.test(name)).reduce((sum, [, count]) => sum + count, 0);
+}
+
+/** The choice of another recording to lay over this one; nothing where there is no other. */
+function overlayForm(samples, names, draw, signal) {
+  if (!names.length) return null;
+  const said = h("span", { role: "alert" });
+  const other = h("select", { id: "overlay", onchange: () => change() }, h("option", { value: "", text: "none" }), names.map((name) => h("option", { value: name, text: name })));
+  const difference = h("input", { type: "checkbox", id: "difference", onchange: () => change() });
+  async function change() {
+    render(said);
+    try {
+      const found = other.value ? await getSamples(other.value, signal) : null;
+      const isLike = !found || (found.joint_count === samples.joint_count && found.effort === samples.effort);
+      if (!isLike) render(said, `${other.value} has other joints, or another kind of effort.`);
+      draw(isLike ? found : null, difference.checked);
+    } catch (error) { render(said, explained(error)); }
+  }
+  return h("div", { class: "row" }, h("label", { for: "overlay", class: "inline" }, "Overlay", other), h("label", { for: "difference", class: "inline" }, difference, "Difference"), said);
+}
+
+/** A column at other instants, on straight lines between its samples; none beyond its ends. */
+function resampled(time, column, instants) {
+  return instants.map((instant) => {
+    const right = lowerBound(time, instant);
+    if (right === 0) return time[0] === instant ? column[0] : NaN;
+    if (right === time.length) return NaN;
+    const share = (instant - time[right - 1]) / (time[right] - time[right - 1]);
+    return column[right - 1] + share * (column[right] - column[right - 1]);
+  });
 }

@@ -2,20 +2,25 @@
 
 import { armDrawing, jointRows } from "./arm.js";
 import { getJson } from "./api.js";
-import { cautions, figures, h, moment, number, percent, render, section, table, title } from "./dom.js";
-import { items } from "./lists.js";
-import { named, t } from "./words.js";
+import { cautions, figures, h, moment, named, number, percent, render, section, table, title } from "./dom.js";
+import { items, outcome, searchable } from "./lists.js";
 
 const KINDS = { run: "runs", identification: "identifications", diagnosis: "diagnoses", campaign: "campaigns" };
 const STANDS_STILL = ["created", "finished", "degraded", "stopped", "failed", "interrupted", "damaged"];
+const DONE = ["succeeded", "finished"];
 const LATELY = 12;
 
 export async function showRobots(root, { signal }) {
-  const [{ robots }, { leases }] = await Promise.all([getJson("robots", signal), getJson("leases", signal)]);
+  const [{ robots }, { leases }, { items: kept }] = await Promise.all([getJson("robots", signal), getJson("leases", signal), getJson("items?limit=1000", signal)]);
+  const last = (robot) => {
+    const own = kept.filter((each) => each.robot === robot);
+    const told = ["diagnosis", "identification"].map((kind) => own.find((each) => each.kind === kind && each.state === "succeeded")).find(Boolean) ?? own[0];
+    return told && outcome(told, told.figures);
+  };
   const newest = [...robots].sort((a, b) => b.last_seen.localeCompare(a.last_seen));
-  render(root, h("h1", { text: t`Robots` }), h("p", { class: "lead", text: t`Every arm that something is kept about, the last one used first.` }),
-    items(newest.map((each) => ({ href: pageOf(each.name), name: each.name, middle: holderOf(leases, each.name), when: moment(each.last_seen) })),
-      t`No robot yet: begin a campaign with its file.`));
+  render(root, h("h1", { text: "Robots" }), h("p", { class: "lead", text: "Most recent first, each with its last verdict." }),
+    searchable(newest.map((each) => ({ href: pageOf(each.name), name: each.name, detail: holderOf(leases, each.name), outcome: last(each.name), created: each.last_seen })),
+      "No robot yet: begin a campaign with its file."));
 }
 
 const pageOf = (robot) => `#/robots/${encodeURIComponent(robot)}`;
@@ -23,7 +28,7 @@ const pageOf = (robot) => `#/robots/${encodeURIComponent(robot)}`;
 /** Who has the lease of an arm, in words; nothing where nobody has. */
 function holderOf(leases, robot) {
   const held = leases.filter(({ arm }) => arm.slice(0, arm.lastIndexOf(" on ")) === robot);
-  return held.map(({ holder, armed }) => (armed ? t`${holder} has its lease, and it may move` : t`${holder} has its lease`)).join("; ");
+  return held.map(({ holder, armed }) => (armed ? `${holder} has its lease, and it may move` : `${holder} has its lease`)).join("; ");
 }
 
 export async function showRobot(root, { id: robot, signal }) {
@@ -35,33 +40,33 @@ export async function showRobot(root, { id: robot, signal }) {
   const model = models.find((each) => each.state === "active");
   const error = here.find((each) => each.kind === "identification" && each.id === model?.id)?.figures;
   const diagnosis = here.find((each) => each.kind === "diagnosis" && each.state === "succeeded");
-  const source = here.find((each) => each.state !== "damaged");
+  const source = here.find((each) => DONE.includes(each.state)) ?? here.find((each) => each.state !== "damaged"); // what failed may have failed for its robot file
   const path = source && `${KINDS[source.kind]}/${source.id}`;
   const report = path ? await getJson(`${path}/robot`, signal).then((answer) => answer.report, () => null) : null;
   const linkTo = (kind, id, words) => h("a", { href: `#/${KINDS[kind]}/${id}`, text: words });
-  render(root, h("p", { class: "eyebrow", text: t`Robot` }), h("h1", { text: robot }), h("p", { class: "meta", text: holderOf(leases, robot) || t`Nobody has its lease.` }),
+  render(root, h("p", { class: "eyebrow", text: "Robot" }), h("h1", { text: robot }), h("p", { class: "meta", text: holderOf(leases, robot) || "No lease is open." }),
     figures([
-      [t`Now`, moving ? linkTo("run", moving.id, named(moving.state)) : t`at rest`, moving ? t`open it to watch` : t`no run of this service moves it`],
-      [t`Last run`, used ? linkTo("run", used.id, named(used.state)) : "–", used ? moment(used.created) : t`none yet`],
-      [t`Model in use`, model ? linkTo("identification", model.id, moment(model.created)) : "–", model ? explainedShare(error) : t`none has passed every gate`],
-      [t`Last verdict`, diagnosis ? linkTo("diagnosis", diagnosis.id, named(`${diagnosis.figures.verdict}`)) : "–", diagnosis ? moment(diagnosis.created) : t`none yet`],
+      ["Now", moving ? linkTo("run", moving.id, named(moving.state)) : "at rest", moving ? "open it to watch" : "no run of this service moves it"],
+      ["Last run", used ? linkTo("run", used.id, named(used.state)) : "–", used ? moment(used.created) : "none yet"],
+      ["Model in use", model ? linkTo("identification", model.id, moment(model.created)) : "–", model ? explainedShare(error) : "none has passed every gate"],
+      ["Last verdict", diagnosis ? linkTo("diagnosis", diagnosis.id, named(`${diagnosis.figures.verdict}`)) : "–", diagnosis ? moment(diagnosis.created) : "none yet"],
     ]),
     report ? [
-      h("div", { class: "row" }, h("a", { class: "button primary", href: `#/new?robot=${path}`, text: t`New campaign with it` }), h("a", { class: "button", href: "#/history", text: t`Over time` })),
-      section("arm", t`The arm`, robotSheet(report), cautions(report.findings)),
+      h("div", { class: "row" }, h("a", { class: "button primary", href: `#/new?robot=${path}`, text: "New campaign with it" }), h("a", { class: "button", href: "#/history", text: "Over time" })),
+      section("arm", "The arm", robotSheet(report), cautions(report.findings)),
     ] : null,
-    section("lately", t`Lately`, items(here.slice(0, LATELY).map((each) => ({
-      href: `#/${KINDS[each.kind]}/${each.id}`, name: title(each.kind), state: each.state, when: moment(each.created) })), t`Nothing yet.`)));
+    section("lately", "Lately", items(here.slice(0, LATELY).map((each) => ({
+      href: `#/${KINDS[each.kind]}/${each.id}`, name: title(each.kind), outcome: outcome(each, each.figures), created: each.created })), "Nothing yet.")));
 }
 
 /** How well a model did where it was judged. */
 function explainedShare(error) {
   const relative = error?.held_out_error ?? error?.relative_error;
-  return typeof relative === "number" ? t`relative error ${percent(relative)}` : t`passed every gate`;
+  return typeof relative === "number" ? `relative error ${percent(relative)}` : "passed every gate";
 }
 
 /** An arm as a drawing, and its joints with their limits. */
 export function robotSheet(report) {
   return h("div", { class: "split" }, armDrawing(report).element,
-    table(t`Joints`, ["", t`joint`, t`type`, t`position`, t`velocity`, t`torque`], jointRows(report, number), 3));
+    table("Joints", ["", "joint", "type", "position", "velocity", "torque"], jointRows(report, number), 3));
 }

@@ -2,16 +2,17 @@
 
 import { armDrawing } from "./arm.js";
 import { download, follow, getJson, post } from "./api.js";
-import { explained, figures, h, moment, number, render, section, state, table, unitsOf } from "./dom.js";
+import { explained, figures, h, moment, named, number, render, section, state, table, unitsOf } from "./dom.js";
+import { diagnoseAgain } from "./diagnoses.js";
 import { jobList } from "./lists.js";
 import { group, jointStyle, plot } from "./plots.js";
-import { named, t } from "./words.js";
 
 const ENDS = ["finished", "degraded", "stopped", "failed", "interrupted", "damaged"];
 const KEPT = 1500;
+const KEPT_KEYS = ["position", "target", "effort"];
 const NEAR = 0.15;
 
-export const showRuns = jobList("runs", t`Runs`, t`Motions that were played on an arm.`, (run) => (run.campaign ? t`part of a campaign` : run.backend?.name));
+export const showRuns = jobList("runs", "run", "Runs", "Motions that were played on an arm.", (run) => (run.campaign ? "part of a campaign" : run.backend?.name));
 
 export async function showRun(root, { id, signal, show }) {
   const run = await getJson(`runs/${id}`, signal);
@@ -19,10 +20,18 @@ export async function showRun(root, { id, signal, show }) {
   const arm = monitor ? [] : await jointsOf(id);
   const status = h("div", { class: "row", role: "status" }, state(run.state));
   render(root, 
-    h("p", { class: "eyebrow", text: t`Run · ${run.backend?.name ?? ""}` }), h("h1", { text: run.robot ?? id }), h("p", { class: "meta", text: moment(run.created) }), status,
+    h("p", { class: "eyebrow", text: `Run · ${run.backend?.name ?? ""}` }), h("h1", { text: run.robot ?? id }), h("p", { class: "meta", text: moment(run.created) }), status,
     run.problem ? h("p", { role: "alert" }, explained(run.problem)) : null,
     monitor?.element,
     monitor ? null : finished(run, arm));
+  const after = new URLSearchParams(location.hash.split("?")[1] ?? "").get("after");
+  if (after && run.state === "finished" && run.recording?.name) {
+    render(status, state(run.state), h("span", { text: " Handing the diagnosis in …" }));
+    try {
+      const job = await diagnoseAgain(after, run.recording.name);
+      location.replace(`#/diagnoses/${job.id}?before=${encodeURIComponent(after)}`); // the way back hands in no second one
+    } catch (error) { render(status, state(run.state), " ", explained(error)); }
+  }
   if (monitor) {
     let current = run.state;
     await follow(run.links.events, signal, (event) => {
@@ -36,26 +45,26 @@ export async function showRun(root, { id, signal, show }) {
 
 function finished(run, arm) {
   const timing = run.timing;
-  const sent = h("span", { class: "hint", role: "status", text: t` harmless: it has ended` });
+  const sent = h("span", { class: "hint", role: "status", text: " harmless: it has ended" });
   return [
-    run.holds && run.backend?.name !== "sim" ? h("p", { role: "alert", text: t`The arm is under power where it stopped. Support it, then let go of it with: tauscope release` }) : null,
+    run.holds && run.backend?.name !== "sim" ? h("p", { role: "alert", text: "The arm is under power where it stopped. Support it, then let go of it with: tauscope release" }) : null,
     timing ? figures([
-      [t`Rate`, `${number(timing.achieved_rate_hz, 4)} Hz`, t`of ${number(timing.rate_hz, 4)} Hz`],
-      [t`Lateness, 99 %`, `${number(timing.lateness_us.p99, 3)} µs`, t`at most ${number(timing.lateness_us.max, 3)} µs`],
-      [t`Missed cycles`, `${timing.missed_periods}`, t`of ${timing.cycles}`],
-      [t`Samples`, `${run.recording?.samples ?? 0}`, run.recording?.partial ? t`not played to its end` : t`complete`],
+      ["Rate", `${number(timing.achieved_rate_hz, 4)} Hz`, `of ${number(timing.rate_hz, 4)} Hz`],
+      ["Lateness, 99 %", `${number(timing.lateness_us.p99, 3)} µs`, `at most ${number(timing.lateness_us.max, 3)} µs`],
+      ["Missed cycles", `${timing.missed_periods}`, `of ${timing.cycles}`],
+      ["Samples", `${run.recording?.samples ?? 0}`, run.recording?.partial ? "not played to its end" : "complete"],
     ]) : null,
-    run.recording?.name ? h("div", { class: "row" }, h("a", { class: "button primary", href: `#/recordings/${encodeURIComponent(run.recording.name)}`, text: t`Look at the recording` }),
+    run.recording?.name ? h("div", { class: "row" }, h("a", { class: "button primary", href: `#/recordings/${encodeURIComponent(run.recording.name)}`, text: "Look at the recording" }),
       Object.entries(run.links.recordings).map(([format, path]) => h("button", { type: "button", onclick: () => download(path, `run-${run.id}.${format}`), text: format.toUpperCase() }))) : null,
-    run.worst_following?.length ? section("following", t`Largest distance of arm and target`, table(t`Following`, [t`joint`, t`distance`], run.worst_following.map((value, place) => [nameOf(arm, place), `${number(value, 3)} ${unitsOf(arm[place]?.type).position}`]))) : null,
-    h("p", {}, h("button", { type: "button", class: "quiet", onclick: () => post(run.links.stop).catch((error) => render(sent, " ", explained(error))), text: t`Send stop again` }), sent),
+    run.worst_following?.length ? section("following", "Largest distance of arm and target", table("Following", ["joint", "distance"], run.worst_following.map((value, place) => [nameOf(arm, place), `${number(value, 3)} ${unitsOf(arm[place]?.type).position}`]))) : null,
+    h("p", {}, h("button", { type: "button", class: "quiet", onclick: () => post(run.links.stop).catch((error) => render(sent, " ", explained(error))), text: "Send stop again" }), sent),
   ];
 }
 
 /** What a run says while it goes on; `take(event)` feeds it. */
 export function liveMonitor(id) {
-  const bar = h("progress", { max: "100", value: "0", "aria-label": t`Played` });
-  const words = h("p", { class: "meta", text: t`Waiting for the arm` });
+  const bar = h("progress", { max: "100", value: "0", "aria-label": "Played" });
+  const words = h("p", { class: "meta", text: "Waiting for the arm" });
   const joints = h("div", { class: "joints-now" });
   const jitter = h("p", { class: "meta" });
   const plots = h("div", {});
@@ -64,7 +73,7 @@ export function liveMonitor(id) {
   let charts = null;
   let drawing = null;
   let arm = [];
-  const rows = { position: [], effort: [] };
+  const rows = { position: [], target: [], effort: [] };
 
   let isKnown = false; // whether it has been answered what the joints are called
   getJson(`runs/${id}/robot`).then(({ report }) => { arm = report.joints; drawing = armDrawing(report); render(pose, drawing.element); })
@@ -72,10 +81,12 @@ export function liveMonitor(id) {
 
   function begin(count) {
     const together = group();
-    const make = (label, key, unit) => plot({ label, x: [0, 1], xLabel: t`time [s]`, yLabel: unit, raw: true, group: together,
-      series: Array.from({ length: count }, (_, joint) => ({ label: nameOf(arm, joint), values: [null, null], ...jointStyle(joint) })), key });
-    charts = { position: make(t`Position`, "position", t`rad or m`), effort: make(t`Torque`, "effort", t`Nm or N`) };
-    for (const key of ["position", "effort"]) rows[key] = Array.from({ length: count }, () => []);
+    const each = (make) => Array.from({ length: count }, (_, joint) => ({ values: [null, null], ...jointStyle(joint), ...make(joint) }));
+    const measured = each((joint) => ({ label: nameOf(arm, joint) }));
+    const targets = each((joint) => ({ label: `${nameOf(arm, joint)}, target`, dash: [2, 4], width: 1 }));
+    const make = (label, unit, series) => plot({ label, x: [0, 1], xLabel: "time [s]", yLabel: unit, raw: true, group: together, series });
+    charts = { position: make("Position", "rad or m", [...measured, ...targets]), effort: make("Torque", "Nm or N", measured) };
+    for (const key of KEPT_KEYS) rows[key] = Array.from({ length: count }, () => []);
     render(plots, charts.position.element, charts.effort.element);
   }
 
@@ -88,23 +99,26 @@ export function liveMonitor(id) {
     if (!charts) begin(data.position.length);
     if (times.length && data.time_s <= times[times.length - 1]) return;
     times.push(data.time_s);
-    for (const key of ["position", "effort"]) data[key].forEach((value, joint) => rows[key][joint].push(value));
-    if (times.length > KEPT) { times.shift(); for (const key of ["position", "effort"]) rows[key].forEach((each) => each.shift()); }
-    if (times.length > 1) for (const key of ["position", "effort"]) charts[key].replace(times, rows[key]);
+    for (const key of KEPT_KEYS) rows[key].forEach((column, joint) => column.push(data[key]?.[joint] ?? null));
+    if (times.length > KEPT) { times.shift(); for (const key of KEPT_KEYS) rows[key].forEach((column) => column.shift()); }
+    if (times.length > 1) {
+      charts.position.replace(times, [...rows.position, ...rows.target]);
+      charts.effort.replace(times, rows.effort);
+    }
     drawing?.pose(data.position);
-    words.textContent = t`${number(data.time_s, 3)} of ${number(data.duration_s, 3)} s`;
-    jitter.textContent = t`Loop: ${number(data.lateness_us?.p99, 3)} µs late at 99 %, ${number(data.lateness_us?.max, 3)} µs at most; ${data.missed_periods} cycles missed, ${data.lost_rows} rows lost.`;
+    words.textContent = `${number(data.time_s, 3)} of ${number(data.duration_s, 3)} s`;
+    jitter.textContent = `Loop: ${number(data.lateness_us?.p99, 3)} µs late at 99 %, ${number(data.lateness_us?.max, 3)} µs at most; ${data.missed_periods} cycles missed, ${data.lost_rows} rows lost.`;
     render(joints, jointTable(data, arm));
   }
 
-  const element = h("section", { "aria-label": t`Live` }, bar, words, h("div", { class: "split" }, pose, h("div", {}, joints, jitter)), plots);
+  const element = h("section", { "aria-label": "Live" }, bar, words, h("div", { class: "split" }, pose, h("div", {}, joints, jitter)), plots);
   return { element, take };
 }
 
 /** The joints of the arm that a run moves; none where its robot file cannot be read. */
 const jointsOf = (id) => getJson(`runs/${id}/robot`).then(({ report }) => report.joints, () => []);
 
-const nameOf = (arm, joint) => arm[joint]?.name ?? t`joint ${joint + 1}`;
+const nameOf = (arm, joint) => arm[joint]?.name ?? `joint ${joint + 1}`;
 
 function jointTable(data, arm) {
   const gauge = (share) => h("span", { class: `gauge ${share > 1 - NEAR ? "near" : ""}`, "aria-hidden": "true" }, h("span", { "width%": Math.min(Math.max(100 * share, 0), 100) }));
@@ -115,8 +129,8 @@ function jointTable(data, arm) {
     const limit = data.torque_limit[joint];
     const load = limit ? Math.abs(data.effort[joint]) / limit : null;
     const unit = unitsOf(arm[joint]?.type);
-    return [nameOf(arm, joint), `${number(value, 4)} ${unit.position}`, bounded ? h("span", {}, gauge(2 * Math.abs(place - 0.5)), ` ${t`${number(data.position_room[joint], 3)} left`}`) : t`no limit`,
-      `${number(data.effort[joint], 4)} ${unit.torque}`, load === null ? t`no limit` : h("span", {}, gauge(load), ` ${(100 * load).toFixed(0)} %`)];
+    return [nameOf(arm, joint), `${number(value, 4)} ${unit.position}`, bounded ? h("span", {}, gauge(2 * Math.abs(place - 0.5)), ` ${`${number(data.position_room[joint], 3)} left`}`) : "no limit",
+      `${number(data.effort[joint], 4)} ${unit.torque}`, load === null ? "no limit" : h("span", {}, gauge(load), ` ${(100 * load).toFixed(0)} %`)];
   });
-  return table(t`Joints now`, [t`joint`, t`position`, t`room to the limit`, t`torque`, t`of its limit`], rows);
+  return table("Joints now", ["joint", "position", "room to the limit", "torque", "of its limit"], rows);
 }

@@ -1,7 +1,6 @@
 // The button that stops every arm. It needs no lease, and any key will do, an expired one too; it is tried until the service has heard.
 
 import { getJson, post } from "./api.js";
-import { t } from "./words.js";
 
 const ATTEMPTS = 60;
 const AGAIN_MS = 500;
@@ -38,16 +37,16 @@ export async function stopEverything(known, say) {
     try {
       const [all] = await Promise.all(["stop", ...known].map(asked));
       if (all.refused) {
-        say(t`Stop was refused: ${all.refused.message}. Use the arm's own emergency stop now.`);
+        say(`Stop was refused: ${all.refused.message}. Use the arm's own emergency stop now.`);
         return all.refused;
       }
       const more = await stillGoing();
       await Promise.all(more.map(asked));
       const stopped = [...all.told.runs, ...all.told.campaigns, ...known, ...more];
-      say(stopped.length ? t`Stop was sent, and the service has taken it.` : t`Nothing was moving.`);
+      say(stopped.length ? "Stop was sent, and the service has taken it." : "Nothing was moving.");
       return null;
     } catch {
-      say(t`Stop could not be sent. It is tried again. Use the arm's own emergency stop now.`);
+      say("Stop could not be sent. It is tried again. Use the arm's own emergency stop now.");
       await new Promise((done) => setTimeout(done, AGAIN_MS));
     }
   }

@@ -98,7 +98,7 @@ class RobotEntry:
 FIGURES: Mapping[str, tuple[str, ...]] = {
     "run": ("backend",),
     "identification": ("relative_error", "held_out_error"),
-    "diagnosis": ("verdict",),
+    "diagnosis": ("verdict", "headline"),
 }
 """For each kind of item, the columns of its own."""
 

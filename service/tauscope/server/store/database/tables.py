@@ -142,10 +142,11 @@ class Identification(Item):
 
 
 class Diagnosis(Item):
-    """A diagnosis and its `verdict`."""
+    """A diagnosis, its `verdict`, and its `headline`: the most important result in one sentence."""
 
     __mapper_args__ = {"polymorphic_identity": "diagnosis"}  # noqa: RUF012
     verdict: Mapped[str | None] = mapped_column(nullable=True)
+    headline: Mapped[str | None] = mapped_column(nullable=True)
 
 
 class Rollout(Item):
