@@ -102,7 +102,7 @@ def test_a_more_probable_rival_takes_the_place_where_held_out_motion_lets_it(ref
     asked = Deciding(
         NOTHING, NOTHING, None, odds=odds, refuted=frozenset({("cable_force", 0)}) if refuted else frozenset[Place]()
     )
-    at, (found,), exchanges = asked._exchange(holding(JointSpring(0)), 1)
+    at, (found,), exchanges = asked._exchange(holding(JointSpring(0)), 0, 1)
     assert at.model.terms[0].effect.id == ("joint_spring" if refuted else "cable_force")
     assert exchanges == (not refuted)
     assert bool(found.rivals) is not refuted, "one that is refuted is no alternative"
@@ -113,7 +113,7 @@ def test_a_more_probable_rival_takes_the_place_where_held_out_motion_lets_it(ref
 
 def test_the_more_probable_of_two_stays() -> None:
     odds: dict[Place, float] = {("joint_spring", 0): 60.0, ("cable_force", 0): 20.0}
-    at, (found,), _ = Deciding(NOTHING, NOTHING, None, odds=odds)._exchange(holding(JointSpring(0)), 1)
+    at, (found,), _ = Deciding(NOTHING, NOTHING, None, odds=odds)._exchange(holding(JointSpring(0)), 0, 1)
     assert at.model.terms[0].effect.id == "joint_spring"
     assert found.rivals[0].log_odds == 20.0
 
@@ -121,8 +121,8 @@ def test_the_more_probable_of_two_stays() -> None:
 @pytest.mark.parametrize(("log_odds", "named"), [(2.0, False), (4.0, True)])
 def test_what_every_geared_joint_has_must_stand_out_to_be_a_finding(log_odds: float, named: bool) -> None:
     odds: dict[Place, float] = {("rotor_inertia", 0): log_odds, ("joint_spring", 0): -9.0, ("cable_force", 0): -9.0}
-    _, found, _ = Deciding(NOTHING, NOTHING, None, odds=odds)._exchange(holding(RotorInertia(0)), 1)
+    _, found, _ = Deciding(NOTHING, NOTHING, None, odds=odds)._exchange(holding(RotorInertia(0)), 0, 1)
     assert bool(found) is named
     odds = {("joint_spring", 0): log_odds, ("cable_force", 0): -9.0}
-    _, found, _ = Deciding(NOTHING, NOTHING, None, odds=odds)._exchange(holding(JointSpring(0)), 1)
+    _, found, _ = Deciding(NOTHING, NOTHING, None, odds=odds)._exchange(holding(JointSpring(0)), 0, 1)
     assert found

@@ -21,8 +21,8 @@ from tauscope.recording.recording import Array
 MOST_EXCHANGES = 4
 """Effects whose place another one takes at most."""
 
-WEIGHED = 3
-"""Rivals of a finding that are looked at."""
+WEIGHED = 4
+"""Rivals of a finding that are looked at, itself in another shape among them."""
 
 MOST_EFFECTS = 12
 """Effects that are added at most."""
@@ -162,7 +162,7 @@ class Search:
             at, tried = self._grow(at, first, refused)
             steps += tried
             at = self._refine(self._without_harm(at, nominal), first)
-            at, weighed, exchanged = self._exchange(at, MOST_EXCHANGES - exchanges)
+            at, weighed, exchanged = self._exchange(at, first, MOST_EXCHANGES - exchanges)
             if not exchanged:
                 return Found(nominal, at, tuple(steps), weighed)
             exchanges += exchanged
@@ -203,8 +203,8 @@ class Search:
                 return found
         return at
 
-    def _exchange(self, at: Hypothesis, most: int) -> tuple[Hypothesis, tuple[Weighed, ...], int]:
-        """Each effect weighed beside all others, and a more probable one in its place where there is one."""
+    def _exchange(self, at: Hypothesis, first: int, most: int) -> tuple[Hypothesis, tuple[Weighed, ...], int]:
+        """Each effect weighed beside all others, a more probable one in its place, and none that is improbable."""
         weighed = {own: self._weigh(at, places) for own, places in _groups(at.model).items()}
         exchanges, stale = 0, set[Place]()
         while weighed:
@@ -212,7 +212,12 @@ class Search:
             if weighed[own].lead <= 0.0 or len(weighed[own].places) > 1 or exchanges >= most:
                 own = next(iter(stale), None)
             if own is None:
-                break
+                least = min(weighed, key=lambda each: weighed[each].log_odds)
+                if weighed[least].log_odds > 0.0 or weighed[least].places[0] < first:
+                    break
+                at = weighed.pop(least).without
+                stale = set(weighed)
+                continue
             if own in stale:
                 stale.remove(own)
                 weighed[own] = self._weigh(at, _groups(at.model)[own])
@@ -226,8 +231,8 @@ class Search:
             groups = _groups(at.model)
             stale = set(groups) - {new}
             weighed = {each: weighed[each] for each in stale} | {new: self._weigh(at, groups[new])}
-        found = tuple(each for each in weighed.values() if each.log_odds > self._least(at, each))
-        return at, found, exchanges
+        found = (each.refuse(own) for own, each in weighed.items() if each.log_odds > self._least(at, each))
+        return at, tuple(found), exchanges
 
     def _least(self, at: Hypothesis, weighed: Weighed) -> float:
         """Log odds from which an effect is a finding: one that every arm has must stand out."""
@@ -255,7 +260,7 @@ class Search:
 
         def competes(each: Effect) -> bool:
             place = each.id, each.joint
-            is_new = place != own and (each.repeats or place not in others)
+            is_new = (each.repeats and place != own) or place not in others  # itself in another shape, too
             is_like = lasts != isinstance(each, TimeLocalEffect)
             return is_new and is_like and not shared.isdisjoint(each.touched(len(at.scales)))
 
@@ -263,7 +268,7 @@ class Search:
         rivals = []
         for proposal in (each for each in proposals if self._log_odds(each) > 0.0):
             nearer = self.laboratory.approach(self._add(without, proposal))
-            odds = log_odds - trained + self._log_odds(proposal)
+            odds = log_odds - trained + self._log_odds(proposal) - (CATALOGUED if proposal.place == own else 0.0)
             odds += 0.0 if self.held_out is None else self.held_out.change(at, nearer).log_odds()
             rivals.append(Rival(nearer.model.terms[-1], nearer.model, odds))
         rivals.sort(key=lambda each: -each.log_odds)
@@ -289,10 +294,21 @@ class Search:
         refusals: list[Step] = []
         for proposal in self._rank(at, [each for each in proposals if self._is_worth_a_try(each)]):
             step, found = self._try(at, proposal, proposals)
+            forms = [] if step.is_confirmed or _is_possible(found.model) else self._forms_beyond(at, proposal)
+            for form in forms:  # where its own law cannot be
+                step, found = self._try(at, form, proposals)
+                if step.is_confirmed:
+                    break
             if step.is_confirmed:
                 return [*refusals, step], found
             refusals.append(step)
         return refusals, None
+
+    def _forms_beyond(self, at: Hypothesis, proposal: Proposal) -> list[Proposal]:
+        """Farther forms that refine an effect."""
+        name, joint = proposal.place
+        forms = [each for each in self.farther if name in each.refines and each.joint == joint]
+        return Proposer(self.laboratory, forms).propose(at, lambda _: True) if forms else []
 
     def _rank(self, at: Hypothesis, proposals: Sequence[Proposal]) -> list[Proposal]:
         """Proposals after all motion, the most probable first."""
