@@ -155,7 +155,7 @@ def test_its_parameters_are_within_four_standard_errors_of_the_truth(case: str) 
     values = {entry.name: entry for entry in told(case).findings[0].parameters}
     for name, truth in CASES[case][3].items():
         assert abs(values[name].value - truth) < 4.0 * values[name].std + 0.01 * abs(truth), name
-        assert values[name].std < 0.2 * abs(truth)
+        assert values[name].std < 0.25 * abs(truth)  # rows behind a low pass count as fewer than they are
 
 
 @pytest.mark.parametrize("case", EVERY_CASE)
@@ -228,17 +228,18 @@ def test_what_a_formula_leaves_of_its_effect_is_no_second_effect() -> None:
 
 
 @pytest.mark.slow
-def test_what_a_curve_leaves_and_held_out_motion_does_not_show_is_tentative() -> None:
-    found = told("hardening")
-    (first,) = found.findings
+def test_what_a_curve_leaves_gets_a_name_only_where_held_out_motion_is_predicted_better() -> None:
+    """The spring of a cube is first; what it leaves is a wave of long period to all that these motions show."""
+    found, plain = told("hardening"), told(None)
+    first, *others = found.findings
     assert (first.effect, first.joint, first.confirmed) == ("joint_spring", "joint3", True)
-    assert found.verdict == "partly_explained"
-    assert found.tentative, "what the curve leaves of the cube is significant, and something takes it up"
-    for each in found.tentative:
-        assert 0.1 < each.probability < 0.9
-        assert "It is small: the formula of joint spring at joint3 may cause it." in each.statement
-        assert "Held-out motion does not confirm it" in each.statement
-        assert each.statement.endswith("% (95 %).")  # no advice
+    assert found.fit.held_out is not None
+    assert plain.fit.held_out is not None
+    assert found.fit.held_out.rms_after[2] < 1.1 * plain.fit.held_out.rms_after[2]
+    for each in others:
+        assert each.joint == "joint3"
+        assert each.held_out_change is not None
+        assert each.held_out_change.relative[2] < 0.0
 
 
 @pytest.mark.slow
