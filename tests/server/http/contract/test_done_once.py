@@ -42,6 +42,7 @@ REQUESTS: dict[str, dict[str, Any]] = {
     f"{V1}/excitations": {"json": {"robot": ROBOT}},
     f"{V1}/identifications": {"json": {"robot": ROBOT, **SNAPSHOT_JOB}},
     f"{V1}/diagnoses": {"json": {"robot": ROBOT, **SNAPSHOT_JOB}},
+    f"{V1}/rollouts": {"json": {"robot": ROBOT, "recordings": ["monday.csv"]}},
     f"{V1}/leases": {"json": {"robot": "two-joint-arm"}},
     RECORDINGS: {"files": {"file": ("new.csv", b"t,q1,tau1\n")}},
     f"{V1}/schedules/{{name}}/run": {"json": {"reason": "a test"}},

@@ -43,8 +43,8 @@ def test_operations_have_names_of_their_own() -> None:
 
 
 def test_the_document_repeats_no_problem() -> None:
-    """As it is sent: 237 kB; with every problem at every operation it was 620 kB."""
-    assert len(json.dumps(DOCUMENT, separators=(",", ":"))) < 240_000
+    """As it is sent: 266 kB with rollouts and mappings; with every problem at every operation it was 620 kB."""
+    assert len(json.dumps(DOCUMENT, separators=(",", ":"))) < 270_000
 
 
 def test_lists_are_read_page_by_page(client: TestClient) -> None:
