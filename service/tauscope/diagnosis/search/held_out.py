@@ -67,7 +67,7 @@ class HeldOut:
             weighted = own.rows * (self._weights(joint, at) / at.dependence[joint])
             matrix[np.ix_(own.index, own.index)] += weighted @ own.rows.T
             right[own.index] += weighted @ residual
-        return np.asarray(np.linalg.solve(matrix, right))
+        return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
 
     @cached_property
     def _white(self) -> WhiteColumns:
