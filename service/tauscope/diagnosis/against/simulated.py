@@ -13,6 +13,7 @@ from tauscope.diagnosis.model.nominal import nominal_model
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.noise.floor import band_share, white_noise, with_pure_error
 from tauscope.diagnosis.observations.observations import Observations
+from tauscope.diagnosis.observations.whitening import JointNoise
 from tauscope.effects import TimeLocalEffect
 from tauscope.identification import Options, identify
 from tauscope.recording.conditioning import Conditioner
@@ -54,12 +55,19 @@ def fit_to_simulation(diagnosis: Diagnosis, simulated: Sequence[Recording], opti
     base, cutoff = start.structure.base, diagnosis.cutoff_hz
     rows = Observations.prepare(conditioners, diagnosis.robot, base, cutoff, start.steepness)
     repeated = with_pure_error(rows, start)
-    rows = repeated or rows.with_noise(white_noise(rows, start, band_share(rows)))
+    rows = repeated or rows.with_noise(_quieter_noise(rows, start))
     fit = Fitter(rows.with_weightings(weightings_of_motion(rows, start))).fit(start)
     inflation = 1.0 if repeated else fit.inflation()
     size = start.structure.size
     covariance = fit.covariance[:size, :size] * inflation
     return SimulatedFit(fit.model.parameters, covariance, _shared(diagnosis, fit, inflation))
+
+
+def _quieter_noise(rows: Observations, start: ExtendedModel) -> list[JointNoise]:
+    """Noise of every joint beside the model that leaves less there: with the arm's effects, or without them."""
+    share = band_share(rows)
+    pairs = zip(*(white_noise(rows, model, share) for model in (start, start.without_terms())), strict=True)
+    return [min(pair, key=lambda each: float(each.model.variance)) for pair in pairs]
 
 
 def _in_columns_of(final: ExtendedModel, simulated: ExtendedModel, terms: Sequence[Term]) -> ExtendedModel:
