@@ -331,13 +331,13 @@ def _next_experiment(
 
 def _open_question(diagnosis: Diagnosis, names: Sequence[str]) -> tuple[list[str], str]:
     """What is to be told apart, and the motion for it in words; empty where nothing is open."""
+    if diagnosis.verdict is Verdict.INCONCLUSIVE:
+        return [], f"{_reason(diagnosis)}: {_WIDE}"
     for finding in diagnosis.findings:
         if finding.alternatives:
             effects = [finding.terms[0].effect, *(rival.term.effect for rival in finding.alternatives)]
             motions = dict.fromkeys(effect.revealing_motion for effect in effects)
             return [effect.name(names) for effect in effects], "record " + "; and ".join(motions)
-    if diagnosis.verdict is Verdict.INCONCLUSIVE:
-        return [], f"{_reason(diagnosis)}: {_WIDE}"
     if diagnosis.verdict in OPEN:
         why = "repeat the same motion several times and slower: what repeats with time, angle or speed shows its kind"
         return [UNKNOWN], why
