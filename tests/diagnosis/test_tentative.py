@@ -9,7 +9,7 @@ from tauscope.diagnosis.findings.conclude import _tentative
 from tauscope.diagnosis.findings.finding import Finding
 from tauscope.diagnosis.model.extended import with_terms
 from tauscope.diagnosis.model.term import Place, Term
-from tauscope.diagnosis.search.search import Step
+from tauscope.diagnosis.search.found import Step
 from tauscope.effects.joint_spring import JointSpring
 
 

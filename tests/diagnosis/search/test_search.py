@@ -5,8 +5,8 @@ import pytest
 
 from diagnosis.diagnosed_arm import EffectTorque, at_joint, recordings
 from identification.simulated import paper_robot
+from tauscope.diagnosis.search.found import Found
 from tauscope.diagnosis.search.from_recordings import search
-from tauscope.diagnosis.search.search import Found
 from tauscope.identification import identify
 
 pytestmark = pytest.mark.slow

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from tauscope.diagnosis.findings.finding import EQUIVALENT, FORMULA_ERROR, equivalent
 from tauscope.diagnosis.model.term import Place, Term
-from tauscope.diagnosis.search.search import Rival, Search, Step, Weighed
+from tauscope.diagnosis.search.found import Rival, Step, Weighed
+from tauscope.diagnosis.search.search import Search
 from tauscope.effects import Effect
 from tauscope.effects.cable_force import CableForce
 from tauscope.effects.joint_spring import JointSpring

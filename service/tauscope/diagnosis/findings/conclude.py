@@ -19,10 +19,10 @@ from tauscope.diagnosis.model.nominal import delivered_model
 from tauscope.diagnosis.model.term import Place
 from tauscope.diagnosis.model.torque_scale import covariance_on_the_arm
 from tauscope.diagnosis.observations.observations import Observations
+from tauscope.diagnosis.search.found import Step
 from tauscope.diagnosis.search.from_recordings import Searched
 from tauscope.diagnosis.search.hypothesis import Hypothesis
 from tauscope.diagnosis.search.left import measure_lack, rows_under, weigh
-from tauscope.diagnosis.search.search import Step
 from tauscope.effects.payload import Payload
 from tauscope.effects.plain_terms import TorqueOffset
 from tauscope.identification import Identification

@@ -10,7 +10,7 @@ from tauscope.diagnosis.model.held_out_change import HeldOutChange, sum_stretche
 from tauscope.diagnosis.model.residual import raw_squares
 from tauscope.diagnosis.model.term import Place, Term
 from tauscope.diagnosis.observations.observations import Observations
-from tauscope.diagnosis.search.search import Rival
+from tauscope.diagnosis.search.found import Rival
 from tauscope.recording.recording import Array
 
 EQUIVALENT = 5.0

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from tauscope.diagnosis.search.found import Rival
 from tauscope.diagnosis.search.from_recordings import Searched
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
 from tauscope.diagnosis.search.proposals import Proposal, Proposer
-from tauscope.diagnosis.search.search import Rival
 
 CERTAIN = 1e12
 """Factor by which a constant that is not there is believed more precisely."""

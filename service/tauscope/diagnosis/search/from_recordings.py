@@ -13,11 +13,12 @@ from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.noise.floor import band_share, white_noise, with_pure_error
 from tauscope.diagnosis.observations.band import diagnosis_cutoff
 from tauscope.diagnosis.observations.observations import Observations
+from tauscope.diagnosis.search.found import Found
 from tauscope.diagnosis.search.held_out import HeldOut
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory, Prior
 from tauscope.diagnosis.search.left import is_left
 from tauscope.diagnosis.search.proposals import Proposer
-from tauscope.diagnosis.search.search import Found, Search
+from tauscope.diagnosis.search.search import Search
 from tauscope.effects import ArmContext, Effect, farther_effects, possible_effects
 from tauscope.effects.rotor_inertia import RotorInertia
 from tauscope.identification import Identification
@@ -77,7 +78,7 @@ def search(
     progress("compare effects")
     laboratory = Laboratory(rows, Prior.of(identification, model), repeated is not None)
     known = [*_rotors(identification, effects), *(each.term for each in direct_terms(deflections, setting))]
-    nominal = _with_known(laboratory.start(model), laboratory, known)
+    nominal = _add_known(laboratory.start(model), laboratory, known)
     unseen = None
     if held_out:
         others = [Conditioner.survey(recording, robot) for recording in held_out]
@@ -101,7 +102,7 @@ def _rotors(identification: Identification, effects: Sequence[Effect]) -> list[T
     return [Term(of_joint[joint], np.zeros(0), np.array([rotors[joint]])) for joint in rotors if joint in of_joint]
 
 
-def _with_known(nominal: Hypothesis, laboratory: Laboratory, known: Sequence[Term]) -> Hypothesis:
+def _add_known(nominal: Hypothesis, laboratory: Laboratory, known: Sequence[Term]) -> Hypothesis:
     """The nominal model with effects that are known beforehand, each in the shape of its grid that fits best."""
     for term in known:
         size = KNOWN_SPREAD * np.abs(term.coefficients)

@@ -8,7 +8,8 @@ import numpy as np
 
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.held_out_change import HeldOutChange
-from tauscope.diagnosis.model.term import Place, Term
+from tauscope.diagnosis.model.term import Place
+from tauscope.diagnosis.search.found import Found, Rival, Step, Weighed
 from tauscope.diagnosis.search.held_out import HeldOut
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
 from tauscope.diagnosis.search.proposals import Proposal, Proposer
@@ -16,7 +17,6 @@ from tauscope.diagnosis.search.scoring import unnamed_log_odds
 from tauscope.diagnosis.search.window import window_log_odds
 from tauscope.effects import Effect, TimeLocalEffect
 from tauscope.effects.computation import side_by_side
-from tauscope.recording.recording import Array
 
 MOST_EXCHANGES = 4
 """Effects whose place another one takes at most."""
@@ -35,105 +35,6 @@ UNREFUTED = 18.0
 
 CATALOGUED = 3.0
 """Log odds before the data that torque which is left out has a name: one in twenty laws is in no catalogue."""
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """An effect that was added or refused.
-
-    log_odds, trained_log_odds : float
-        posterior, that it is there, after all motion and after training
-    rivals : tuple of Proposal
-        other effects that were as good as looked at in its place
-    change : HeldOutChange or None
-        on held-out motion; None where there is none
-    covariance : (p, p) float64
-        of the parameters with it
-    """
-
-    proposal: Proposal
-    log_odds: float
-    rivals: tuple[Proposal, ...]
-    change: HeldOutChange | None
-    is_confirmed: bool
-    before: ExtendedModel
-    after: ExtendedModel
-    covariance: Array
-    trained_log_odds: float
-
-    @property
-    def probability(self) -> float:
-        """Of the effect, against none: no more than even where held-out motion contradicts it."""
-        log_odds = self.log_odds if self.is_confirmed else min(self.log_odds, 0.0)
-        return float(1.0 / (1.0 + np.exp(-np.clip(log_odds, -700.0, 700.0))))
-
-
-@dataclass(frozen=True, eq=False)
-class Rival:
-    """What may be in the place of a finding.
-
-    log_odds : float
-        posterior, against neither
-    absent : int or None
-        parameter of the nominal model in whose place it is
-    """
-
-    term: Term
-    model: ExtendedModel
-    log_odds: float
-    absent: int | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Weighed:
-    """Effects of one kind at one place beside all others.
-
-    places : tuple of int
-        of their terms in the model
-    without : Hypothesis
-        all others, at their most probable parameters
-    log_odds : float
-        posterior, that it is there
-    rivals : tuple of Rival
-        the most probable first
-    """
-
-    places: tuple[int, ...]
-    without: Hypothesis
-    log_odds: float
-    rivals: tuple[Rival, ...]
-    proposals: tuple[Proposal, ...]
-
-    @property
-    def lead(self) -> float:
-        """Log odds of the best rival against it."""
-        return self.rivals[0].log_odds - self.log_odds if self.rivals else -np.inf
-
-    def refuse(self, rival: Place) -> "Weighed":
-        """The same without a rival that held-out motion refuses."""
-        return replace(self, rivals=tuple(each for each in self.rivals if each.term.place != rival))
-
-    @property
-    def probability(self) -> float:
-        """Share of all visited models that contain it (Madigan & Raftery 1994)."""
-        ahead = np.array([-self.log_odds, *(each.log_odds - self.log_odds for each in self.rivals)])
-        return float(1.0 / (1.0 + np.exp(np.clip(ahead, -700.0, 700.0)).sum()))
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """Result of a search.
-
-    steps : tuple of Step
-        every effect that was tried, in the order of trial
-    weighed : tuple of Weighed
-        every effect of the hypothesis
-    """
-
-    nominal: Hypothesis
-    hypothesis: Hypothesis
-    steps: tuple[Step, ...]
-    weighed: tuple[Weighed, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,12 +62,12 @@ class Search:
         while True:
             at, tried = self._grow(at, first, refused)
             steps += tried
-            at = self._refine(self._without_harm(at, nominal), first)
+            at = self._refine(self._drop_harmful(at, nominal), first)
             at, weighed, exchanged = self._exchange(at, first, MOST_EXCHANGES - exchanges)
             if not exchanged:
                 return Found(nominal, at, tuple(steps), weighed)
             exchanges += exchanged
-            at = self._without_superfluous(at, first)
+            at = self._drop_superfluous(at, first)
 
     def _grow(self, at: Hypothesis, first: int, refused: set[Place]) -> tuple[Hypothesis, list[Step]]:
         """One more effect, and without those that it makes superfluous, until nothing helps."""
@@ -178,7 +79,7 @@ class Search:
             steps += tried
             if found is None:
                 break
-            at = self._without_superfluous(found, first)
+            at = self._drop_superfluous(found, first)
             refused |= _places(found) - _places(at)
         return at, steps
 
@@ -196,7 +97,7 @@ class Search:
         touched, without = effect.touched(len(at.scales)), self._settle_without(at, place)
         for proposal in Proposer(self.laboratory, [effect]).propose(without, lambda _: True):
             found = self._settle(self._add(without, proposal), touched)
-            found = self._without_superfluous(found, first)
+            found = self._drop_superfluous(found, first)
             gained = self.laboratory.under(found, at.dependence, touched).log_evidence - at.log_evidence
             gained += 0.0 if self.held_out is None else self.held_out.change(at, found).log_odds()
             if gained > 0.0 and _is_possible(found.model):
@@ -212,8 +113,9 @@ class Search:
             if weighed[own].lead <= 0.0 or len(weighed[own].places) > 1 or exchanges >= most:
                 own = next(iter(stale), None)
             if own is None:
-                least = min(weighed, key=lambda each: weighed[each].log_odds)
-                if weighed[least].log_odds > 0.0 or weighed[least].places[0] < first:
+                added = (each for each in weighed if weighed[each].places[0] >= first)
+                least = min(added, key=lambda each: weighed[each].log_odds, default=None)
+                if least is None or weighed[least].log_odds > 0.0:
                     break
                 at = weighed.pop(least).without
                 stale = set(weighed)
@@ -274,7 +176,7 @@ class Search:
         rivals.sort(key=lambda each: -each.log_odds)
         return Weighed(places, without, log_odds, tuple(rivals), tuple(proposals))
 
-    def _without_harm(self, at: Hypothesis, nominal: Hypothesis) -> Hypothesis:
+    def _drop_harmful(self, at: Hypothesis, nominal: Hypothesis) -> Hypothesis:
         """The same without the effects at whose cost joints are predicted worse than by the nominal model."""
         first = len(nominal.model.terms)
         while self.held_out is not None and len(at.model.terms) > first:
@@ -334,11 +236,11 @@ class Search:
         change = None if self.held_out is None else self.held_out.change(at, found)
         rivals = tuple(each for each in proposals if each is not proposal)
         log_odds = self._log_odds(proposal)
-        lasts = not isinstance(proposal.term.effect, TimeLocalEffect)
-        if not lasts:
+        passes = isinstance(proposal.term.effect, TimeLocalEffect)
+        if passes:
             log_odds = min(log_odds, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
         log_odds += 0.0 if change is None else change.log_odds()
-        confirmed = log_odds > (NAMED if lasts else UNREFUTED) and _is_possible(found.model)
+        confirmed = log_odds > (UNREFUTED if passes else NAMED) and _is_possible(found.model)
         confirmed &= change is None or self._agrees(change, proposal.term.effect, touched)
         covariance = found.posterior.covariance
         trained = self._log_odds(proposal)
@@ -395,7 +297,7 @@ class Search:
         joints = self.laboratory.rows.observations.robot.joint_count
         return float(np.clip(unnamed, 0.0, CATALOGUED + np.log(joints)) - np.log(sites))
 
-    def _without_superfluous(self, at: Hypothesis, first: int) -> Hypothesis:
+    def _drop_superfluous(self, at: Hypothesis, first: int) -> Hypothesis:
         """The same without effects that the later ones made superfluous.
 
         Parameters
@@ -405,7 +307,7 @@ class Search:
         """
         while True:
             places = range(first, len(at.model.terms) - 1)
-            gains = side_by_side(lambda place, at=at: self._gain_without(at, place), places)
+            gains = side_by_side(lambda place, at=at: self._weigh_absence(at, place), places)
             pairs = sorted(zip(gains, places, strict=True), reverse=True)
             others = (self._leave_out(at, place, gain) for gain, place in pairs if gain > CATALOGUED)
             other = next((each for each in others if each is not None), None)
@@ -419,7 +321,7 @@ class Search:
         gain += 0.0 if self.held_out is None else self.held_out.change(at, without).log_odds()
         return without if gain > CATALOGUED else None
 
-    def _gain_without(self, at: Hypothesis, place: int) -> float:
+    def _weigh_absence(self, at: Hypothesis, place: int) -> float:
         """Log posterior odds that an effect is not there."""
         term, own = at.model.terms[place], at.model.term_places()[place]
         effect, steps = term.effect, np.zeros(term.size)

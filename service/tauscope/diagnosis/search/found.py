@@ -1,0 +1,111 @@
+"""What a search comes to: the effects it tried, and how probable each is beside its rivals."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.model.held_out_change import HeldOutChange
+from tauscope.diagnosis.model.term import Place, Term
+from tauscope.diagnosis.search.hypothesis import Hypothesis
+from tauscope.diagnosis.search.proposals import Proposal
+from tauscope.recording.recording import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """An effect that was added or refused.
+
+    log_odds, trained_log_odds : float
+        posterior, that it is there, after all motion and after training
+    rivals : tuple of Proposal
+        other effects that were as good as looked at in its place
+    change : HeldOutChange or None
+        on held-out motion; None where there is none
+    covariance : (p, p) float64
+        of the parameters with it
+    """
+
+    proposal: Proposal
+    log_odds: float
+    rivals: tuple[Proposal, ...]
+    change: HeldOutChange | None
+    is_confirmed: bool
+    before: ExtendedModel
+    after: ExtendedModel
+    covariance: Array
+    trained_log_odds: float
+
+    @property
+    def probability(self) -> float:
+        """Of the effect, against none: no more than even where held-out motion contradicts it."""
+        log_odds = self.log_odds if self.is_confirmed else min(self.log_odds, 0.0)
+        return float(1.0 / (1.0 + np.exp(-np.clip(log_odds, -700.0, 700.0))))
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """What may be in the place of a finding.
+
+    log_odds : float
+        posterior, against neither
+    absent : int or None
+        parameter of the nominal model in whose place it is
+    """
+
+    term: Term
+    model: ExtendedModel
+    log_odds: float
+    absent: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """Effects of one kind at one place beside all others.
+
+    places : tuple of int
+        of their terms in the model
+    without : Hypothesis
+        all others, at their most probable parameters
+    log_odds : float
+        posterior, that it is there
+    rivals : tuple of Rival
+        the most probable first
+    """
+
+    places: tuple[int, ...]
+    without: Hypothesis
+    log_odds: float
+    rivals: tuple[Rival, ...]
+    proposals: tuple[Proposal, ...]
+
+    @property
+    def lead(self) -> float:
+        """Log odds of the best rival against it."""
+        return self.rivals[0].log_odds - self.log_odds if self.rivals else -np.inf
+
+    def refuse(self, rival: Place) -> "Weighed":
+        """The same without a rival that held-out motion refuses."""
+        return replace(self, rivals=tuple(each for each in self.rivals if each.term.place != rival))
+
+    @property
+    def probability(self) -> float:
+        """Share of all visited models that contain it (Madigan & Raftery 1994)."""
+        ahead = np.array([-self.log_odds, *(each.log_odds - self.log_odds for each in self.rivals)])
+        return float(1.0 / (1.0 + np.exp(np.clip(ahead, -700.0, 700.0)).sum()))
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Result of a search.
+
+    steps : tuple of Step
+        every effect that was tried, in the order of trial
+    weighed : tuple of Weighed
+        every effect of the hypothesis
+    """
+
+    nominal: Hypothesis
+    hypothesis: Hypothesis
+    steps: tuple[Step, ...]
+    weighed: tuple[Weighed, ...]
