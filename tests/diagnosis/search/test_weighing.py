@@ -83,9 +83,10 @@ class Deciding(Search):
     def _weigh(self, at: Any, places: tuple[int, ...]) -> Weighed:
         own = at.model.terms[places[0]]
         others = [each for each in (JointSpring(0), CableForce(0)) if each.id != own.effect.id]
-        rivals = tuple(rival(self.odds[each.id, 0], each) for each in others)
+        rivals = tuple(rival(odds, each) for each in others if (odds := self.odds[each.id, 0]) > -1.0)
         proposals: Any = tuple(SimpleNamespace(term=each.term) for each in rivals)
-        return Weighed(places, NOTHING, self.odds[own.place], rivals, proposals)
+        kept = [term.effect for number, term in enumerate(at.model.terms) if number not in places]
+        return Weighed(places, holding(*kept), self.odds[own.place], rivals, proposals)
 
     def _try(self, at: Any, proposal: Any, proposals: Any) -> Any:
         stands = proposal.term.place not in self.refuted
@@ -127,3 +128,10 @@ def test_what_every_geared_joint_has_must_stand_out_to_be_a_finding(log_odds: fl
     odds = {("joint_spring", 0): log_odds, ("cable_force", 0): -9.0}
     _, found, _ = Deciding(NOTHING, NOTHING, None, odds=odds)._exchange(holding(JointSpring(0)), 0, 1)
     assert found
+
+
+def test_what_is_improbable_is_dropped_beside_a_nominal_effect_that_is_less_probable_still() -> None:
+    odds: dict[Place, float] = {("rotor_inertia", 0): -5.0, ("joint_spring", 0): -1.0, ("cable_force", 0): -9.0}
+    at, found, _ = Deciding(NOTHING, NOTHING, None, odds=odds)._exchange(holding(RotorInertia(0), JointSpring(0)), 1, 1)
+    assert [each.effect.id for each in at.model.terms] == ["rotor_inertia"]
+    assert not found
