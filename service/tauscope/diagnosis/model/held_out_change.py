@@ -8,6 +8,7 @@ the squared errors after and before, summed over stretch s of S, and ρ = Σ a_s
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -29,6 +30,12 @@ SPILLED = 1.0 / 3.0
 """Part of the gain of all joints that others may lose."""
 
 
+def stretches(count: int) -> list[slice]:
+    """Rows of each stretch among `count` rows in the order of time."""
+    edges = np.linspace(0, count, max(min(STRETCHES, count // SHORTEST), 1) + 1).astype(int)
+    return [slice(start, stop) for start, stop in pairwise(edges)]
+
+
 def sum_stretches(squares: Array) -> Array:
     """Sums over stretches of motion, (n, S).
 
@@ -37,8 +44,7 @@ def sum_stretches(squares: Array) -> Array:
     squares : (n, N) float64
         squared errors in the order of time
     """
-    count = max(min(STRETCHES, squares.shape[1] // SHORTEST), 1)
-    return np.stack([part.sum(axis=1) for part in np.array_split(squares, count, axis=1)], axis=1)
+    return np.stack([squares[:, rows].sum(axis=1) for rows in stretches(squares.shape[1])], axis=1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,12 @@
 """What a hypothesis predicts of motion that it has not seen, joint by joint.
 
-Its parameters are as uncertain as training leaves them: their most probable values given the held-out rows r, too,
-minimise |r - L δ|²/κσ² + δᵀ Σ⁻¹ δ. Where training tells them, δ is nothing. Where it does not, what they may do says
-nothing of physics.
+Its parameters are as uncertain as training leaves them, so each stretch s of the motion is predicted from training and
+from all other stretches: with residual r and slopes L of a stretch's rows, and Σ of training,
+
+    δ_s = argmin δᵀ Σ⁻¹ δ + Σ_{t ≠ s} |r_t - L_t δ|²/κσ²,        error of stretch s: r_s - L_s δ_s.
+
+Where training tells the parameters, δ is nothing. Where it does not, what they may do says nothing of physics, and no
+coefficient gains by being fitted to what it is judged by.
 """
 
 from dataclasses import dataclass, field
@@ -12,11 +16,9 @@ import numpy as np
 
 from tauscope.diagnosis.evidence.rows import find_rest
 from tauscope.diagnosis.evidence.scales import REST_BOUNDS
-from tauscope.diagnosis.fitting.fit import stepped
 from tauscope.diagnosis.fitting.white_columns import WhiteColumns
 from tauscope.diagnosis.model.extended import ExtendedModel
-from tauscope.diagnosis.model.held_out_change import HeldOutChange, sum_stretches
-from tauscope.diagnosis.model.residual import residual_rows
+from tauscope.diagnosis.model.held_out_change import STRETCHES, HeldOutChange, stretches, sum_stretches
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.search.hypothesis import Hypothesis
 from tauscope.effects.computation import LastFew
@@ -54,20 +56,23 @@ class HeldOut:
         return self._known.get(id(at.model), lambda: (at.model, self._make_errors(at)))[1]
 
     def _make_errors(self, at: Hypothesis) -> list[Array]:
-        pieces = residual_rows(stepped(at.model, self._update(at)), self.observations)
-        rows = [np.concatenate([piece[0] for piece in own]) for own in pieces]
-        return [own[self.observations.kept(joint)] for joint, own in enumerate(rows)]
-
-    def _update(self, at: Hypothesis) -> Array:
-        """δ, (p,)."""
+        columns, residuals = self._white.all(at.model), self._white.residual(at.model)
         root = at.posterior.scale[:, None] * at.posterior.factor
-        matrix, right = root @ root.T, np.zeros(len(root))
-        pairs = zip(self._white.all(at.model), self._white.residual(at.model), strict=True)
-        for joint, (own, residual) in enumerate(pairs):
-            weighted = own.rows * (self._weights(joint, at) / at.dependence[joint])
-            matrix[np.ix_(own.index, own.index)] += weighted @ own.rows.T
-            right[own.index] += weighted @ residual
-        return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+        precision = root @ root.T
+        left_out = np.zeros((STRETCHES, len(root), len(root) + 1))
+        for joint, (own, residual) in enumerate(zip(columns, residuals, strict=True)):
+            weights = self._weights(joint, at) / at.dependence[joint]
+            for stretch, rows in zip(left_out, stretches(len(residual)), strict=False):
+                weighted = weights[rows] * own.rows[:, rows]
+                stretch[np.ix_(own.index, own.index)] += weighted @ own.rows[:, rows].T
+                stretch[own.index, -1] += weighted @ residual[rows]
+        matrices = precision + left_out[..., :-1].sum(axis=0) - left_out[..., :-1]
+        steps = np.linalg.solve(matrices, left_out[..., -1:].sum(axis=0) - left_out[..., -1:])[..., 0]
+        errors = [residual.copy() for residual in residuals]
+        for own, error in zip(columns, errors, strict=True):
+            for step, rows in zip(steps, stretches(len(error)), strict=False):
+                error[rows] -= step[own.index] @ own.rows[:, rows]
+        return errors
 
     @cached_property
     def _white(self) -> WhiteColumns:
