@@ -9,6 +9,7 @@ Where training tells the parameters, δ is nothing. Where it does not, what they
 coefficient gains by being fitted to what it is judged by.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -36,11 +37,24 @@ class HeldOut:
     _known: LastFew[int, tuple[ExtendedModel, list[Array]]] = field(default_factory=lambda: LastFew(MODELS_KEPT))
 
     def change(self, before: Hypothesis, after: Hypothesis) -> HeldOutChange:
-        """What a second hypothesis predicts better than a first; rows near rest count as little as its scales say."""
-        pairs = zip(self._errors(before), self._errors(after), strict=True)
+        """What a second hypothesis predicts better than a first from training and all other stretches."""
+        return self._compare(self._errors(before), self._errors(after), after)
+
+    def trained_change(self, before: Hypothesis, after: Hypothesis) -> HeldOutChange:
+        """…from training alone: this is what a user of the model gets."""
+        return self._compare(self._white.residual(before.model), self._white.residual(after.model), after)
+
+    def open_share(self, at: Hypothesis, joint: int) -> float:
+        """Standard error of a joint's torque that training leaves, as share of what was measured."""
+        own = self._white.all(at.model)[joint]
+        spread = own.rows.T @ at.posterior.spread[own.index]
+        return float(np.linalg.norm(spread) / np.linalg.norm(self._white.measured(joint)))
+
+    def _compare(self, before: Sequence[Array], after: Sequence[Array], at: Hypothesis) -> HeldOutChange:
+        """From the errors of every joint; rows near rest count as little as the scales of a hypothesis say."""
         found = [
-            HeldOutChange.between(*sum_stretches(self._weights(joint, after) * np.square(errors))[:, None])
-            for joint, errors in enumerate(pairs)
+            HeldOutChange.between(*sum_stretches(self._weights(joint, at) * np.square(pair))[:, None])
+            for joint, pair in enumerate(zip(before, after, strict=True))
         ]
         relative, error = (np.concatenate([getattr(each, name) for each in found]) for name in ("relative", "error"))
         return HeldOutChange(relative, error)

@@ -20,6 +20,9 @@ from tauscope.recording.recording import Array
 SLOPE_SPREAD = 1.0
 """Standard deviation of the logarithm of a friction slope that the robot file does not state."""
 
+CERTAIN = 1e-6
+"""…that is held."""
+
 SHAPE_SPREAD = 1.0
 """…of a shape that is searched by its logarithm."""
 
@@ -241,6 +244,11 @@ class Laboratory:
     def paint(self, at: Hypothesis, like: Hypothesis) -> Hypothesis:
         """The same model under another hypothesis' scales."""
         return self.at(at.model, at.sizes, like.scales, like.dependence)
+
+    def with_slopes_of(self, at: Hypothesis) -> "Laboratory":
+        """The same, sure of friction's slopes."""
+        spreads = np.full(len(self.prior.slopes), CERTAIN)
+        return replace(self, prior=replace(self.prior, slopes=_slopes(at.model), slope_spreads=spreads))
 
     def _nearer(self, at: Hypothesis) -> Hypothesis | None:
         """The model after a step under which data and parameters are more probable; None where there is none."""

@@ -1,6 +1,6 @@
 """From the nominal model to the most probable set of effects: one more, one less, until nothing helps."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cmp_to_key
 
@@ -17,15 +17,13 @@ from tauscope.diagnosis.search.scoring import unnamed_log_odds
 from tauscope.diagnosis.search.window import window_log_odds
 from tauscope.effects import Effect, TimeLocalEffect
 from tauscope.effects.computation import side_by_side
-
-MOST_EXCHANGES = 4
-"""Effects whose place another one takes at most."""
+from tauscope.identification.warnings import UNSEEN
 
 WEIGHED = 4
 """Rivals of a finding that are looked at, itself in another shape among them."""
 
 MOST_EFFECTS = 12
-"""Effects that are added at most."""
+"""Effects that are added, and that another one takes the place of, at most."""
 
 NAMED = 3.0
 """Log odds from which an effect is named, and those of its joints' held-out motion alone: nineteen in twenty."""
@@ -44,7 +42,7 @@ class Search:
     farther : sequence of Effect
         forms that say more than what they refine
     undetermined : frozenset of int
-        joints whose held-out torque training leaves open: it confirms no effect there
+        joints whose held-out torque an identification without effects leaves open
     """
 
     laboratory: Laboratory
@@ -63,7 +61,7 @@ class Search:
             at, tried = self._grow(at, first, refused)
             steps += tried
             at = self._refine(self._drop_harmful(at, nominal), first)
-            at, weighed, exchanged = self._exchange(at, first, MOST_EXCHANGES - exchanges)
+            at, weighed, exchanged = self._exchange(at, first, MOST_EFFECTS - exchanges)
             if not exchanged:
                 return Found(nominal, at, tuple(steps), weighed)
             exchanges += exchanged
@@ -98,9 +96,7 @@ class Search:
         for proposal in Proposer(self.laboratory, [effect]).propose(without, lambda _: True):
             found = self._settle(self._add(without, proposal), touched)
             found = self._drop_superfluous(found, first)
-            gained = self.laboratory.under(found, at.dependence, touched).log_evidence - at.log_evidence
-            gained += 0.0 if self.held_out is None else self.held_out.change(at, found).log_odds()
-            if gained > 0.0 and _is_possible(found.model):
+            if self._compare(at, found, touched) > 0.0 and _is_possible(found.model):
                 return found
         return at
 
@@ -124,7 +120,7 @@ class Search:
                 stale.remove(own)
                 weighed[own] = self._weigh(at, _groups(at.model)[own])
                 continue
-            other, rival = self._try_rival(weighed[own]), weighed[own].rivals[0].term.place
+            other, rival = self._try_rival(at, weighed[own]), weighed[own].rivals[0].term.place
             if other is None:
                 weighed = {each: weighed[each].refuse(rival) for each in weighed}
                 continue
@@ -140,12 +136,19 @@ class Search:
         """Log odds from which an effect is a finding: one that every arm has must stand out."""
         return CATALOGUED if at.model.terms[weighed.places[0]].effect.is_expected else 0.0
 
-    def _try_rival(self, weighed: Weighed) -> Hypothesis | None:
+    def _try_rival(self, at: Hypothesis, weighed: Weighed) -> Hypothesis | None:
         """The hypothesis with the best rival in the place of an effect, where that is more probable."""
-        rival, without = weighed.rivals[0], weighed.without
-        proposal = next(each for each in weighed.proposals if each.term.effect is rival.term.effect)
-        step, found = self._try(without, proposal, weighed.proposals)
-        return found if step.is_confirmed and step.log_odds > weighed.log_odds else None
+        rival, own = weighed.rivals[0].term.effect, at.model.terms[weighed.places[0]].effect
+        proposal = next(each for each in weighed.proposals if each.term.effect is rival)
+        step, found = self._try(weighed.without, proposal, weighed.proposals)
+        gained = self._compare(at, found, {*rival.touched(len(at.scales)), *own.touched(len(at.scales))})
+        gained += self._prior_odds(rival, 0.0) - self._prior_odds(own, 0.0)
+        return found if step.is_confirmed and gained > 0.0 else None
+
+    def _compare(self, at: Hypothesis, found: Hypothesis, touched: Collection[int]) -> float:
+        """Log Bayes factor of a second hypothesis; what both predict alike of held-out motion says nothing."""
+        gained = self.laboratory.under(found, at.dependence, touched).log_evidence - at.log_evidence
+        return gained + (0.0 if self.held_out is None else self.held_out.change(at, found).log_odds())
 
     def _weigh(self, at: Hypothesis, places: tuple[int, ...]) -> Weighed:
         """An effect's odds against none and against others in its place."""
@@ -180,10 +183,10 @@ class Search:
         """The same without the effects at whose cost joints are predicted worse than by the nominal model."""
         first = len(nominal.model.terms)
         while self.held_out is not None and len(at.model.terms) > first:
-            if self.held_out.change(nominal, at).harm <= 0.0:
+            if self.held_out.trained_change(nominal, at).harm <= 0.0:
                 break
             others = [self._settle_without(at, place) for place in range(first, len(at.model.terms))]
-            harms = [self.held_out.change(nominal, each).harm for each in others]
+            harms = [self.held_out.trained_change(nominal, each).harm for each in others]
             at = others[int(np.argmin(harms))]
         return at
 
@@ -241,15 +244,32 @@ class Search:
             log_odds = min(log_odds, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
         log_odds += 0.0 if change is None else change.log_odds()
         confirmed = log_odds > (UNREFUTED if passes else NAMED) and _is_possible(found.model)
-        confirmed &= change is None or self._agrees(change, proposal.term.effect, touched)
+        confirmed = confirmed and (change is None or self._agrees(change, at, found))
         covariance = found.posterior.covariance
         trained = self._log_odds(proposal)
         return Step(proposal, log_odds, rivals, change, confirmed, at.model, found.model, covariance, trained), found
 
-    def _agrees(self, change: HeldOutChange, effect: Effect, touched: Sequence[int]) -> bool:
-        """Whether held-out motion shows an effect; a window in time is of its own recording, and has to do no harm."""
+    def _agrees(self, change: HeldOutChange, at: Hypothesis, found: Hypothesis) -> bool:
+        """Whether held-out motion shows the last effect, and is predicted no worse; a window has to do no harm."""
+        assert self.held_out is not None
+        effect = found.model.terms[-1].effect
+        if self.held_out.trained_change(at, found).harm > 0.0:
+            return False
+        if effect.joint in self.undetermined and self.held_out.open_share(found, effect.joint) > UNSEEN:
+            return False
+        touched = effect.touched(len(found.scales))
         is_shown = isinstance(effect, TimeLocalEffect) or change.log_odds(touched) > NAMED
-        return change.harm <= 0.0 and is_shown and effect.joint not in self.undetermined
+        return is_shown or self._shows_beside_friction(found, touched)
+
+    def _shows_beside_friction(self, found: Hypothesis, touched: Sequence[int]) -> bool:
+        """Whether held-out motion shows the last effect beside friction's slopes as they are with it.
+
+        Without it they may have moved to what nobody believes, for slopes and effect may predict the same.
+        """
+        laboratory = self.laboratory.with_slopes_of(found)
+        without = laboratory.settle(laboratory.without_term(found, len(found.model.terms) - 1), touched)
+        assert self.held_out is not None
+        return self.held_out.change(without, found).log_odds(touched) > NAMED
 
     def _settle(self, at: Hypothesis, touched: Sequence[int]) -> Hypothesis:
         """The most probable parameters; the edges of a window, of which each has several, are looked for once more."""
