@@ -36,13 +36,20 @@ NO_SHAPE = np.zeros((1, 0))
 
 @dataclass(frozen=True)
 class Coefficient:
-    """A linear coefficient of an effect."""
+    """A linear coefficient of an effect.
+
+    largest, smallest : float
+        magnitudes beyond which there is no such effect
+    whole : float
+        value of what is complete, where an estimate stops
+    """
 
     name: str
     unit: str
     positive: bool = False
     largest: float = np.inf
     smallest: float = 0.0
+    whole: float = np.inf
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
 LARGEST_SHARE = 2.0
-"""One where all of the torque is filtered; sharper filters of higher order look like more. Beyond two it amplifies."""
+"""Share of the torque that a constant near the right one makes late: the right one makes all of it late at most."""
 
 SMALLEST_SHARE = 0.5
 """A channel is late as a whole: where less than half of its torque seems to be, noise or something else does."""
@@ -92,7 +92,7 @@ class Shift(LateTorque):
     """
 
     is_variant = True
-    coefficients = (Coefficient("a", "1", positive=True, largest=LARGEST_SHARE, smallest=SMALLEST_SHARE),)
+    coefficients = (Coefficient("a", "1", positive=True, largest=LARGEST_SHARE, smallest=SMALLEST_SHARE, whole=1.0),)
     shapes = (Shape("T", "s", logarithmic=True),)
 
     @classmethod

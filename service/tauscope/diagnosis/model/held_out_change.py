@@ -55,18 +55,21 @@ class HeldOutChange:
         of every joint's rms; below zero is better
     error : (n,) float64
         its standard error; infinite where the motion is too short to tell it
+    expected : (n,) float64, optional
+        magnitude of the change in standard errors if all that the models differ in is there
     """
 
     relative: Array
     error: Array
+    expected: Array | None = None
 
     @staticmethod
-    def between(before: Array, after: Array) -> "HeldOutChange":
-        """From squared errors of two models.
+    def between(before: Array, after: Array, difference: Array | None = None) -> "HeldOutChange":
+        """From squared errors of two models, and what they differ in.
 
         Parameters
         ----------
-        before, after : (n, S) float64
+        before, after, difference : (n, S) float64
             summed over the same stretches
         """
         stretches = before.shape[1]
@@ -77,7 +80,11 @@ class HeldOutChange:
             return HeldOutChange(np.sqrt(ratio) - 1.0, np.full(len(before), np.inf))
         spread = (after - ratio[:, None] * before).std(axis=1, ddof=1)
         slope = 2.0 * np.sqrt(np.maximum(ratio, np.finfo(float).tiny))
-        return HeldOutChange(np.sqrt(ratio) - 1.0, np.sqrt(stretches) * spread / whole / slope)
+        error, expected = np.sqrt(stretches) * spread / whole, None
+        if difference is not None:
+            size = difference.sum(axis=1) / whole
+            expected = np.divide(size, error, out=np.zeros_like(size), where=error > 0.0)
+        return HeldOutChange(np.sqrt(ratio) - 1.0, error / slope, expected)
 
     @property
     def standard(self) -> Array:
@@ -100,15 +107,17 @@ class HeldOutChange:
         return lost + SPILLED * float(np.minimum(gain, 0.0).sum()) if lost > 0.0 else 0.0
 
     def log_odds(self, joints: Sequence[int] | None = None) -> float:
-        """Log odds that held-out motion adds to the second model, 2 z² of each joint.
+        """Log odds that held-out motion adds to the second model, 2 z min(|z|, z_e) of each joint.
 
         Where a torque f is there, leaving it out costs Σ f² ± 2σ √(κ Σ f²) in white noise σ whose rows count as 1/κ:
-        z = √(Σ f²/κ) / 2σ, and Σ f² / 2κσ² is the log odds. So the noise need not be known.
+        the change expected is z_e = √(Σ f²/κ) / 2σ, and a change z has the likelihood ratio exp(2 z z_e). So the noise
+        need not be known, and a luck that is larger than the torque says no more than that would.
 
         Parameters
         ----------
         joints : sequence of int, optional
             that count, from 0
         """
-        own = self.standard if joints is None else self.standard[list(joints)]
-        return -2.0 * float(np.sum(own * np.abs(own)))
+        size = np.abs(self.standard) if self.expected is None else np.minimum(np.abs(self.standard), self.expected)
+        own = -2.0 * self.standard * size
+        return float(np.sum(own if joints is None else own[list(joints)]))

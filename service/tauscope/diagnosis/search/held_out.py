@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tauscope.diagnosis.evidence.rows import find_rest
+from tauscope.diagnosis.evidence.rows import find_rest, weigh_rows
 from tauscope.diagnosis.evidence.scales import REST_BOUNDS
 from tauscope.diagnosis.fitting.white_columns import WhiteColumns
 from tauscope.diagnosis.model.extended import ExtendedModel
@@ -24,6 +24,8 @@ from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.search.hypothesis import Hypothesis
 from tauscope.effects.computation import LastFew
 from tauscope.recording.recording import Array
+
+FIELDS = ("relative", "error", "expected")
 
 MODELS_KEPT = 16
 """Models whose errors are kept: each is compared with several others."""
@@ -53,17 +55,18 @@ class HeldOut:
     def _compare(self, before: Sequence[Array], after: Sequence[Array], at: Hypothesis) -> HeldOutChange:
         """From the errors of every joint; rows near rest count as little as the scales of a hypothesis say."""
         found = [
-            HeldOutChange.between(*sum_stretches(self._weights(joint, at) * np.square(pair))[:, None])
+            HeldOutChange.between(
+                *sum_stretches(self._weights(joint, at) * np.square([*pair, pair[0] - pair[1]]))[:, None]
+            )
             for joint, pair in enumerate(zip(before, after, strict=True))
         ]
-        relative, error = (np.concatenate([getattr(each, name) for each in found]) for name in ("relative", "error"))
-        return HeldOutChange(relative, error)
+        return HeldOutChange(*(np.concatenate([getattr(each, name) for each in found]) for name in FIELDS))
 
     def _weights(self, joint: int, at: Hypothesis) -> Array:
-        """How much each row of a joint counts, (R,): none of a stop."""
-        near, stops = find_rest(self.observations, at.model, joint)
+        """How much each row of a joint counts, (R,): as little as in training near rest and beside friction's step."""
+        near, _ = find_rest(self.observations, at.model, joint)
         weights = at.scales[joint].weights()[np.digitize(near, REST_BOUNDS)]
-        return np.where(stops > 0, 0.0, weights)
+        return weights * weigh_rows(self.observations, at.model, joint) ** 2
 
     def _errors(self, at: Hypothesis) -> list[Array]:
         """Measured less predicted torque of every joint, (R,)."""

@@ -54,7 +54,7 @@ STEPS = 8
 """Most steps to the most probable parameters."""
 
 ROUNDING = 1e-3
-"""Part of its standard error by which rounding may leave a coefficient below zero."""
+"""Part of its standard error by which rounding may leave a coefficient beyond a bound."""
 
 PROGRESS = 0.1
 """Gain in log probability below which a step is the last."""
@@ -306,37 +306,40 @@ class Laboratory:
 
 
 def _hold_impossible(linear: LinearModel, model: ExtendedModel, scales: Sequence[Scales]) -> LinearModel:
-    """The same with coefficients held at zero that would else be negative and cannot be: friction takes power."""
-    values = _one_sided(model)
-    places = np.flatnonzero(np.isfinite(values))
-    held, found = np.zeros(len(places), dtype=bool), linear
+    """The same with coefficients held at the bound that they would else pass: friction takes power, it gives none."""
+    lower, upper = _bounds(model)
+    places = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
+    held, bounds, found = np.zeros(len(places), dtype=bool), np.zeros(len(places)), linear
     for _ in range(2 * len(places)):
         posterior = found.posterior(scales)
-        wanted = (values + posterior.mean)[places] / np.linalg.norm(posterior.spread[places], axis=1)
-        freed = held & (wanted > 0.0)
+        mean, width = posterior.mean[places], np.linalg.norm(posterior.spread[places], axis=1)
+        beyond = np.maximum(lower[places] - mean, mean - upper[places]) / width
+        freed = held & (beyond < 0.0)
         if freed.any():
             held &= ~freed
-        elif held.all() or wanted[~held].min() >= -ROUNDING:
+        elif held.all() or beyond[~held].max() <= ROUNDING:
             break
         else:
-            held[np.flatnonzero(~held)[np.argmin(wanted[~held])]] = True
-        found = linear.hold(places[held], -values[places[held]])
+            most = np.flatnonzero(~held)[np.argmax(beyond[~held])]
+            held[most], bounds[most] = True, np.clip(mean[most], lower[places[most]], upper[places[most]])
+        found = linear.hold(places[held], bounds[held])
     return found
 
 
-def _one_sided(model: ExtendedModel) -> Array:
-    """Values of the parameters that cannot be negative, (p,); NaN for all others."""
-    values = np.full(model.size, np.nan)
+def _bounds(model: ExtendedModel) -> tuple[Array, Array]:
+    """Least and largest steps of the parameters, (p,) each."""
+    lower, upper = np.full(model.size, -np.inf), np.full(model.size, np.inf)
     for joint in range(model.structure.robot.joint_count):
         for name in ("stiction", "viscous"):
             place = model.structure.coefficient(joint, name)
             if place is not None:
-                values[place] = model.parameters[place]
+                lower[place] = -model.parameters[place]
     for term, place in zip(model.terms, model.term_places(), strict=True):
         for number, (coefficient, value) in enumerate(zip(term.effect.coefficients, term.coefficients, strict=True)):
             if coefficient.positive:
-                values[place.start + number] = value
-    return values
+                lower[place.start + number] = -value
+            upper[place.start + number] = coefficient.whole - value
+    return lower, upper
 
 
 def _slopes(model: ExtendedModel) -> Array:

@@ -41,8 +41,6 @@ class Proposal:
 
     log_factor : float
         log Bayes factor of the effect beside the hypothesis, its shape and size averaged over what is believed
-    log_factor_alone : float
-        the same on the grid if nothing without a name were left out
     size : (c,) float64
         standard deviation believed of its coefficients
     unnamed : float
@@ -54,7 +52,6 @@ class Proposal:
     term: Term
     size: Array
     log_factor: float
-    log_factor_alone: float
     unnamed: float
     found: Hypothesis
 
@@ -140,7 +137,7 @@ class Proposer:
         sized = float(np.log(2.0)) * one_sided - float(np.log(len(SIZES)))
         before = self.laboratory.tune(self.laboratory.under(at, found.dependence, joints), joints)
         factor = found.log_evidence - before.log_evidence + averaged + sized
-        return Proposal(term, size, factor, alone.log_evidence, unnamed_log_odds(at), found)
+        return Proposal(term, size, factor, unnamed_log_odds(at), found)
 
     def _zoom_in_each_form(self, on_grid: Scored, at: Hypothesis, signals: Sequence[Signals]) -> tuple[Array, Array]:
         """The most probable shape of all values that no step changes: each has an optimum of its own."""

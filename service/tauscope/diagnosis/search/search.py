@@ -7,7 +7,6 @@ from functools import cmp_to_key
 import numpy as np
 
 from tauscope.diagnosis.model.extended import ExtendedModel
-from tauscope.diagnosis.model.held_out_change import HeldOutChange
 from tauscope.diagnosis.model.term import Place
 from tauscope.diagnosis.search.found import Found, Rival, Step, Weighed
 from tauscope.diagnosis.search.held_out import HeldOut
@@ -26,7 +25,10 @@ MOST_EFFECTS = 12
 """Effects that are added, and that another one takes the place of, at most."""
 
 NAMED = 3.0
-"""Log odds from which an effect is named, and those of its joints' held-out motion alone: nineteen in twenty."""
+"""Log odds from which training alone names an effect: nineteen in twenty."""
+
+SHOWN = float(np.log(3.0))
+"""Log odds of held-out motion alone, of the joints that an effect touches, from which it is shown: three to one."""
 
 UNREFUTED = 18.0
 """…and a window in time, three standard errors of what its stretches agree on: no other motion can refute it."""
@@ -101,7 +103,7 @@ class Search:
         return at
 
     def _exchange(self, at: Hypothesis, first: int, most: int) -> tuple[Hypothesis, tuple[Weighed, ...], int]:
-        """Each effect weighed beside all others, a more probable one in its place, and none that is improbable."""
+        """Each effect weighed beside all others, a more probable one in its place, and none that does not hold."""
         weighed = {own: self._weigh(at, places) for own, places in _groups(at.model).items()}
         exchanges, stale = 0, set[Place]()
         while weighed:
@@ -109,10 +111,11 @@ class Search:
             if weighed[own].lead <= 0.0 or len(weighed[own].places) > 1 or exchanges >= most:
                 own = next(iter(stale), None)
             if own is None:
-                added = (each for each in weighed if weighed[each].places[0] >= first)
-                least = min(added, key=lambda each: weighed[each].log_odds, default=None)
-                if least is None or weighed[least].log_odds > 0.0:
+                added = {each: found for each, found in weighed.items() if found.places[0] >= first}
+                doubtful = [each for each, found in added.items() if not self._holds(at, found)]
+                if not doubtful:
                     break
+                least = min(doubtful, key=lambda each: weighed[each].log_odds)
                 at = weighed.pop(least).without
                 stale = set(weighed)
                 continue
@@ -131,6 +134,10 @@ class Search:
             weighed = {each: weighed[each] for each in stale} | {new: self._weigh(at, groups[new])}
         found = (each.refuse(own) for own, each in weighed.items() if each.log_odds > self._least(at, each))
         return at, tuple(found), exchanges
+
+    def _holds(self, at: Hypothesis, weighed: Weighed) -> bool:
+        """Whether an effect is as probable beside all others, and as visible, as one that is added has to be."""
+        return weighed.log_odds > 0.0 and self._agrees(weighed.without, at, weighed.places)
 
     def _least(self, at: Hypothesis, weighed: Weighed) -> float:
         """Log odds from which an effect is a finding: one that every arm has must stand out."""
@@ -197,7 +204,7 @@ class Search:
     def _best(self, at: Hypothesis, proposals: list[Proposal]) -> tuple[list[Step], Hypothesis | None]:
         """The most probable proposal that held-out motion does not contradict, after those that it does."""
         refusals: list[Step] = []
-        for proposal in self._rank(at, [each for each in proposals if self._is_worth_a_try(each)]):
+        for proposal in self._rank(at, [each for each in proposals if self._log_odds(each) > 0.0]):
             step, found = self._try(at, proposal, proposals)
             forms = [] if step.is_confirmed or _is_possible(found.model) else self._forms_beyond(at, proposal)
             for form in forms:  # where its own law cannot be
@@ -238,38 +245,38 @@ class Search:
         found = self._settle(self._add(at, proposal), touched)
         change = None if self.held_out is None else self.held_out.change(at, found)
         rivals = tuple(each for each in proposals if each is not proposal)
-        log_odds = self._log_odds(proposal)
+        trained = self._log_odds(proposal)
         passes = isinstance(proposal.term.effect, TimeLocalEffect)
         if passes:
-            log_odds = min(log_odds, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
-        log_odds += 0.0 if change is None else change.log_odds()
-        confirmed = log_odds > (UNREFUTED if passes else NAMED) and _is_possible(found.model)
-        confirmed = confirmed and (change is None or self._agrees(change, at, found))
+            trained = min(trained, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
+        log_odds = trained + (0.0 if change is None else change.log_odds())
+        confirmed = min(trained, log_odds) > (UNREFUTED if passes else NAMED) and _is_possible(found.model)
+        confirmed = confirmed and self._agrees(at, found, [len(found.model.terms) - 1])
         covariance = found.posterior.covariance
-        trained = self._log_odds(proposal)
         return Step(proposal, log_odds, rivals, change, confirmed, at.model, found.model, covariance, trained), found
 
-    def _agrees(self, change: HeldOutChange, at: Hypothesis, found: Hypothesis) -> bool:
-        """Whether held-out motion shows the last effect, and is predicted no worse; a window has to do no harm."""
-        assert self.held_out is not None
-        effect = found.model.terms[-1].effect
-        if self.held_out.trained_change(at, found).harm > 0.0:
+    def _agrees(self, without: Hypothesis, at: Hypothesis, places: Sequence[int]) -> bool:
+        """Whether held-out motion shows an effect, and is predicted no worse; a window has to do no harm."""
+        if self.held_out is None:
+            return True
+        if self.held_out.trained_change(without, at).harm > 0.0:
             return False
-        if effect.joint in self.undetermined and self.held_out.open_share(found, effect.joint) > UNSEEN:
+        effect = at.model.terms[places[0]].effect
+        if effect.joint in self.undetermined and self.held_out.open_share(at, effect.joint) > UNSEEN:
             return False
-        touched = effect.touched(len(found.scales))
-        is_shown = isinstance(effect, TimeLocalEffect) or change.log_odds(touched) > NAMED
-        return is_shown or self._shows_beside_friction(found, touched)
+        touched = effect.touched(len(at.scales))
+        is_shown = isinstance(effect, TimeLocalEffect) or self.held_out.change(without, at).log_odds(touched) > SHOWN
+        return is_shown or self.held_out.change(self._hold_friction(at, places), at).log_odds(touched) > SHOWN
 
-    def _shows_beside_friction(self, found: Hypothesis, touched: Sequence[int]) -> bool:
-        """Whether held-out motion shows the last effect beside friction's slopes as they are with it.
+    def _hold_friction(self, at: Hypothesis, places: Sequence[int]) -> Hypothesis:
+        """The hypothesis without an effect, friction's slopes as they are with it.
 
-        Without it they may have moved to what nobody believes, for slopes and effect may predict the same.
+        Where they may move to what nobody believes, slopes and effect may predict the same.
         """
-        laboratory = self.laboratory.with_slopes_of(found)
-        without = laboratory.settle(laboratory.without_term(found, len(found.model.terms) - 1), touched)
-        assert self.held_out is not None
-        return self.held_out.change(without, found).log_odds(touched) > NAMED
+        laboratory, without = self.laboratory.with_slopes_of(at), at
+        for place in reversed(places):
+            without = laboratory.without_term(without, place)
+        return laboratory.settle(without, at.model.terms[places[0]].effect.touched(len(at.scales)))
 
     def _settle(self, at: Hypothesis, touched: Sequence[int]) -> Hypothesis:
         """The most probable parameters; the edges of a window, of which each has several, are looked for once more."""
@@ -300,11 +307,6 @@ class Search:
 
     def _log_odds(self, proposal: Proposal) -> float:
         return proposal.log_factor + self._prior_odds(proposal.term.effect, proposal.unnamed)
-
-    def _is_worth_a_try(self, proposal: Proposal) -> bool:
-        """Whether an effect is about as probable as torque without a name, and far more than none."""
-        alone = proposal.log_factor_alone + self._prior_odds(proposal.term.effect, 0.0)
-        return self._log_odds(proposal) > (-CATALOGUED if alone > CATALOGUED else 0.0)
 
     def _prior_odds(self, effect: Effect, unnamed: float) -> float:
         """Log odds before the data, that one effect at one place is missing, whichever.
