@@ -112,7 +112,7 @@ class Search:
                 own = next(iter(stale), None)
             if own is None:
                 added = {each: found for each, found in weighed.items() if found.places[0] >= first}
-                doubtful = [each for each, found in added.items() if not self._holds(at, found)]
+                doubtful: list[Place] = [each for each, found in added.items() if not self._holds(at, found)]
                 if not doubtful:
                     break
                 least = min(doubtful, key=lambda each: weighed[each].log_odds)
