@@ -88,14 +88,21 @@ class Deciding(Search):
         kept = [term.effect for number, term in enumerate(at.model.terms) if number not in places]
         return Weighed(places, holding(*kept), self.odds[own.place], rivals, proposals)
 
+    def _prior_odds(self, effect: Any, unnamed: float) -> float:
+        return 0.0
+
     def _try(self, at: Any, proposal: Any, proposals: Any) -> Any:
         stands = proposal.term.place not in self.refuted
         step = Step(proposal, self.odds[proposal.term.place], (), None, stands, NOTHING, NOTHING, np.zeros((0, 0)), 0.0)
         return step, holding(proposal.term.effect)
 
+    def _compare(self, at: Any, found: Any, touched: Any) -> float:
+        own, other = (each.model.terms[-1].place for each in (at, found))
+        return self.odds[other] - self.odds[own]
+
 
 def holding(*effects: Effect) -> Any:
-    return SimpleNamespace(model=SimpleNamespace(terms=[term(each) for each in effects]))
+    return SimpleNamespace(model=SimpleNamespace(terms=[term(each) for each in effects]), scales=(NOTHING,))
 
 
 @pytest.mark.parametrize("refuted", [False, True])

@@ -22,7 +22,6 @@ from tauscope.diagnosis.search.search import Search
 from tauscope.effects import ArmContext, Effect, farther_effects, possible_effects
 from tauscope.effects.rotor_inertia import RotorInertia
 from tauscope.identification import Identification
-from tauscope.identification.warnings import undetermined
 from tauscope.recording.conditioning import Conditioner
 from tauscope.recording.recording import Recording
 
@@ -86,7 +85,7 @@ def search(
     confirming = None if unseen is None else HeldOut(unseen.with_noise(white_noise(unseen, model)))
     farther = tuple(farther_effects(setting))
     near, far = Proposer(laboratory, effects), Proposer(laboratory, [*effects, *farther])
-    search_near = Search(laboratory, near, confirming, farther, undetermined(identification))
+    search_near = Search(laboratory, near, confirming, farther)
     found = search_near.run(nominal)
     named = any(not term.effect.is_expected for term in found.hypothesis.model.terms)
     if not named and is_left(found.hypothesis, white, pure_error=repeated is not None):

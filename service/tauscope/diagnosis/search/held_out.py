@@ -46,12 +46,6 @@ class HeldOut:
         """…from training alone: this is what a user of the model gets."""
         return self._compare(self._white.residual(before.model), self._white.residual(after.model), after)
 
-    def open_share(self, at: Hypothesis, joint: int) -> float:
-        """Standard error of a joint's torque that training leaves, as share of what was measured."""
-        own = self._white.all(at.model)[joint]
-        spread = own.rows.T @ at.posterior.spread[own.index]
-        return float(np.linalg.norm(spread) / np.linalg.norm(self._white.measured(joint)))
-
     def _compare(self, before: Sequence[Array], after: Sequence[Array], at: Hypothesis) -> HeldOutChange:
         """From the errors of every joint; rows near rest count as little as the scales of a hypothesis say."""
         found = [

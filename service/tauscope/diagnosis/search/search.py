@@ -16,7 +16,6 @@ from tauscope.diagnosis.search.scoring import unnamed_log_odds
 from tauscope.diagnosis.search.window import window_log_odds
 from tauscope.effects import Effect, TimeLocalEffect
 from tauscope.effects.computation import side_by_side
-from tauscope.identification.warnings import UNSEEN
 
 WEIGHED = 4
 """Rivals of a finding that are looked at, itself in another shape among them."""
@@ -43,19 +42,16 @@ class Search:
 
     farther : sequence of Effect
         forms that say more than what they refine
-    undetermined : frozenset of int
-        joints whose held-out torque an identification without effects leaves open
     """
 
     laboratory: Laboratory
     proposer: Proposer
     held_out: HeldOut | None
     farther: Sequence[Effect] = ()
-    undetermined: frozenset[int] = frozenset()
 
     def run(self, nominal: Hypothesis, before: Found | None = None) -> Found:
         """Add what makes the data most probable and held-out motion no worse, to what was found before."""
-        at, steps, refused = nominal, list[Step](), set[Place]()
+        at, steps, refused = nominal, list[Step](), dict[Place, frozenset[int]]()
         if before is not None:
             at, steps = before.hypothesis, list(before.steps)
         first, exchanges = len(nominal.model.terms), 0
@@ -69,18 +65,23 @@ class Search:
             exchanges += exchanged
             at = self._drop_superfluous(at, first)
 
-    def _grow(self, at: Hypothesis, first: int, refused: set[Place]) -> tuple[Hypothesis, list[Step]]:
-        """One more effect, and without those that it makes superfluous, until nothing helps."""
+    def _grow(self, at: Hypothesis, first: int, refused: dict[Place, frozenset[int]]) -> tuple[Hypothesis, list[Step]]:
+        """One more effect, and without those that it makes superfluous, until nothing helps.
+
+        What was refused is tried again after something else was found at its joints.
+        """
         steps: list[Step] = []
         while len(at.model.terms) - first < MOST_EFFECTS:
             proposals = self.proposer.propose(at, _Wanted(_places(at), refused))
             tried, found = self._best(at, proposals)
-            refused.update(step.proposal.place for step in tried if not step.is_confirmed)
             steps += tried
+            refused |= {step.proposal.place: _touched(step) for step in tried if not step.is_confirmed}
             if found is None:
                 break
             at = self._drop_superfluous(found, first)
-            refused |= _places(found) - _places(at)
+            for place in [each for each, own in refused.items() if own & _touched(tried[-1])]:
+                del refused[place]
+            refused |= dict.fromkeys(_places(found) - _places(at), frozenset())
         return at, steps
 
     def _refine(self, at: Hypothesis, first: int) -> Hypothesis:
@@ -262,8 +263,6 @@ class Search:
         if self.held_out.trained_change(without, at).harm > 0.0:
             return False
         effect = at.model.terms[places[0]].effect
-        if effect.joint in self.undetermined and self.held_out.open_share(at, effect.joint) > UNSEEN:
-            return False
         touched = effect.touched(len(at.scales))
         is_shown = isinstance(effect, TimeLocalEffect) or self.held_out.change(without, at).log_odds(touched) > SHOWN
         return is_shown or self.held_out.change(self._hold_friction(at, places), at).log_odds(touched) > SHOWN
@@ -368,7 +367,7 @@ class _Wanted:
     """Whether an effect may be added: none a second time, but what repeats, and none that was refused."""
 
     present: set[Place]
-    refused: set[Place]
+    refused: Collection[Place]
 
     def __call__(self, effect: Effect) -> bool:
         place = effect.id, effect.joint
@@ -378,6 +377,11 @@ class _Wanted:
         """Whether it is there at its joint, or at the whole arm: an effect of all joints and one of each are alike."""
         joints = {joint for name, joint in self.present if name == effect.id}
         return bool(joints) if effect.joint is None else bool(joints & {None, effect.joint})
+
+
+def _touched(step: Step) -> frozenset[int]:
+    """Joints at which a step's effect acts."""
+    return frozenset(step.proposal.term.effect.touched(step.after.structure.robot.joint_count))
 
 
 def _groups(model: ExtendedModel) -> dict[Place, tuple[int, ...]]:

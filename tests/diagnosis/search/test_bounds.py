@@ -1,0 +1,45 @@
+"""Friction takes power, and no more than all torque is late: no step to the most probable parameters passes a bound."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from diagnosis.evidence.test_linear_model import problem
+from tauscope.diagnosis.evidence.linear_model import LinearModel
+from tauscope.diagnosis.search import hypothesis
+
+MODEL: Any = None
+SEEDS = st.integers(0, 10_000)
+PLACES = st.lists(st.integers(0, 3), min_size=1, max_size=4, unique=True)
+
+
+def hold(case: Any, lower: np.ndarray, upper: np.ndarray) -> LinearModel:
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(hypothesis, "_bounds", lambda model: (lower, upper))
+        return hypothesis._hold_impossible(case.model, MODEL, case.scales)
+
+
+@settings(max_examples=60)
+@given(SEEDS, PLACES, st.floats(0.0, 2.0), st.floats(0.0, 2.0))
+def test_no_coefficient_passes_a_bound(seed: int, places: list[int], below: float, above: float) -> None:
+    case = problem(seed)
+    lower, upper = np.full(case.model.size, -np.inf), np.full(case.model.size, np.inf)
+    lower[places], upper[places[0]] = -below, above
+    held = hold(case, lower, upper)
+    spread = np.linalg.norm(case.model.posterior(case.scales).spread, axis=1)
+    step = held.posterior(case.scales).mean
+    assert (step >= lower - 1e-2 * spread).all()
+    assert (step <= upper + 1e-2 * spread).all()
+
+
+@settings(max_examples=20)
+@given(SEEDS)
+def test_what_stays_within_its_bounds_is_not_touched(seed: int) -> None:
+    case = problem(seed)
+    lower, upper = np.full(case.model.size, -np.inf), np.full(case.model.size, np.inf)
+    mean = case.model.posterior(case.scales).mean
+    lower[:2], upper[1:3] = mean[:2] - 1.0, mean[1:3] + 1.0
+    assert hold(case, lower, upper) is case.model
