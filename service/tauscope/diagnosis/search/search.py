@@ -21,7 +21,10 @@ WEIGHED = 4
 """Rivals of a finding that are looked at, itself in another shape among them."""
 
 MOST_EFFECTS = 12
-"""Effects that are added, and that another one takes the place of, at most."""
+"""Effects that are added at most."""
+
+MOST_EXCHANGES = 4
+"""Effects whose place another one takes at most: after each, all are weighed anew."""
 
 NAMED = 3.0
 """Log odds from which training alone names an effect: nineteen in twenty."""
@@ -59,7 +62,7 @@ class Search:
             at, tried = self._grow(at, first, refused)
             steps += tried
             at = self._refine(self._drop_harmful(at, nominal), first)
-            at, weighed, exchanged = self._exchange(at, first, MOST_EFFECTS - exchanges)
+            at, weighed, exchanged = self._exchange(at, first, MOST_EXCHANGES - exchanges)
             if not exchanged:
                 return Found(nominal, at, tuple(steps), weighed)
             exchanges += exchanged
