@@ -32,8 +32,8 @@ NAMED = 3.0
 SHOWN = float(np.log(3.0))
 """Log odds of held-out motion alone, of the joints that an effect touches, from which it is shown: three to one."""
 
-UNREFUTED = 18.0
-"""…and a window in time, three standard errors of what its stretches agree on: no other motion can refute it."""
+CERTAIN = 18.0
+"""…from which either alone does: three standard errors. No other motion can refute a window in time."""
 
 CATALOGUED = 3.0
 """Log odds before the data that torque which is left out has a name: one in twenty laws is in no catalogue."""
@@ -141,7 +141,7 @@ class Search:
 
     def _holds(self, at: Hypothesis, weighed: Weighed) -> bool:
         """Whether an effect is as probable beside all others, and as visible, as one that is added has to be."""
-        return weighed.log_odds > 0.0 and self._agrees(weighed.without, at, weighed.places)
+        return weighed.log_odds > 0.0 and self._agrees(weighed.without, at, weighed.places, SHOWN)
 
     def _least(self, at: Hypothesis, weighed: Weighed) -> float:
         """Log odds from which an effect is a finding: one that every arm has must stand out."""
@@ -254,21 +254,28 @@ class Search:
         if passes:
             trained = min(trained, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
         log_odds = trained + (0.0 if change is None else change.log_odds())
-        confirmed = min(trained, log_odds) > (UNREFUTED if passes else NAMED) and _is_possible(found.model)
-        confirmed = confirmed and self._agrees(at, found, [len(found.model.terms) - 1])
+        confirmed = log_odds > (CERTAIN if passes else NAMED) and _is_possible(found.model)
+        least = SHOWN if trained > NAMED else CERTAIN
+        confirmed = confirmed and self._agrees(at, found, [len(found.model.terms) - 1], least)
         covariance = found.posterior.covariance
         return Step(proposal, log_odds, rivals, change, confirmed, at.model, found.model, covariance, trained), found
 
-    def _agrees(self, without: Hypothesis, at: Hypothesis, places: Sequence[int]) -> bool:
-        """Whether held-out motion shows an effect, and is predicted no worse; a window has to do no harm."""
+    def _agrees(self, without: Hypothesis, at: Hypothesis, places: Sequence[int], least: float) -> bool:
+        """Whether held-out motion shows an effect by some log odds, and no joint is predicted worse from training.
+
+        Joints of the effect have to be predicted no worse, all others not clearly worse. No other motion shows a window
+        in time.
+        """
         if self.held_out is None:
             return True
-        if self.held_out.trained_change(without, at).harm > 0.0:
-            return False
         effect = at.model.terms[places[0]].effect
-        touched = effect.touched(len(at.scales))
-        is_shown = isinstance(effect, TimeLocalEffect) or self.held_out.change(without, at).log_odds(touched) > SHOWN
-        return is_shown or self.held_out.change(self._hold_friction(at, places), at).log_odds(touched) > SHOWN
+        touched, trained = effect.touched(len(at.scales)), self.held_out.trained_change(without, at)
+        if trained.harm > 0.0 or isinstance(effect, TimeLocalEffect):
+            return trained.harm <= 0.0
+        shown = self.held_out.change(without, at).log_odds(touched)
+        if shown <= least:
+            shown = self.held_out.change(self._hold_friction(at, places), at).log_odds(touched)
+        return shown > least and trained.log_odds(touched) >= 0.0
 
     def _hold_friction(self, at: Hypothesis, places: Sequence[int]) -> Hypothesis:
         """The hypothesis without an effect, friction's slopes as they are with it.
