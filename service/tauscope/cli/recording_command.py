@@ -5,17 +5,7 @@ from typing import Annotated
 
 import typer
 
-from tauscope.cli.arguments import (
-    Columns,
-    Decimal,
-    Delimiter,
-    Rate,
-    RecordingFile,
-    Topic,
-    TrustUnits,
-    Units,
-    reading_fields,
-)
+from tauscope.cli.arguments import LayoutArguments, ReadingArguments, RecordingFile
 from tauscope.cli.verbs import add_verb
 
 RobotOption = Annotated[
@@ -35,27 +25,12 @@ def check(
         int | None, typer.Option(min=1, metavar="N", help="Number of joints that it has to have.")
     ] = None,
     robot: RobotOption = None,
-    units: Units = None,
-    rate: Rate = None,
-    trust_units: TrustUnits = False,
-    columns: Columns = None,
-    decimal: Decimal = None,
-    delimiter: Delimiter = None,
-    topic: Topic = None,
+    reading: ReadingArguments,
 ) -> None:
-    """Show what a recording holds, and what to look at before trusting it.
-
-    Parameters
-    ----------
-    rate : float or None
-        samples a second where t counts samples [Hz]
-    """
-    fields = reading_fields(columns, units, rate, trust_units, decimal, delimiter, topic)
+    """Show what a recording holds, and what to look at before trusting it."""
+    options = reading.options()
     from tauscope.cli.recording_summary import show_recording
-    from tauscope.cli.task_run import make_request
-    from tauscope.tasks.task import ReadingOptions
 
-    options = make_request(ReadingOptions, **fields)
     show_recording(file, joints, robot, options.reading)
 
 
@@ -68,27 +43,13 @@ def convert(
     recover: Annotated[bool, typer.Option(help="Keep what comes before the damage of a truncated MCAP file.")] = False,
     overwrite: Annotated[bool, typer.Option(help="Replace TARGET where it exists.")] = False,
     robot: RobotOption = None,
-    units: Units = None,
-    rate: Rate = None,
-    columns: Columns = None,
-    decimal: Decimal = None,
-    delimiter: Delimiter = None,
-    topic: Topic = None,
+    reading: LayoutArguments,
 ) -> None:
-    """Write a recording in another format, in SI; the source stays as it is.
-
-    Parameters
-    ----------
-    rate : float or None
-        samples a second where t counts samples [Hz]
-    """
-    fields = reading_fields(columns, units, rate, False, decimal, delimiter, topic)
+    """Write a recording in another format, in SI; the source stays as it is."""
+    options = reading.options()
     from tauscope.cli.recording_summary import convert_file
-    from tauscope.cli.task_run import make_request
-    from tauscope.tasks.task import ReadingOptions
 
-    reading = make_request(ReadingOptions, **fields).reading
-    convert_file(source, target, robot, reading, recover=recover, overwrite=overwrite)
+    convert_file(source, target, robot, options.reading, recover=recover, overwrite=overwrite)
 
 
 def map_file(

@@ -38,7 +38,6 @@ def run_task(
     task: ModuleType,
     request: Any,
     asked: Sequence[tuple[Path | None, str]],
-    recordings: Sequence[Path] = (),
     show: Callable[[Any], None] | None = None,
 ) -> Any:
     """Perform a task, write its outputs, and show the result.
@@ -59,8 +58,9 @@ def run_task(
     """
     outputs = [(path, name) for path, name in asked if path is not None]
     paths, robot_file = tuple(path for path, _ in outputs), Path(request.robot)
-    require_distinct(recordings)
-    require_free(paths, (robot_file, *recordings))
+    inputs = list_files(request)
+    require_distinct(inputs)
+    require_free(paths, (robot_file, *inputs))
     robot = read_robot(robot_file)
     require_free(paths, [path for _, path in robot.files])
     with shown_progress() as progress:
@@ -72,6 +72,16 @@ def run_task(
             output().print(plain(f"wrote {path}"), soft_wrap=True)
     _show_warnings(robot, result, summarised=show is not None)
     return result
+
+
+def list_files(request: Any) -> list[Path]:
+    """Recordings and models that a request names."""
+    return [Path(name) for names in getattr(request, "inputs", {}).values() for name in names]
+
+
+def name_files(paths: Iterable[Path] | None) -> tuple[str, ...]:
+    """Files as a request names them."""
+    return tuple(map(str, paths or ()))
 
 
 def write_outputs(

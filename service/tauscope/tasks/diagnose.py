@@ -28,13 +28,13 @@ from tauscope.identification import Options
 from tauscope.recording import Recording
 from tauscope.report.provenance import Provenance
 from tauscope.robot import read_robot
-from tauscope.strict_model import StrictModel
 from tauscope.tasks.identify import CutoffFrequency
 from tauscope.tasks.task import (
     Files,
     Outputs,
     Progress,
     ReadingOptions,
+    TaskRequest,
     command_words,
     json_text,
     model_origin,
@@ -67,7 +67,7 @@ class DiagnosisOptions(ReadingOptions):
     )
 
 
-class Request(StrictModel):
+class Request(TaskRequest):
     """What is to be diagnosed, by the names of its files."""
 
     robot: str = Field(description="robot file")
@@ -78,14 +78,9 @@ class Request(StrictModel):
     options: DiagnosisOptions = Field(default=DiagnosisOptions(), description="how it is diagnosed")
 
     @property
-    def compared(self) -> dict[str, tuple[str, ...]]:
-        """Files that the recordings are compared with, by role."""
-        return {"simulated": self.simulated, "model": () if self.model is None else (self.model,)}
-
-    @property
     def command(self) -> tuple[str, ...]:
         """The command line that does the same."""
-        compared = tuple(name for names in self.compared.values() for name in names)
+        compared = (*self.simulated, *self.inputs["model"])
         return command_words(
             "diagnose",
             self.robot,
@@ -136,9 +131,7 @@ class Result:
     @cached_property
     def provenance(self) -> Provenance:
         """What the result was made from, and when."""
-        request = self.request
-        given = {"recordings": request.recordings, "held_out": request.held_out, **request.compared}
-        return record_provenance(self.files, request.command, self.diagnosis.robot, given)
+        return record_provenance(self.files, self.request, self.diagnosis.robot)
 
     def _improved_robot(self) -> str:
         source = self.files.find("robot", self.request.robot)

@@ -21,12 +21,12 @@ from tauscope.identification import (
 from tauscope.recording import Recording
 from tauscope.report.provenance import Provenance
 from tauscope.robot import Robot, read_robot
-from tauscope.strict_model import StrictModel
 from tauscope.tasks.task import (
     Files,
     Outputs,
     Progress,
     ReadingOptions,
+    TaskRequest,
     command_words,
     json_text,
     model_origin,
@@ -52,7 +52,7 @@ class IdentificationOptions(ReadingOptions):
     )
 
 
-class Request(StrictModel):
+class Request(TaskRequest):
     """What is to be identified, by the names of its files."""
 
     robot: str = Field(description="robot file")
@@ -99,8 +99,7 @@ class Result:
     @cached_property
     def provenance(self) -> Provenance:
         """What the result was made from, and when."""
-        given = {"recordings": self.request.recordings, "held_out": self.request.held_out}
-        return record_provenance(self.files, self.request.command, self.robot, given)
+        return record_provenance(self.files, self.request, self.robot)
 
     def _plots(self) -> str:
         from tauscope.report.identification_plots import identification_plots

@@ -10,12 +10,12 @@ from tauscope.export.model_file import read_export_models
 from tauscope.recording import Recording
 from tauscope.report.provenance import Provenance
 from tauscope.robot import read_robot
-from tauscope.strict_model import StrictModel
 from tauscope.tasks.task import (
     Files,
     Outputs,
     Progress,
     ReadingOptions,
+    TaskRequest,
     command_words,
     json_text,
     read_recordings,
@@ -23,7 +23,7 @@ from tauscope.tasks.task import (
 )
 
 
-class Request(StrictModel):
+class Request(TaskRequest):
     """What is to be rolled out, by the names of its files."""
 
     robot: str = Field(description="robot file")
@@ -59,10 +59,7 @@ class Result:
     @cached_property
     def provenance(self) -> Provenance:
         """What the result was made from, and when."""
-        request = self.request
-        model = () if request.model is None else (request.model,)
-        given = {"recordings": request.recordings, "refine": request.refine, "model": model}
-        return record_provenance(self.files, request.command, self.rollout.robot, given)
+        return record_provenance(self.files, self.request, self.rollout.robot)
 
     def _report(self) -> str:
         from tauscope.closed_loop.page import rollout_page

@@ -18,8 +18,29 @@ from tauscope.robot import RecordingLayout, Robot, find_column_fault, find_fault
 from tauscope.robot.messages import one_line
 from tauscope.strict_model import StrictModel
 
-ROLES = {"recordings": "recording", "held_out": "held out", "simulated": "compared with", "model": "compared with"}
-"""What each list of a request is called in a report."""
+ROLES = {
+    "recordings": "recording",
+    "held_out": "held out",
+    "refine": "refined by",
+    "simulated": "compared with",
+    "model": "compared with",
+}
+"""Name of each input of a request in a report."""
+
+
+class TaskRequest(StrictModel):
+    """A request that names recordings, and perhaps a model."""
+
+    @property
+    def command(self) -> tuple[str, ...]:
+        """The command line that does the same."""
+        raise NotImplementedError
+
+    @property
+    def inputs(self) -> dict[str, tuple[str, ...]]:
+        """Names of its files by role, without the robot file."""
+        named = {role: getattr(self, role, None) or () for role in ROLES}
+        return {role: (names,) if isinstance(names, str) else names for role, names in named.items()}
 
 
 class ReadingOptions(StrictModel):
@@ -210,15 +231,8 @@ def _open(path: Path, robot: Robot, reading: Reading) -> Recording:
         raise RecordingMismatchError(one_line("; ".join([str(error), *chosen]))) from error
 
 
-def record_provenance(
-    files: Files, command: Sequence[str], robot: Robot, inputs: Mapping[str, Sequence[str]]
-) -> Provenance:
+def record_provenance(files: Files, request: TaskRequest, robot: Robot) -> Provenance:
     """Hash all inputs and note the versions.
-
-    Parameters
-    ----------
-    inputs : mapping of str to sequence of str
-        names of the request by role
 
     Raises
     ------
@@ -226,13 +240,13 @@ def record_provenance(
         where a file cannot be read any more
     """
     paths = list(robot.files)
-    paths += [(ROLES[role], files.find(role, name)) for role, names in inputs.items() for name in names]
+    paths += [(ROLES[role], files.find(role, name)) for role, names in request.inputs.items() for name in names]
     hashed = [
         InputFile(role, files.show(Path(file.path)), file.size_bytes, file.sha256)
         for role, path in paths
         for file in input_files(role, str(path))
     ]
-    return Provenance(tuple(command), tuple(hashed), versions(), datetime.now(UTC))
+    return Provenance(request.command, tuple(hashed), versions(), datetime.now(UTC))
 
 
 def model_origin(robot: Robot, recordings: Sequence[Recording], provenance: Provenance) -> Origin:
