@@ -19,9 +19,9 @@ from patience import eventually
 from server.queue.paper_files import PAPER_ROBOT, write_recording
 from server.queue.waiting import wait_until
 from tauscope.errors import StoreError
+from tauscope.server.queue.analyses import IdentificationOrder, IdentificationWorkspace, run_identification
 from tauscope.server.queue.cluster_executor import SCHEDULER, ClusterExecutor, ClusterUnavailableError
 from tauscope.server.queue.executors import open_executor
-from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace, run_identification
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.record import JobState
 from tauscope.server.queue.task_job import OrderedRecording

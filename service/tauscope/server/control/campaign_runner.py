@@ -24,9 +24,13 @@ from tauscope.server.control.motions import (
 )
 from tauscope.server.control.run import RunRequestRecord, RunWorkspace
 from tauscope.server.control.run_manager import RunManager, run_recording_name
-from tauscope.server.queue.diagnosis import DiagnosisOrder, DiagnosisWorkspace
+from tauscope.server.queue.analyses import (
+    DiagnosisOrder,
+    DiagnosisWorkspace,
+    IdentificationOrder,
+    IdentificationWorkspace,
+)
 from tauscope.server.queue.excitation import ExcitationOrder, ExcitationWorkspace
-from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace
 from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, JobKind, JobQueue, QueueFullError
 from tauscope.server.queue.record import JobProblem, JobState
 from tauscope.server.queue.task_job import (

@@ -16,8 +16,7 @@ from tauscope.server.control.run import RunWorkspace
 from tauscope.server.history.drift import Drift
 from tauscope.server.history.model_history import ModelEntry, ModelHistory
 from tauscope.server.history.model_judgement import Candidate, compare_models
-from tauscope.server.queue.diagnosis import DiagnosisWorkspace
-from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace
+from tauscope.server.queue.analyses import DiagnosisWorkspace, IdentificationOrder, IdentificationWorkspace
 from tauscope.server.store.items import ItemStore
 
 _log = logging.getLogger("tauscope.jobs")

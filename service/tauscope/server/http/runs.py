@@ -32,10 +32,10 @@ from tauscope.server.http.openapi import binary_part, file_contents
 from tauscope.server.http.robots.files import read_received_robot
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.answers import shown_problem
+from tauscope.server.http.tasks.answers import MotionLinks, shown_problem
 from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
 from tauscope.server.http.tasks.routes import Identifier
-from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request
+from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request, stage_request
 from tauscope.server.models import AnswerModel, PageAnswer
 from tauscope.server.problems import Problem, ProblemError, make_problem, problem_responses
 from tauscope.server.queue.excitation import ExcitationOrder, ExcitationWorkspace, check_trajectory
@@ -85,12 +85,9 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 }
 
 
-class RunLinks(AnswerModel):
+class RunLinks(MotionLinks):
     """Where to go on from a run."""
 
-    self_: str = Field(alias="self", description="its state")
-    events: str = Field(description="what happens to it, as server-sent events")
-    stop: str = Field(description="where a POST stops it")
     excitation: str | None = Field(default=None, description="the excitation that it plays")
     recordings: dict[RecordingFormat, str] = Field(default={}, description="its recording by format, once there is one")
 
@@ -298,11 +295,7 @@ async def submit_run(request: Request, services: Services) -> str:
     TauscopeError
         if the robot or the motion is not valid, somebody else has the arm, or the lease does not let it move
     """
-    items = services.runs.items
-    staged = await run_in_threadpool(items.stage)
-    try:
-        workspace = RunWorkspace(staged)
-        await run_in_threadpool(workspace.prepare)
+    async with stage_request(services.runs.items, RunWorkspace) as workspace:
         most = min(LARGEST_TRAJECTORY, services.settings.max_upload_bytes)
         parts = {"trajectory": PartRule(most, workspace.trajectories, default_name="trajectory.json")}
         received = await receive_request(request, RunRequest, services.settings, workspace.robot, parts)
@@ -315,8 +308,6 @@ async def submit_run(request: Request, services: Services) -> str:
                 request, check_trajectory, workspace.trajectories, workspace.robot / wanted.robot_file
             )
         return await run_in_threadpool(_submit, wanted, services, workspace, permit)
-    finally:
-        await run_in_threadpool(items.discard, staged)
 
 
 @dataclass(frozen=True, eq=False)
@@ -425,15 +416,16 @@ RUNS = Resource(
 router = make_router(RUNS)
 
 
-def _stop(services: Services, identifier: str) -> StopAnswer:
-    """Stop a run; neither a lock nor a disk is needed for one that goes on."""
+def _stop(services: Services, identifier: str) -> RunState | None:
+    """Stop a run; None where it does not go on."""
     live = services.runs.stop(identifier)
-    if live is not None:
-        return StopAnswer(id=identifier, state=live.state)
+    return None if live is None else live.state
+
+
+def _read_state(services: Services, identifier: str) -> RunState | None:
+    """Where a run stands; None where its record is damaged."""
     record = find_run(services, identifier).read_run()
-    if record is None:
-        raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it does not go on")
-    return StopAnswer(id=identifier, state=record.state)
+    return None if record is None else record.state
 
 
 add_stopping(
@@ -441,6 +433,7 @@ add_stopping(
     RUNS,
     StopAnswer,
     _stop,
+    _read_state,
     lambda services, identifier: services.runs.remove(identifier),
     (
         "Stops the arm by the run's stop policy; legal in every state, any number of times; needs no body.\n\n"

@@ -36,14 +36,12 @@ from tauscope.server.http.reading import WIDTH, ReadingQueue
 from tauscope.server.http.repeated_answers import Answers, MemoryAnswers, StoredAnswers
 from tauscope.server.http.settings import Settings
 from tauscope.server.http.tasks.event_feeds import EventFeeds
+from tauscope.server.queue.analyses import run_diagnosis, run_identification, run_rollout
 from tauscope.server.queue.cluster_executor import ClusterExecutor
-from tauscope.server.queue.diagnosis import run_diagnosis
 from tauscope.server.queue.excitation import run_excitation
 from tauscope.server.queue.executors import open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
-from tauscope.server.queue.identification import run_identification
 from tauscope.server.queue.queue import JobKind, JobQueue
-from tauscope.server.queue.rollout import run_rollout
 from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.server.schedules.repeater import Repeater
 from tauscope.server.schedules.repository import ScheduleRepository

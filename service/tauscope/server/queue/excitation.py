@@ -22,17 +22,14 @@ MOST_ROWS = 2_000_000
 class ExcitationOrder(TaskOrder):
     """Input of an excitation job."""
 
+    task = design_excitation
+
     form: Literal["tauscope.excitation-order/1"] = Field(
         default="tauscope.excitation-order/1", description="name and version of this form"
     )
     options: ExcitationDesignOptions = Field(
         default=ExcitationDesignOptions(), description="how the motion is designed"
     )
-
-    @property
-    def request(self) -> design_excitation.Request:
-        """The request of the task."""
-        return design_excitation.Request(robot=self.robot_file, options=self.options)
 
 
 class ExcitationWorkspace(TaskWorkspace[ExcitationOrder]):
@@ -45,7 +42,7 @@ class ExcitationWorkspace(TaskWorkspace[ExcitationOrder]):
 
 def run_excitation(folder: Path) -> JobProblem | None:
     """Do an excitation job; returns why there is no result."""
-    return perform_job(design_excitation, ExcitationWorkspace(folder), folder)
+    return perform_job(ExcitationWorkspace(folder), folder)
 
 
 def write_trajectory_piece(workspace: TaskWorkspace[Any], rate_hz: float, start: int) -> bytes:

@@ -21,6 +21,7 @@ from tauscope.server.store.files import hash_file
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.strict_model import StrictModel
+from tauscope.tasks.task import ROLES
 
 TRAJECTORY, SAVED_MODEL = "trajectory.json", "against"
 
@@ -39,10 +40,16 @@ class TaskOrder(StrictModel):
     robot_file: str = Field(description="name of the robot file in the job's robot folder")
     robot_name: str = Field(description="what the robot file calls the robot")
 
+    task: ClassVar[ModuleType]
+
     @property
     def request(self) -> Any:
-        """The request of the task."""
-        raise NotImplementedError
+        """The request of the task; its files are called by their bare names."""
+        fields: dict[str, Any] = {name: getattr(self, name) for name in ("model", "options") if hasattr(self, name)}
+        for role in ROLES:
+            if role != "model" and hasattr(self, role):
+                fields[role] = tuple(entry.name for entry in getattr(self, role))
+        return self.task.Request(robot=self.robot_file, **fields)
 
 
 Order = TypeVar("Order", bound=TaskOrder)
@@ -58,6 +65,7 @@ class TaskWorkspace(Workspace, Generic[Order]):
     order_type: ClassVar[type[TaskOrder]]
     noun: ClassVar[str]
     roles: ClassVar[tuple[str, ...]] = ()
+    takes_model: ClassVar[bool] = False
     outputs: ClassVar[Mapping[str, str | None]]
     formats: ClassVar[Mapping[ExportFormat, ExportFile]] = {}
 
@@ -76,7 +84,7 @@ class TaskWorkspace(Workspace, Generic[Order]):
 
     def prepare(self) -> None:
         """Make the folders that hold a job's input."""
-        for folder in (self.robot, *map(self.uploads, self.roles)):
+        for folder in (self.robot, *map(self.uploads, (*self.roles, *([SAVED_MODEL] if self.takes_model else [])))):
             folder.mkdir()
 
     def uploads(self, role: str) -> Path:
@@ -175,7 +183,7 @@ class JobFiles:
         return Path(output) if output == TRAJECTORY else None
 
 
-def perform_job(task: ModuleType, workspace: TaskWorkspace[Any], server_recordings: Path) -> JobProblem | None:
+def perform_job(workspace: TaskWorkspace[Any], server_recordings: Path) -> JobProblem | None:
     """Do a job, as a worker process does it.
 
     Returns
@@ -196,7 +204,7 @@ def perform_job(task: ModuleType, workspace: TaskWorkspace[Any], server_recordin
         order = workspace.read_order()
         if order is None:
             raise TauscopeError(f"the job's order.json is missing or damaged; hand the {workspace.noun} in again")
-        result = task.perform(order.request, JobFiles(workspace, order, server_recordings), tell)
+        result = order.task.perform(order.request, JobFiles(workspace, order, server_recordings), tell)
         tell("write result and exports")
         workspace.write_outputs(result.outputs, *folders)
 

@@ -14,8 +14,12 @@ from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
 from tauscope.server.control.campaign_manager import CampaignManager
 from tauscope.server.control.campaign_runner import CampaignDependencies
 from tauscope.server.control.leases import FREE, Permit
-from tauscope.server.queue.diagnosis import DiagnosisOrder, DiagnosisWorkspace
-from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace
+from tauscope.server.queue.analyses import (
+    DiagnosisOrder,
+    DiagnosisWorkspace,
+    IdentificationOrder,
+    IdentificationWorkspace,
+)
 from tauscope.server.queue.task_job import OrderedRecording, ordered_on_server, staged_workspace, submit_job
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.schedules.definition import RecordingChoice, ScheduleDefinition

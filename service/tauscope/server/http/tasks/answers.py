@@ -11,6 +11,25 @@ from tauscope.server.queue.record import JobProblem, JobState
 from tauscope.server.queue.workspace import Workspace
 
 
+class Links(AnswerModel):
+    """Where to go on from any item."""
+
+    self_: str = Field(alias="self", description="its state")
+    events: str = Field(description="what happens to it, as server-sent events")
+
+
+class JobLinks(Links):
+    """Where to go on from a job."""
+
+    result: str | None = Field(default=None, description="its result, once it succeeded")
+
+
+class MotionLinks(Links):
+    """Where to go on from what moves an arm."""
+
+    stop: str = Field(description="where a POST stops it")
+
+
 class JobAnswer(AnswerModel):
     """The state of a job."""
 
@@ -23,6 +42,7 @@ class JobAnswer(AnswerModel):
     started: datetime | None = Field(default=None, description="when its work began, UTC")
     ended: datetime | None = Field(default=None, description="when it ended, UTC")
     problem: Problem | None = Field(default=None, description="why it did not succeed")
+    robot: str | None = Field(default=None, description="name of the robot")
 
 
 def job_fields(workspace: Workspace, here: str) -> dict[str, Any]:

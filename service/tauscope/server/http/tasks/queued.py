@@ -23,7 +23,7 @@ from tauscope.server.http.tasks.router import (
     add_export_route,
     make_router,
 )
-from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request
+from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request, stage_request
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.queue import JobKind
 from tauscope.server.queue.record import JobState
@@ -153,11 +153,8 @@ class QueuedTask:
         TauscopeError
             if the robot is not valid, a recording is not there, or something is too large
         """
-        items, settings = self.kind(services).items, services.settings
-        staged = await run_in_threadpool(items.stage)
-        try:
-            workspace = self.workspace(staged)
-            await run_in_threadpool(workspace.prepare)
+        settings = services.settings
+        async with stage_request(self.kind(services).items, self.workspace) as workspace:
             most, largest = settings.max_recordings, settings.max_upload_bytes
             rules = {role: PartRule(largest, workspace.uploads(role), most) for role in workspace.roles}
             for part, (folder, limit) in self.further_parts.items():
@@ -168,8 +165,6 @@ class QueuedTask:
             wanted = {"robot_file": robot_file, "robot_name": robot.name}
             caller = find_caller(request.scope).name
             return await run_in_threadpool(self._submit, received, services, workspace, wanted, caller)
-        finally:
-            await run_in_threadpool(items.discard, staged)
 
     def _submit(
         self,

@@ -79,6 +79,27 @@ def text_document(name: str, output: str, media_type: str, summary: str, words: 
     return JobDocument(name, output, summary, words, answer, media_type, missing)
 
 
+def result_document(noun: str, verb: str, model: type[BaseModel]) -> JobDocument:
+    """The result of a command that has ``--json``."""
+    answer = {"model": model, "description": f"the same document as `tauscope {verb} --json`"}
+    words = f"The result of {noun} that succeeded; else the problem that it ended in."
+    return JobDocument("result", "result.json", "Fetch the result", words, answer)
+
+
+def report_document(verb: str) -> JobDocument:
+    """The page of a command that has ``--report``."""
+    words = "The report as one page: no script, no request to anywhere, ready to print."
+    return text_document(
+        "report", "report.html", HTML, "Fetch the report", words, f"page as `tauscope {verb} --report`"
+    )
+
+
+def plots_document(noun: str, model: type[BaseModel], words: str) -> JobDocument:
+    """Data of the figures."""
+    answer, summary = {"model": model, "description": words}, "Fetch the data of its figures"
+    return JobDocument("plots", "plots.json", summary, f"What figures of {noun} are drawn from.", answer)
+
+
 class Folder(Protocol):
     """What every resource keeps in a folder."""
 
@@ -218,7 +239,8 @@ def add_stopping(
     router: APIRouter,
     resource: Resource,
     answer: type[BaseModel],
-    stop: Callable[[Services, str], BaseModel],
+    stop: Callable[[Services, str], Any],
+    read_state: Callable[[Services, str], Any],
     remove: Callable[[Services, str], bool],
     words: tuple[str, str],
 ) -> None:
@@ -226,6 +248,10 @@ def add_stopping(
 
     Parameters
     ----------
+    stop : callable
+        the state in which it was stopped; None where it does not go on
+    read_state : callable
+        the state in its folder; None where that is damaged
     remove : callable
         False where it goes on
     words : (str, str)
@@ -243,8 +269,11 @@ def add_stopping(
         openapi_extra={"requestBody": {"required": False, "content": {}}},
     )
     async def stop_item(identifier: Identifier, services: ServicesDep) -> BaseModel:
-        # Neither a thread of the pool nor a lock is needed: whatever is stuck, this is not.
-        return stop(services, identifier)
+        # Neither a thread of the pool nor a lock nor a disk is needed for one that goes on, whatever is stuck.
+        state = stop(services, identifier) or read_state(services, identifier)
+        if state is None:
+            raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it does not go on")
+        return answer(id=identifier, state=state)
 
     @router.delete(
         "/{identifier}",

@@ -1,20 +1,28 @@
 """A request that hands a job in: JSON, or a form with the JSON as part `request` and files beside it."""
 
-from collections.abc import Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, Self, TypeVar
 
 from fastapi import Request
-from pydantic import Field
+from pydantic import AfterValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+from starlette.concurrency import run_in_threadpool
 
 from tauscope.server.http.documents import JSON, media_type, parse_document, read_document, refuse_media_type
 from tauscope.server.http.form import FORM, PartRule, ReceivedForm, receive_form
 from tauscope.server.http.openapi import Examples, binary_part, form_body, json_body, model_reference
 from tauscope.server.http.robots.files import keep_inline_robot, robot_part_rules
+from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.server.http.settings import Settings
 from tauscope.server.problems import ProblemError
+from tauscope.server.queue.task_job import Staged
+from tauscope.server.store.files import FILE_NAME_PATTERN, FILE_NAME_RULE, is_file_name
+from tauscope.server.store.items import ItemStore
 from tauscope.strict_model import StrictModel
+from tauscope.tasks.task import ROLES
 
 
 class RobotRequest(StrictModel):
@@ -25,6 +33,35 @@ class RobotRequest(StrictModel):
     )
 
 
+def _check_file_name(value: str) -> str:
+    """Refuse what cannot be a recording's name."""
+    if not is_file_name(value):
+        raise PydanticCustomError("file_name", "is no name of a recording; {rule}", {"rule": FILE_NAME_RULE})
+    return value
+
+
+FileName = Annotated[str, AfterValidator(_check_file_name), Field(json_schema_extra={"pattern": FILE_NAME_PATTERN})]
+Names = Annotated[list[FileName], Field(max_length=1000)]
+
+
+class RecordingsRequest(RobotRequest):
+    """What a request says about recordings: lists of names, each name once a list."""
+
+    @model_validator(mode="after")
+    def _check_once(self) -> Self:
+        """A recording counts once."""
+        for names in (getattr(self, role, None) or [] for role in ROLES if role != "model"):
+            twice = next((name for index, name in enumerate(names) if name in names[:index]), None)
+            if twice is not None:
+                raise PydanticCustomError("twice", "{name} is listed twice; list it once", {"name": twice})
+        return self
+
+
+RECORDINGS_EXAMPLE: tuple[str, Any] = (
+    "Recordings that lie on the server",
+    {"robot": EXAMPLE_ROBOT, "recordings": ["monday.csv", "tuesday.csv"], "held_out": ["wednesday.mcap"]},
+)
+
 Document = TypeVar("Document", bound=RobotRequest)
 
 
@@ -34,6 +71,18 @@ class Received(Generic[Document]):
 
     document: Document
     form: ReceivedForm
+
+
+@asynccontextmanager
+async def stage_request(items: ItemStore, kind: Callable[[Path], Staged]) -> AsyncIterator[Staged]:
+    """A new folder that is removed in the end, unless it was handed in meanwhile."""
+    staged = await run_in_threadpool(items.stage)
+    try:
+        workspace = kind(staged)
+        await run_in_threadpool(workspace.prepare)
+        yield workspace
+    finally:
+        await run_in_threadpool(items.discard, staged)
 
 
 async def receive_request(
