@@ -37,13 +37,6 @@ def read_csv(
 
     Comma, semicolon, tab, | or blanks between the fields; an empty field or ``nan`` is a missed sample.
 
-    Parameters
-    ----------
-    joint_count : int or None
-        joints that the recording must have; None where any number is welcome
-    spool_above_bytes : int
-        size above which the rows go to a temporary file [bytes]
-
     Raises
     ------
     RecordingError
