@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.diagnosis import Diagnosis
-from tauscope.diagnosis.extended_model.consistent_links import consistent_links
+from tauscope.diagnosis.extended_model import consistent_links
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.torque_scale import on_the_arm
 from tauscope.effects import Effect

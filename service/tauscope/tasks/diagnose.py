@@ -17,7 +17,7 @@ from tauscope.diagnosis import (
     document,
 )
 from tauscope.diagnosis.documents.plots import diagnosis_plots
-from tauscope.diagnosis.extended_model.saved import model_document
+from tauscope.diagnosis.extended_model import model_document
 from tauscope.diagnosis.next_experiment import PlannedExperiment, planned_experiment
 from tauscope.errors import ExcitationError, IdentificationError
 from tauscope.export.formats import CODE_FILES, EXPORT_FILES, ExportFormat, make_export

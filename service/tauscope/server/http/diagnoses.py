@@ -6,7 +6,7 @@ from pydantic import Field
 
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.plots import DiagnosisPlots
-from tauscope.diagnosis.extended_model.saved import LARGEST_FILE
+from tauscope.diagnosis.extended_model import LARGEST_FILE
 from tauscope.export.model_file import ModelFile
 from tauscope.server.http.openapi import binary_part, binary_parts
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT

@@ -5,7 +5,7 @@ from typing import Any
 from pydantic import Field
 
 from tauscope.closed_loop import RolloutDocument
-from tauscope.diagnosis.extended_model.saved import LARGEST_FILE
+from tauscope.diagnosis.extended_model import LARGEST_FILE
 from tauscope.errors import NotFoundError
 from tauscope.server.http.diagnoses import DIAGNOSES
 from tauscope.server.http.identifications import IDENTIFICATIONS

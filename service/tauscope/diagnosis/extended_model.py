@@ -1,26 +1,46 @@
-"""An extended model as a file, schema tauscope.model/1, and back: every number reads as the same float64."""
+"""An extended model as a document, schema tauscope.model/1, and back: every number reads as the same float64."""
 
+from collections.abc import Mapping
 from dataclasses import fields
 from inspect import isabstract
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from tauscope.diagnosis.extended_model.consistent_links import consistent_links
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.term import Term
 from tauscope.dynamics import base_parameters
 from tauscope.effects import Effect, catalogue
 from tauscope.errors import IdentificationError
+from tauscope.identification.consistency import plausible_prior
+from tauscope.identification.full_parameters import FullParameters
+from tauscope.identification.physical_estimate import consistent_estimate
+from tauscope.identification.posterior import WIDE
 from tauscope.identification.structure import JointTerms, ModelStructure
-from tauscope.recording.recording import Array
-from tauscope.robot import Robot
-from tauscope.robot.bounded_file import decode_utf8, read_bounded
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot import LinkInertia, Robot
+from tauscope.robot.messages import shown
 from tauscope.strict_model import ResultModel
+
+SMALLEST = 1e-12
+"""Eigenvalues of the scaled covariance below this share of the largest are no direction."""
+
+
+def consistent_links(diagnosis: Diagnosis) -> tuple[LinkInertia, ...]:
+    """The nearest physically consistent links to the final model, in the metric of its covariance."""
+    fit = diagnosis.selection.fit
+    structure, size = fit.model.structure, fit.model.structure.size
+    covariance = fit.covariance[:size, :size] * diagnosis.inflation
+    scale = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    known = values > SMALLEST * values[-1]
+    factor = (vectors[:, known] / np.sqrt(values[known])).T / scale
+    target = factor @ fit.model.parameters
+    full = FullParameters.of(structure)
+    prior = plausible_prior(structure.robot, factor @ full.map, target, full.friction).widen(WIDE)
+    return consistent_estimate(structure, factor, target, prior).links
+
 
 LARGEST_FILE = 16 * 2**20
 
@@ -77,66 +97,40 @@ class ModelDocument(ResultModel):
     )
 
 
+def list_friction(structure: ModelStructure, values: Mapping[str, float]) -> list[JointFrictionEntry]:
+    """Nominal friction of every joint; a term that the model does not have is zero."""
+    return [
+        JointFrictionEntry(
+            joint=joint.name,
+            stiction=values.get(f"stiction {joint.name}", 0.0),
+            stribeck=values.get(f"stribeck {joint.name}"),
+            viscous=values.get(f"viscous {joint.name}", 0.0),
+            offset=values.get(f"offset {joint.name}", 0.0),
+            k_v=float(terms.k_v),
+            delta=None if terms.delta is None else float(terms.delta),
+        )
+        for joint, terms in zip(structure.robot.joints, structure.terms, strict=True)
+    ]
+
+
 def model_document(diagnosis: Diagnosis) -> ModelDocument:
     """The final model of a diagnosis as a document."""
-    model = diagnosis.selection.fit.model
-    structure = model.structure
+    fit = diagnosis.selection.fit
+    structure, size = fit.model.structure, fit.model.structure.size
     names = [joint.name for joint in diagnosis.robot.joints]
-    values = dict(zip(structure.names, map(float, model.parameters), strict=True))
-    links = consistent_links(diagnosis)
+    values = dict(zip(structure.names, map(float, fit.model.parameters), strict=True))
     return ModelDocument(
         robot=diagnosis.robot.name,
         joints=names,
         base_parameters=[NamedValue(name=name, value=values[name]) for name in structure.base.expressions],
-        links=[[float(value) for value in link.to_vector()] for link in links],
-        friction=[
-            JointFrictionEntry(
-                joint=name,
-                stiction=values[f"stiction {name}"],
-                stribeck=values.get(f"stribeck {name}"),
-                viscous=values[f"viscous {name}"],
-                offset=values[f"offset {name}"],
-                k_v=float(terms.k_v),
-                delta=None if terms.delta is None else float(terms.delta),
-            )
-            for name, terms in zip(names, structure.terms, strict=True)
-        ],
-        effects=[_entry(term, names) for term in model.terms],
-        covariance=_covariance(diagnosis).tolist(),
+        links=[[float(value) for value in link.to_vector()] for link in consistent_links(diagnosis)],
+        friction=list_friction(structure, values),
+        effects=[_entry(term, names) for term in fit.model.terms],
+        covariance=(fit.covariance[:size, :size] * diagnosis.inflation).tolist(),
     )
 
 
-def _covariance(diagnosis: Diagnosis) -> Array:
-    """Of the nominal parameters, (p, p)."""
-    fit = diagnosis.selection.fit
-    size = fit.model.structure.size
-    return fit.covariance[:size, :size] * diagnosis.inflation
-
-
-def read_model(path: Path, robot: Robot) -> ExtendedModel:
-    """The extended model of a file.
-
-    Raises
-    ------
-    IdentificationError
-        naming the file and the key
-    """
-    text = decode_utf8(read_bounded(path, LARGEST_FILE), str(path))
-    try:
-        document = ModelDocument.model_validate_json(text)
-    except ValidationError as error:
-        fault = error.errors(include_url=False, include_context=False)[0]
-        key = ".".join(str(part) for part in fault["loc"]) or "the document"
-        raise IdentificationError(
-            one_line(f"{path}: {key}: {fault['msg']}; give a file that diagnose --model wrote")
-        ) from None
-    try:
-        return restored(document, robot)
-    except IdentificationError as error:
-        raise IdentificationError(one_line(f"{path}: {error}")) from None
-
-
-def restored(document: ModelDocument, robot: Robot) -> ExtendedModel:
+def restore_model(document: ModelDocument, robot: Robot) -> ExtendedModel:
     """The extended model of a document.
 
     Raises
