@@ -103,20 +103,14 @@ class Backend(Protocol):
     def connect(self) -> ArmState:
         """Reach every drive and read it; moves nothing and switches no torque on.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: a device is missing, taken or of the wrong kind
+        Raises DriverError ``cannot-connect`` where a device is missing, taken or of the wrong kind.
         """
         ...
 
     def acknowledge_faults(self) -> ArmState:
         """Clear the faults that the drives have latched, on the operator's word; moves nothing.
 
-        Raises
-        ------
-        DriverError
-            ``not-connected``, or ``fault`` where a fault stays
+        Raises DriverError: ``not-connected``, or ``fault`` where a fault stays.
         """
         ...
 
@@ -130,17 +124,14 @@ class Backend(Protocol):
     ) -> ArmState:
         """Take the arm under power where it stands: targets := present, limits and watchdog read back, then torque.
 
+        Raises DriverError: ``not-connected``, ``refused`` (a mode, policy or time that the backend cannot do), or
+        ``fault`` (latched and not acknowledged).
+
         Parameters
         ----------
         cycle_s : float or None
             time between two calls of `exchange`, for drives that interpolate between targets; None where it is not
             known [s]
-
-        Raises
-        ------
-        DriverError
-            ``not-connected``, ``refused`` (a mode, policy or time that the backend cannot do), or ``fault`` (latched
-            and not acknowledged)
         """
         ...
 
@@ -148,11 +139,8 @@ class Backend(Protocol):
         """One cycle: write the setpoints, read the arm. Feeds the watchdog; never waits longer than the bus takes.
 
         A drive that does not answer leaves NaN in the state; a fault that it reports stands in `ArmState.faults`.
-
-        Raises
-        ------
-        DriverError
-            ``not-enabled``, ``refused`` (a target that is not finite: nothing is sent), or ``lost`` (the bus is gone)
+        Raises DriverError: ``not-enabled``, ``refused`` (a target that is not finite: nothing is sent), or ``lost``
+        (the bus is gone).
         """
         ...
 

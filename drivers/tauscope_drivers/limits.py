@@ -45,15 +45,12 @@ def stated_limits(joints: Sequence[DriveJoint]) -> DriveLimits:
 def require_sensible(limits: DriveLimits, position: Array, labels: Sequence[str]) -> None:
     """Refuse limits that leave no motion, are no numbers, or are those of another place.
 
+    Raises DriverError ``refused``, which names the joint and the limit.
+
     Parameters
     ----------
     position : (n,) float64
         where the arm stands [rad or m]
-
-    Raises
-    ------
-    DriverError
-        ``refused``: names the joint and the limit
     """
     joint_count = len(position)
     for name in ("position_low", "position_high", "velocity", "torque"):
@@ -76,13 +73,7 @@ def require_sensible(limits: DriveLimits, position: Array, labels: Sequence[str]
 
 
 def require_finite(setpoint: Setpoint, joint_count: int) -> None:
-    """Refuse targets that are missing or no numbers.
-
-    Raises
-    ------
-    DriverError
-        ``refused``
-    """
+    """Refuse targets that are missing or no numbers. Raises DriverError: ``refused``."""
     for targets in (setpoint.position, setpoint.torque):
         if np.shape(targets) != (joint_count,) or not np.isfinite(targets).all():
             raise DriverError(

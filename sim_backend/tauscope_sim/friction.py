@@ -17,6 +17,9 @@ def static_friction_torque(
 ) -> Array:
     """Friction torque τ_f = τ_s S₀(v) + τ_sc (2/π) arctan(v δ) + τ_v v, with S₀(v) = (2/π) arctan(v K_v).
 
+    Raises RobotFileError where a shape constant that is needed is None, or where the number of entries is not the
+    number of joints.
+
     Parameters
     ----------
     velocity : (N, n) float64
@@ -28,11 +31,6 @@ def static_friction_torque(
     -------
     (N, n) float64
         τ_f, positive where the drive has to overcome it in the positive direction [Nm or N]
-
-    Raises
-    ------
-    RobotFileError
-        where a shape constant that is needed is None, or where the number of entries is not the number of joints
 
     Notes
     -----
@@ -59,15 +57,12 @@ def shape_constants(
 ) -> list[tuple[float, float]]:
     """K_v and δ of each joint; zero where the coefficient that they shape is zero and the robot file states none.
 
+    Raises RobotFileError where a shape constant that is needed is None.
+
     Parameters
     ----------
     friction_shape : sequence of FrictionShape
         K_v and δ, one entry a joint [s/rad or s/m]
-
-    Raises
-    ------
-    RobotFileError
-        where a shape constant that is needed is None
     """
     constants: list[tuple[float, float]] = []
     for number, (coefficients, shape) in enumerate(zip(friction, friction_shape, strict=True), 1):

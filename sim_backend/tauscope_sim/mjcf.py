@@ -51,17 +51,14 @@ def read_chain(
 ) -> Chain:
     """The chain from body `base` to body `tip`; by default from the root to the deepest body.
 
+    Raises RobotFileError if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip.
+
     Parameters
     ----------
     path : Path or None
         where the file lies, for the files that it names; None for text without files beside it
     locked : mapping of str to float
         position of joints that do not move [rad or m]
-
-    Raises
-    ------
-    RobotFileError
-        if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip
     """
     return _Reader(compile_model(data, label, path), label, locked).chain(base, tip)
 

@@ -77,19 +77,13 @@ def random_fourier_motion(
     """Random finite Fourier series, each joint scaled until the first of its limits is reached.
 
     Velocity and acceleration are zero at the start and the end of the period: Σ a_l = 0 and Σ l b_l = 0. The limits
-    hold at every instant, not only at samples. A limit that is not stated does not bind.
+    hold at every instant, not only at samples. A limit that is not stated does not bind. Raises RobotFileError where a
+    joint states no limit. Raises RecordingError where `period_s`, `harmonics` or `limit_fraction` is out of its range.
 
     Parameters
     ----------
     period_s : float
         duration of one period [s]
-
-    Raises
-    ------
-    RobotFileError
-        where a joint states no limit
-    RecordingError
-        where `period_s`, `harmonics` or `limit_fraction` is out of its range
     """
     if not (np.isfinite(period_s) and period_s > 0.0):
         raise RecordingError(f"period_s is {period_s}; give a positive duration")

@@ -31,15 +31,12 @@ class MujocoLog:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, joints: Sequence[str] | None = None) -> None:
         """Take a simulation; nothing of it is changed.
 
+        Raises RecordingError where a joint is not there, or is no hinge or slide.
+
         Parameters
         ----------
         joints : sequence of str or None
             hinges and slides, base first; None: all of them, as the file has them
-
-        Raises
-        ------
-        RecordingError
-            a joint is not there, or is no hinge or slide
         """
         every = [model.joint(index).name for index in range(model.njnt) if model.jnt_type[index] in HINGE_OR_SLIDE]
         self.joints = tuple(every if joints is None else joints)

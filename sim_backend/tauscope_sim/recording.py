@@ -57,7 +57,9 @@ def simulate_recording(
 ) -> SimulatedRecording:
     """Record an arm that follows a motion exactly: τ = H(q) q̈ + h(q, q̇) + c(q) + τ_f(q̇) + noise, equations (1), (6).
 
-    The noise is Gaussian, white, of zero mean, and independent between joints, as in the paper's section 3.
+    The noise is Gaussian, white, of zero mean, and independent between joints, as in the paper's section 3. Raises
+    RobotFileError where the robot file lacks what the simulation needs. Raises RecordingError where the settings make
+    no recording.
 
     Parameters
     ----------
@@ -71,13 +73,6 @@ def simulate_recording(
         resolution to which positions are rounded, zero for none [rad or m]
     friction_shape : sequence of FrictionShape, optional
         K_v and δ of each joint [s/rad or s/m]; the robot file's where None
-
-    Raises
-    ------
-    RobotFileError
-        where the robot file lacks what the simulation needs
-    RecordingError
-        where the settings make no recording
     """
     samples_per_period = _samples_per_period(motion.period_s, rate_hz)
     if periods < 1:

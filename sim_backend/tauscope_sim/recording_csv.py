@@ -17,12 +17,8 @@ def write_recording_csv(
     """Write what a real arm's logger would have written, the joints' wiring included.
 
     A joint with ``sign: -1`` is recorded the other way round; with `as_current` the columns are i1…in and hold torque
-    divided by the joint's torque constant. Numbers are written so that reading them gives the same float64.
-
-    Raises
-    ------
-    RecordingError
-        where the file exists, or cannot be written
+    divided by the joint's torque constant. Numbers are written so that reading them gives the same float64. Raises
+    RecordingError where the file exists, or cannot be written.
     """
     signs = np.array([joint.sign for joint in joints], dtype=np.float64)
     constants = np.array([joint.torque_constant for joint in joints])

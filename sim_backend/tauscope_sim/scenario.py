@@ -43,30 +43,20 @@ class Scenario:
     def plant(self, robot: Robot, *, step_s: float = STEP) -> Plant:
         """Forward physics of the arm with its concealed effects.
 
+        Raises RobotFileError where the robot file lacks what the simulation needs. Raises ScenarioError where effects
+        contradict one another or the robot.
+
         Parameters
         ----------
         step_s : float
             longest step of the integration [s]
-
-        Raises
-        ------
-        RobotFileError
-            where the robot file lacks what the simulation needs
-        ScenarioError
-            where effects contradict one another or the robot
         """
         for effect in self.effects:
             effect.check(robot)
         return Plant(robot, self.effects, step_s=step_s)
 
     def sensors(self, robot: Robot, rng: np.random.Generator | None = None) -> "Sensors":
-        """The sensors, at the beginning of a recording.
-
-        Raises
-        ------
-        ScenarioError
-            where an effect contradicts the robot
-        """
+        """The sensors, at the beginning of a recording. Raises ScenarioError where an effect contradicts the robot."""
         for effect in self.sensor_effects:
             effect.check(robot)
         return Sensors(self, robot.joint_count, np.random.default_rng(self.seed) if rng is None else rng)

@@ -56,10 +56,8 @@ class ScenarioDocument(Document):
 def read_scenario(path: Path | str, robot: Robot) -> Scenario:
     """The scenario of a file.
 
-    Raises
-    ------
-    ScenarioError
-        if the file cannot be read, is not valid or does not fit the robot; one line naming file, entry and key
+    Raises ScenarioError if the file cannot be read, is not valid or does not fit the robot; one line naming file, entry
+    and key.
     """
     try:
         data = read_bounded(Path(path), LARGEST_SCENARIO_FILE)
@@ -69,13 +67,7 @@ def read_scenario(path: Path | str, robot: Robot) -> Scenario:
 
 
 def scenario_from_yaml(data: bytes, label: str, robot: Robot) -> Scenario:
-    """The scenario of a YAML document.
-
-    Raises
-    ------
-    ScenarioError
-        if the document is not valid or does not fit the robot
-    """
+    """The scenario of a YAML document. Raises ScenarioError if the document is not valid or does not fit the robot."""
     try:
         content = read_yaml(decode_utf8(data, label), label)
     except RobotFileError as error:

@@ -58,10 +58,7 @@ class CanopenArm:
     ) -> None:
         """Check the configuration; nothing is opened yet.
 
-        Raises
-        ------
-        DriverError
-            ``refused``: the configuration is not usable; names the joint and the key
+        Raises DriverError ``refused`` where the configuration is not usable; names the joint and the key.
         """
         self._configuration = read_configuration(joints)
         self._given_bus = bus
@@ -248,10 +245,7 @@ class CanopenArm:
 def _require_hold(nodes: Sequence[DriveNode], mode: ControlMode, policy: StopPolicy) -> None:
     """Refuse torque mode where a drive would fall at a stop that is to hold: it has no targets of position to stay at.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: names the joint
+    Raises DriverError ``refused``, which names the joint.
     """
     falling = [node for node in nodes if not node.stays_stopped]
     if falling and mode is ControlMode.TORQUE and policy is StopPolicy.HOLD:

@@ -45,10 +45,7 @@ class CanBus:
     ) -> None:
         """Open the bus.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the interface is not there, or another program holds it
+        Raises DriverError ``cannot-connect`` where the interface is not there, or another program holds it.
         """
         self._name = f"{configuration.interface} {configuration.channel}"
         self._clock = clock or MonotonicClock()
@@ -85,13 +82,7 @@ class CanBus:
         return NodeDictionary(client, node_id)
 
     def send(self, identifier: int, data: bytes) -> None:
-        """Send a frame.
-
-        Raises
-        ------
-        DriverError
-            ``lost``: the bus does not take it
-        """
+        """Send a frame. Raises DriverError ``lost`` where the bus does not take it."""
         try:
             self._bus.send(
                 can.Message(arbitration_id=identifier, data=data, is_extended_id=False), timeout=SEND_TIMEOUT_S
@@ -102,15 +93,12 @@ class CanBus:
     def send_together(self, frames: Iterable[tuple[int, bytes]]) -> None:
         """Send frames one after the other, with one write where the adapter takes that.
 
+        Raises DriverError ``lost`` where the bus does not take them.
+
         Parameters
         ----------
         frames : iterable of (int, bytes)
             identifier and payload of each, in their order
-
-        Raises
-        ------
-        DriverError
-            ``lost``: the bus does not take them
         """
         gathering = self._bus.gathering() if isinstance(self._bus, SerialAdapterBus) else nullcontext()
         try:
@@ -123,15 +111,12 @@ class CanBus:
     def receive(self, deadline_ns: int) -> bool:
         """Wait for one frame and hand it to its handler; the heartbeat is sent meanwhile when it is due.
 
+        Raises DriverError ``lost`` where the bus is gone.
+
         Returns
         -------
         bool
             False where none came
-
-        Raises
-        ------
-        DriverError
-            ``lost``: the bus is gone
         """
         self.beat()
         wait_s = max(0.0, (deadline_ns - time.monotonic_ns()) * 1e-9)

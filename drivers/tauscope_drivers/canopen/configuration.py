@@ -72,11 +72,8 @@ class BusConfiguration:
 def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
     """Bus and drives of an arm.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: a key is missing, unknown or not usable, or the EDS or DCF file describes no drive that the driver
-        can use; names the joint and the key
+    Raises DriverError ``refused`` where a key is missing, unknown or not usable, or the EDS or DCF file describes no
+    drive that the driver can use; names the joint and the key.
     """
     first = joints[0]
     require_known_keys(joints, _BUS_KEYS, _NODE_KEYS)
@@ -95,10 +92,7 @@ def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
 def require_targets(configuration: BusConfiguration, mode: ControlMode) -> None:
     """Refuse a mode whose targets a drive does not take, by its EDS or DCF file.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: names joint, file and object
+    Raises DriverError ``refused``, which names joint, file and object.
     """
     for joint, node in enumerate(configuration.nodes, 1):
         if node.device_file is None:
@@ -111,13 +105,7 @@ def require_targets(configuration: BusConfiguration, mode: ControlMode) -> None:
 
 
 def read_node(joint: DriveJoint) -> NodeConfiguration:
-    """The drive of a joint.
-
-    Raises
-    ------
-    DriverError
-        ``refused``: as `read_configuration`
-    """
+    """The drive of a joint. Raises DriverError ``refused`` as `read_configuration`."""
     counts_per_turn = read_positive(joint, "counts_per_turn")
     if counts_per_turn is None:
         raise refusal(joint, "counts_per_turn", "is missing; give the position counts of a motor turn")

@@ -46,10 +46,7 @@ def can_interfaces() -> list[Finding]:
 def examine(joints: Sequence[DriveJoint]) -> list[Finding]:
     """Bus, and every drive that the robot file names.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: a ``drive`` block is not valid
+    Raises DriverError: ``refused``: a ``drive`` block is not valid.
     """
     configuration = read_configuration(joints)
     subject = f"{configuration.interface} {configuration.channel}"
@@ -180,17 +177,13 @@ def scan_bus(interface: str, channel: str, bit_rates: Sequence[int] | None = Non
     """Every node that answers, one bit rate after the other.
 
     Reads the device type (0x1000) by SDO, then name and version of those that answered. At a wrong bit rate
-    this disturbs a bus that is in use: name the rate where anything moves.
+    this disturbs a bus that is in use: name the rate where anything moves. Raises DriverError ``cannot-connect`` where
+    the bus is missing, not permitted or taken.
 
     Parameters
     ----------
     bit_rates : sequence of int or None
         to try [bit/s]; the usual ones where None, one where the interface has a fixed one
-
-    Raises
-    ------
-    DriverError
-        ``cannot-connect``: the bus is missing, not permitted or taken
     """
     if bit_rates is None:
         bit_rates = USUAL_BIT_RATES[:1] if interface in _FIXED_RATE else USUAL_BIT_RATES

@@ -143,11 +143,8 @@ class DriveNode:
     def identify(self) -> frozenset[ControlMode]:
         """Make sure that it is the drive that is meant, learn its units, and return the modes that it has.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: it does not answer or is no CiA 402 drive; ``refused``: its rated torque is not usable,
-            it does not watch its master, or it is not the drive of its EDS or DCF file
+        Raises DriverError: ``cannot-connect``: it does not answer or is no CiA 402 drive; ``refused``: its rated torque
+        is not usable, it does not watch its master, or it is not the drive of its EDS or DCF file.
         """
         kind = self.dictionary.read(objects.DEVICE_TYPE) & 0xFFFF
         if kind != _CIA_402:
@@ -194,17 +191,14 @@ class DriveNode:
     def targets(self, mode: ControlMode, controlword: int, position: float, torque: float) -> list[tuple[int, bytes]]:
         """Identifier and payload of its target frames.
 
+        Raises DriverError ``refused`` where the target is beyond what the drive can be told.
+
         Parameters
         ----------
         position : float
             of the joint, finite [rad or m]
         torque : float
             of the joint, finite [Nm or N]
-
-        Raises
-        ------
-        DriverError
-            ``refused``: the target is beyond what the drive can be told
         """
         target = TARGETS[mode][self.mode_numbers[mode]]
         quantity = self.units.counts(position) if mode is ControlMode.POSITION else self.units.permille(torque)

@@ -38,10 +38,7 @@ _COMMANDED = {objects.CONTROLWORD, objects.TARGET_POSITION, objects.TARGET_TORQU
 def map_process_data(node: DriveNode, mode: ControlMode) -> None:
     """Write the parameters of all PDOs that a mode needs, by explicit SDOs, and listen to them.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: a needed object is in none of its PDOs, or a PDO is not exchanged at SYNC
+    Raises DriverError ``refused`` where a needed object is in none of its PDOs, or a PDO is not exchanged at SYNC.
     """
     for _ in range(2 * PDO_COUNT + 1):
         plan = node.plan_for(mode)

@@ -34,6 +34,8 @@ def read_rated_torque(
 ) -> RatedTorque:
     """Rated torque in the unit that fits the joint's torque limit, else the rated current (0x6075).
 
+    Raises ValueError where neither unit fits, or it reads 0.
+
     Parameters
     ----------
     value : int
@@ -42,11 +44,6 @@ def read_rated_torque(
         of the joint; None where the robot file states none [Nm or N]
     rated_current_ma : int or None
         None where the drive states none [mA]
-
-    Raises
-    ------
-    ValueError
-        neither unit fits, or it reads 0
     """
     milli, micro = value * _MILLI, value * _MICRO
     if value <= 0:

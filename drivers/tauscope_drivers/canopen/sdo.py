@@ -50,21 +50,15 @@ class NodeDictionary:
     def read(self, entry: DriveObject) -> int:
         """Value of an entry.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the node does not answer; ``refused``: it has no such entry
+        Raises DriverError: ``cannot-connect``: the node does not answer; ``refused``: it has no such entry.
         """
         return int.from_bytes(self.read_data(entry), "little", signed=entry.signed)
 
     def read_surely(self, entry: DriveObject) -> int:
         """Value of an entry that every measurement hangs on: as two readings in a row have it.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the node does not answer, or gives another value each time; ``refused``: it has no such
-            entry
+        Raises DriverError: ``cannot-connect``: the node does not answer, or gives another value each time; ``refused``:
+        it has no such entry.
         """
         values = [self.read(entry)]
         for _ in range(_READINGS):
@@ -79,10 +73,7 @@ class NodeDictionary:
     def read_data(self, entry: DriveObject) -> bytes:
         """Value of an entry as transferred, cut to its size; of a text without the zeros that end it.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the node does not answer; ``refused``: it has no such entry
+        Raises DriverError: ``cannot-connect``: the node does not answer; ``refused``: it has no such entry.
         """
         try:
             data = bytes(_transferred(lambda: self._client.upload(entry.index, entry.subindex)))
@@ -109,10 +100,8 @@ class NodeDictionary:
     def write(self, entry: DriveObject, value: int) -> None:
         """Write an entry and read it back.
 
-        Raises
-        ------
-        DriverError
-            ``refused``: the drive keeps another value or forbids the write; ``cannot-connect``: it does not answer
+        Raises DriverError: ``refused``: the drive keeps another value or forbids the write; ``cannot-connect``: it does
+        not answer.
         """
         kept = None
         for _ in range(_WRITES):
@@ -128,20 +117,14 @@ class NodeDictionary:
     def send(self, entry: DriveObject, value: int) -> None:
         """Write an entry that cannot be read back yet.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the drive does not answer; ``refused``: it forbids the write
+        Raises DriverError: ``cannot-connect``: the drive does not answer; ``refused``: it forbids the write.
         """
         self.send_data(entry, value.to_bytes(entry.bits // 8, "little", signed=entry.signed), str(value))
 
     def send_data(self, entry: DriveObject, data: bytes, text: str) -> None:
         """Write an entry as transferred.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the drive does not answer; ``refused``: it forbids the write
+        Raises DriverError: ``cannot-connect``: the drive does not answer; ``refused``: it forbids the write.
         """
         try:
             _transferred(lambda: self._client.download(entry.index, entry.subindex, data))

@@ -66,15 +66,12 @@ class DynamixelArm:
     ) -> None:
         """Nothing is opened yet.
 
+        Raises DriverError: ``refused``: a ``drive`` block is not valid.
+
         Parameters
         ----------
         keeps_settings : bool
             whether changes of EEPROM stay after the arm is let go
-
-        Raises
-        ------
-        DriverError
-            ``refused``: a ``drive`` block is not valid
         """
         self._configuration = read_configuration(joints)
         self._clock = MonotonicClock() if clock is None else clock
@@ -116,22 +113,14 @@ class DynamixelArm:
         return self._clock
 
     def require_rate(self, rate_hz: float) -> None:
-        """Refuse a rate that the bus does not carry.
-
-        Raises
-        ------
-        DriverError
-            ``refused``: names what limits it
-        """
+        """Refuse a rate that the bus does not carry. Raises DriverError ``refused``, which names what limits it."""
         require_rate(rate_hz, *self._budget())
 
     def connect(self) -> ArmState:
         """Lock the port and reach every servo; moves nothing and switches no torque on.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: connected already, the port is taken or missing, a servo is missing or of the wrong kind
+        Raises DriverError ``cannot-connect``: connected already, the port is taken or missing, a servo is missing or of
+        the wrong kind.
         """
         if self._session is not None:
             raise DriverError(DriverErrorKind.CANNOT_CONNECT, "the arm is connected already; disconnect it first")
@@ -149,11 +138,7 @@ class DynamixelArm:
 
         A hardware error (overload, heat …) stays until the servo was switched off and on: it is never restarted from
         here, for a restart lets go of the joint. Servos of the Y series forget errors without one, and are told to.
-
-        Raises
-        ------
-        DriverError
-            ``not-connected``, or ``fault`` where a fault stays
+        Raises DriverError: ``not-connected``, or ``fault`` where a fault stays.
         """
         session = self._reached()
         with self._watching_the_port():
@@ -184,6 +169,8 @@ class DynamixelArm:
     ) -> ArmState:
         """Take the arm under power where it stands.
 
+        Raises DriverError: ``not-connected``, ``refused`` or ``fault``.
+
         Parameters
         ----------
         watchdog_s : float
@@ -191,11 +178,6 @@ class DynamixelArm:
         cycle_s : float or None
             time between two goals, over which the servos go from one to the next; they leap where it is None, or too
             short for a bus that has to carry the speeds as well [s]
-
-        Raises
-        ------
-        DriverError
-            ``not-connected``, ``refused`` or ``fault``
         """
         session = self._reached()
         self._require_possible(mode, stop_policy)
@@ -217,10 +199,7 @@ class DynamixelArm:
     def exchange(self, setpoint: Setpoint) -> ArmState:
         """One cycle: Sync Write of the goals, Sync Read of all servos, health of one servo.
 
-        Raises
-        ------
-        DriverError
-            ``not-enabled``, ``refused`` (nothing is sent), or ``lost``
+        Raises DriverError: ``not-enabled``, ``refused`` (nothing is sent), or ``lost``.
         """
         session = self._reached()
         if self._mode is None or self._bounds is None:

@@ -145,10 +145,7 @@ class ServoBus:
     def read_block(self, servo: int, block: Block) -> dict[str, int]:
         """Values of a block by their names.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the servo does not answer; ``refused``: it has no such block
+        Raises DriverError: ``cannot-connect``: the servo does not answer; ``refused``: it has no such block.
         """
         answer = None
         for _ in range(ATTEMPTS):
@@ -160,20 +157,14 @@ class ServoBus:
     def read(self, servo: int, item: Item) -> int:
         """Value of an item.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the servo does not answer; ``refused``: it has no such item
+        Raises DriverError: ``cannot-connect``: the servo does not answer; ``refused``: it has no such item.
         """
         return self.read_block(servo, Block(item.address, item.size, (item,)))[item.name]
 
     def write(self, servo: int, item: Item, value: int) -> None:
         """Write an item and read it back.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the servo does not answer; ``refused``: it does not take the value
+        Raises DriverError: ``cannot-connect``: the servo does not answer; ``refused``: it does not take the value.
         """
         answer = None
         for _ in range(ATTEMPTS):

@@ -94,10 +94,7 @@ def largest_rate_hz(traffic: CycleTraffic, timing: BusTiming, load: float = LARG
 def require_rate(rate_hz: float, traffic: CycleTraffic, timing: BusTiming) -> None:
     """Refuse a rate that the bus does not carry, and say what limits it.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: names the limit and the rate that is possible
+    Raises DriverError ``refused``, which names the limit and the rate that is possible.
     """
     most = largest_rate_hz(traffic, timing)
     if rate_hz <= most:

@@ -69,10 +69,7 @@ class BusConfiguration:
 def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
     """Bus and servos of an arm.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: a key is missing, unknown or not usable; names the joint and the key
+    Raises DriverError ``refused`` where a key is missing, unknown or not usable; names the joint and the key.
     """
     first = joints[0]
     require_known_keys(joints, _BUS_KEYS, _SERVO_KEYS)

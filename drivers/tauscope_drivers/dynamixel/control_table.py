@@ -180,10 +180,7 @@ def model_names() -> Mapping[int, str]:
 def find_model(number: int, firmware: int = 0) -> ServoModel:
     """The model of a number, with the table of its firmware.
 
-    Raises
-    ------
-    DriverError
-        ``cannot-connect``: no table is known for it
+    Raises DriverError ``cannot-connect`` where no table is known for it.
     """
     name = model_names().get(number)
     family = None if name is None else family_of(name)
@@ -216,10 +213,7 @@ def find_model(number: int, firmware: int = 0) -> ServoModel:
 def find_model_by_name(name: str) -> ServoModel:
     """The model of a name, with the table of its oldest firmware.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: there is no such model
+    Raises DriverError ``refused`` where there is no such model.
     """
     wanted = name.lower().replace("-", "_")
     for number, known in model_names().items():

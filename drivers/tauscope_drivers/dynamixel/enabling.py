@@ -66,7 +66,8 @@ def enable_servos(
     """Prepare every servo, then give each its place for a goal, its watchdog and torque, one servo at a time.
 
     An arm may fall meanwhile: each servo is asked where it is at the last moment, and catches its joint there. A servo
-    that holds its joint already, in the mode that is asked for, is taken over without letting go.
+    that holds its joint already, in the mode that is asked for, is taken over without letting go. Raises DriverError:
+    ``refused`` or ``cannot-connect``: no servo has torque that had none before.
 
     Returns
     -------
@@ -74,11 +75,6 @@ def enable_servos(
         for the cyclic exchange
     list of int
         Goal Position that each servo was given where positions are tracked [counts]
-
-    Raises
-    ------
-    DriverError
-        ``refused`` or ``cannot-connect``: no servo has torque that had none before
     """
     tasks, ranges = plan_tasks(session, mode, limits, watchdog_s)
     taken = _give_torque(session, tasks)
@@ -92,17 +88,14 @@ def plan_tasks(
 ) -> tuple[list[ServoTask], list[tuple[int, int]]]:
     """Check everything that enabling needs, and plan it; only reads.
 
+    Raises DriverError: ``refused`` or ``cannot-connect``: names the joint.
+
     Returns
     -------
     list of ServoTask
         one a joint
     list of tuple of two int
         lowest and highest Goal Position, one a joint [counts]
-
-    Raises
-    ------
-    DriverError
-        ``refused`` or ``cannot-connect``: names the joint
     """
     steps = watchdog_steps(watchdog_s)
     present = [_present_position(session, joint) for joint in range(len(session.servos))]

@@ -49,10 +49,7 @@ class SerialPort(PortHandler):
     def open(self) -> None:
         """Open the port and lock it against everybody else.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: it is not there, not permitted, or taken; names the holder
+        Raises DriverError ``cannot-connect`` where it is not there, not permitted, or taken; names the holder.
         """
         try:
             self.openPort()

@@ -117,10 +117,7 @@ def taking_writes(servo: JointServo, task: ServoTask, *, holds: bool) -> list[Re
 def watchdog_steps(watchdog_s: float) -> int:
     """Bus Watchdog for a time, at most that time.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: shorter or longer than the servos can
+    Raises DriverError ``refused``: shorter or longer than the servos can.
     """
     steps = math.floor(watchdog_s / WATCHDOG_STEP_S + _ROUNDING) if math.isfinite(watchdog_s) else 0
     if not 1 <= steps <= WATCHDOG_MOST:
@@ -135,15 +132,12 @@ def watchdog_steps(watchdog_s: float) -> int:
 def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -> int:
     """Most current within a torque limit, the robot file's limit and the servo's own Current Limit [units].
 
+    Raises DriverError ``refused`` where the limit cannot be turned into current, or leaves none.
+
     Parameters
     ----------
     torque : float
         limit of the joint, infinite where there is none [Nm or N]
-
-    Raises
-    ------
-    DriverError
-        ``refused``: the limit cannot be turned into current, or leaves none
     """
     cap = settings["Current Limit"]
     if servo.current_limit_ma is not None:
@@ -165,15 +159,12 @@ def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -
 def velocity_cap(servo: JointServo, settings: Mapping[str, int], velocity: float) -> int:
     """Profile Velocity within a speed limit and the servo's own Velocity Limit, beyond which it refuses it [units].
 
+    Raises DriverError ``refused`` where the servo's own limit leaves no motion.
+
     Parameters
     ----------
     velocity : float
         limit of the joint, infinite where there is none [rad/s or m/s]
-
-    Raises
-    ------
-    DriverError
-        ``refused``: the servo's own limit leaves no motion
     """
     cap, own = servo.units.velocity_cap(velocity), settings.get("Velocity Limit")
     if own is None:

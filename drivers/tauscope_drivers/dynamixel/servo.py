@@ -33,15 +33,13 @@ class JointServo:
 def make_servo(number: int, configuration: ServoConfiguration, identity: tuple[int, int] | None) -> JointServo:
     """A servo of a joint, with the identity that it stated, or without one as its configuration promises it.
 
+    Raises DriverError ``cannot-connect`` where not the model that the robot file names, one that senses no current or
+    has no watchdog.
+
     Parameters
     ----------
     number : int
         of the joint, from 1
-
-    Raises
-    ------
-    DriverError
-        ``cannot-connect``: not the model that the robot file names, one that senses no current or has no watchdog
     """
     place = f"joint {configuration.joint} (servo {configuration.servo})"
     if identity is not None:

@@ -67,10 +67,7 @@ class Session:
     def restore(self) -> None:
         """Put back what was changed in EEPROM, on servos without torque; others keep it until they are let go.
 
-        Raises
-        ------
-        DriverError
-            a servo does not answer, or does not take it
+        Raises DriverError where a servo does not answer, or does not take it.
         """
         for joint, kept in enumerate(self.originals):
             before = kept.before
@@ -119,10 +116,7 @@ class Session:
 def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) -> Session:
     """Reach every servo, set what moves nothing, and read its health.
 
-    Raises
-    ------
-    DriverError
-        ``cannot-connect``: a servo is missing or of the wrong kind
+    Raises DriverError ``cannot-connect`` where a servo is missing or of the wrong kind.
     """
     bus.return_delay_s = FACTORY_RETURN_DELAY_S
     servos = tuple(_reach(bus, number, servo) for number, servo in enumerate(configurations, 1))
@@ -153,10 +147,7 @@ def make_session(bus: ServoBus, servos: Sequence[JointServo], settings: Sequence
 def read_settings(bus: ServoBus, servo: JointServo) -> dict[str, int]:
     """Settings of a servo whose counts and speeds are those of its model's table.
 
-    Raises
-    ------
-    DriverError
-        ``cannot-connect``: it does not answer, or its gear is another one
+    Raises DriverError ``cannot-connect`` where it does not answer, or its gear is another one.
     """
     settings = read_items(bus, servo, SETTINGS)
     _require_delivered_gear(bus, servo)

@@ -120,6 +120,8 @@ def servo_units(
 ) -> ServoUnits:
     """Units of a servo of this model at its joint.
 
+    Raises ValueError where no unit of current is known for the model, and none is given.
+
     Parameters
     ----------
     reduction : float
@@ -130,11 +132,6 @@ def servo_units(
         one unit of Present Current, in place of the model's [mA]
     torque_per_milliampere : float or None
         as recorded torque constants are: joint torque for one milliampere [Nm/mA or N/mA]
-
-    Raises
-    ------
-    ValueError
-        no unit of current is known for the model, and none is given
     """
     unit = model.current_unit
     if milliampere is None and unit is None:

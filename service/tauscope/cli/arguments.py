@@ -118,10 +118,7 @@ class LayoutArguments:
     def fields(self) -> dict[str, Any]:
         """Fields of `ReadingOptions`; an option overrides the file of ``--columns``.
 
-        Raises
-        ------
-        typer.BadParameter
-            for a part that is no unit, or a layout that cannot be read
+        Raises typer.BadParameter for a part that is no unit, or a layout that cannot be read.
         """
         from tauscope.errors import RobotFileError
         from tauscope.robot.recording_layout import RecordingLayout
@@ -142,13 +139,7 @@ class LayoutArguments:
         }
 
     def options(self) -> "ReadingOptions":
-        """The same as a task takes them.
-
-        Raises
-        ------
-        typer.BadParameter
-            naming the option
-        """
+        """The same as a task takes them. Raises typer.BadParameter naming the option."""
         fields = self.fields()
         from tauscope.cli.task_run import make_request
         from tauscope.tasks.task import ReadingOptions
@@ -182,10 +173,7 @@ def _parse_units(text: str | None) -> Mapping[str, str] | None:
 def parse_cutoff(text: str) -> float | Literal["auto"] | None:
     """Read the value of ``--cutoff``: ``auto``, ``none`` or a positive number [Hz].
 
-    Raises
-    ------
-    typer.BadParameter
-        for anything else
+    Raises typer.BadParameter for anything else.
     """
     if text.lower() == "auto":
         return "auto"
@@ -203,13 +191,7 @@ def parse_cutoff(text: str) -> float | Literal["auto"] | None:
 
 
 def parse_numbers(text: str, option: str, count: int | None = None) -> tuple[float, ...]:
-    """Numbers separated by commas, as many as `count` says.
-
-    Raises
-    ------
-    typer.BadParameter
-        for anything else
-    """
+    """Numbers separated by commas, as many as `count` says. Raises typer.BadParameter for anything else."""
     try:
         numbers = tuple(float(part) for part in text.split(","))
     except ValueError:

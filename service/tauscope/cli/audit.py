@@ -10,13 +10,7 @@ from tauscope.server.http.settings import default_data_folder
 
 
 def verify_audit(data: Path | None, head: str | None, file: Path | None) -> None:
-    """Check the log, and print the hash of its last entry.
-
-    Raises
-    ------
-    TauscopeError
-        if anything is wrong with it
-    """
+    """Check the log, and print the hash of its last entry. Raises TauscopeError if anything is wrong with it."""
     log = AuditLog(data or default_data_folder())
     if file is not None:
         log.path = file

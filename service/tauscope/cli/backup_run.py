@@ -15,12 +15,8 @@ from tauscope.version import tauscope_version
 def make_backup(file: Path, data: Path | None, database: str | None) -> None:
     """Write everything that is kept into one file.
 
-    Raises
-    ------
-    ExportError
-        if the file is there already
-    StoreError
-        if the database cannot be used, or the file cannot be written
+    Raises ExportError if the file is there already. Raises StoreError if the database cannot be used, or the file
+    cannot be written.
     """
     require_new(file)
     folder = data or default_data_folder()
@@ -36,10 +32,7 @@ def make_backup(file: Path, data: Path | None, database: str | None) -> None:
 def use_backup(file: Path, data: Path, database: str | None) -> None:
     """Make a data folder from a backup.
 
-    Raises
-    ------
-    StoreError
-        if the backup is damaged, there is something already, or it cannot be written
+    Raises StoreError if the backup is damaged, there is something already, or it cannot be written.
     """
     with shown_progress() as progress:
         progress(f"unpack {file}")

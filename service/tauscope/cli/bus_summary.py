@@ -32,15 +32,12 @@ _RATE_HZ = 200.0
 def show_devices(backend: str, port: str, bit_rates: Sequence[int] | None) -> None:
     """Scan a bus and show who answers.
 
+    Raises AcquisitionError where nobody answers, or the port is missing, not permitted or taken.
+
     Parameters
     ----------
     bit_rates : sequence of int or None
         to try [bit/s]; the usual ones where None
-
-    Raises
-    ------
-    AcquisitionError
-        nobody answers, or the port is missing, not permitted or taken
     """
     found: list[FoundDevice] = []
     with shown_progress() as told, translate_driver_errors():
@@ -57,10 +54,7 @@ def show_devices(backend: str, port: str, bit_rates: Sequence[int] | None) -> No
 def show_frames(robot_file: Path, backend: str, trajectory: Path | None, options: RunOptions) -> None:
     """Show the frames that a run would send: connecting, enabling, its first cycles, stopping.
 
-    Raises
-    ------
-    AcquisitionError
-        a drive block or a limit is not possible
+    Raises AcquisitionError where a drive block or a limit is not possible.
     """
     robot = read_robot(robot_file)
     targets = _targets(robot, trajectory, options)

@@ -19,17 +19,13 @@ from tauscope.tasks.task import LocalFiles
 def run_campaign(robot: Path, steps: Mapping[str, str], out: Path) -> None:
     """Run a campaign on the arm of a robot file.
 
+    Raises typer.BadParameter where an option is not valid. Raises TauscopeError where a step has no result, or the
+    folder exists.
+
     Parameters
     ----------
     steps : mapping of str to str
         JSON by field of the request
-
-    Raises
-    ------
-    typer.BadParameter
-        where an option is not valid
-    TauscopeError
-        where a step has no result, or the folder exists
     """
     request = _request(robot, steps)
     try:

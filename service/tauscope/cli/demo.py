@@ -81,10 +81,8 @@ class Comparison:
 def run_demo(folder: Path, page: PageShown) -> None:
     """Design, run, identify, compare, and say where everything is.
 
-    Raises
-    ------
-    TauscopeError
-        where the folder holds somebody else's files of the same names, cannot be written, or the page not be served
+    Raises TauscopeError where the folder holds somebody else's files of the same names, cannot be written, or the page
+    not be served.
     """
     prepare_folder(folder, (*FILES, DATA))
     arm = read_robot(example_robot("paper_arm"))
@@ -127,10 +125,7 @@ def design_motion(robot: Path, out: Path, options: ExcitationOptions, told: Told
 def run_motion(folder: Path, trajectory: Path, out: Path, seed: int, told: Told) -> None:
     """Play a motion on the simulated arm, and keep what it recorded.
 
-    Raises
-    ------
-    AcquisitionError
-        if the run does not finish
+    Raises AcquisitionError if the run does not finish.
     """
     scenario = folder.with_suffix(".yaml")
     scenario.write_text(f"{SCENARIO_TEXT}seed: {seed}\n", encoding="utf-8")

@@ -29,13 +29,7 @@ MOTION = ExcitationDesignOptions(starts=1, periods=2, slow_postures=1, closing_p
 
 
 def run_campaign(data: Path, robot_file: Path, scenario: Mapping[str, Any], told: Told) -> DiagnosisDocument:
-    """Run a campaign on a simulated arm, and diagnose it.
-
-    Raises
-    ------
-    TauscopeError
-        if the campaign does not succeed
-    """
+    """Run a campaign on a simulated arm, and diagnose it. Raises TauscopeError if the campaign does not succeed."""
     with open_services(Settings(data_folder=data)) as services:
         identifier = _begun(services, robot_file, scenario)
         _wait_for_end(services, identifier, told)

@@ -13,10 +13,7 @@ _FIRST_LINE = "Written by `tauscope demo`, which replaces the files named here w
 def prepare_folder(folder: Path, files: Sequence[str]) -> None:
     """Make the folder, mark it, and take away the files that an earlier demo wrote into it; folders stay.
 
-    Raises
-    ------
-    ExportError
-        where one of these names is taken by a file that no demo wrote, or the folder cannot be written
+    Raises ExportError where one of these names is taken by a file that no demo wrote, or the folder cannot be written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

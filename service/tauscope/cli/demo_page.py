@@ -63,15 +63,12 @@ class LeftPage:
 def leave_page(folder: Path, seconds: float = LEFT_FOR_S) -> LeftPage:
     """Serve the page from a process of its own.
 
+    Raises StoreError if that process ends instead, with what it said.
+
     Parameters
     ----------
     seconds : float
         after which it ends [s]
-
-    Raises
-    ------
-    StoreError
-        if that process ends instead, with what it said
     """
     process = subprocess.Popen(  # noqa: S603 - this program
         [sys.executable, "-m", __name__, str(folder.resolve()), str(seconds)],

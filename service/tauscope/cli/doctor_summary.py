@@ -26,10 +26,7 @@ _MARKS = {Severity.GOOD: "ok", Severity.WARNING: "warning", Severity.FAILURE: "f
 def show_findings(robot: Path | None, backend: str | None) -> None:
     """Look, and show what was found.
 
-    Raises
-    ------
-    AcquisitionError
-        something keeps the arm from running, or the robot file speaks of no bus
+    Raises AcquisitionError: something keeps the arm from running, or the robot file speaks of no bus.
     """
     with shown_progress() as told:
         told("look at the adapters" if robot is None else "ask the drives")
@@ -41,13 +38,7 @@ def show_findings(robot: Path | None, backend: str | None) -> None:
 
 
 def require_sound(findings: Sequence[Finding]) -> None:
-    """Refuse to go on where a finding is a failure.
-
-    Raises
-    ------
-    AcquisitionError
-        names the first
-    """
+    """Refuse to go on where a finding is a failure. Raises AcquisitionError, which names the first."""
     failures = [finding for finding in findings if finding.severity is Severity.FAILURE]
     if failures:
         first = failures[0]
@@ -60,12 +51,8 @@ def require_sound(findings: Sequence[Finding]) -> None:
 def check_drives(path: Path) -> list[Finding]:
     """Everything doubtful in a robot file's ``drive`` blocks and the files that they name, without a port.
 
-    Nothing where no bus is meant, or where the drivers are not installed.
-
-    Raises
-    ------
-    AcquisitionError
-        a joint has no ``drive`` block, and another one has
+    Nothing where no bus is meant, or where the drivers are not installed. Raises AcquisitionError where a joint has no
+    ``drive`` block, and another one has.
     """
     robot = read_robot(path)
     meant = [bus for bus in bus_drivers().values() if any(bus.is_meant(joint.drive or {}) for joint in robot.joints)]

@@ -30,17 +30,13 @@ GOOD_ENDS = ("succeeded", "finished")
 def run_job(name: str, data: Path | None, database: str | None, timeout_s: float) -> None:
     """Do what a schedule repeats now, and wait for its end.
 
+    Raises NotFoundError if there is no such schedule. Raises StoreError if nothing was started, it did not succeed, or
+    its end did not come in time.
+
     Parameters
     ----------
     timeout_s : float
         how long its end is waited for [s]
-
-    Raises
-    ------
-    NotFoundError
-        if there is no such schedule
-    StoreError
-        if nothing was started, it did not succeed, or its end did not come in time
     """
     folder = data or default_data_folder()
     if not folder.is_dir():
@@ -57,13 +53,7 @@ def run_job(name: str, data: Path | None, database: str | None, timeout_s: float
 
 
 def list_jobs(data: Path | None, database: str | None) -> None:
-    """Show all schedules, and what came of each the last time.
-
-    Raises
-    ------
-    StoreError
-        if the database cannot be used
-    """
+    """Show all schedules, and what came of each the last time. Raises StoreError if the database cannot be used."""
     rows = []
     with open_database(data, database) as opened:
         book = ScheduleRepository(opened, "", "")

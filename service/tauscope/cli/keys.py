@@ -15,15 +15,12 @@ from tauscope.server.http.settings import default_data_folder
 def add_key(name: str, scope: str, days: int, data: Path | None) -> None:
     """Make a key, and print it on standard output.
 
+    Raises TauscopeError if the name is in use, or the file cannot be worked with.
+
     Parameters
     ----------
     days : int
         how long it holds, for good where 0 [days]
-
-    Raises
-    ------
-    TauscopeError
-        if the name is in use, or the file cannot be worked with
     """
     folder = data or default_data_folder()
     folder.mkdir(parents=True, exist_ok=True)
@@ -36,13 +33,7 @@ def add_key(name: str, scope: str, days: int, data: Path | None) -> None:
 
 
 def list_keys(data: Path | None) -> None:
-    """Print all keys, one a line.
-
-    Raises
-    ------
-    TauscopeError
-        if the file is damaged
-    """
+    """Print all keys, one a line. Raises TauscopeError if the file is damaged."""
     now = utc_now()
     for key in KeyFile(data or default_data_folder()).read():
         expires = "never" if key.expires is None else f"{key.expires:%Y-%m-%d}"
@@ -50,13 +41,7 @@ def list_keys(data: Path | None) -> None:
 
 
 def revoke_key(name: str, data: Path | None) -> None:
-    """Take a key back.
-
-    Raises
-    ------
-    TauscopeError
-        if there is no such key
-    """
+    """Take a key back. Raises TauscopeError if there is no such key."""
     folder = data or default_data_folder()
     key = KeyFile(folder).revoke(name, utc_now())
     _note(folder, "key revoke", key)

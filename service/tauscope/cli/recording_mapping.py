@@ -31,10 +31,7 @@ NONE = "-"
 def map_recording(path: Path, robot_file: Path | None, out: Path | None, asks: bool | None) -> None:
     """Show or write the mapping of a file's columns.
 
-    Raises
-    ------
-    RecordingError
-        the file cannot be read, or the mapping does not fit it
+    Raises RecordingError where the file cannot be read, or the mapping does not fit it.
     """
     robot = None if robot_file is None else read_robot(robot_file)
     reading = Reading().for_robot(robot)

@@ -15,10 +15,7 @@ from tauscope.robot import read_robot
 def show_recording(path: Path, joint_count: int | None, robot_file: Path | None, reading: Reading) -> None:
     """Show what a recording holds, and what to look at before trusting it.
 
-    Raises
-    ------
-    RecordingError
-        if the recording cannot be read, breaks a rule, or no other verb accepts it
+    Raises RecordingError if the recording cannot be read, breaks a rule, or no other verb accepts it.
     """
     with shown_progress() as progress:
         progress(f"read {path}")
@@ -42,12 +39,8 @@ def convert_file(
 ) -> None:
     """Write a recording in another format and say what was left out.
 
-    Raises
-    ------
-    typer.BadParameter
-        if the target's suffix names no format
-    RecordingError
-        if the source cannot be read or the target cannot be written
+    Raises typer.BadParameter if the target's suffix names no format. Raises RecordingError if the source cannot be read
+    or the target cannot be written.
     """
     if target.suffix.lower() not in FORMATS:
         raise typer.BadParameter(

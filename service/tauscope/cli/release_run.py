@@ -15,10 +15,7 @@ from tauscope.runtime.release import release
 def release_arm(path: Path, backend: str | None, *, is_supported: bool) -> None:
     """Let go of an arm.
 
-    Raises
-    ------
-    AcquisitionError
-        nobody states that it is supported, or a drive is not reached or under power still
+    Raises AcquisitionError where nobody states that it is supported, or a drive is not reached or under power still.
     """
     robot = read_robot(path)
     bus = select_bus(robot) if backend is None else find_bus(backend)

@@ -12,12 +12,8 @@ from tauscope.robot import JointSummary, RobotReport, check_robot
 def show_robot(path: Path) -> None:
     """Show what a robot file says, and everything doubtful in it.
 
-    Raises
-    ------
-    RobotFileError
-        if the file is not valid
-    AcquisitionError
-        if a drive block or the EDS or DCF file that it names is not usable
+    Raises RobotFileError if the file is not valid. Raises AcquisitionError if a drive block or the EDS or DCF file that
+    it names is not usable.
     """
     report = check_robot(path)
     console = output()

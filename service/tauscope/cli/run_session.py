@@ -25,12 +25,8 @@ SUFFIXES = (".csv", ".parquet", ".mcap")
 def run_arm(request: run.Request, asked: Path | None) -> None:
     """Run to the end, keep the recording, and show what came.
 
-    Raises
-    ------
-    typer.BadParameter
-        where an option is out of place
-    TauscopeError
-        where the run cannot start, or ended before its time
+    Raises typer.BadParameter where an option is out of place. Raises TauscopeError where the run cannot start, or ended
+    before its time.
     """
     out = _output(asked)
     folder, is_settled = _folder_beside(out), False
@@ -54,15 +50,12 @@ def run_arm(request: run.Request, asked: Path | None) -> None:
 def keep_recording(result: run.Result, out: Path) -> bool:
     """Give the recording of a run its place; no file is ever replaced.
 
+    Raises ExportError if there is such a file by now, or it cannot be written.
+
     Returns
     -------
     bool
         False where nothing was recorded
-
-    Raises
-    ------
-    ExportError
-        if there is such a file by now, or it cannot be written
     """
     recording = result.recording(out.suffix.lower().removeprefix("."))
     if recording is not None:

@@ -36,12 +36,8 @@ class OpenStore:
 def open_store(data: Path | None, database: str | None) -> Iterator[OpenStore]:
     """Take a data folder.
 
-    Raises
-    ------
-    StoreError
-        if there is no such folder, or its database cannot be used
-    TauscopeError
-        if a service works with it
+    Raises StoreError if there is no such folder, or its database cannot be used. Raises TauscopeError if a service
+    works with it.
     """
     folder = data or default_data_folder()
     if not folder.is_dir():
@@ -64,10 +60,7 @@ def open_store(data: Path | None, database: str | None) -> Iterator[OpenStore]:
 def open_database(data: Path | None, database: str | None) -> Iterator[Database]:
     """Open the database alone, beside a service that may work with it.
 
-    Raises
-    ------
-    StoreError
-        if there is none, or it cannot be used
+    Raises StoreError if there is none, or it cannot be used.
     """
     path = (data or default_data_folder()) / FILE_NAME
     if database is None and not path.is_file():
@@ -82,10 +75,7 @@ def open_database(data: Path | None, database: str | None) -> Iterator[Database]
 def check_store(data: Path | None, database: str | None, *, quick: bool) -> None:
     """Compare every file of every finished item with what it was when the item ended.
 
-    Raises
-    ------
-    StoreError
-        if a file is missing or is another one
+    Raises StoreError if a file is missing or is another one.
     """
     with shown_progress() as progress, open_store(data, database) as store:
         progress(f"compare the files of {store.folder}")
@@ -114,15 +104,12 @@ def prune_store(
 ) -> None:
     """Remove what is old.
 
+    Raises StoreError if the database cannot be used, or something cannot be removed.
+
     Parameters
     ----------
     days : float
         age [days]
-
-    Raises
-    ------
-    StoreError
-        if the database cannot be used, or something cannot be removed
     """
     rule = RetentionRule(timedelta(days=days), frozenset(kinds or FOLDERS), recordings)
     with open_store(data, database) as store:

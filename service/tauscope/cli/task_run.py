@@ -19,13 +19,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def make_request(kind: type[Model], **fields: Any) -> Model:
-    """A request or its options.
-
-    Raises
-    ------
-    typer.BadParameter
-        naming the field
-    """
+    """A request or its options. Raises typer.BadParameter naming the field."""
     try:
         return kind(**fields)
     except ValidationError as error:
@@ -42,19 +36,15 @@ def run_task(
 ) -> Any:
     """Perform a task, write its outputs, and show the result.
 
+    Raises typer.BadParameter where files are given twice, or an output would destroy an input. Raises TauscopeError
+    where the data or the robot cannot answer.
+
     Parameters
     ----------
     asked : sequence of (Path or None, str)
         files to write, each with the name of its output
     show : callable or None
         shows the result on the terminal
-
-    Raises
-    ------
-    typer.BadParameter
-        where files are given twice, or an output would destroy an input
-    TauscopeError
-        where the data or the robot cannot answer
     """
     outputs = [(path, name) for path, name in asked if path is not None]
     paths, robot_file = tuple(path for path, _ in outputs), Path(request.robot)
@@ -89,17 +79,15 @@ def write_outputs(
 ) -> tuple[Any, Iterable[Path]]:
     """Perform a task and write its outputs: all of them, or none where one cannot be made.
 
+    Raises TauscopeError where the data or the robot cannot answer, a format cannot hold the model, or a file cannot be
+    written.
+
     Returns
     -------
     result
         of the task
     iterable of Path
         what was written; an output that the result does not have is left out
-
-    Raises
-    ------
-    TauscopeError
-        where the data or the robot cannot answer, a format cannot hold the model, or a file cannot be written
     """
     result = task.perform(request, LocalFiles({name: path for path, name in outputs.items()}), progress)
     progress("make outputs")
@@ -114,22 +102,13 @@ def write_outputs(
 def export_outputs(paths: Sequence[Path], files: Mapping[ExportFormat, ExportFile]) -> list[tuple[Path, str]]:
     """The outputs that ``--export`` asks for, by the files' suffixes.
 
-    Raises
-    ------
-    typer.BadParameter
-        where a suffix names no format
+    Raises typer.BadParameter where a suffix names no format.
     """
     return [(path, files[parse_export_format(path, files, "'--export'")].output) for path in paths]
 
 
 def parse_export_format(path: Path, files: Mapping[ExportFormat, ExportFile], option: str) -> ExportFormat:
-    """The format that the suffix of a file names.
-
-    Raises
-    ------
-    typer.BadParameter
-        where it names none
-    """
+    """The format that the suffix of a file names. Raises typer.BadParameter where it names none."""
     kind = SUFFIXES.get(path.suffix.lower())
     if kind is None or kind not in files:
         known = ", ".join(suffix for suffix, kind in SUFFIXES.items() if kind in files)

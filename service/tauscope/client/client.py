@@ -109,15 +109,12 @@ class Client:
     def wait(self, item: Followed, timeout_s: float | None = None, lease: HeldLease | None = None) -> Followed:
         """Wait until a job, run or campaign has ended.
 
+        Raises TimeoutError if it has not ended by then.
+
         Parameters
         ----------
         timeout_s : float or None
             how long; for good where None [s]
-
-        Raises
-        ------
-        TimeoutError
-            if it has not ended by then
         """
         last = None if timeout_s is None else time.monotonic() + timeout_s
         while True:

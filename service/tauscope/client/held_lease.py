@@ -28,13 +28,7 @@ class HeldLease:
         return self.lease.token or ""
 
     def require(self) -> None:
-        """Refuse to go on with a lease that was lost.
-
-        Raises
-        ------
-        ApiError
-            if it was
-        """
+        """Refuse to go on with a lease that was lost. Raises ApiError if it was."""
         if self.lost is not None:
             raise ApiError("lease-lost", 409, self.lost)
 

@@ -39,15 +39,12 @@ class Transport:
     def __init__(self, url: str, key: str | None, timeout_s: float, ca_file: Path | None = None) -> None:
         """Prepare; nothing is sent yet.
 
+        Raises ValueError if that is no address, or a key would go over the network in clear.
+
         Parameters
         ----------
         timeout_s : float
             how long each step of a request may take [s]
-
-        Raises
-        ------
-        ValueError
-            if that is no address, or a key would go over the network in clear
         """
         parts = urlsplit(url)
         if parts.scheme not in ("http", "https") or not parts.hostname or parts.path.strip("/") or parts.query:
@@ -63,10 +60,7 @@ class Transport:
     ) -> Answer:
         """Make a request, and wait for its answer.
 
-        Raises
-        ------
-        ApiError
-            the problem that the service answered with, or that it did not answer
+        Raises ApiError where the problem that the service answered with, or that it did not answer.
         """
         body = content or Content("", (), 0)
         sent = {**self._headers, "Content-Length": str(body.length), **(headers or {})}

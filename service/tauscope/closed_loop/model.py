@@ -78,13 +78,7 @@ def stated_model(robot: Robot) -> ExportModel | None:
 
 
 def rollout_model(name: str, model: ExportModel, friction_by_load: LoadFriction | None = None) -> RolloutModel:
-    """The model as a simulator and the laws beside it take it.
-
-    Raises
-    ------
-    ExportError
-        a link cannot exist
-    """
+    """The model as a simulator and the laws beside it take it. Raises ExportError where a link cannot exist."""
     from tauscope.dynamics import mass_matrix
 
     added = add_findings(model)

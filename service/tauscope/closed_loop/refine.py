@@ -74,17 +74,14 @@ def refine_model(
 ) -> Refined:
     """Refine a model on recordings with commands; terms of friction by load that are not significant are left out.
 
+    Raises RecordingError where no recording is long enough.
+
     Parameters
     ----------
     model : ExportModel
         without findings
     loops : sequence of Actuator
         one a joint, with their delays
-
-    Raises
-    ------
-    RecordingError
-        no recording is long enough
     """
     arm = RefinableModel(model, tuple(loops), Segments.of(recordings, loops))
     progress(f"refine {len(arm.terms)} parameters on {arm.segments.count} segments")

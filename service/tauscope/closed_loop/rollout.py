@@ -114,19 +114,15 @@ def roll_out(
 ) -> Rollout:
     """Simulate what a recording commanded, without and with the findings of a model.
 
+    Raises RecordingMismatchError where the model is of another arm, or nothing states a model. Raises TauscopeError
+    where a recording holds neither commands for loops nor torque, or there is no simulator.
+
     Parameters
     ----------
     exports : sequence of ExportModel
         of a model file, as `read_export_models` reads it; empty where the robot file's own model is judged alone
     training : sequence of Recording
         with commands, by which the model without findings is refined; the other recordings judge it
-
-    Raises
-    ------
-    RecordingMismatchError
-        the model is of another arm, or nothing states a model
-    TauscopeError
-        a recording holds neither commands for loops nor torque, or there is no simulator
     """
     models = _models(robot, exports)
     known = exports[-1].robot if exports else None
@@ -257,13 +253,7 @@ def _plain_model(robot: Robot, exports: Sequence[ExportModel]) -> ExportModel | 
 def _refine(
     model: ExportModel | None, loops: tuple[Actuator, ...], training: Sequence[Recording], progress: Progress
 ) -> Refined:
-    """The refined model.
-
-    Raises
-    ------
-    RecordingMismatchError
-        no commands reach loops
-    """
+    """The refined model. Raises RecordingMismatchError where no commands reach loops."""
     commands = [_as_commands(recording) for recording in training]
     lacking = [recording.name for recording, each in zip(training, commands, strict=True) if each is None]
     if not loops or model is None or lacking:

@@ -64,13 +64,7 @@ class Segments:
 
     @staticmethod
     def of(recordings: Sequence[Recording], loops: Sequence[Actuator]) -> "Segments":
-        """Segments of recordings with commands.
-
-        Raises
-        ------
-        RecordingError
-            no recording is long enough
-        """
+        """Segments of recordings with commands. Raises RecordingError where no recording is long enough."""
         steps = round(SEGMENT_S / plant.STEP_S)
         pieces: list[tuple[Array, ...]] = []
         for recording in recordings:

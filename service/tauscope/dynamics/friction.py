@@ -48,6 +48,8 @@ def smooth_sign_slope(velocity: Array, k_v: float | Array) -> Array:
 def friction_columns(velocity: Array, shape: FrictionShape, *, offset: bool = True) -> Array:
     """Friction columns of one joint, the seed paper's (9): Φ_fric = [2/π arctan(v K_v), 2/π arctan(v δ), v, 1].
 
+    Raises IdentificationError: K_v or δ is not given.
+
     Parameters
     ----------
     velocity : (N,) float64
@@ -59,11 +61,6 @@ def friction_columns(velocity: Array, shape: FrictionShape, *, offset: bool = Tr
     -------
     (N, 4) or (N, 3) float64
         columns of τ_s, τ_sc, τ_v and the offset, as in `FRICTION_COLUMNS`
-
-    Raises
-    ------
-    IdentificationError
-        K_v or δ is not given
     """
     k_v, delta = _given(shape)
     columns = np.empty((4 if offset else 3, len(velocity))).T
@@ -78,7 +75,7 @@ def friction_columns(velocity: Array, shape: FrictionShape, *, offset: bool = Tr
 def friction_torque(coefficients: FrictionCoefficients, shape: FrictionShape, velocity: Array) -> Array:
     """Friction torque τ_f = τ_s S₀(v) + τ_sc 2/π arctan(v δ) + τ_v v, the seed paper's equation (7).
 
-    The paper prints (7) without the v of its last term; (9) has it.
+    The paper prints (7) without the v of its last term; (9) has it. Raises IdentificationError: K_v or δ is not given.
 
     Parameters
     ----------
@@ -91,11 +88,6 @@ def friction_torque(coefficients: FrictionCoefficients, shape: FrictionShape, ve
     -------
     (N,) float64
         τ_f, which the drive has to overcome [Nm or N]
-
-    Raises
-    ------
-    IdentificationError
-        K_v or δ is not given
     """
     weights = np.array([coefficients.stiction, coefficients.stribeck, coefficients.viscous])
     return friction_columns(velocity, shape, offset=False) @ weights

@@ -56,10 +56,7 @@ def design_excitation(
 ) -> ExcitationDesign:
     """The best excitation found within the limits: the seed paper's (20) and (21).
 
-    Raises
-    ------
-    ExcitationError
-        where no motion keeps the limits, naming the constraint and the joint that block
+    Raises ExcitationError where no motion keeps the limits, naming the constraint and the joint that block.
     """
     options = options or ExcitationOptions()
     setting = Setting.of(robot, options)

@@ -44,10 +44,7 @@ class Feasibility:
     def standing_postures(self, rng: np.random.Generator) -> Array:
         """Postures at which the arm may stand, (K, n), K ≥ 1 [rad or m].
 
-        Raises
-        ------
-        ExcitationError
-            where there is none, naming the constraint and the joint that block
+        Raises ExcitationError where there is none, naming the constraint and the joint that block.
         """
         unit = rng.uniform(-1.0, 1.0, (POSTURES, self.space.joint_count))
         unit[0] = 0.0
@@ -172,13 +169,7 @@ class Feasibility:
 
 
 def require_room(robot: Robot, limits: MotionLimits) -> None:
-    """Refuse limits of a joint that leave no motion.
-
-    Raises
-    ------
-    ExcitationError
-        naming the joint and the limit
-    """
+    """Refuse limits of a joint that leave no motion. Raises ExcitationError naming the joint and the limit."""
     for j, joint in enumerate(robot.joints):
         unit = "rad" if joint.type is JointType.REVOLUTE else "m"
         low, high = limits.position_low[j], limits.position_high[j]

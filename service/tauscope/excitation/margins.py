@@ -88,10 +88,7 @@ def trajectory_margins(
 def require_within_limits(trajectory: Trajectory, robot: Robot, limits: MotionLimits, name: str = "trajectory") -> None:
     """Refuse a trajectory that leaves the limits of position, velocity or acceleration at any instant.
 
-    Raises
-    ------
-    ExcitationError
-        naming joint, instant, value and limit
+    Raises ExcitationError naming joint, instant, value and limit.
     """
     margins = kinematic_margins(trajectory, limits)
     for kind in ("position", "velocity", "acceleration"):

@@ -156,10 +156,7 @@ def optimise(
 ) -> OptimiserResult:
     """The best feasible vector of several starts.
 
-    Raises
-    ------
-    ExcitationError
-        where no motion is feasible, or none excites all parameters
+    Raises ExcitationError where no motion is feasible, or none excites all parameters.
     """
     begin = time.perf_counter()
     search = _Search(stages, feasibility, progress, starts * SHORT_ROUND + ROUNDS * LONG_ROUND)

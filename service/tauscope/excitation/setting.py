@@ -63,13 +63,7 @@ class Setting:
 
     @staticmethod
     def of(robot: Robot, options: ExcitationOptions) -> "Setting":
-        """Prepare a design.
-
-        Raises
-        ------
-        ExcitationError
-            for options that do not fit the robot
-        """
+        """Prepare a design. Raises ExcitationError for options that do not fit the robot."""
         if options.noise_std is not None:
             _require_noise(np.asarray(options.noise_std), robot)
         base = base_parameters(robot)

@@ -47,17 +47,14 @@ def actuator_elements(
 ) -> tuple[list[str], list[str]]:
     """Actuator elements, one a joint, and notes on gains that are chosen rather than known.
 
+    Raises ExportError if the number of gains is not one, nor that of the joints.
+
     Parameters
     ----------
     names : sequence of str
         names of the joints as quoted attribute values
     rotors : sequence of float
         reflected rotor inertias, one a joint [kg m² or kg]
-
-    Raises
-    ------
-    ExportError
-        if the number of gains is not one, nor that of the joints
     """
     if choice.kind is ActuatorKind.MOTOR:
         return [_motor(joint, name) for joint, name in zip(robot.joints, names, strict=True)], []
@@ -77,15 +74,12 @@ def joint_gains(
 ) -> tuple[list[tuple[float, float]], list[str]]:
     """Gains kp and kv of each joint: as given, as in the user's MJCF, or for a bandwidth; and notes on the last.
 
+    Raises ExportError if the number of gains is not one, nor that of the joints.
+
     Parameters
     ----------
     rotors : sequence of float
         reflected rotor inertias, one a joint [kg m² or kg]
-
-    Raises
-    ------
-    ExportError
-        if the number of gains is not one, nor that of the joints
     """
     count, notes = robot.joint_count, []
     for option, values in (("kp", choice.kp), ("kv", choice.kv)):

@@ -26,23 +26,14 @@ def compensation_code(
 ) -> str:
     """Source code that gives the torque of friction and of the found effects.
 
-    Raises
-    ------
-    ExportError
-        for another suffix, or coefficients that no controller can use
+    Raises ExportError for another suffix, or coefficients that no controller can use.
     """
     origin = Origin(tuple(sources), effort_kind, created, version=version)
     return source_code(of_extended_model(diagnosis.selection.fit.model, (), origin), suffix)
 
 
 def source_code(model: ExportModel, suffix: str) -> str:
-    """The same of any model.
-
-    Raises
-    ------
-    ExportError
-        for another suffix, or coefficients that no controller can use
-    """
+    """The same of any model. Raises ExportError for another suffix, or coefficients that no controller can use."""
     plain = model.compensation
     if suffix == ".py":
         return to_python(plain) + (_python(identifier(plain.robot), model) if model.effects else "")

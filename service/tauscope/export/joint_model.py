@@ -80,10 +80,7 @@ def joint_models(
 def centred(joint: str, link: LinkInertia) -> CentredInertia:
     """Centre of mass and inertia about it: I_c = I - m (sᵀs 1 - s sᵀ), equation (5) reversed.
 
-    Raises
-    ------
-    ExportError
-        if no rigid body has these parameters
+    Raises ExportError if no rigid body has these parameters.
     """
     finite = bool(np.isfinite(link.to_vector()).all())
     defect = find_defect(link) if finite and link.mass > 0.0 else f"mass {link.mass:g} kg"
@@ -98,15 +95,12 @@ def centred(joint: str, link: LinkInertia) -> CentredInertia:
 def dry_friction_and_damping(joint: str, friction: JointFriction) -> tuple[float, float]:
     """The two numbers that simulators hold: τ_s + τ_sc and τ_v, neither below zero.
 
+    Raises ExportError if a coefficient is not finite.
+
     Returns
     -------
     tuple of two float
         dry friction [Nm or N], damping [Nm s/rad or N s/m]
-
-    Raises
-    ------
-    ExportError
-        if a coefficient is not finite
     """
     check_friction(joint, friction)
     return max(0.0, friction.stiction + friction.stribeck), max(0.0, friction.viscous)
@@ -137,10 +131,7 @@ def friction_notes(joint: str, friction: JointFriction, format_name: str) -> lis
 def without_branch(name: str, model: JointModel) -> tuple[LinkInertia, list[str]]:
     """A joint's own link, without the bodies that the file has elsewhere; and notes.
 
-    Raises
-    ------
-    ExportError
-        if these bodies weigh more than the link
+    Raises ExportError if these bodies weigh more than the link.
     """
     link = model.link or LinkInertia.from_vector(np.zeros(10))
     if model.branch is None or not np.any(model.branch.to_vector()):

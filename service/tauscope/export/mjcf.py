@@ -35,12 +35,8 @@ def to_mjcf(model: ExportModel, choice: ActuatorChoice = MOTORS) -> MjcfModel:
     """Write the arm as a complete MJCF: bodies, joints, inertials, friction, findings, an actuator a joint; no shapes.
 
     A body's frame is the link frame, and joint positions are the robot file's. damping = τ_v; frictionloss =
-    τ_s + τ_sc, the Coulomb level at speed; armature is the rotor's inertia where it was identified, else 0.
-
-    Raises
-    ------
-    ExportError
-        if a joint's link cannot exist, or a number is not finite
+    τ_s + τ_sc, the Coulomb level at speed; armature is the rotor's inertia where it was identified, else 0. Raises
+    ExportError if a joint's link cannot exist, or a number is not finite.
     """
     added = add_findings(model)
     robot, labels = added.robot, model.robot.segment_labels

@@ -86,10 +86,7 @@ class ExportModel:
     def compensation(self) -> CompensationModel:
         """Friction as delivered, for controllers.
 
-        Raises
-        ------
-        ExportError
-            if a coefficient is not usable, or the drive's units contradict each other
+        Raises ExportError if a coefficient is not usable, or the drive's units contradict each other.
         """
         joints = tuple(
             JointCompensation(joint.name, joint.type, friction, drive_units(joint, self.origin.effort_kind))

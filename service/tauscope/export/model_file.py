@@ -100,13 +100,7 @@ def identified_document(result: Identification) -> ModelDocument:
 
 
 def read_model_file(path: Path) -> ModelFile:
-    """The document of a file.
-
-    Raises
-    ------
-    IdentificationError
-        naming the file and the key
-    """
+    """The document of a file. Raises IdentificationError naming the file and the key."""
     text = decode_utf8(read_bounded(path, LARGEST_FILE), str(path))
     try:
         return ModelFile.model_validate_json(text)
@@ -120,10 +114,7 @@ def read_model_file(path: Path) -> ModelFile:
 def read_extended_model(path: Path, robot: Robot) -> ExtendedModel:
     """The extended model of a file, for an arm that is at hand.
 
-    Raises
-    ------
-    IdentificationError
-        naming the file and the key, or where it belongs to another arm
+    Raises IdentificationError naming the file and the key, or where it belongs to another arm.
     """
     try:
         return restore_model(read_model_file(path), robot)
@@ -135,12 +126,7 @@ def read_extended_model(path: Path, robot: Robot) -> ExtendedModel:
 def read_export_model(path: Path) -> ExportModel:
     """The model of a file as exports need it, findings included.
 
-    Raises
-    ------
-    ExportError
-        where the file has no arm
-    IdentificationError
-        naming the file and the key
+    Raises ExportError where the file has no arm. Raises IdentificationError naming the file and the key.
     """
     return read_export_models(path)[-1]
 
@@ -148,12 +134,7 @@ def read_export_model(path: Path) -> ExportModel:
 def read_export_models(path: Path) -> tuple[ExportModel, ...]:
     """The models of a file as exports need them: without findings where the file has that, and with them.
 
-    Raises
-    ------
-    ExportError
-        where the file has no arm
-    IdentificationError
-        naming the file and the key
+    Raises ExportError where the file has no arm. Raises IdentificationError naming the file and the key.
     """
     document = read_model_file(path)
     arm = document.arm

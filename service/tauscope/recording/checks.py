@@ -55,10 +55,7 @@ class RecordingReport:
     def require_usable(self) -> None:
         """Refuse a recording that no other verb accepts.
 
-        Raises
-        ------
-        RecordingError
-            a column can hardly be in its unit, or a joint has no effort
+        Raises RecordingError where a column can hardly be in its unit, or a joint has no effort.
         """
         for finding in self.findings:
             if finding.severity is Severity.ERROR:
@@ -70,15 +67,12 @@ def check_recording(
 ) -> RecordingReport:
     """Read a recording and report what it holds, in memory that does not grow with its length.
 
+    Raises RecordingError where the file cannot be read or breaks a rule.
+
     Parameters
     ----------
     joint_count : int or None
         joints that the recording must have; None where any number is welcome
-
-    Raises
-    ------
-    RecordingError
-        the file cannot be read or breaks a rule
     """
     reading = reading.for_robot(robot)
     joints = None if robot is None else [joint.name for joint in robot.joints]

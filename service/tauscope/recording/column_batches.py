@@ -32,6 +32,9 @@ def read_batches(
 ) -> Recording:
     """Find the wanted columns and take all rows.
 
+    Raises RecordingError, which names the row and column at fault. Raises RecordingMismatchError where the file has
+    another number of joints.
+
     Parameters
     ----------
     rows : int
@@ -42,13 +45,6 @@ def read_batches(
         number of the file's first row in messages
     has_episodes : bool
         whether a column `episode_index` splits the rows into episodes, each on a clock of its own
-
-    Raises
-    ------
-    RecordingError
-        names the row and column at fault
-    RecordingMismatchError
-        the file has another number of joints
     """
     reading, layout = find_layout(header, reading, name)
     require_joint_count(layout.joint_count, joint_count, name)

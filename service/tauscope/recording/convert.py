@@ -46,12 +46,8 @@ def convert_recording(
     """Write a recording, in SI, in the format that the target's suffix names.
 
     MCAP holds time from the first sample on in whole nanoseconds, positions, torques and velocities; CSV and Parquet
-    hold every column exactly.
-
-    Raises
-    ------
-    RecordingError
-        the source cannot be read, or the target cannot hold it or exists
+    hold every column exactly. Raises RecordingError where the source cannot be read, or the target cannot hold it or
+    exists.
     """
     source_path, target_path = Path(source), Path(target)
     _require_other(source_path, target_path)
@@ -68,10 +64,7 @@ def write_recording(
 ) -> tuple[str, ...]:
     """Write a recording; the file appears under its name only when it is complete.
 
-    Raises
-    ------
-    RecordingError
-        the file exists or cannot be written, or its suffix names no format
+    Raises RecordingError where the file exists or cannot be written, or its suffix names no format.
     """
     path = Path(path)
     _require_writable(path, overwrite=overwrite)

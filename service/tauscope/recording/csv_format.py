@@ -35,14 +35,9 @@ def read_csv(
 ) -> Recording:
     """Read a CSV recording, in time linear and in memory bounded in its number of lines.
 
-    Comma, semicolon, tab, | or blanks between the fields; an empty field or ``nan`` is a missed sample.
-
-    Raises
-    ------
-    RecordingError
-        names the line and column at fault
-    RecordingMismatchError
-        the file has another number of joints
+    Comma, semicolon, tab, | or blanks between the fields; an empty field or ``nan`` is a missed sample. Raises
+    RecordingError, which names the line and column at fault. Raises RecordingMismatchError where the file has another
+    number of joints.
     """
     with path.open("rb") as file:
         header = _read_header(file, name, reading)
@@ -65,10 +60,7 @@ def read_csv(
 def read_csv_header(path: Path, name: str, reading: Reading = SI) -> list[str]:
     """Names of a file's columns, or numbers from 1 where it has none.
 
-    Raises
-    ------
-    RecordingError
-        the file holds no line of text
+    Raises RecordingError where the file holds no line of text.
     """
     with path.open("rb") as file:
         return _read_names(file, name, reading).names

@@ -79,15 +79,12 @@ def _parse_numbers(text: bytes) -> Array | None:
 def parse_number(field: bytes, file: str, line: int, column: str) -> float:
     """Parse one field strictly: a decimal number, or NaN where it is empty or ``nan``.
 
+    Raises RecordingError where the text is not a number, or is infinite.
+
     Parameters
     ----------
     line : int
         its line, counted from 1
-
-    Raises
-    ------
-    RecordingError
-        the text is not a number, or is infinite
     """
     text = field.strip(b" \t")
     if not text or _MISSED.fullmatch(text):
@@ -110,6 +107,8 @@ class Clock:
     def parse(self, field: bytes, file: str, line: int) -> float:
         """Time of a row.
 
+        Raises RecordingError where the text is neither a number nor a date.
+
         Parameters
         ----------
         line : int
@@ -119,11 +118,6 @@ class Clock:
         -------
         float
             [s], or in the file's own unit
-
-        Raises
-        ------
-        RecordingError
-            the text is neither a number nor a date
         """
         text = field.strip(b' \t"')
         if not _DATE.match(text):

@@ -19,10 +19,7 @@ def require_plausible_inflation(
 ) -> None:
     """Refuse a file that unpacks to more than `LARGEST_RATIO` times its size, beyond a size that does no harm.
 
-    Raises
-    ------
-    RecordingError
-        if it does
+    Raises RecordingError if it does.
     """
     accepted_bytes = ALWAYS_ACCEPTED_BYTES if accepted_bytes is None else accepted_bytes
     if unpacked_bytes > max(accepted_bytes, LARGEST_RATIO * packed_bytes):

@@ -58,15 +58,12 @@ class RowIntake:
     def add(self, block: Array, place: Callable[[int], str]) -> None:
         """Take the next block.
 
+        Raises RecordingError, which names the row and the column at fault.
+
         Parameters
         ----------
         block : (rows, columns) float64
             as the file has them
-
-        Raises
-        ------
-        RecordingError
-            names the row and the column at fault
         """
         self._check(block, place)
         rows = np.append(self._tail_rows, np.arange(self._rows, self._rows + len(block)))
@@ -88,10 +85,7 @@ class RowIntake:
     ) -> Recording:
         """The recording of all rows.
 
-        Raises
-        ------
-        RecordingError
-            there is next to none, or too many have the same stamp
+        Raises RecordingError where there is next to none, or too many have the same stamp.
         """
         self._builder.append(self._tail)
         require_rows(len(self._builder), self._file)

@@ -62,13 +62,7 @@ class JointStateLayout:
     """Where a publisher's messages keep what; learned from one message."""
 
     def __init__(self, message: bytes) -> None:
-        """Learn the layout.
-
-        Raises
-        ------
-        ValueError
-            it is no JointState
-        """
+        """Learn the layout. Raises ValueError where it is no JointState."""
         cursor = CdrCursor(message)
         self.first = _decode(cursor)
         self._size = len(message)
@@ -106,23 +100,14 @@ class JointStateLayout:
 
 
 def decode_cdr(message: bytes) -> JointState:
-    """Decode one CDR message.
-
-    Raises
-    ------
-    ValueError
-        it is no JointState
-    """
+    """Decode one CDR message. Raises ValueError where it is no JointState."""
     return _decode(CdrCursor(message))
 
 
 def decode_json(message: bytes) -> JointState:
     """Decode one message in JSON, with the field names of the ROS 2 message.
 
-    Raises
-    ------
-    ValueError
-        it is no JointState
+    Raises ValueError where it is no JointState.
     """
     content = from_json(message)
     if not isinstance(content, dict):

@@ -53,10 +53,7 @@ class JointStateLog:
 def choose_topic(topics: Mapping[str, JointStateTopic], other_topics: Sequence[str], file: str) -> JointStateTopic:
     """The one topic with efforts of the wanted joints, or the one of several that ROS itself would take.
 
-    Raises
-    ------
-    RecordingError
-        there is none, or more than one and none of them is ``/joint_states``
+    Raises RecordingError where there is none, or more than one and none of them is ``/joint_states``.
     """
     filled = {name: topic for name, topic in topics.items() if topic.messages}
     if not filled:

@@ -131,10 +131,7 @@ class JointStateTopic:
     def finish(self) -> Recording:
         """The recording that this topic holds.
 
-        Raises
-        ------
-        RecordingError
-            names the message at fault, counted from 1 within the topic
+        Raises RecordingError, which names the message at fault, counted from 1 within the topic.
         """
         self.flush()
         if self.fault is not None:

@@ -49,13 +49,7 @@ class JournalWriter:
     """Writes rows and events of one run, in the order in which they come."""
 
     def __init__(self, path: Path, header: JournalHeader, *, synchronise: bool = False) -> None:
-        """Create the file; it must not exist.
-
-        Raises
-        ------
-        OSError
-            the file exists or cannot be created
-        """
+        """Create the file; it must not exist. Raises OSError where the file exists or cannot be created."""
         self.header = header
         self.rows = 0
         self._synchronise = synchronise
@@ -75,15 +69,12 @@ class JournalWriter:
     def write_rows(self, rows: NDArray[np.void]) -> None:
         """Write cycles.
 
+        Raises OSError where the disk does not take them.
+
         Parameters
         ----------
         rows : (k,) of `journal_row_type`
             the cycles, oldest first
-
-        Raises
-        ------
-        OSError
-            the disk does not take them
         """
         before = self._file.tell()
         for row in rows:

@@ -55,13 +55,7 @@ class FrameWriter:
         self._pending = b""
 
     def feed(self, data: bytes) -> None:
-        """Take the next bytes.
-
-        Raises
-        ------
-        OSError
-            the disk does not take them
-        """
+        """Take the next bytes. Raises OSError where the disk does not take them."""
         data, at, rows = self._pending + data, 0, []
         while len(data) - at >= FRAME.size:
             length, kind = FRAME.unpack_from(data, at)

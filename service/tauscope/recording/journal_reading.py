@@ -45,10 +45,7 @@ class Journal:
 def read_journal(path: Path) -> Journal:
     """Read a journal up to its end or its first damage.
 
-    Raises
-    ------
-    RecordingError
-        the file cannot be read, or its header did not come through
+    Raises RecordingError where the file cannot be read, or its header did not come through.
     """
     collector = _Collector()
     try:
@@ -68,12 +65,8 @@ def journal_recording(journal: Journal, name: str) -> Recording:
 
     Columns t, q, tau (i where the drives report no torque), qd and temp where they report them, qref, taucmd where
     effort was commanded, and period where the motion is repeated. Where the host commanded effort, tau (i) is the mean
-    of what acted before and after the sample; the journal keeps what was reported.
-
-    Raises
-    ------
-    RecordingError
-        next to nothing of the motion is there
+    of what acted before and after the sample; the journal keeps what was reported. Raises RecordingError: next to
+    nothing of the motion is there.
     """
     rows, header = journal.motion, journal.header
     if not len(rows):

@@ -51,13 +51,7 @@ class JournalHeader:
 
     @staticmethod
     def from_dict(data: Any) -> "JournalHeader":
-        """The header of plain data.
-
-        Raises
-        ------
-        RecordingError
-            it is no such header
-        """
+        """The header of plain data. Raises RecordingError where it is no such header."""
         fields = {key: value for key, value in data.items() if key != "form"} if isinstance(data, dict) else {}
         try:
             header = TypeAdapter(JournalHeader).validate_python(fields)

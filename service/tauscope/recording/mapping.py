@@ -35,10 +35,7 @@ class ColumnMapping:
 def find_mapping(path: Path, robot: Robot | None = None, reading: Reading = SI) -> ColumnMapping:
     """The mapping by which a table is read; where none is, as much as its column names suggest.
 
-    Raises
-    ------
-    RecordingError
-        the header cannot be read, or the file is a log, which names its joints itself
+    Raises RecordingError where the header cannot be read, or the file is a log, which names its joints itself.
     """
     header = tuple(read_header(path))
     reading = reading.for_robot(robot)

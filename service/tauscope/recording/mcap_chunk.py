@@ -57,10 +57,7 @@ def find_handler(sink: MessageSink, channel: Channel, schemas: Mapping[int, Sche
 def unpack_chunk(body: bytes) -> bytes:
     """Records within a chunk, their checksum compared.
 
-    Raises
-    ------
-    ValueError
-        the chunk is damaged or implausibly large, among other errors of `UNREADABLE`
+    Raises ValueError where the chunk is damaged or implausibly large, among other errors of `UNREADABLE`.
     """
     chunk = Chunk.read(ReadDataStream(BytesIO(body)))
     if chunk.compression not in ("", "zstd", "lz4"):

@@ -56,10 +56,7 @@ class Salvage:
 def read_mcap(path: Path, choice: Choice) -> Recording:
     """Read the joint states of an MCAP file.
 
-    Raises
-    ------
-    RecordingError
-        the file is truncated or damaged, or holds no usable joint states
+    Raises RecordingError where the file is truncated or damaged, or holds no usable joint states.
     """
     log = JointStateLog(choice)
     add_mcap(path, choice.file, log)
@@ -67,13 +64,7 @@ def read_mcap(path: Path, choice: Choice) -> Recording:
 
 
 def add_mcap(path: Path, name: str, log: JointStateLog) -> None:
-    """Add the messages of one whole file to a log.
-
-    Raises
-    ------
-    RecordingError
-        the file is truncated or damaged
-    """
+    """Add the messages of one whole file to a log. Raises RecordingError where the file is truncated or damaged."""
     damage = _read_whole(path, log)
     if damage is not None:
         samples = log.samples
@@ -83,13 +74,7 @@ def add_mcap(path: Path, name: str, log: JointStateLog) -> None:
 
 
 def recover_mcap(path: Path, choice: Choice) -> Salvage:
-    """Read a damaged MCAP file up to the damage.
-
-    Raises
-    ------
-    RecordingError
-        nothing usable comes before the damage
-    """
+    """Read a damaged MCAP file up to the damage. Raises RecordingError where nothing usable comes before the damage."""
     log = JointStateLog(choice)
     damage = scan_mcap(path, log)
     if damage is not None and log.samples < MINIMUM_ROWS:

@@ -69,15 +69,12 @@ class _Part:
 def read_by_index(file: BinaryIO, size: int, sink: MessageSink) -> bool:
     """Hand the wanted messages over in the order of the file.
 
+    Raises DamageError where a chunk is not as the index says.
+
     Returns
     -------
     bool
         False, and nothing was handed over, where the file has no sound index or most of it is wanted
-
-    Raises
-    ------
-    DamageError
-        a chunk is not as the index says
     """
     try:
         summary = _read_summary(file, size)

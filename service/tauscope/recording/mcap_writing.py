@@ -18,10 +18,7 @@ _LATEST_STAMP_S = 2.0**31
 def write_mcap(recording: Recording, file: BinaryIO, joint_names: Sequence[str] | None = None) -> tuple[str, ...]:
     """Write a recording as ``/joint_states`` of type sensor_msgs/msg/JointState.
 
-    Raises
-    ------
-    RecordingError
-        efforts are currents, or times cannot be kept as nanoseconds
+    Raises RecordingError where efforts are currents, or times cannot be kept as nanoseconds.
     """
     if recording.effort_kind is not EffortKind.TORQUE:
         raise RecordingError(f"{recording.name}: JointState holds torques and this recording currents (i1…); use .csv")

@@ -19,10 +19,7 @@ _COPY_BYTES = 2**20
 def decompress_message(message: bytes) -> bytes:
     """The message itself, where it is compressed.
 
-    Raises
-    ------
-    ValueError
-        the frame is damaged, or larger than any joint state
+    Raises ValueError where the frame is damaged, or larger than any joint state.
     """
     if not message.startswith(ZSTD_MAGIC):
         return message
@@ -37,10 +34,7 @@ def decompress_message(message: bytes) -> bytes:
 def decompress_file(source: Path, target: Path, name: str) -> Path:
     """Write a compressed file's content to a target, which is returned.
 
-    Raises
-    ------
-    RecordingError
-        the file is damaged, or holds implausibly much
+    Raises RecordingError where the file is damaged, or holds implausibly much.
     """
     size, written = source.stat().st_size, 0
     try:

@@ -38,10 +38,7 @@ _UNREADABLE = (
 def read_npz(path: Path, name: str, joint_count: int | None = None, reading: Reading = SI) -> Recording:
     """Read an archive; columns of an array are named ``qpos[0]``, ``qpos[1]``, ….
 
-    Raises
-    ------
-    RecordingError
-        the archive is damaged, is none of NumPy's, or names the row and column at fault
+    Raises RecordingError where the archive is damaged, is none of NumPy's, or names the row and column at fault.
     """
     columns = _read_columns(path, name)
     rows = len(next(iter(columns.values())))
@@ -54,13 +51,7 @@ def read_npz(path: Path, name: str, joint_count: int | None = None, reading: Rea
 
 
 def read_npz_header(path: Path, name: str) -> list[str]:
-    """Names of an archive's columns.
-
-    Raises
-    ------
-    RecordingError
-        the archive is damaged, or is none of NumPy's
-    """
+    """Names of an archive's columns. Raises RecordingError where the archive is damaged, or is none of NumPy's."""
     return list(_read_columns(path, name))
 
 

@@ -25,10 +25,7 @@ class FileColumn:
 def unfold_columns(arrow: Any, file: Any, path: Path, name: str) -> dict[str, FileColumn]:
     """Every column by its name, elements of lists as ``observation.state[0]`` or ``observation.state[elbow.pos]``.
 
-    Raises
-    ------
-    RecordingError
-        two columns have one name
+    Raises RecordingError where two columns have one name.
     """
     found: dict[str, FileColumn] = {}
     schema, elements = file.schema_arrow, _element_names(path)

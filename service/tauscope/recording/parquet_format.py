@@ -33,12 +33,8 @@ def read_parquet(
 ) -> Recording:
     """Read a Parquet recording batch by batch; null is a missed sample.
 
-    Raises
-    ------
-    RecordingError
-        pyarrow is not installed, the file is damaged, or names the row and column at fault
-    RecordingMismatchError
-        the file has another number of joints
+    Raises RecordingError where pyarrow is not installed, the file is damaged, or names the row and column at fault.
+    Raises RecordingMismatchError where the file has another number of joints.
     """
     arrow = _arrow(name)
     with path.open("rb") as stream, _arrow_errors(arrow, name):
@@ -89,10 +85,7 @@ def _take_batches(
 def read_parquet_header(path: Path, name: str) -> list[str]:
     """Names of a file's columns, lists unfolded.
 
-    Raises
-    ------
-    RecordingError
-        pyarrow is not installed, or the file is damaged
+    Raises RecordingError where pyarrow is not installed, or the file is damaged.
     """
     arrow = _arrow(name)
     with path.open("rb") as stream, _arrow_errors(arrow, name):
@@ -102,10 +95,7 @@ def read_parquet_header(path: Path, name: str) -> list[str]:
 def write_parquet(recording: Recording, file: BinaryIO) -> None:
     """Write a recording as Parquet, float64 columns, checksums on every page.
 
-    Raises
-    ------
-    RecordingError
-        pyarrow is not installed
+    Raises RecordingError where pyarrow is not installed.
     """
     arrow = _arrow(recording.name)
     table = recording.table

@@ -88,6 +88,9 @@ class Recording:
     def joint_torque(self, effort: Array, robot: Robot) -> Array:
         """Turn recorded efforts into joint torque: τ = sign · k · effort, with k = 1 where torque was recorded.
 
+        Raises RecordingMismatchError where the efforts have another number of joints than the robot. Raises
+        RecordingError where commands were recorded, and no actuator has made torque of them.
+
         Parameters
         ----------
         effort : (N, n) float64
@@ -97,13 +100,6 @@ class Recording:
         -------
         (N, n) float64
             joint torque [Nm or N]
-
-        Raises
-        ------
-        RecordingMismatchError
-            the efforts have another number of joints than the robot
-        RecordingError
-            commands were recorded, and no actuator has made torque of them
         """
         if self.effort_kind is EffortKind.COMMAND:
             raise RecordingError(
@@ -139,6 +135,8 @@ class Recording:
     ) -> "Recording":
         """Make a recording of arrays, held to the same rules as a file.
 
+        Raises RecordingError, which names the argument, the row (counted from 0, as NumPy does) and the joint at fault.
+
         Parameters
         ----------
         time : (N,) float64
@@ -165,11 +163,6 @@ class Recording:
             gain kp in force, in the unit of the robot file's actuator
         period : (N,) float64 or None
             index of the repeated excitation period, NaN outside the repeated part
-
-        Raises
-        ------
-        RecordingError
-            names the argument, the row (counted from 0, as NumPy does) and the joint at fault
         """
         groups = {
             "qd": velocity,

@@ -26,15 +26,12 @@ class RowCheck:
     def __call__(self, block: Array, place: Callable[[int], str]) -> None:
         """Check the next block.
 
+        Raises RecordingError, which names the row and the column at fault.
+
         Parameters
         ----------
         block : (rows, columns) float64
             the rows
-
-        Raises
-        ------
-        RecordingError
-            names the row and the column at fault
         """
         if not len(block):
             return
@@ -63,17 +60,14 @@ class RowCheck:
 def require_rising(time: Array, previous: float, file: str, place: Callable[[int], str]) -> None:
     """Refuse time that does not rise from row to row.
 
+    Raises RecordingError, which names the row.
+
     Parameters
     ----------
     time : (rows,) float64
         stamps [s]
     previous : float
         the stamp before them [s]
-
-    Raises
-    ------
-    RecordingError
-        names the row
     """
     is_up = np.diff(time, prepend=previous) > 0
     if is_up.all():
@@ -88,13 +82,7 @@ def require_rising(time: Array, previous: float, file: str, place: Callable[[int
 
 
 def require_rows(count: int, file: str) -> None:
-    """Refuse a file that holds next to nothing.
-
-    Raises
-    ------
-    RecordingError
-        fewer than `MINIMUM_ROWS` samples
-    """
+    """Refuse a file that holds next to nothing. Raises RecordingError: fewer than `MINIMUM_ROWS` samples."""
     if count < MINIMUM_ROWS:
         found = "no sample" if count == 0 else "only 1 sample" if count == 1 else f"only {count} samples"
         raise RecordingError(f"{file}: holds {found}; at least {MINIMUM_ROWS} are needed")

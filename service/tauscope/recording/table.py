@@ -121,15 +121,12 @@ class TableBuilder:
     def append(self, block: Array) -> None:
         """Add rows behind the last one.
 
+        Raises RecordingError where the temporary folder has no room left.
+
         Parameters
         ----------
         block : (rows, columns) float64
             the rows; copied
-
-        Raises
-        ------
-        RecordingError
-            the temporary folder has no room left
         """
         length = self._length + len(block)
         if self._spool is None and length > self._limit_rows:

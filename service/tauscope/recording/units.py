@@ -61,10 +61,7 @@ class Reading:
     def for_robot(self, robot: Robot | None) -> "Reading":
         """The same reading, with the units of the robot file where this one states none.
 
-        Raises
-        ------
-        RecordingError
-            a unit is not known, or the rate is missing
+        Raises RecordingError where a unit is not known, or the rate is missing.
         """
         layout = RecordingLayout() if robot is None else robot.recording
         columns = layout.columns if self.columns is None else self.columns
@@ -144,13 +141,7 @@ def preset_units(columns: Mapping[str, Source] | str | None) -> Mapping[str, str
 
 
 def parse_units(text: str) -> dict[str, str]:
-    """Units as a command line writes them: ``q=deg,t=ms``.
-
-    Raises
-    ------
-    ValueError
-        naming the part that is no assignment
-    """
+    """Units as a command line writes them: ``q=deg,t=ms``. Raises ValueError naming the part that is no assignment."""
     units: dict[str, str] = {}
     for part in filter(None, (part.strip() for part in text.split(","))):
         column, sign, unit = (piece.strip() for piece in part.partition("="))

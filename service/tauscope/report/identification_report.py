@@ -43,10 +43,7 @@ def identification_report(
 ) -> str:
     """A self-contained HTML page on an identification.
 
-    Raises
-    ------
-    RecordingError
-        where a recording cannot be conditioned again
+    Raises RecordingError where a recording cannot be conditioned again.
     """
     result = document(identification)
     train = [torque_series(identification, recording) for recording in recordings[:MOST_SERIES]]

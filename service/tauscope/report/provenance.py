@@ -56,13 +56,7 @@ def installed_version(package: str) -> str:
 
 
 def input_files(role: str, path: str) -> Iterator[InputFile]:
-    """The file of a path, or the files in it where it is a folder.
-
-    Raises
-    ------
-    RecordingError
-        where it cannot be read
-    """
+    """The file of a path, or the files in it where it is a folder. Raises RecordingError where it cannot be read."""
     source = Path(path)
     try:
         files = sorted(entry for entry in source.iterdir() if entry.is_file()) if source.is_dir() else [source]

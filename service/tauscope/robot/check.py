@@ -64,10 +64,7 @@ class RobotReport:
 def check_robot(path: Path | str) -> RobotReport:
     """The report on a robot file; links that no body can be are among its findings.
 
-    Raises
-    ------
-    RobotFileError
-        if the file or its URDF cannot be read or is not valid
+    Raises RobotFileError if the file or its URDF cannot be read or is not valid.
     """
     robot = read_robot(path)
     rank = list(Severity)

@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 def link_placements(chain: Robot | Sequence[Segment], q: Array) -> Array:
     """Every link frame seen from the base: T_j = T_{j-1} · before_j · motion_z(q_j) · after_j.
 
+    Raises RecordingMismatchError if `q` has not one column a joint.
+
     Parameters
     ----------
     chain : Robot or sequence of Segment
@@ -25,11 +27,6 @@ def link_placements(chain: Robot | Sequence[Segment], q: Array) -> Array:
     -------
     (N, m, 4, 4) float64
         homogeneous transforms; [:, j] is link frame j + 1 in the base frame [m]
-
-    Raises
-    ------
-    RecordingMismatchError
-        if `q` has not one column a joint
     """
     segments = chain.segments if isinstance(chain, Robot) else tuple(chain)
     position = np.asarray(q, dtype=np.float64)

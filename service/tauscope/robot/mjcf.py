@@ -29,10 +29,7 @@ class MjcfReader(Protocol):
     ) -> Chain:
         """The chain from body `base` to body `tip`.
 
-        Raises
-        ------
-        RobotFileError
-            if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip
+        Raises RobotFileError if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip.
         """
         ...
 
@@ -47,19 +44,15 @@ def read_mjcf_chain(
 ) -> Chain:
     """The chain from body `base` to body `tip` of an MJCF; by default from the root to the deepest body.
 
+    Raises RobotFileError if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip. Raises
+    MissingExtraError where MuJoCo is not installed.
+
     Parameters
     ----------
     path : Path or None
         where the file lies, for the files that it names; None for text without files beside it
     locked : mapping of str to float, or None
         position of joints that do not move [rad or m]
-
-    Raises
-    ------
-    RobotFileError
-        if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip
-    MissingExtraError
-        MuJoCo is not installed
     """
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         with require_extra(f"{label}: reading an MJCF"):

@@ -83,10 +83,7 @@ class _Kinematics:
 def build_robot(document: RobotDocument, origin: DocumentOrigin, file_source: FileSource) -> Robot:
     """The robot of a document; a link of its model that no body can be is replaced by the nearest body.
 
-    Raises
-    ------
-    RobotFileError
-        if parts of the document do not fit each other, or the URDF is not valid
+    Raises RobotFileError if parts of the document do not fit each other, or the URDF is not valid.
     """
     kinematics = _kinematics(document, origin, file_source)
     chain = kinematics.chain

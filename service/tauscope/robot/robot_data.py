@@ -21,12 +21,8 @@ def robot_from_dict(
 ) -> Robot:
     """The robot of plain data: the robot file's form, or that of `robot_to_dict`.
 
-    No file is opened: a URDF that the data name is taken from `urdf_files`.
-
-    Raises
-    ------
-    RobotFileError
-        if the data are not valid; one line naming the JSON path and joint
+    No file is opened: a URDF that the data name is taken from `urdf_files`. Raises RobotFileError if the data are not
+    valid; one line naming the JSON path and joint.
     """
     origin = DocumentOrigin(label, data)
     document = origin.validated(PlainRobotDocument)
@@ -36,10 +32,7 @@ def robot_from_dict(
 def robot_from_yaml(data: bytes, label: str = "robot", urdf_files: Mapping[str, bytes] | None = None) -> Robot:
     """The robot of an uploaded robot file; as `robot_from_dict` this opens no file.
 
-    Raises
-    ------
-    RobotFileError
-        if the robot file or its URDF is not valid; one line naming line, place and joint
+    Raises RobotFileError if the robot file or its URDF is not valid; one line naming line, place and joint.
     """
     document, origin = parse_robot_file(data, label)
     files = {Path(label).name: data} if is_xml(data) else urdf_files or {}

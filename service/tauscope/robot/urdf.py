@@ -45,15 +45,12 @@ def read_urdf_chain(
 ) -> Chain:
     """The chain from link `base` to link `tip`; by default from the root to the deepest leaf.
 
+    Raises RobotFileError if the URDF is not valid, or no chain of movable joints runs from base to tip.
+
     Parameters
     ----------
     locked : mapping of str to float, or None
         position of joints that do not move [rad or m]
-
-    Raises
-    ------
-    RobotFileError
-        if the URDF is not valid, or no chain of movable joints runs from base to tip
     """
     findings: list[Finding] = []
     tree = parse_urdf(data, label, findings)

@@ -57,15 +57,12 @@ def only_child(label: str, element: Element, kind: str, findings: list[Finding])
 def number(label: str, element: Element, key: str, default: float | None = None) -> float:
     """A finite number in an attribute.
 
+    Raises RobotFileError if the attribute is missing or not a finite number.
+
     Parameters
     ----------
     default : float or None
         value where the attribute is absent; None where it must be there
-
-    Raises
-    ------
-    RobotFileError
-        if the attribute is missing or not a finite number
     """
     text = element.get(key)
     if text is None:
@@ -78,10 +75,7 @@ def number(label: str, element: Element, key: str, default: float | None = None)
 def bounded_number(label: str, element: Element, key: str) -> float:
     """A number in an attribute that must be there, of a size that SI quantities of an arm have.
 
-    Raises
-    ------
-    RobotFileError
-        if the attribute is missing, not a number or beyond 1e9
+    Raises RobotFileError if the attribute is missing, not a number or beyond 1e9.
     """
     return _bounded(label, element, key, number(label, element, key))
 
@@ -89,15 +83,12 @@ def bounded_number(label: str, element: Element, key: str) -> float:
 def vector(label: str, element: Element | None, key: str, default: tuple[float, float, float]) -> NDArray[np.float64]:
     """Three numbers in an attribute, shape (3,).
 
+    Raises RobotFileError if the attribute does not hold three numbers.
+
     Parameters
     ----------
     element : Element or None
         the element; None where the whole element is absent
-
-    Raises
-    ------
-    RobotFileError
-        if the attribute does not hold three numbers
     """
     text = None if element is None else element.get(key)
     if text is None:

@@ -37,17 +37,14 @@ def lumped_inertia(
 ) -> tuple[LinkInertia | None, list[Repair]]:
     """Sum of the inertials of the bodies that move with one link, or None where none of them has an `<inertial>`.
 
+    Raises RobotFileError if an `<inertial>` is incomplete or not made of numbers.
+
     Parameters
     ----------
     link : int
         index of the link, from 0
     bodies : iterable of (Element, Placement)
         link elements, with the placement of each in the frame of the link that they move with
-
-    Raises
-    ------
-    RobotFileError
-        if an `<inertial>` is incomplete or not made of numbers
     """
     vectors, repairs = [], []
     for body, placement in bodies:

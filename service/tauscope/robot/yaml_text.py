@@ -67,10 +67,7 @@ class _BoundedComposer(Composer):
 def read_yaml(text: str, label: str) -> YamlContent:
     """Plain data of one YAML document.
 
-    Raises
-    ------
-    RobotFileError
-        if the text is not one well-formed YAML document of plain data
+    Raises RobotFileError if the text is not one well-formed YAML document of plain data.
     """
     root = _compose(text, label)
     if root is None:

@@ -34,17 +34,13 @@ class GuardedArm:
     def exchange(self, setpoint: Setpoint, due_ns: int) -> ArmState:
         """Send a command that the guard passes, and read the arm.
 
+        Raises GuardViolationError where the guard objects; nothing was sent. Raises DriverError where the backend
+        cannot.
+
         Parameters
         ----------
         due_ns : int
             when it was to be sent [ns]
-
-        Raises
-        ------
-        GuardViolationError
-            the guard objects; nothing was sent
-        DriverError
-            the backend cannot
         """
         violation = self._guard.check(self.state, setpoint, self._backend.clock.now_ns(), due_ns)
         if violation is not None:
@@ -107,14 +103,8 @@ class Cycles:
     def play(self) -> None:
         """Play the plan from its first cycle to its last.
 
-        Raises
-        ------
-        StopAskedError
-            it was asked to stop
-        GuardViolationError
-            the guard objected
-        DriverError
-            the backend gave up
+        Raises StopAskedError where it was asked to stop. Raises GuardViolationError where the guard objected. Raises
+        DriverError where the backend gave up.
         """
         plan, metronome = self.plan, self.metronome
         while metronome.wait():

@@ -78,13 +78,7 @@ class RunOptions(StrictModel, strict=False):
 
 
 def choose_rate_hz(options: RunOptions, capabilities: Capabilities) -> float:
-    """Cycles a second of a run.
-
-    Raises
-    ------
-    AcquisitionError
-        more is asked for than the bus allows
-    """
+    """Cycles a second of a run. Raises AcquisitionError where more is asked for than the bus allows."""
     largest = capabilities.largest_rate_hz
     if options.rate_hz is None:
         return min(DEFAULT_RATE_HZ, largest)
@@ -102,17 +96,13 @@ def chosen_stop_policy(
 ) -> StopPolicy:
     """How the arm is stopped: as the run says, else as the robot file's drives say, else under power where it is.
 
-    An arm that is released is held first.
+    An arm that is released is held first. Raises AcquisitionError where the robot file states no policy, or several; or
+    the device cannot do it by itself.
 
     Parameters
     ----------
     capabilities : Capabilities or None
         what the device can do by itself; None where it is not known yet
-
-    Raises
-    ------
-    AcquisitionError
-        the robot file states no policy, or several; or the device cannot do it by itself
     """
     wanted = options.stop_policy or _stated_policy(joints)
     policy = StopPolicy.HOLD if wanted == RELEASE else StopPolicy(wanted)
@@ -127,10 +117,8 @@ def chosen_stop_policy(
 def is_released(options: RunOptions, joints: Sequence[Joint]) -> bool:
     """Whether the arm is let go once it stands still at the end of its motion.
 
-    Raises
-    ------
-    AcquisitionError
-        it is asked for, and the robot file does not state that the arm is safe without torque
+    Raises AcquisitionError where it is asked for, and the robot file does not state that the arm is safe without
+    torque.
     """
     if options.stop_policy not in (None, RELEASE):
         return False
@@ -180,24 +168,12 @@ class RunOrder(StrictModel):
 
 
 def write_order(folder: Path, order: RunOrder) -> None:
-    """Write ``order.json``.
-
-    Raises
-    ------
-    OSError
-        the disk does not take it
-    """
+    """Write ``order.json``. Raises OSError where the disk does not take it."""
     write_atomically(folder / ORDER_FILE, order.model_dump_json(indent=1).encode())
 
 
 def read_order(folder: Path) -> RunOrder:
-    """Read ``order.json``.
-
-    Raises
-    ------
-    AcquisitionError
-        there is none, or it is not valid
-    """
+    """Read ``order.json``. Raises AcquisitionError where there is none, or it is not valid."""
     path = folder / ORDER_FILE
     try:
         return RunOrder.model_validate_json(path.read_bytes())

@@ -133,15 +133,12 @@ def make_plan(
 ) -> Plan:
     """Plan a run: a minimum-jerk ramp from where the arm stands, a pause, and the motion, all within the limits.
 
+    Raises AcquisitionError where the motion does not fit the arm or its limits, or the arm stands outside them.
+
     Parameters
     ----------
     start : (n,) float64
         where the arm stands [rad or m]
-
-    Raises
-    ------
-    AcquisitionError
-        the motion does not fit the arm or its limits, or the arm stands outside them
     """
     _require_fitting(robot, trajectory, start, capabilities)
     rate_hz = choose_rate_hz(options, capabilities)

@@ -44,13 +44,7 @@ class RunLock:
     """Holds a run's folder for this process."""
 
     def __init__(self, folder: Path) -> None:
-        """Take the folder.
-
-        Raises
-        ------
-        AcquisitionError
-            another process holds it
-        """
+        """Take the folder. Raises AcquisitionError where another process holds it."""
         self._descriptor = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -77,13 +77,7 @@ class DirectRecorder:
     """Writes the journal itself: in virtual time nobody is late."""
 
     def __init__(self, path: Path, header: JournalHeader) -> None:
-        """Open the journal.
-
-        Raises
-        ------
-        AcquisitionError
-            the journal cannot be created
-        """
+        """Open the journal. Raises AcquisitionError where the journal cannot be created."""
         self._path = path
         try:
             self._writer = JournalWriter(path, header)
@@ -169,13 +163,7 @@ class RecorderProcess:
         self._row = np.frombuffer(self._buffer, np.uint8, row_bytes, FRAME.size)
 
     def wait_until_open(self, stops: Stops) -> None:
-        """Wait until the journal is open.
-
-        Raises
-        ------
-        AcquisitionError
-            the journal cannot be created
-        """
+        """Wait until the journal is open. Raises AcquisitionError where the journal cannot be created."""
         deadline = time.monotonic() + OPENING_S
         poll = select.poll()
         poll.register(self._said, select.POLLIN | select.POLLHUP)

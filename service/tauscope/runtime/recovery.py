@@ -46,17 +46,13 @@ _WITHOUT_POWER = (RunState.CREATED, RunState.CONNECTING)
 def recover_runs(folder: Path, *, patience_s: float = PATIENCE_S) -> tuple[RunRecord, ...]:
     """Show every run that nobody carries out any more as interrupted, and save what its journal holds.
 
-    A run whose owner lives is left to its owner. Nothing is ever moved by this.
+    A run whose owner lives is left to its owner. Nothing is ever moved by this. Raises AcquisitionError where a record
+    is damaged, or cannot be written.
 
     Parameters
     ----------
     patience_s : float
         time that a control process whose owner is gone gets to stop its arm [s]
-
-    Raises
-    ------
-    AcquisitionError
-        a record is damaged, or cannot be written
     """
     runs = sorted(path.parent for path in folder.glob(f"*/{RUN_FILE}"))
     recovered = (recover_run(run, patience_s=patience_s) for run in runs)
@@ -68,6 +64,8 @@ def recover_run(
 ) -> RunRecord | None:
     """Show a run as interrupted if nobody carries it out any more, or as stopped where that kept it from beginning.
 
+    Raises AcquisitionError where the record is damaged, or cannot be written.
+
     Parameters
     ----------
     patience_s : float
@@ -77,11 +75,6 @@ def recover_run(
     -------
     RunRecord or None
         the new record; None where the run has ended by itself or goes on
-
-    Raises
-    ------
-    AcquisitionError
-        the record is damaged, or cannot be written
     """
     record = read_record(folder)
     if record.state.is_end or (not is_own and record.owner is not None and record.owner.is_alive):

@@ -46,13 +46,7 @@ def release_settled(backend: Backend, state: ArmState) -> ArmState:
 
 
 def release(backend_name: str, robot: Robot, settings: Mapping[str, Any]) -> None:
-    """Take the torque off an arm.
-
-    Raises
-    ------
-    AcquisitionError
-        a drive is not reached, or is under power still
-    """
+    """Take the torque off an arm. Raises AcquisitionError where a drive is not reached, or is under power still."""
     backend = make_backend(backend_name, robot, settings).backend
     with translate_driver_errors():
         backend.connect()

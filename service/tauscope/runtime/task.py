@@ -61,10 +61,8 @@ LEAST_CYCLES_A_WATCHDOG = 2
 def prepare(task: RunTask, backend: Backend, state: ArmState) -> Plan:
     """Plan a run for the arm as it was found, or refuse it: no torque is on yet.
 
-    Raises
-    ------
-    AcquisitionError
-        the backend cannot do what was asked for, a drive reports a fault, or the motion does not fit
+    Raises AcquisitionError where the backend cannot do what was asked for, a drive reports a fault, or the motion does
+    not fit.
     """
     options, capabilities = task.options, backend.capabilities
     chosen_stop_policy(options, task.robot.joints, capabilities)

@@ -68,15 +68,12 @@ class TorqueControl:
 def torque_control(robot: Robot, plan: Plan, bandwidth_rad_s: float) -> TorqueControl:
     """The loop for an arm whose model is known.
 
+    Raises AcquisitionError where the robot file has no model to take the gains from, or the rate is too low.
+
     Parameters
     ----------
     bandwidth_rad_s : float
         ω [rad/s]
-
-    Raises
-    ------
-    AcquisitionError
-        the robot file has no model to take the gains from, or the rate is too low
     """
     found = compute_inertia(robot, plan.position)
     if found is None:

@@ -157,13 +157,7 @@ class Result:
 
 
 def perform(request: Request, files: Files, progress: Progress) -> Result:
-    """Read the files and diagnose the arm.
-
-    Raises
-    ------
-    TauscopeError
-        where the data or the robot cannot answer
-    """
+    """Read the files and diagnose the arm. Raises TauscopeError where the data or the robot cannot answer."""
     if request.options.against == "saved" and request.model is None:
         raise IdentificationError("against saved: no model was given; give one, or compare with something else")
     if request.options.headroom:

@@ -123,13 +123,7 @@ class Result:
 
 
 def perform(request: Request, files: Files, progress: Progress) -> Result:
-    """Read the files and identify the arm.
-
-    Raises
-    ------
-    TauscopeError
-        where the data or the robot cannot answer
-    """
+    """Read the files and identify the arm. Raises TauscopeError where the data or the robot cannot answer."""
     progress("read robot and recordings")
     robot = read_robot(files.find("robot", request.robot))
     recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)

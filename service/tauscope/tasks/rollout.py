@@ -68,13 +68,7 @@ class Result:
 
 
 def perform(request: Request, files: Files, progress: Progress) -> Result:
-    """Read the files and simulate.
-
-    Raises
-    ------
-    TauscopeError
-        where the data, the robot or the model cannot answer
-    """
+    """Read the files and simulate. Raises TauscopeError where the data, the robot or the model cannot answer."""
     progress("read robot and recordings")
     robot = read_robot(files.find("robot", request.robot))
     exports = () if request.model is None else read_export_models(files.find("model", request.model))

@@ -232,13 +232,7 @@ def _open(path: Path, robot: Robot, reading: Reading) -> Recording:
 
 
 def record_provenance(files: Files, request: TaskRequest, robot: Robot) -> Provenance:
-    """Hash all inputs and note the versions.
-
-    Raises
-    ------
-    RecordingError
-        where a file cannot be read any more
-    """
+    """Hash all inputs and note the versions. Raises RecordingError where a file cannot be read any more."""
     paths = list(robot.files)
     paths += [(ROLES[role], files.find(role, name)) for role, names in request.inputs.items() for name in names]
     hashed = [

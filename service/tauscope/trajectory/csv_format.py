@@ -71,12 +71,7 @@ def parse_trajectory_csv(text: str, name: str, robot: str, joints: tuple[str, ..
     """The trajectory of a CSV file.
 
     Velocity and acceleration that the file lacks come from a quintic spline through the positions that rests at both
-    ends.
-
-    Raises
-    ------
-    ExcitationError
-        naming the file, the line and the column
+    ends. Raises ExcitationError naming the file, the line and the column.
     """
     numbers, columns, lines = _read_numbers(text, name)
     count = len(joints)

@@ -135,13 +135,7 @@ def trajectory_document(trajectory: Trajectory) -> TrajectoryDocument:
 
 
 def trajectory_of(document: TrajectoryDocument) -> Trajectory:
-    """The trajectory that a document describes.
-
-    Raises
-    ------
-    ExcitationError
-        naming the key
-    """
+    """The trajectory that a document describes. Raises ExcitationError naming the key."""
     joints = len(document.joints)
     segments = tuple(_segment_of(entry, joints, f"segments[{place}]") for place, entry in enumerate(document.segments))
     design = document.design

@@ -134,6 +134,8 @@ class Trajectory:
     def samples(self, rate_hz: float) -> TrajectorySamples:
         """The trajectory at a constant rate, from its start to its end.
 
+        Raises ExcitationError for a rate that is not positive, or absurd.
+
         Parameters
         ----------
         rate_hz : float
@@ -143,21 +145,13 @@ class Trajectory:
         -------
         TrajectorySamples
             instants k / rate from 0 to the first one at which the motion has ended
-
-        Raises
-        ------
-        ExcitationError
-            for a rate that is not positive, or absurd
         """
         return self.evaluate(np.arange(self.count_samples(rate_hz)) / rate_hz)
 
     def count_samples(self, rate_hz: float) -> int:
         """How many samples it has at a constant rate [1/s].
 
-        Raises
-        ------
-        ExcitationError
-            for a rate that is not positive, or absurd
+        Raises ExcitationError for a rate that is not positive, or absurd.
         """
         if not (np.isfinite(rate_hz) and rate_hz > 0.0):
             raise ExcitationError(f"the sampling rate is {rate_hz} Hz; give a positive number")
@@ -200,17 +194,12 @@ def ramp(start: Array, end: Array, limits: MotionLimits, *, fraction: float = RA
     """A straight minimum-jerk move between postures within the limits of velocity and acceleration.
 
     Its duration is known before it runs, and it stays between the two postures: where both are within the position
-    limits, so is all of it.
+    limits, so is all of it. Raises ExcitationError for a posture that is not finite or has another number of joints.
 
     Parameters
     ----------
     start, end : (n,) float64
         postures [rad or m]
-
-    Raises
-    ------
-    ExcitationError
-        for a posture that is not finite or has another number of joints
     """
     start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     joints = len(limits.velocity)

@@ -90,13 +90,7 @@ class ObjectDictionary:
         entry.value = min(max(value, low), high)
 
     def read(self, index: int, subindex: int) -> bytes:
-        """Value of an entry as a master gets it, little end first.
-
-        Raises
-        ------
-        AbortError
-            there is no such entry
-        """
+        """Value of an entry as a master gets it, little end first. Raises AbortError where there is no such entry."""
         self._visible(index, subindex)
         return self.encode(index, subindex)
 
@@ -108,10 +102,8 @@ class ObjectDictionary:
     def write(self, index: int, subindex: int, data: bytes) -> None:
         """A master's write.
 
-        Raises
-        ------
-        AbortError
-            there is no such entry, it is not writable, the length is wrong, or the drive refuses the value
+        Raises AbortError where there is no such entry, it is not writable, the length is wrong, or the drive refuses
+        the value.
         """
         entry = self._visible(index, subindex)
         if not entry.writable:

@@ -144,15 +144,12 @@ class SimulatedDevice:
     def enable(self, mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> None:
         """Take the arm under power where it stands.
 
+        Raises DriverError: ``refused`` or ``fault``.
+
         Parameters
         ----------
         watchdog_s : float
             time without setpoints after which it does [s]
-
-        Raises
-        ------
-        DriverError
-            ``refused`` or ``fault``
         """
         if self._activity in COMMANDED:
             raise refused("the arm is enabled already; stop it before enabling it again")
@@ -169,15 +166,12 @@ class SimulatedDevice:
     def command(self, setpoint: Setpoint, sent_ns: int | None = None) -> None:
         """Take the host's setpoint, and feed the watchdog; drives that stopped by a fault do not follow it.
 
+        Raises DriverError: ``not-enabled`` or ``refused``.
+
         Parameters
         ----------
         sent_ns : int or None
             when it was sent, by the device's clock; None for now [ns]
-
-        Raises
-        ------
-        DriverError
-            ``not-enabled`` or ``refused``
         """
         if self._enabling is None:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the arm is not enabled; enable it before sending setpoints")
@@ -203,13 +197,7 @@ class SimulatedDevice:
         self._enabling = None
 
     def acknowledge_faults(self) -> None:
-        """Clear the latched faults.
-
-        Raises
-        ------
-        DriverError
-            ``fault`` where the cause of one persists
-        """
+        """Clear the latched faults. Raises DriverError: ``fault`` where the cause of one persists."""
         self._latch.clear()
         self._look_for_faults()
         self._refuse_faults()
@@ -217,12 +205,7 @@ class SimulatedDevice:
     def put_back(self) -> None:
         """Carry the arm back to where it began and set its brakes: nobody's order to the drives, but a hand's work.
 
-        Faults and disturbances are gone afterwards.
-
-        Raises
-        ------
-        DriverError
-            ``refused`` while the arm is enabled
+        Faults and disturbances are gone afterwards. Raises DriverError: ``refused`` while the arm is enabled.
         """
         if self._activity in COMMANDED:
             raise refused("the arm is enabled; stop it before carrying it back")
@@ -233,13 +216,7 @@ class SimulatedDevice:
         self._mechanism.put_back(self._tick)
 
     def inject(self, injection: Injection) -> None:
-        """Make a disturbance happen.
-
-        Raises
-        ------
-        DriverError
-            ``refused``: no such joint
-        """
+        """Make a disturbance happen. Raises DriverError ``refused`` where no such joint."""
         if not 1 <= injection.joint <= self.capabilities.joint_count:
             raise refused(
                 f"joint {injection.joint}: the arm has {self.capabilities.joint_count} joints; name one of them"

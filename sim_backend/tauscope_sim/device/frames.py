@@ -63,10 +63,7 @@ class FrameBuffer:
     def feed(self, data: bytes) -> list[Frame]:
         """Take what arrived and return the frames that are complete.
 
-        Raises
-        ------
-        BrokenFrameError
-            where the kind is unknown or the body longer than `LARGEST_BODY`
+        Raises BrokenFrameError where the kind is unknown or the body longer than `LARGEST_BODY`.
         """
         self._bytes += data
         frames: list[Frame] = []

@@ -49,16 +49,12 @@ class Mechanism:
         """Take the reading of a tick, then let the arm move until the next.
 
         The torque of a reading is the mean of those before and after the tick, which belongs to the tick's own instant.
+        Raises ScenarioError where the motion grows beyond all bounds; the arm is at rest then.
 
         Parameters
         ----------
         torque : (n,) float64
             of the drives from this tick on [Nm or N]
-
-        Raises
-        ------
-        ScenarioError
-            where the motion grows beyond all bounds; the arm is at rest then
         """
         self._take(0.5 * (self._torque + torque), tick)
         self._torque = torque

@@ -83,10 +83,8 @@ class RemoteSimulatedArm:
     def connect(self) -> ArmState:
         """Reach the device and read it.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect`` where there is no device, another host has it, or it has another number of joints
+        Raises DriverError: ``cannot-connect`` where there is no device, another host has it, or it has another number
+        of joints.
         """
         if self._socket is not None:
             raise _cannot_connect("the arm is connected already; disconnect it first")
@@ -147,10 +145,7 @@ class RemoteSimulatedArm:
     def stop(self, policy: StopPolicy) -> ArmState:
         """Stop the arm; where there is no connection the device has done so by itself, and nothing is known of it.
 
-        Raises
-        ------
-        DriverError
-            ``lost`` where the device does not confirm
+        Raises DriverError: ``lost`` where the device does not confirm.
         """
         return self._missed() if self._socket is None else self._state_after(FrameKind.STOP, encode_stop(policy))
 

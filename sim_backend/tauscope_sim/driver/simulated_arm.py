@@ -48,13 +48,7 @@ class SimulatedArm:
         return self._clock
 
     def connect(self) -> ArmState:
-        """Reach the device and read it.
-
-        Raises
-        ------
-        DriverError
-            ``cannot-connect`` where it is connected already
-        """
+        """Reach the device and read it. Raises DriverError: ``cannot-connect`` where it is connected already."""
         if self._connected:
             raise DriverError(DriverErrorKind.CANNOT_CONNECT, "the arm is connected already; disconnect it first")
         self._connected = True

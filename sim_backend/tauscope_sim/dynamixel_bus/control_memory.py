@@ -81,13 +81,7 @@ class ControlMemory:
         return found
 
     def write(self, address: int, data: bytes) -> list[str]:
-        """Write whole items as a master does.
-
-        Raises
-        ------
-        WriteRefusedError
-            nothing was written
-        """
+        """Write whole items as a master does. Raises WriteRefusedError where nothing was written."""
         wanted: list[tuple[str, int]] = []
         start = 0
         while start < len(data):

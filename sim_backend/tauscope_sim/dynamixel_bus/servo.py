@@ -94,10 +94,7 @@ class EmulatedServo:
     def write(self, address: int, data: bytes) -> None:
         """Write to the control table and do what that means.
 
-        Raises
-        ------
-        WriteRefusedError
-            the servo does not take it
+        Raises WriteRefusedError where the servo does not take it.
         """
         memory, had_torque, was_latched = self.memory, self.has_torque, self.memory.is_latched
         written = memory.write(address, data)
@@ -120,13 +117,7 @@ class EmulatedServo:
         self.memory.put("Registered Instruction", 1)
 
     def act(self) -> None:
-        """Carry out the write that was kept.
-
-        Raises
-        ------
-        WriteRefusedError
-            none was kept, or it is refused
-        """
+        """Carry out the write that was kept. Raises WriteRefusedError where none was kept, or it is refused."""
         if self._registered is None:
             raise WriteRefusedError(2)
         registered, self._registered = self._registered, None
@@ -136,10 +127,7 @@ class EmulatedServo:
     def clear(self, what: bytes) -> None:
         """Carry out the instruction Clear: an error of the Y series, where its cause is gone.
 
-        Raises
-        ------
-        WriteRefusedError
-            the error stays, or this servo knows no such thing
+        Raises WriteRefusedError where the error stays, or this servo knows no such thing.
         """
         code = self.memory.get("Error Code")
         is_hot = self.memory.get("Present Motor Temperature") > self.memory.get("Motor Temperature Limit")

@@ -22,13 +22,7 @@ class ScenarioEntry(Document):
     """id of CONTRACT.md, the entry's key ``effect``"""
 
     def check(self, robot: Robot) -> None:
-        """Refuse an entry that this robot cannot have.
-
-        Raises
-        ------
-        ScenarioError
-            naming effect and key
-        """
+        """Refuse an entry that this robot cannot have. Raises ScenarioError naming effect and key."""
         joint = getattr(self, "joint", None)
         if joint is not None and joint > robot.joint_count:
             raise self.refused("joint", f"is {joint}, but the arm has {robot.joint_count} joints")

@@ -15,15 +15,12 @@ Array = NDArray[np.float64]
 def compliant_transmissions(effects: Sequence[PhysicalEffect], rotor_inertia: Array) -> dict[int, Transmission]:
     """Compliant transmissions by joint, counted from 0.
 
+    Raises ScenarioError where two effects make the same joint compliant, or both give it a rotor.
+
     Parameters
     ----------
     rotor_inertia : (n,) float64
         that effects give to the motors of rigid joints [kg m² or kg]
-
-    Raises
-    ------
-    ScenarioError
-        where two effects make the same joint compliant, or both give it a rotor
     """
     found: dict[int, Transmission] = {}
     for transmission in (effect.transmission() for effect in effects):

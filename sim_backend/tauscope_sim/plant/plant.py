@@ -111,15 +111,12 @@ class Plant:
     def place(self, position: ArrayLike) -> None:
         """Start afresh at time zero: motors at rest in a place, compliant links hanging still, effects as when new.
 
+        Raises ScenarioError where that is no place, or a transmission is too soft to carry its link.
+
         Parameters
         ----------
         position : (n,) float64
             of the motors, in joint units [rad or m]
-
-        Raises
-        ------
-        ScenarioError
-            where that is no place, or a transmission is too soft to carry its link
         """
         motors = np.asarray(position, dtype=np.float64)
         if motors.shape != (self.joint_count,) or not np.all(np.isfinite(motors)):
@@ -134,17 +131,14 @@ class Plant:
     def advance(self, motor_torque: ArrayLike, duration_s: float) -> None:
         """Let time pass under constant torque.
 
+        Raises ScenarioError where the duration is negative, or the motion grows beyond all bounds.
+
         Parameters
         ----------
         motor_torque : (n,) float64
             of the drives, on the joint's side of the gear [Nm or N]
         duration_s : float
             how long [s]
-
-        Raises
-        ------
-        ScenarioError
-            where the duration is negative, or the motion grows beyond all bounds
         """
         if not duration_s >= 0.0:
             raise ScenarioError(f"duration_s is {duration_s}; time passes forwards only")

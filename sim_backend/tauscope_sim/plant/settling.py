@@ -18,6 +18,8 @@ TOLERANCE = 1e-13
 def settled(equations: EquationsOfMotion, motor_position: Array) -> Array:
     """State of an arm at rest with q_j = θ_j - twist_j(load_j(q)), found by iteration.
 
+    Raises ScenarioError where a transmission is too soft to carry its link.
+
     Parameters
     ----------
     motor_position : (n,) float64
@@ -27,11 +29,6 @@ def settled(equations: EquationsOfMotion, motor_position: Array) -> Array:
     -------
     (2N + m,) float64
         y: positions, zero velocities, the effects' initial states
-
-    Raises
-    ------
-    ScenarioError
-        where a transmission is too soft to carry its link
     """
     compliant = list(equations.coordinates.compliant)
     position = np.concatenate([motor_position, motor_position[compliant]])

@@ -39,10 +39,7 @@ class DataSheetError(ValueError):
 def read_sections(text: str) -> Sections:
     """Sections that describe the device and its objects; compact arrays are written out.
 
-    Raises
-    ------
-    DataSheetError
-        it is no such file; names the line or the section
+    Raises DataSheetError where it is no such file; names the line or the section.
     """
     # No section is everybody's default, and no indented line goes on with the one before.
     parser = configparser.RawConfigParser(inline_comment_prefixes=(";",), default_section="\0")
@@ -199,13 +196,7 @@ class DeviceFile:
 
 
 def read_device_file(path: Path, node_id: int) -> DeviceFile:
-    """Read a file.
-
-    Raises
-    ------
-    DataSheetError
-        it cannot be read, or is no such file
-    """
+    """Read a file. Raises DataSheetError where it cannot be read, or is no such file."""
     sections = read_sections(_content(path))
     try:
         dictionary = eds.import_eds(io.StringIO(library_text(sections)), node_id)

@@ -48,10 +48,7 @@ class Settings:
 def settings_of(file: DeviceFile) -> Settings:
     """Values that a drive is given before it is commissioned.
 
-    Raises
-    ------
-    DataSheetError
-        a value is not of its object's type; names both
+    Raises DataSheetError where a value is not of its object's type; names both.
     """
     written: list[Setting] = []
     left_out: dict[str, tuple[DescribedObject, ...]] = {}

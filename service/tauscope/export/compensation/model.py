@@ -83,10 +83,7 @@ class CompensationModel:
 def check_friction(joint: str, friction: JointFriction) -> None:
     """Refuse coefficients that are not finite and shapes without meaning.
 
-    Raises
-    ------
-    ExportError
-        naming the joint and the coefficient
+    Raises ExportError naming the joint and the coefficient.
     """
     for name in ("stiction", "stribeck", "viscous", "offset", "k_v"):
         if not math.isfinite(getattr(friction, name)):

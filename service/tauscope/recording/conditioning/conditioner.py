@@ -70,10 +70,7 @@ class Conditioner:
     def survey(recording: Recording, robot: Robot) -> "Conditioner":
         """Find the usable stretches of a recording, the noise of its positions and the best source of its motion.
 
-        Raises
-        ------
-        RecordingError
-            where nothing in the recording is long enough to be used
+        Raises RecordingError where nothing in the recording is long enough to be used.
         """
         timing = find_stretches(recording)
         spans = _spread_windows(timing.rows)
@@ -124,15 +121,12 @@ class Conditioner:
     def motions(self, cutoff_hz: float | None) -> Iterator[Motion]:
         """The recording's motion, piece by piece, in one band.
 
+        Raises RecordingError where the band is so narrow that nothing of the recording is left.
+
         Parameters
         ----------
         cutoff_hz : float or None
             cut-off of the band that torque and regressor share [Hz]; None for no filter
-
-        Raises
-        ------
-        RecordingError
-            where the band is so narrow that nothing of the recording is left
         """
         found = False
         for rows in self.timing.rows:

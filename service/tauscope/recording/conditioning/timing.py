@@ -78,10 +78,7 @@ class Timing:
 def find_stretches(recording: Recording) -> Timing:
     """Row ranges of `recording` that can be filtered in one go.
 
-    Raises
-    ------
-    RecordingError
-        where no stretch is long enough to be used
+    Raises RecordingError where no stretch is long enough to be used.
     """
     interval, incomplete, labels = _scan(recording)
     count = len(recording) - len(incomplete)

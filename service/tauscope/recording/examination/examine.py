@@ -24,10 +24,7 @@ TRUST = "go on with --trust-units"
 def open_recording(path: str | Path, robot: Robot | None = None, reading: Reading = SI) -> Recording:
     """Read a recording, convert its units, and examine it.
 
-    Raises
-    ------
-    RecordingError
-        the file cannot be read, a column can hardly be in its unit, or a joint has no effort
+    Raises RecordingError where the file cannot be read, a column can hardly be in its unit, or a joint has no effort.
     """
     reading = reading.for_robot(robot)
     joints = None if robot is None else [joint.name for joint in robot.joints]
@@ -37,10 +34,7 @@ def open_recording(path: str | Path, robot: Robot | None = None, reading: Readin
 def examine_recording(recording: Recording, robot: Robot | None = None, *, trust_units: bool = False) -> Recording:
     """Examine a recording, and mend its samples; an examined one is returned as it is.
 
-    Raises
-    ------
-    RecordingError
-        a column can hardly be in its unit, or a joint has no effort
+    Raises RecordingError where a column can hardly be in its unit, or a joint has no effort.
     """
     if recording.is_examined:
         return recording

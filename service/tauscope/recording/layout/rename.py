@@ -23,12 +23,8 @@ _EFFORTS = ("tau", "i")
 def rename_columns(header: Sequence[str], reading: Reading, file: str) -> list[str]:
     """The header with the names of CONTRACT.md.
 
-    Raises
-    ------
-    RecordingError
-        the file has no column of a name that the mapping states
-    RecordingMismatchError
-        it names other joints than the robot, or numbers more of them
+    Raises RecordingError where the file has no column of a name that the mapping states. Raises RecordingMismatchError
+    where it names other joints than the robot, or numbers more of them.
     """
     columns = reading.columns
     if columns is None:

@@ -141,23 +141,11 @@ class AuditLog:
         self._clock = clock
 
     def append(self, actor: str, action: str, **details: Any) -> None:
-        """Add an entry; it is on the disk when this returns.
-
-        Raises
-        ------
-        OSError
-            if it cannot be written
-        """
+        """Add an entry; it is on the disk when this returns. Raises OSError if it cannot be written."""
         self._append(self._content(actor, action, details))
 
     def verify(self, noted: str | None = None) -> Verification:
-        """Check the whole log.
-
-        Raises
-        ------
-        NotFoundError
-            if there is no log
-        """
+        """Check the whole log. Raises NotFoundError if there is no log."""
         try:
             with self.path.open("rb") as file:
                 return verify_lines(file, noted)

@@ -148,15 +148,12 @@ def _key(headers: Headers) -> str | None:
 def require_upload_quota(scope: AsgiScope) -> Callable[[int], None]:
     """Refuse an upload of a caller who has sent enough for now.
 
+    Raises ProblemError if the caller has to wait.
+
     Returns
     -------
     callable
         counts what is sent [bytes]
-
-    Raises
-    ------
-    ProblemError
-        if the caller has to wait
     """
     access, caller = cast(Access, scope["app"].state.services.access), find_caller(scope)
     quota, key = access.uploads, caller.key or caller.name

@@ -68,10 +68,7 @@ class KeyFile:
     def read(self) -> tuple[ApiKey, ...]:
         """All keys ever made, revoked ones too; none where there is no file.
 
-        Raises
-        ------
-        TauscopeError
-            if the file is damaged or cannot be read
+        Raises TauscopeError if the file is damaged or cannot be read.
         """
         try:
             return _KeyList.model_validate_json(self.path.read_bytes()).keys
@@ -90,13 +87,7 @@ class KeyFile:
         return status.st_mtime_ns, status.st_size, status.st_ino
 
     def add(self, name: str, scope: Scope, now: datetime, life: timedelta | None) -> tuple[ApiKey, str]:
-        """Make a key.
-
-        Raises
-        ------
-        TauscopeError
-            if the name is in use, or none
-        """
+        """Make a key. Raises TauscopeError if the name is in use, or none."""
         if not (name.isprintable() and 0 < len(name.strip()) <= 100):
             raise TauscopeError(one_line(f"name {shown(name)}: give 1 to 100 printable characters"))
         secret, salt = secrets.token_urlsafe(32), secrets.token_hex(16)
@@ -117,13 +108,7 @@ class KeyFile:
         return key, f"{_PREFIX}_{key.id}_{secret}"
 
     def revoke(self, name: str, now: datetime) -> ApiKey:
-        """Take a key back; a service that runs knows within seconds.
-
-        Raises
-        ------
-        TauscopeError
-            if there is no such key
-        """
+        """Take a key back; a service that runs knows within seconds. Raises TauscopeError if there is no such key."""
         with self._changing() as keys:
             for place, key in enumerate(keys):
                 if name in (key.name, key.id) and key.revoked is None:
@@ -192,13 +177,7 @@ class KeyRing:
     """
 
     def __init__(self, file: KeyFile, *, is_required: bool, clock: Callable[[], datetime] = utc_now) -> None:
-        """Read the keys.
-
-        Raises
-        ------
-        TauscopeError
-            if the file is damaged
-        """
+        """Read the keys. Raises TauscopeError if the file is damaged."""
         self._file, self._clock = file, clock
         self._is_required = is_required
         self._stamp = file.stamp()

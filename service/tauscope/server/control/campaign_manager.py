@@ -29,12 +29,8 @@ class CampaignManager(Manager[CampaignRunner]):
     def submit(self, staged: Path, permit: Permit = FREE) -> str:
         """Start a campaign; it claims the arm until its motions are done.
 
-        Raises
-        ------
-        BusyError
-            if somebody else has the arm; the folder stays staged
-        LeaseError
-            if the arm may not be moved by that leave; the folder stays staged
+        Raises BusyError if somebody else has the arm; the folder stays staged. Raises LeaseError if the arm may not be
+        moved by that leave; the folder stays staged.
         """
         workspace = CampaignWorkspace(staged)
         order = workspace.read_order()

@@ -105,13 +105,7 @@ class RunWorkspace(JobFolder):
         return record is None or record.state.is_end
 
     def end_before_start(self, state: RunState, problem: RunProblem | None) -> None:
-        """Write the end of a run that no control process was started for.
-
-        Raises
-        ------
-        OSError
-            if it cannot be written
-        """
+        """Write the end of a run that no control process was started for. Raises OSError if it cannot be written."""
         record = self.read_run()
         if record is None or record.state.is_end or self._has_begun:
             return
@@ -120,10 +114,7 @@ class RunWorkspace(JobFolder):
     def recover(self) -> None:
         """Show a run that nobody carries out any more as interrupted; nothing happens to one that has ended.
 
-        Raises
-        ------
-        AcquisitionError
-            if its record is damaged, or its control process does not end
+        Raises AcquisitionError if its record is damaged, or its control process does not end.
         """
         if self._has_begun:
             recover_run(self.control)
@@ -158,12 +149,8 @@ class RunWorkspace(JobFolder):
 def start_control(workspace: RunWorkspace, report: Report, *, sim_socket: Path | None = None) -> RunProcess:
     """Start the control process of a run whose folder holds everything that it needs.
 
-    Raises
-    ------
-    RobotFileError
-        if the robot file was damaged meanwhile
-    AcquisitionError
-        if files are missing, or the process cannot be started
+    Raises RobotFileError if the robot file was damaged meanwhile. Raises AcquisitionError if files are missing, or the
+    process cannot be started.
     """
     order, trajectory = workspace.read_order(), workspace.trajectory
     if order is None or trajectory is None:

@@ -45,17 +45,13 @@ class RunManager(Manager[RunSupervisor]):
     def submit(self, staged: Path, motion: Motion, holder: str | None = None, permit: Permit = FREE) -> str:
         """Start a run.
 
+        Raises BusyError if somebody else has the arm; the folder stays staged. Raises LeaseError if the arm may not be
+        moved by that leave; the folder stays staged.
+
         Parameters
         ----------
         holder : str or None
             who has the arm already, to whom the run belongs; None where the run takes the arm itself
-
-        Raises
-        ------
-        BusyError
-            if somebody else has the arm; the folder stays staged
-        LeaseError
-            if the arm may not be moved by that leave; the folder stays staged
         """
         workspace = RunWorkspace(staged)
         request = workspace.read_order()
@@ -106,10 +102,7 @@ class RunManager(Manager[RunSupervisor]):
     def settle(self) -> None:
         """Keep the recordings that a full disk did not take; to be called again and again.
 
-        Raises
-        ------
-        OSError
-            if the disk is in the way still
+        Raises OSError if the disk is in the way still.
         """
         for workspace in list(self._pending.values()):
             self._conclude(workspace)

@@ -92,15 +92,12 @@ class Manager(Generic[S]):
     def remove(self, identifier: str) -> bool:
         """Remove an item that has ended, with all its files; its recordings stay.
 
+        Raises NotFoundError if there is no such item.
+
         Returns
         -------
         bool
             False where the item is active
-
-        Raises
-        ------
-        NotFoundError
-            if there is no such item
         """
         if self._threads.find(identifier) is not None:
             return False

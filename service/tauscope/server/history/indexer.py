@@ -230,10 +230,7 @@ class Indexer:
     def sync(self, *, thorough: bool = False) -> None:
         """Bring the index up to date.
 
-        Raises
-        ------
-        StoreError
-            if the database does not answer; the next call goes on where this one ended
+        Raises StoreError if the database does not answer; the next call goes on where this one ended.
         """
         with self._lock:
             thorough = thorough or not self._is_whole
@@ -251,10 +248,7 @@ class Indexer:
     def refresh(self) -> None:
         """Bring the index up to date, unless that takes long because somebody else is at it.
 
-        Raises
-        ------
-        StoreError
-            if the database does not answer
+        Raises StoreError if the database does not answer.
         """
         if self._lock.acquire(timeout=LONGEST_WAIT_S):
             self._lock.release()
@@ -345,10 +339,7 @@ class Indexer:
 def open_index(index: Index, items: Mapping[str, ItemStore], recordings: RecordingStore, label: str) -> Indexer:
     """Open the index of a data folder; `Indexer.sync` fills it from the folders, and upgrades an old one so.
 
-    Raises
-    ------
-    StoreError
-        if the database does not answer
+    Raises StoreError if the database does not answer.
     """
     index.register(label, datetime.now(UTC))
     return Indexer(index, items, recordings)

@@ -121,24 +121,12 @@ WAITING, GONE = "waiting", "gone"
 
 
 def find_campaign(services: Services, identifier: str) -> CampaignWorkspace:
-    """The folder of a campaign.
-
-    Raises
-    ------
-    NotFoundError
-        if there is none
-    """
+    """The folder of a campaign. Raises NotFoundError if there is none."""
     return CampaignWorkspace(services.campaigns.items.folder(identifier))
 
 
 def describe(services: Services, identifier: str, root: str) -> CampaignAnswer:
-    """The state of a campaign; one whose files are damaged is said to be so.
-
-    Raises
-    ------
-    NotFoundError
-        if there is none
-    """
+    """The state of a campaign; one whose files are damaged is said to be so. Raises NotFoundError if there is none."""
     workspace = find_campaign(services, identifier)
     here, made, order = f"{root}/campaigns/{identifier}", workspace.read_made(), workspace.read_order()
     if order is None:
@@ -153,12 +141,8 @@ def describe(services: Services, identifier: str, root: str) -> CampaignAnswer:
 def result_of(services: Services, identifier: str, root: str) -> CampaignResult:
     """What came of a campaign that succeeded.
 
-    Raises
-    ------
-    NotFoundError
-        if there is none, or its identification was removed
-    ProblemError
-        if it has not succeeded
+    Raises NotFoundError if there is none, or its identification was removed. Raises ProblemError if it has not
+    succeeded.
     """
     require_success(find_campaign(services, identifier))
     answer = describe(services, identifier, root)
@@ -221,12 +205,8 @@ def _links(here: str, root: str, made: CampaignLinks, *, has_result: bool) -> Ca
 async def submit_campaign(request: Request, services: Services) -> str:
     """Take a request for a campaign.
 
-    Raises
-    ------
-    ProblemError
-        if the request is not as documented
-    TauscopeError
-        if the robot is not valid, somebody else has the arm, or the lease does not let it move
+    Raises ProblemError if the request is not as documented. Raises TauscopeError if the robot is not valid, somebody
+    else has the arm, or the lease does not let it move.
     """
     async with stage_request(services.campaigns.items, CampaignWorkspace) as workspace:
         received = await receive_request(request, CampaignRequest, services.settings, workspace.robot)

@@ -116,12 +116,8 @@ YAML = "text/yaml"  # an alias of application/yaml (RFC 9512), which generators 
 def place_model(received: Received[DiagnosisRequest], services: Services, workspace: Any) -> dict[str, str | None]:
     """Put the model that is compared with into its place; what is compared with and what was sent belong together.
 
-    Raises
-    ------
-    ProblemError
-        where they do not, or the model came twice
-    NotFoundError
-        if there is no diagnosis of that identifier
+    Raises ProblemError where they do not, or the model came twice. Raises NotFoundError if there is no diagnosis of
+    that identifier.
     """
     document, file = received.document, received.form.file("model")
     against, has_simulated = document.options.against, bool(received.form.files.get("simulated") or document.simulated)

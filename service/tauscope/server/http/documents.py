@@ -32,17 +32,12 @@ def refuse_media_type(request: Request, *accepted: str) -> ProblemError:
 async def read_document(request: Request, kind: type[Model], limit: int) -> Model:
     """The JSON body of a request.
 
+    Raises ProblemError if the body is not as the model wants it. Raises LimitExceededError if it is too large.
+
     Parameters
     ----------
     limit : int
         largest body [bytes]
-
-    Raises
-    ------
-    ProblemError
-        if the body is not as the model wants it
-    LimitExceededError
-        if it is too large
     """
     content = bytearray()
     async for piece in request.stream():
@@ -53,13 +48,7 @@ async def read_document(request: Request, kind: type[Model], limit: int) -> Mode
 
 
 def parse_document(content: bytes, kind: type[Model], *, within: str) -> Model:
-    """A model from JSON text.
-
-    Raises
-    ------
-    ProblemError
-        if it is not as the model wants it
-    """
+    """A model from JSON text. Raises ProblemError if it is not as the model wants it."""
     try:
         return kind.model_validate_json(content)
     except ValidationError as error:

@@ -57,13 +57,8 @@ class ReceivedForm:
 async def receive_form(request: Request, rules: Mapping[str, PartRule]) -> ReceivedForm:
     """Read the form of a request; two files of one part never share a name.
 
-    Raises
-    ------
-    ProblemError
-        if the body is no form, or has a part that is not foreseen, or a file of a name that is not allowed; or the
-        caller has sent enough for now
-    LimitExceededError
-        if a part is too large
+    Raises ProblemError if the body is no form, or has a part that is not foreseen, or a file of a name that is not
+    allowed; or the caller has sent enough for now. Raises LimitExceededError if a part is too large.
     """
     charge = require_upload_quota(request.scope)
     receiver = _Receiver(rules)

@@ -38,15 +38,12 @@ class Answers(Protocol):
     def begin(self, name: str) -> bool:
         """Claim a request before anything is done.
 
+        Raises OSError if that has to be written down and cannot be.
+
         Returns
         -------
         bool
             False where the request was begun before
-
-        Raises
-        ------
-        OSError
-            if that has to be written down and cannot be
         """
         ...
 

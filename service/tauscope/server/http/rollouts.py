@@ -76,12 +76,8 @@ class RolloutListAnswer(PageAnswer):
 def place_model(received: Received[RolloutRequest], services: Services, workspace: Any) -> dict[str, str | None]:
     """Put the model into its place.
 
-    Raises
-    ------
-    ProblemError
-        where it came twice, or what is named has not succeeded
-    NotFoundError
-        if there is neither an identification nor a diagnosis of that identifier
+    Raises ProblemError where it came twice, or what is named has not succeeded. Raises NotFoundError if there is
+    neither an identification nor a diagnosis of that identifier.
     """
 
     def read(identifier: str) -> bytes:

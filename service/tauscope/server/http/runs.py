@@ -156,13 +156,7 @@ FORMATS: tuple[RecordingFormat, ...] = ("mcap", "csv", "parquet")
 
 
 def find_run(services: Services, identifier: str) -> RunWorkspace:
-    """The folder of a run.
-
-    Raises
-    ------
-    NotFoundError
-        if there is none
-    """
+    """The folder of a run. Raises NotFoundError if there is none."""
     return RunWorkspace(services.runs.items.folder(identifier))
 
 
@@ -175,13 +169,7 @@ class FollowedRun:
 
 
 def followed_run(services: Services, identifier: str) -> FollowedRun:
-    """A run whose events are followed.
-
-    Raises
-    ------
-    NotFoundError
-        if there is none
-    """
+    """A run whose events are followed. Raises NotFoundError if there is none."""
     workspace = find_run(services, identifier)
 
     def has_ended() -> bool:
@@ -191,13 +179,7 @@ def followed_run(services: Services, identifier: str) -> FollowedRun:
 
 
 def describe(services: Services, identifier: str, root: str) -> RunAnswer:
-    """The state of a run; one whose files are damaged is said to be so.
-
-    Raises
-    ------
-    NotFoundError
-        if there is none
-    """
+    """The state of a run; one whose files are damaged is said to be so. Raises NotFoundError if there is none."""
     workspace, live = find_run(services, identifier), services.runs.live(identifier)
     here = f"{root}/runs/{identifier}"
     record, request = workspace.read_run(), workspace.read_order()
@@ -237,12 +219,7 @@ def describe(services: Services, identifier: str, root: str) -> RunAnswer:
 def require_recording(services: Services, identifier: str, format_: RecordingFormat) -> RunWorkspace:
     """The folder of a run that left a recording of a format.
 
-    Raises
-    ------
-    NotFoundError
-        if there is no such run, or no such file
-    ProblemError
-        if the run goes on
+    Raises NotFoundError if there is no such run, or no such file. Raises ProblemError if the run goes on.
     """
     workspace = find_run(services, identifier)
     if not workspace.has_ended() or services.runs.live(identifier) is not None:
@@ -288,12 +265,8 @@ LARGEST_TRAJECTORY = 64 * 2**20
 async def submit_run(request: Request, services: Services) -> str:
     """Take a request for a run.
 
-    Raises
-    ------
-    ProblemError
-        if the request is not as documented
-    TauscopeError
-        if the robot or the motion is not valid, somebody else has the arm, or the lease does not let it move
+    Raises ProblemError if the request is not as documented. Raises TauscopeError if the robot or the motion is not
+    valid, somebody else has the arm, or the lease does not let it move.
     """
     async with stage_request(services.runs.items, RunWorkspace) as workspace:
         most = min(LARGEST_TRAJECTORY, services.settings.max_upload_bytes)

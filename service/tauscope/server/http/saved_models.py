@@ -21,6 +21,8 @@ def keep_model(
 ) -> str | None:
     """Put a model into its place in a job's folder; returns its name there.
 
+    Raises ProblemError where it came twice. Raises IdentificationError where it holds what JSON cannot.
+
     Parameters
     ----------
     model : str or dict or None
@@ -29,13 +31,6 @@ def keep_model(
         part of the form, which lies in its place
     read : callable
         the model of an identifier
-
-    Raises
-    ------
-    ProblemError
-        where it came twice
-    IdentificationError
-        where it holds what JSON cannot
     """
     if file is not None and model is not None:
         raise ProblemError("invalid-request", "the model came twice, as part model and in part request; send it once")

@@ -115,10 +115,7 @@ def open_services(
 ) -> Iterator[Services]:
     """Take the data folder, and end all work on leaving: first what moves, then the rest.
 
-    Raises
-    ------
-    TauscopeError
-        if another service works with the data folder, or its database cannot be used
+    Raises TauscopeError if another service works with the data folder, or its database cannot be used.
     """
     settings.data_folder.mkdir(0o700, parents=True, exist_ok=True)
     access = _open_access(settings)
@@ -344,10 +341,8 @@ def _open_access(settings: Settings) -> Access:
 def require_data_folder(settings: Settings) -> None:
     """Make the data folder, and refuse one that cannot be worked with.
 
-    Raises
-    ------
-    TauscopeError
-        if it cannot be made or written to, another service works with it, or it has no key where one is needed
+    Raises TauscopeError if it cannot be made or written to, another service works with it, or it has no key where one
+    is needed.
     """
     folder = settings.data_folder
     try:

@@ -13,10 +13,7 @@ from tauscope.server.problems import FieldError, ProblemError
 async def require_known_query(request: Request) -> None:
     """Refuse a request with a query parameter that its route does not know; a stop is never refused.
 
-    Raises
-    ------
-    ProblemError
-        naming the parameter
+    Raises ProblemError naming the parameter.
     """
     if not request.query_params or is_stop(request.method, request.url.path):
         return

@@ -48,19 +48,13 @@ def run_excitation(folder: Path) -> JobProblem | None:
 def write_trajectory_piece(workspace: TaskWorkspace[Any], rate_hz: float, start: int) -> bytes:
     """Rows of the trajectory of an excitation that succeeded, as CSV; empty beyond the last one.
 
+    Raises NotFoundError if the file is missing. Raises ExcitationError if the file was damaged. Raises
+    LimitExceededError if the CSV would be too long.
+
     Parameters
     ----------
     rate_hz : float
         samples a second [Hz]
-
-    Raises
-    ------
-    NotFoundError
-        if the file is missing
-    ExcitationError
-        if the file was damaged
-    LimitExceededError
-        if the CSV would be too long
     """
     try:
         content, order = workspace.trajectory.read_bytes(), workspace.read_order()
@@ -80,10 +74,7 @@ def write_trajectory_piece(workspace: TaskWorkspace[Any], rate_hz: float, start:
 def check_trajectory(folder: Path, robot_file: Path) -> None:
     """Read a trajectory that a client sent, as a worker process does it.
 
-    Raises
-    ------
-    ExcitationError
-        if it is not valid, or was made for an arm of another number of joints
+    Raises ExcitationError if it is not valid, or was made for an arm of another number of joints.
     """
     (path,) = folder.iterdir()
     try:

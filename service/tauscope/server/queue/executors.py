@@ -10,7 +10,8 @@ from tauscope.server.queue.worker_pool import WorkerPool
 def open_executor(workers: int, wait_s: float = 0.0, deadline_s: float | None = None) -> Executor:
     """Where analysis is done: on the cluster that the environment names, else in processes of our own.
 
-    The workers of a cluster have to see the data folder under the same path.
+    The workers of a cluster have to see the data folder under the same path. Raises StoreError if the cluster does not
+    answer, or Dask is not installed.
 
     Parameters
     ----------
@@ -18,11 +19,6 @@ def open_executor(workers: int, wait_s: float = 0.0, deadline_s: float | None = 
         how long a task waits for a cluster that is away before it ends [s]
     deadline_s : float or None
         how long a task may take in a process of our own [s]
-
-    Raises
-    ------
-    StoreError
-        if the cluster does not answer, or Dask is not installed
     """
     address = os.environ.get(SCHEDULER, "")
     return ClusterExecutor(address, wait_s) if address else WorkerPool(workers, deadline_s=deadline_s)

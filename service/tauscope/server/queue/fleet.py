@@ -53,12 +53,8 @@ FleetWork = Callable[[FleetEntry, Path], FleetResult]
 def read_manifest(path: Path) -> Iterator[FleetEntry]:
     """The robots of a manifest, line by line; paths are relative to it.
 
-    A CSV file with the columns `COLUMNS`; several recordings are separated by ``;``, `held_out` may be empty.
-
-    Raises
-    ------
-    RecordingError
-        naming the line
+    A CSV file with the columns `COLUMNS`; several recordings are separated by ``;``, `held_out` may be empty. Raises
+    RecordingError naming the line.
     """
     names: dict[str, int] = {}
     try:

@@ -26,15 +26,12 @@ from tauscope.server.queue.record import without_folders
 def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport:
     """Report what a recording in the store holds.
 
+    Raises RecordingError if it cannot be read or breaks a rule; the message calls the file by its name alone.
+
     Parameters
     ----------
     joint_count : int or None
         joints that it must have; None where any number is welcome
-
-    Raises
-    ------
-    RecordingError
-        if it cannot be read or breaks a rule; the message calls the file by its name alone
     """
     try:
         report = check_recording(path, joint_count)
@@ -81,18 +78,14 @@ def read_kept_samples(path: Path, most: int) -> bytes:
     """Time, positions and effort of a recording in the store, for a plot.
 
     A recording of more samples than asked for is thinned: of each stretch those are kept at which any joint's position
-    or effort is least or greatest.
+    or effort is least or greatest. Raises RecordingError if it cannot be read; the message calls the file by its name
+    alone.
 
     Returns
     -------
     bytes
         length of the header (4 bytes, little-endian), the header (JSON, filled with blanks to a multiple of four), then
         each column that the header names as 32-bit floats, little-endian; time counts from the first sample [s]
-
-    Raises
-    ------
-    RecordingError
-        if it cannot be read; the message calls the file by its name alone
     """
     try:
         recording = read_recording(path)

@@ -64,17 +64,13 @@ class QueuedJob:
     def move(self, state: JobState, problem: JobProblem | None = None) -> bool:
         """Write a new state, if it may follow the present one.
 
-        An earlier attempt may have written it and failed after that, as on a disk that became full in between.
+        An earlier attempt may have written it and failed after that, as on a disk that became full in between. Raises
+        OSError if the disk does not take it.
 
         Returns
         -------
         bool
             whether the job is in that state now; False where it may not be, its record is damaged, or it is gone
-
-        Raises
-        ------
-        OSError
-            if the disk does not take it
         """
         try:
             workspace = Workspace(self.folder)
@@ -175,10 +171,7 @@ class JobQueue:
     def submit(self, kind: JobKind, staged: Path, caller: str = "") -> str:
         """Take a job; what campaigns and schedules hand in has no caller.
 
-        Raises
-        ------
-        QueueFullError
-            if too many jobs are waiting, or too many of the caller's; the folder stays staged
+        Raises QueueFullError if too many jobs are waiting, or too many of the caller's; the folder stays staged.
         """
         with self._lock:
             if self._is_closed or len(self._waiting) >= self._most_waiting:
@@ -201,17 +194,13 @@ class JobQueue:
     def cancel_or_remove(self, kind: JobKind, identifier: str) -> bool:
         """Cancel a job that has not ended; remove one that has, or whose record is damaged.
 
-        Cancelled work stops at its next step; what it still does until then is dropped.
+        Cancelled work stops at its next step; what it still does until then is dropped. Raises NotFoundError if there
+        is no such job.
 
         Returns
         -------
         bool
             True where the job was removed
-
-        Raises
-        ------
-        NotFoundError
-            if there is no such job
         """
         with self._lock:
             if self.cancel(kind, identifier):
@@ -223,15 +212,12 @@ class JobQueue:
     def cancel(self, kind: JobKind, identifier: str) -> bool:
         """Cancel a job that has not ended.
 
+        Raises NotFoundError if there is no such job.
+
         Returns
         -------
         bool
             False where it had ended, or its record is damaged
-
-        Raises
-        ------
-        NotFoundError
-            if there is no such job
         """
         with self._lock:
             job, workspace = QueuedJob(kind, identifier), Workspace(kind.items.folder(identifier))
@@ -255,12 +241,8 @@ class JobQueue:
     def settle(self) -> None:
         """Do what was hindered by a full disk or an executor that was away: write ends, and begin what waits.
 
-        To be called again and again; while nothing is in the way there is nothing to do.
-
-        Raises
-        ------
-        OSError
-            if the disk is in the way still
+        To be called again and again; while nothing is in the way there is nothing to do. Raises OSError if the disk is
+        in the way still.
         """
         with self._lock:
             try:

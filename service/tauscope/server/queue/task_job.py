@@ -117,13 +117,7 @@ class TaskWorkspace(Workspace, Generic[Order]):
         return {str(key): str(reason) for key, reason in refused.items()} if isinstance(refused, dict) else {}
 
     def read_export(self, file_name: str) -> bytes:
-        """An export.
-
-        Raises
-        ------
-        NotFoundError
-            if it was not written
-        """
+        """An export. Raises NotFoundError if it was not written."""
         try:
             return (self.exports / file_name).read_bytes()
         except OSError:
@@ -157,10 +151,7 @@ class JobFiles:
     def find(self, role: str, name: str) -> Path:
         """Where an input lies.
 
-        Raises
-        ------
-        RecordingError
-            if a recording was changed or removed after the job was handed in
+        Raises RecordingError if a recording was changed or removed after the job was handed in.
         """
         if role in ("robot", "model"):
             return self._workspace.uploads("robot" if role == "robot" else SAVED_MODEL) / name
@@ -239,15 +230,12 @@ def submit_job(
 ) -> str:
     """Hand in a job whose files lie on the server already; returns its identifier.
 
+    Raises QueueFullError if too many jobs are waiting.
+
     Parameters
     ----------
     put_robot : callable
         writes the robot's files into a folder
-
-    Raises
-    ------
-    QueueFullError
-        if too many jobs are waiting
     """
     with staged_workspace(kind.items, workspace) as staged:
         put_robot(staged.robot)
@@ -256,11 +244,5 @@ def submit_job(
 
 
 def ordered_on_server(recordings: RecordingStore, names: Sequence[str]) -> tuple[OrderedRecording, ...]:
-    """Recordings that lie on the server, as an order holds them.
-
-    Raises
-    ------
-    NotFoundError
-        if one does not lie there
-    """
+    """Recordings that lie on the server, as an order holds them. Raises NotFoundError if one does not lie there."""
     return tuple(OrderedRecording(name=name, origin="server", sha256=recordings.digest(name)) for name in names)

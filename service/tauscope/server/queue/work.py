@@ -39,24 +39,12 @@ def do_work(workspace: Workspace, work: Callable[[], None], *folders: Path) -> J
 
 
 def begin_step(workspace: Workspace, step: str) -> None:
-    """Tell a step, unless nobody wants to know any more.
-
-    Raises
-    ------
-    StoppedError
-        if the job was cancelled
-    """
+    """Tell a step, unless nobody wants to know any more. Raises StoppedError if the job was cancelled."""
     require_wanted(workspace)
     workspace.write_step(step)
 
 
 def require_wanted(workspace: Workspace) -> None:
-    """Stop a job that was cancelled.
-
-    Raises
-    ------
-    StoppedError
-        if it was
-    """
+    """Stop a job that was cancelled. Raises StoppedError if it was."""
     if workspace.is_asked_to_stop():
         raise StoppedError

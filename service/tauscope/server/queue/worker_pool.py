@@ -65,13 +65,7 @@ class WorkerPool(Executor):
     def submit(
         self, fn: Callable[Arguments, Result], /, *args: Arguments.args, **kwargs: Arguments.kwargs
     ) -> "Future[Result]":
-        """Have a function called in a process.
-
-        Raises
-        ------
-        RuntimeError
-            after `shutdown`
-        """
+        """Have a function called in a process. Raises RuntimeError after `shutdown`."""
         future: Future[Result] = Future()
         with self._condition:
             if self._is_closed:
@@ -211,13 +205,7 @@ class _Worker:
             theirs.close()  # the process has the only other end: when it dies, the connection does
 
     def begin(self, call: tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]) -> None:
-        """Have it call a function.
-
-        Raises
-        ------
-        OSError, EOFError
-            if it has ended
-        """
+        """Have it call a function. Raises OSError, EOFError if it has ended."""
         if not self._is_ready:
             if not self.connection.poll(START_S):
                 raise EOFError("the process did not start")

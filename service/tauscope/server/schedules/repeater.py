@@ -46,17 +46,12 @@ class Repeater:
     def start(self, entry: ScheduleEntry, since: datetime | None) -> tuple[str, str]:
         """Start it; returns at once.
 
+        Raises NothingToDoError if there is no new recording. Raises TauscopeError if it cannot be started.
+
         Returns
         -------
         (str, str)
             kind and identifier of what was started
-
-        Raises
-        ------
-        NothingToDoError
-            if there is no new recording
-        TauscopeError
-            if it cannot be started
         """
         definition = ScheduleDefinition.model_validate(dict(entry.definition), strict=False)
         if definition.kind == "campaign":
@@ -103,10 +98,7 @@ def newest_recordings(
 ) -> tuple[tuple[OrderedRecording, ...], tuple[OrderedRecording, ...]]:
     """The recordings that an analysis takes: those to judge by are the newest, the others come before them.
 
-    Raises
-    ------
-    NothingToDoError
-        if there are too few, or none is new
+    Raises NothingToDoError if there are too few, or none is new.
     """
     found = [entry for entry in store.entries() if fnmatchcase(entry.name, choice.pattern)]
     wanted = sorted(found, key=lambda entry: (entry.modified, entry.name))[-(choice.train + choice.held_out) :]
@@ -142,15 +134,12 @@ def make_schedule(
 ) -> ScheduleEntry:
     """A schedule that repeats an item of this site.
 
+    Raises NotFoundError if there is no such item, or its files are damaged.
+
     Parameters
     ----------
     site : str or None
         of the data folder whose service does it; None for whichever comes first
-
-    Raises
-    ------
-    NotFoundError
-        if there is no such item, or its files are damaged
     """
     workspace = _WORKSPACES[definition.kind](repeater.items(definition.kind).folder(like))
     order = workspace.read_order()

@@ -96,24 +96,12 @@ class ScheduleRepository:
             row.definition, row.order, row.files = dict(entry.definition), dict(entry.order), dict(entry.files)
 
     def remove(self, name: str) -> None:
-        """Remove a schedule and its firings; what they started stays.
-
-        Raises
-        ------
-        NotFoundError
-            if there is none
-        """
+        """Remove a schedule and its firings; what they started stays. Raises NotFoundError if there is none."""
         with self._database.writing() as session:
             session.execute(delete(Schedule).where(Schedule.id == _schedule(session, name).id))
 
     def find(self, name: str) -> ScheduleEntry:
-        """A schedule.
-
-        Raises
-        ------
-        NotFoundError
-            if there is none
-        """
+        """A schedule. Raises NotFoundError if there is none."""
         with self._database.reading() as session:
             return schedule_entry(_schedule(session, name))
 
@@ -152,13 +140,7 @@ class ScheduleRepository:
             return firing.id
 
     def ask(self, name: str, now: datetime) -> int:
-        """Ask the service of a schedule's site to do it now.
-
-        Raises
-        ------
-        NotFoundError
-            if there is no such schedule
-        """
+        """Ask the service of a schedule's site to do it now. Raises NotFoundError if there is no such schedule."""
         with self._database.writing() as session:
             firing = Firing(schedule_id=_schedule(session, name).id, due=now, is_asked=True, state="asked")
             session.add(firing)
@@ -206,13 +188,7 @@ class ScheduleRepository:
         return self._move(mine, "claimed", state="interrupted", reason=reason)
 
     def firing(self, number: int) -> FiringEntry:
-        """A firing.
-
-        Raises
-        ------
-        NotFoundError
-            if there is none
-        """
+        """A firing. Raises NotFoundError if there is none."""
         with self._database.reading() as session:
             firing = session.get(Firing, number)
             if firing is None:
@@ -220,13 +196,7 @@ class ScheduleRepository:
             return firing_entry(session, firing)
 
     def firings(self, name: str, limit: int) -> list[FiringEntry]:
-        """The firings of a schedule, the newest first.
-
-        Raises
-        ------
-        NotFoundError
-            if there is no such schedule
-        """
+        """The firings of a schedule, the newest first. Raises NotFoundError if there is no such schedule."""
         with self._database.reading() as session:
             query = select(Firing).where(Firing.schedule_id == _schedule(session, name).id)
             rows = session.scalars(query.order_by(Firing.id.desc()).limit(limit)).all()

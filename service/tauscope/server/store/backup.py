@@ -31,12 +31,7 @@ def write_backup(data_folder: Path, database: Database, target: Path, version: s
     """Write a backup; the file appears under its name only when it is complete.
 
     The database comes first, and in every folder the state before what it speaks of: what is copied later can only be
-    newer, and the start of a service puts that right as it does after a crash.
-
-    Raises
-    ------
-    OSError
-        if it cannot be written
+    newer, and the start of a service puts that right as it does after a crash. Raises OSError if it cannot be written.
     """
     partial = target.with_name(f".{target.name}-{secrets.token_hex(4)}.partial")
     hashes: dict[str, dict[str, Any]] = {}
@@ -62,12 +57,8 @@ def write_backup(data_folder: Path, database: Database, target: Path, version: s
 def restore_backup(source: Path, data_folder: Path, address: str | None) -> int:
     """Make a data folder and its database from a backup; nothing appears before everything was found sound.
 
-    Raises
-    ------
-    StoreError
-        if the backup is damaged or of a newer program, or there is something already
-    OSError
-        if it cannot be written
+    Raises StoreError if the backup is damaged or of a newer program, or there is something already. Raises OSError if
+    it cannot be written.
     """
     if data_folder.exists() and (not data_folder.is_dir() or any(data_folder.iterdir())):
         raise StoreError(f"{data_folder}: there is something already; name a folder that is not there yet")

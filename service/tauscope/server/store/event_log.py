@@ -37,10 +37,7 @@ class EventLog:
     def append(self, content: Mapping[str, Any]) -> None:
         """Add a line; a crash of the machine may lose the last ones.
 
-        Raises
-        ------
-        OSError
-            if it cannot be written, or only in part; what is there of it is passed over by readers
+        Raises OSError if it cannot be written, or only in part; what is there of it is passed over by readers.
         """
         line = json.dumps(content, ensure_ascii=False, allow_nan=False).encode() + b"\n"
         descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o640)

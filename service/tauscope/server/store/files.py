@@ -36,13 +36,7 @@ def is_identifier(text: str) -> bool:
 
 
 def identifier_time(identifier: str) -> datetime:
-    """The second in which an identifier was made.
-
-    Raises
-    ------
-    ValueError
-        if it is none
-    """
+    """The second in which an identifier was made. Raises ValueError if it is none."""
     return datetime.strptime(identifier[:16], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
 
 
@@ -85,10 +79,7 @@ class IncomingFile:
     def write(self, piece: bytes) -> None:
         """Append some bytes.
 
-        Raises
-        ------
-        LimitExceededError
-            if the file grows beyond its limit; nothing more is written then
+        Raises LimitExceededError if the file grows beyond its limit; nothing more is written then.
         """
         self.size += len(piece)
         if self.size > self.limit:

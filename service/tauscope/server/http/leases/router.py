@@ -43,13 +43,7 @@ def find_owner(request: Request) -> str:
 
 
 def permit_of(request: Request, services: Services, device: str) -> Permit:
-    """Leave to move an arm, by the lease that comes with a request.
-
-    Raises
-    ------
-    LeaseError
-        if there is no such leave
-    """
+    """Leave to move an arm, by the lease that comes with a request. Raises LeaseError if there is no such leave."""
     is_needed = services.settings.require_lease or find_caller(request.scope).key is not None
     return services.leases.permit(device, request.headers.get(LEASE_TOKEN), find_owner(request), is_needed=is_needed)
 

@@ -75,10 +75,7 @@ def shown_problem(problem: JobProblem | None, here: str) -> Problem | None:
 def require_success(workspace: Workspace) -> None:
     """Refuse to go on with a job that has no result.
 
-    Raises
-    ------
-    ProblemError
-        if it has not succeeded: the problem that it ended in, or that it has not ended
+    Raises ProblemError if it has not succeeded: the problem that it ended in, or that it has not ended.
     """
     identifier, record = workspace.folder.name, workspace.read_record()
     if record is None:
@@ -93,15 +90,12 @@ def require_success(workspace: Workspace) -> None:
 def require_document(content: bytes | None, identifier: str) -> bytes:
     """The result of a job that succeeded.
 
+    Raises ProblemError if it is damaged.
+
     Parameters
     ----------
     content : bytes or None
         as its folder holds it; None where it is damaged
-
-    Raises
-    ------
-    ProblemError
-        if it is damaged
     """
     if content is None:
         raise ProblemError("damaged", f"the result of {identifier} is missing or damaged; hand it in again")

@@ -70,24 +70,14 @@ class QueuedTask:
     further_parts: Mapping[str, tuple[str, int]] = field(default_factory=dict)
 
     def find(self, services: Services, identifier: str) -> TaskWorkspace[Any]:
-        """The folder of a job.
-
-        Raises
-        ------
-        NotFoundError
-            if there is none
-        """
+        """The folder of a job. Raises NotFoundError if there is none."""
         return self.workspace(self.kind(services).items.folder(identifier))
 
     def finished(self, services: Services, identifier: str) -> TaskWorkspace[Any]:
         """The folder of a job that succeeded.
 
-        Raises
-        ------
-        NotFoundError
-            if there is none
-        ProblemError
-            if it has not succeeded: the problem that it ended in, or that it has not ended
+        Raises NotFoundError if there is none. Raises ProblemError if it has not succeeded: the problem that it ended
+        in, or that it has not ended.
         """
         workspace = self.find(services, identifier)
         require_success(workspace)
@@ -119,13 +109,7 @@ class QueuedTask:
         return router
 
     def describe(self, services: Services, identifier: str, root: str) -> Any:
-        """The state of a job; one whose files are damaged is said to be so.
-
-        Raises
-        ------
-        NotFoundError
-            if there is none
-        """
+        """The state of a job; one whose files are damaged is said to be so. Raises NotFoundError if there is none."""
         answer, workspace = self.models[1], self.find(services, identifier)
         here, order = f"{root}/{self.plural}/{identifier}", workspace.read_order()
         links: dict[str, Any] = {"self": here, "events": f"{here}/events"}
@@ -146,12 +130,8 @@ class QueuedTask:
     async def submit(self, request: Request, services: Services) -> str:
         """Take a request: what was sent is kept in a job's folder, and checked as far as that is quick.
 
-        Raises
-        ------
-        ProblemError
-            if the request is not as documented
-        TauscopeError
-            if the robot is not valid, a recording is not there, or something is too large
+        Raises ProblemError if the request is not as documented. Raises TauscopeError if the robot is not valid, a
+        recording is not there, or something is too large.
         """
         settings = services.settings
         async with stage_request(self.kind(services).items, self.workspace) as workspace:
@@ -187,12 +167,8 @@ class QueuedTask:
 def ordered_recordings(role: str, received: Received[Any], store: RecordingStore) -> tuple[OrderedRecording, ...]:
     """The recordings of a role: each a file of the form, or else a recording on the server.
 
-    Raises
-    ------
-    ProblemError
-        if a file was sent but is not listed
-    NotFoundError
-        if a recording is neither sent nor on the server
+    Raises ProblemError if a file was sent but is not listed. Raises NotFoundError if a recording is neither sent nor on
+    the server.
     """
     files: dict[str, KeptFile] = {file.name: file for file in received.form.files.get(role, [])}
     listed: Sequence[str] | None = getattr(received.document, role)
@@ -214,12 +190,7 @@ def ordered_recordings(role: str, received: Received[Any], store: RecordingStore
 def check_recordings(recordings: Mapping[str, Sequence[OrderedRecording]], most: int) -> None:
     """There is something to work on, not too much, and no recording is its own judge.
 
-    Raises
-    ------
-    ProblemError
-        naming the recording
-    LimitExceededError
-        for too many
+    Raises ProblemError naming the recording. Raises LimitExceededError for too many.
     """
     if not recordings["recordings"]:
         text = "no recording was sent or named; send part recordings, or name recordings on the server"

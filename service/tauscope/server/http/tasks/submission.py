@@ -94,12 +94,7 @@ async def receive_request(
 ) -> Received[Document]:
     """Read the body, whichever of the two media types it is.
 
-    Raises
-    ------
-    ProblemError
-        if the request is not as documented
-    LimitExceededError
-        if something is too large
+    Raises ProblemError if the request is not as documented. Raises LimitExceededError if something is too large.
     """
     if media_type(request) == JSON:
         return Received(await read_document(request, kind, settings.max_document_bytes), ReceivedForm())
@@ -117,12 +112,7 @@ async def receive_request(
 def keep_robot(received: Received[Any], folder: Path) -> str:
     """Name of the robot file in the job's folder, written there if it came as JSON.
 
-    Raises
-    ------
-    ProblemError
-        if there is no robot, or two
-    RobotFileError
-        if its content is not plain data
+    Raises ProblemError if there is no robot, or two. Raises RobotFileError if its content is not plain data.
     """
     file, inline = received.form.file("robot"), received.document.robot
     if file is not None and inline is not None:

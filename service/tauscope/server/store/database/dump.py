@@ -28,10 +28,7 @@ def dump_lines(engine: Engine) -> Iterator[bytes]:
 def load_lines(engine: Engine, lines: Iterable[bytes]) -> None:
     """Fill an empty database, and bring it to this program's form; all of it, or nothing.
 
-    Raises
-    ------
-    StoreError
-        if there is something in the database, or the lines are of a newer program
+    Raises StoreError if there is something in the database, or the lines are of a newer program.
     """
     rows = (json.loads(line) for line in lines)
     revision = next(rows)["revision"]
