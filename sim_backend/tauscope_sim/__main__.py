@@ -10,8 +10,7 @@ import numpy as np
 from tauscope.errors import TauscopeError
 from tauscope.robot import read_robot
 from tauscope_sim.motion import LEAST_HARMONICS, random_fourier_motion
-from tauscope_sim.recording import simulate_recording
-from tauscope_sim.recording_csv import write_recording_csv
+from tauscope_sim.recording import simulate_recording, write_recording_csv
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

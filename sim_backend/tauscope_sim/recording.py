@@ -1,19 +1,52 @@
 """A recording that a simulated arm would leave: exact motion, exact torque, and what noisy sensors make of them."""
 
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's extension modules come without type stubs)
+
+import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauscope.errors import RecordingError
-from tauscope.robot.robot import FrictionCoefficients, FrictionShape, Robot
+from tauscope.robot.robot import FrictionCoefficients, FrictionShape, Joint, Robot
 from tauscope_sim.friction import static_friction_torque
-from tauscope_sim.inverse_dynamics import rigid_body_torque
 from tauscope_sim.model import build_model
 from tauscope_sim.motion import FourierMotion, MotionSamples
 
 Array = NDArray[np.float64]
+
+
+def rigid_body_torque(model: mujoco.MjModel, position: Array, velocity: Array, acceleration: Array) -> Array:
+    """Joint torque τ = H(q) q̈ + h(q, q̇) + c(q) along a motion, by ``mj_inverse``.
+
+    Parameters
+    ----------
+    position : (N, n) float64
+        q [rad or m]
+    velocity : (N, n) float64
+        q̇ [rad/s or m/s]
+    acceleration : (N, n) float64
+        q̈ [rad/s² or m/s²]
+
+    Returns
+    -------
+    (N, n) float64
+        τ without friction, the paper's equation (1) [Nm or N]
+    """
+    data = mujoco.MjData(model)
+    torque = np.empty_like(position)
+    for row in range(len(position)):
+        data.qpos[:] = position[row]
+        data.qvel[:] = velocity[row]
+        data.qacc[:] = acceleration[row]
+        mujoco.mj_inverse(model, data)
+        torque[row] = data.qfrc_inverse
+    return torque
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,3 +183,36 @@ def _quantised(position: Array, step: Array) -> Array:
     coarse = step > 0.0
     rounded[:, coarse] = np.rint(position[:, coarse] / step[coarse]) * step[coarse]
     return rounded
+
+
+def write_recording_csv(
+    path: Path, recording: SimulatedRecording, joints: Sequence[Joint], *, as_current: bool = False
+) -> None:
+    """Write what a real arm's logger would have written, the joints' wiring included.
+
+    A joint with ``sign: -1`` is recorded the other way round; with `as_current` the columns are i1…in and hold torque
+    divided by the joint's torque constant. Numbers are written so that reading them gives the same float64. Raises
+    RecordingError where the file exists, or cannot be written.
+    """
+    signs = np.array([joint.sign for joint in joints], dtype=np.float64)
+    constants = np.array([joint.torque_constant for joint in joints])
+    effort = recording.torque * signs / (constants if as_current else 1.0)
+    table = np.column_stack([recording.time, recording.position, effort])
+    try:
+        with path.open("x", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(_header(len(joints), "i" if as_current else "tau"))
+            # tolist turns a row into Python floats, whose text is the shortest that reads back exactly
+            writer.writerows([*row.tolist(), int(period)] for row, period in zip(table, recording.period, strict=True))
+    except FileExistsError as error:
+        raise RecordingError(
+            f"{path}: exists already, and recordings are not overwritten; choose another name"
+        ) from error
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
+
+
+def _header(joint_count: int, effort: str) -> list[str]:
+    """Column names of the recording file."""
+    numbers = range(1, joint_count + 1)
+    return ["t", *(f"q{number}" for number in numbers), *(f"{effort}{number}" for number in numbers), "period"]

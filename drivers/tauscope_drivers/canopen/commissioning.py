@@ -12,8 +12,7 @@ from tauscope_drivers.canopen.bus import MASTER_NODE
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile
 from tauscope_drivers.canopen.data_sheet.settings import Setting, settings_of
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.objects import DriveObject
-from tauscope_drivers.canopen.optional_objects import STAYING_OPTIONS
+from tauscope_drivers.canopen.objects import STAYING_OPTIONS, DriveObject
 from tauscope_drivers.canopen.pdo_mapping import map_process_data
 from tauscope_drivers.canopen.state_machine import POWERED, decode_state
 from tauscope_drivers.errors import DriverError, DriverErrorKind

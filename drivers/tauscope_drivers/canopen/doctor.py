@@ -9,9 +9,8 @@ from tauscope_drivers.canopen.bus import CanBus
 from tauscope_drivers.canopen.configuration import BusConfiguration, read_configuration
 from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile
 from tauscope_drivers.canopen.data_sheet.settings import settings_of
-from tauscope_drivers.canopen.drive_modes import TARGETS
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.optional_objects import DOUBTFUL
+from tauscope_drivers.canopen.objects import DOUBTFUL, TARGETS
 from tauscope_drivers.canopen.rehearsal import rehearse
 from tauscope_drivers.canopen.session import possible_rate_hz
 from tauscope_drivers.canopen.state_machine import POWERED

@@ -11,9 +11,8 @@ from tauscope_drivers.canopen.bus import HEARTBEAT_ID, MASTER_NODE, NMT_ID, NMT_
 from tauscope_drivers.canopen.commissioning import commission_drive, write_settings
 from tauscope_drivers.canopen.configuration import NodeConfiguration, read_configuration, require_targets
 from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects
-from tauscope_drivers.canopen.drive_modes import select_modes
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.objects import DriveObject
+from tauscope_drivers.canopen.objects import DriveObject, select_modes
 from tauscope_drivers.canopen.state_machine import DriveState, Goal, next_controlword
 from tauscope_drivers.canopen.units import drive_units
 from tauscope_drivers.drive_block import DriveJoint

@@ -9,11 +9,16 @@ from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, NMT_OPERATIONAL_STATE, CanBus
 from tauscope_drivers.canopen.configuration import NodeConfiguration
 from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects, require_identity
-from tauscope_drivers.canopen.drive_modes import TARGETS, select_modes
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST, decode_emergency, describe_error
 from tauscope_drivers.canopen.glitch_filter import GlitchFilter
-from tauscope_drivers.canopen.objects import DriveObject
-from tauscope_drivers.canopen.optional_objects import STAYING_OPTIONS, SUBSTITUTES, describe_absent
+from tauscope_drivers.canopen.objects import (
+    STAYING_OPTIONS,
+    SUBSTITUTES,
+    TARGETS,
+    DriveObject,
+    describe_absent,
+    select_modes,
+)
 from tauscope_drivers.canopen.pdo_plan import (
     MEASURED,
     MEASURED_WHERE_THERE,
@@ -24,10 +29,9 @@ from tauscope_drivers.canopen.pdo_plan import (
     sent_identifier,
 )
 from tauscope_drivers.canopen.process_data import PdoLayout, decode_pdo, encode_pdo
-from tauscope_drivers.canopen.rated_torque import read_rated_torque
 from tauscope_drivers.canopen.sdo import NodeDictionary
 from tauscope_drivers.canopen.state_machine import ENABLE_OPERATION, DriveState, Goal, decode_state, next_controlword
-from tauscope_drivers.canopen.units import DriveUnits, drive_units
+from tauscope_drivers.canopen.units import DriveUnits, drive_units, read_rated_torque
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
 
 _CIA_402 = 402

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tauscope_drivers.answer_time import AnswerTime
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import NMT_PRE_OPERATIONAL, SYNC_ID, CanBus
@@ -17,7 +16,7 @@ from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.observation import arm_faults, arm_state
 from tauscope_drivers.canopen.pdo_plan import MEASURED_WHERE_THERE, PdoSlots, plan_pdos
 from tauscope_drivers.canopen.state_machine import DriveState, Goal, decode_state
-from tauscope_drivers.clock import Clock
+from tauscope_drivers.clock import AnswerTime, Clock
 from tauscope_drivers.errors import Fault
 from tauscope_drivers.state import ArmState, Array, Setpoint
 

@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from tauscope_drivers.backend import Capabilities, ControlMode, DriveLimits, StopPolicy
 from tauscope_drivers.clock import Clock, MonotonicClock
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.dynamixel.bus import ServoBus
+from tauscope_drivers.dynamixel.bus import PATIENCE_S, ServoBus
 from tauscope_drivers.dynamixel.bus_budget import (
     BusTiming,
     CycleTraffic,
@@ -25,7 +26,6 @@ from tauscope_drivers.dynamixel.enabling import Bounds, enable_servos, goals_of
 from tauscope_drivers.dynamixel.faults import lost_bus_fault, silent_servo_fault
 from tauscope_drivers.dynamixel.group import GroupReading
 from tauscope_drivers.dynamixel.models import WATCHDOG_MOST, WATCHDOG_STEP_S
-from tauscope_drivers.dynamixel.observation import arm_state, blind_state, observe
 from tauscope_drivers.dynamixel.pacing import GoalPace
 from tauscope_drivers.dynamixel.port import SerialPort
 from tauscope_drivers.dynamixel.preparation import commissioning_writes
@@ -36,6 +36,57 @@ from tauscope_drivers.limits import RunawayWatch, require_finite
 from tauscope_drivers.state import ArmState, Setpoint
 
 Array = NDArray[np.float64]
+
+
+def observe(session: Session, temperature: Array | None = None, *failures: Fault) -> ArmState:
+    """State without moving anything, with the errors of servos that set their alert bit.
+
+    Parameters
+    ----------
+    temperature : (n,) float64 or None
+        where it was just read [°C]
+    """
+    reading = session.group.read_patiently()
+    for joint, alert in enumerate(reading.alerts):
+        if alert and not session.health.states_error(joint):
+            servo = session.servos[joint]
+            item = servo.model.error_item
+            answer = session.bus.read_once(servo.servo, item.address, item.size, PATIENCE_S)
+            if answer is not None and len(answer.data) == item.size:
+                session.health.take(joint, {item.name: item.decode(answer.data, item.address)})
+    unknown = np.full(len(session.servos), np.nan)
+    state = arm_state(session, reading, unknown if temperature is None else temperature)
+    return replace(state, faults=state.faults + failures)
+
+
+def arm_state(session: Session, reading: GroupReading, temperature: Array) -> ArmState:
+    """State of a cycle.
+
+    Parameters
+    ----------
+    temperature : (n,) float64
+        where it was read in this cycle, else NaN [°C]
+    """
+    for joint, alert in enumerate(reading.alerts):
+        if alert is not None:
+            session.health.take_alert(joint, alert)
+    return ArmState(
+        time_ns=reading.time_ns,
+        position=reading.position,
+        velocity=reading.velocity,
+        effort=reading.current,
+        temperature=temperature,
+        enabled=session.enabled,
+        faults=session.health.faults,
+        late_ns=reading.late_ns,
+    )
+
+
+def blind_state(time_ns: int, joint_count: int, faults: tuple[Fault, ...]) -> ArmState:
+    """State of an arm that cannot be seen."""
+    unknown = np.full(joint_count, np.nan)
+    return ArmState(time_ns, unknown, unknown, unknown, unknown, np.zeros(joint_count, dtype=np.bool_), faults)
+
 
 _POLICIES = {
     ControlMode.POSITION: frozenset([StopPolicy.HOLD]),

@@ -5,8 +5,7 @@ import time
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from tauscope_drivers.answer_time import AnswerTime
-from tauscope_drivers.clock import Clock, MonotonicClock
+from tauscope_drivers.clock import AnswerTime, Clock, MonotonicClock
 from tauscope_drivers.dynamixel import packets
 from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
 from tauscope_drivers.dynamixel.packets import FrameParser, Status

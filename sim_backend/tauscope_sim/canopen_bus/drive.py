@@ -7,11 +7,9 @@ from collections.abc import Iterator
 
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile
 from tauscope_sim.canopen_bus.axis import AxisDemand, AxisMeasurement, AxisMode, AxisScale
-from tauscope_sim.canopen_bus.device_sheet import apply_sheet
-from tauscope_sim.canopen_bus.object_dictionary import Abort, AbortError, ObjectDictionary
+from tauscope_sim.canopen_bus.object_dictionary import Abort, AbortError, ObjectDictionary, answer_request, apply_sheet
 from tauscope_sim.canopen_bus.power_state import PowerState, PowerStateMachine
 from tauscope_sim.canopen_bus.process_data import ProcessData
-from tauscope_sim.canopen_bus.sdo_server import answer_request
 
 Frame = tuple[int, bytes]
 

@@ -1,15 +1,27 @@
 """Drives, the arm that they move, the wire and the adapter: everything but the port."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
-from tauscope_sim.canopen_bus.drive import EmulatedDrive
+from tauscope_sim.canopen_bus.drive import EmulatedDrive, Frame
 from tauscope_sim.canopen_bus.driven_arm import DrivenArm
-from tauscope_sim.canopen_bus.line import Line
 from tauscope_sim.canopen_bus.power_state import PowerState
 from tauscope_sim.canopen_bus.wire import Wire
 from tauscope_sim.emulation.device_clock import MOST_STEPS, STEP_S, DeviceClock
 from tauscope_sim.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault, faults_from
+
+
+class Line(Protocol):
+    """Turns what a master sends into frames, and frames into what it reads."""
+
+    def take(self, data: bytes) -> tuple[list[Frame], bytes]:
+        """Frames for the bus, and what the adapter answers by itself."""
+        ...
+
+    def text(self, frame: Frame) -> bytes:
+        """A frame of the bus as the host reads it."""
+        ...
+
 
 _TICKS_PER_MEASUREMENT = 10
 """While nobody asks: a drive that has stopped has to see that it stands."""

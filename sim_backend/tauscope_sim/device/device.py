@@ -11,9 +11,8 @@ from tauscope.robot.robot import Robot
 from tauscope_drivers import ArmState, Capabilities, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device.activity import COMMANDED, POWERED, Activity, commanded_by, stopped_by
-from tauscope_sim.device.disturbances import Disturbances
 from tauscope_sim.device.drives import Drives, Motion
-from tauscope_sim.device.faults import FaultCode, FaultLatch, Injection, device_fault
+from tauscope_sim.device.faults import Disturbances, FaultCode, FaultLatch, Injection, device_fault
 from tauscope_sim.device.limits import checked_limits, checked_setpoint, refused
 from tauscope_sim.device.mechanism import Mechanism
 from tauscope_sim.scenario import Scenario
@@ -57,7 +56,7 @@ class SimulatedDevice:
     Parameters
     ----------
     start_position : (n,) float64 or None
-        where the arm stands; None is `tauscope_sim.device.posture.resting_posture` [rad or m]
+        where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m]
     start_ns : int
         device time at which it begins to exist [ns]
 

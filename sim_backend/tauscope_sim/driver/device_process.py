@@ -62,7 +62,7 @@ def start_device(
     Parameters
     ----------
     start_position : sequence of n float or None
-        where the arm stands; None is `tauscope_sim.device.posture.resting_posture` [rad or m]
+        where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m]
     linger_s : float
         how long the process goes on without a host [s]
     """

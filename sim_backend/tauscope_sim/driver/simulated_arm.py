@@ -1,13 +1,47 @@
 """The simulated arm in virtual time: a whole run takes as long as it takes to compute."""
 
+from collections.abc import Callable
+
 from numpy.typing import ArrayLike
 
 from tauscope.robot.robot import Robot
 from tauscope_drivers import ArmState, Capabilities, Clock, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device import SimulatedDevice
-from tauscope_sim.driver.virtual_clock import VirtualClock
 from tauscope_sim.scenario import Scenario
+
+
+class VirtualClock:
+    """The clock of a simulated device; waiting carries the device forward.
+
+    Parameters
+    ----------
+    start_ns : int
+        its first instant [ns]
+    advance : callable
+        lets the device live up to an instant [ns]
+    """
+
+    def __init__(self, start_ns: int, advance: Callable[[int], None]) -> None:
+        self._now_ns = start_ns
+        self._advance = advance
+
+    def now_ns(self) -> int:
+        """The present instant [ns]."""
+        return self._now_ns
+
+    def wait_until_ns(self, deadline_ns: int) -> int:
+        """Let the device live up to a deadline, and return there; at once where it has passed.
+
+        Parameters
+        ----------
+        deadline_ns : int
+            absolute instant [ns]
+        """
+        if deadline_ns > self._now_ns:
+            self._now_ns = deadline_ns
+            self._advance(deadline_ns)
+        return self._now_ns
 
 
 class SimulatedArm:
@@ -18,7 +52,7 @@ class SimulatedArm:
     Parameters
     ----------
     start_position : (n,) float64 or None
-        where the arm stands; None is `tauscope_sim.device.posture.resting_posture` [rad or m]
+        where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m]
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Concealed physics: every effect id of the catalogue that forward physics or sensors can have, one file an effect."""
+"""Concealed physics: every effect id of the catalogue that forward physics or sensors can have."""
 
 from collections.abc import Iterator, Mapping
 from importlib import import_module

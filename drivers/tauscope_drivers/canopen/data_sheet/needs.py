@@ -6,9 +6,7 @@ from typing import Protocol
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.data_sheet.device_file import TYPE_NAMES, DataSheetError, DescribedObject, DeviceFile
-from tauscope_drivers.canopen.drive_modes import TARGETS, select_modes
-from tauscope_drivers.canopen.objects import DriveObject
-from tauscope_drivers.canopen.optional_objects import SUBSTITUTES, WRITTEN
+from tauscope_drivers.canopen.objects import SUBSTITUTES, TARGETS, WRITTEN, DriveObject, select_modes
 from tauscope_drivers.canopen.pdo_plan import (
     MEASURED,
     MEASURED_WHERE_THERE,

@@ -1,21 +1,80 @@
-"""Torque and position channels shifted in time: the recorded torque at t is that of t - d, d in s.
-
-Any fraction of a sample is possible: between samples the torque is taken as linear. Where d is negative the position is
-late by -d instead: no sensor looks into the future. Before anything as old is known, the oldest sample stands.
-"""
+"""What sensors and drives make of the torque and the time: gains, limits, delays."""
 
 from collections import deque
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.robot.document_fields import Nonzero
+from tauscope.robot.document_fields import Nonzero, Positive
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.fields import JointNumber
+from tauscope_sim.effects.fields import JointNumber, one_of
 from tauscope_sim.effects.sensor_effect import Channel, SensorEffect
 
 Array = NDArray[np.float64]
+
+
+class TorqueGainError(SensorEffect):
+    """τ_recorded = gain τ.
+
+    joint : int
+        its number, counted from 1
+    """
+
+    effect_id: ClassVar[str] = "torque_gain_error"
+    joint: JointNumber
+    gain: Nonzero
+
+    def channel(self, joint_count: int) -> Channel:
+        """The scaling."""
+        gains = np.ones(joint_count)
+        gains[self.joint - 1] = self.gain
+        return _Gain(gains)
+
+
+class _Gain:
+    """A factor a joint."""
+
+    def __init__(self, gains: Array) -> None:
+        self._gains = gains
+
+    def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
+        """Scale the torque."""
+        return position, self._gains * torque
+
+
+class TorqueSaturation(SensorEffect):
+    """τ_recorded = c tanh(τ/c), or τ clipped to ±c.
+
+    joint : int
+        its number, counted from 1
+    level : float
+        c [Nm or N]
+    """
+
+    effect_id: ClassVar[str] = "torque_saturation"
+    joint: JointNumber
+    level: Positive
+    shape: Annotated[str, one_of("compression", "clip")] = "compression"
+
+    def channel(self, joint_count: int) -> Channel:
+        """The saturation."""
+        return _Saturation(self.joint - 1, self.level, self.shape == "clip")
+
+
+class _Saturation:
+    """A bounded torque of one joint."""
+
+    def __init__(self, joint: int, level: float, clip: bool) -> None:
+        self._joint, self._level, self._clip = joint, level, clip
+
+    def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
+        """Bound the torque."""
+        recorded, joint, level = torque.copy(), self._joint, self._level
+        ratio = torque[joint] / level
+        recorded[joint] = level * (np.clip(ratio, -1.0, 1.0) if self._clip else np.tanh(ratio))
+        return position, recorded
+
 
 LONGEST_DELAY = 1.0
 """What is late by more is no delay of a channel [s]."""

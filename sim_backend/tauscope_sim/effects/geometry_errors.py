@@ -1,8 +1,4 @@
-"""A link length or frame wrong: the real link frame j is displaced from where the robot file has it.
-
-In the moved joint frame (z along the axis; x is the axis of DH's a) the link frame, and all that follows, is shifted by
-d [m] and turned by the rotation vector r [rad]: after → (exp[r] R, p + d). The link's inertia moves with its frame.
-"""
+"""Geometry that the model has wrong: a tilted base, and joints that do not turn as their encoders say."""
 
 from dataclasses import replace
 from typing import ClassVar
@@ -11,10 +7,36 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial.transform import Rotation
 
-from tauscope.robot.document_fields import Vector
+from tauscope.robot.document_fields import Number, Vector
+from tauscope.robot.placement import rotation_about_x, rotation_about_y
 from tauscope.robot.robot import Placement, Robot
 from tauscope_sim.effects.effect import Effect
 from tauscope_sim.effects.fields import JointNumber, zero_vector
+
+
+class BaseTilt(Effect):
+    """g → R_x(α) R_y(β) g.
+
+    about_x : float
+        α [rad]
+    about_y : float
+        β [rad]
+    """
+
+    effect_id: ClassVar[str] = "base_tilt"
+    about_x: Number = 0.0
+    about_y: Number = 0.0
+
+    def check(self, robot: Robot) -> None:
+        """Refuse a base that is not tilted."""
+        super().check(robot)
+        if self.about_x == 0.0 and self.about_y == 0.0:
+            raise self.refused("about_x", "and about_y are zero; state one of them [rad]")
+
+    def alter(self, robot: Robot) -> Robot:
+        """The arm on its tilted base."""
+        turned = rotation_about_x(self.about_x) @ rotation_about_y(self.about_y) @ robot.gravity
+        return replace(robot, gravity=turned)
 
 
 class KinematicError(Effect):

@@ -1,8 +1,4 @@
-"""One-sided elastic torque past an angle, a hose, cable or end stop.
-
-τ = k (q - q_c)^p for q > q_c where it acts above, τ = -k (q_c - q)^p for q < q_c where it acts below, else 0;
-k in Nm/rad^p (N/m^p).
-"""
+"""Torques that follow a joint's position: springs, cables, a constant."""
 
 from typing import Annotated, ClassVar
 
@@ -10,6 +6,28 @@ from tauscope.robot.document_fields import Number, Positive
 from tauscope.robot.robot import Robot
 from tauscope_sim.effects.fields import Exponent, one_of
 from tauscope_sim.effects.joint_law import JointLaw, Law, Side
+
+
+class JointSpring(JointLaw):
+    """τ = k (q - q₀), between two links: the transmission carries it.
+
+    joint : int
+        its number, counted from 1
+    stiffness : float
+        k [Nm/rad or N/m]
+    rest : float
+        q₀, where the spring is slack [rad or m]
+    """
+
+    effect_id: ClassVar[str] = "joint_spring"
+    side: ClassVar[Side] = Side.LINK
+    stiffness: Number
+    rest: Number = 0.0
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+        return (lambda q, v: self.stiffness * (q - self.rest)), (lambda q, v: (self.stiffness, 0.0))
+
 
 LEAST_STRETCH = 1e-6
 """Below this the slope of a root is taken as here [rad or m]."""
@@ -48,3 +66,20 @@ class CableForce(JointLaw):
             return self.stiffness * self.exponent * max(stretch, LEAST_STRETCH) ** (self.exponent - 1.0), 0.0
 
         return torque, slopes
+
+
+class TorqueOffset(JointLaw):
+    """τ = c.
+
+    joint : int
+        its number, counted from 1
+    torque : float
+        c [Nm or N]
+    """
+
+    effect_id: ClassVar[str] = "torque_offset"
+    torque: Number
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+        return (lambda q, v: self.torque), (lambda q, v: (0.0, 0.0))

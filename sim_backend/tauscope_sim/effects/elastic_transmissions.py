@@ -1,12 +1,4 @@
-"""Lost motion at load reversal: motor and link are two masses that meet on teeth.
-
-With the twist δ = θ - q and the gap b, the teeth overlap by x = δ - sgn(δ) b/2 where |δ| > b/2, else by nothing:
-
-    T = k x max(0, 1 + c sgn(x) δ̇)
-
-k in Nm/rad (N/m). The damping c in s/rad (s/m) grows with the overlap (Hunt and Crossley), so that T neither jumps
-when the teeth meet nor pulls when they part. All friction and the drive act on the motor; the encoder sits there too.
-"""
+"""Transmissions that give way: elastic joints, and gears with play."""
 
 import math
 from typing import ClassVar
@@ -15,6 +7,63 @@ from tauscope.robot.document_fields import Positive
 from tauscope_sim.effects.effect import JointEffect
 from tauscope_sim.effects.fields import NotNegative
 from tauscope_sim.plant.term import Transmission
+
+
+class JointElasticity(JointEffect):
+    """T = K (θ - q) + D (θ̇ - q̇).
+
+    joint : int
+        its number, counted from 1
+    stiffness : float
+        K [Nm/rad or N/m]
+    damping : float
+        D [Nm s/rad or N s/m]
+    rotor_inertia : float
+        J [kg m² or kg]
+    """
+
+    effect_id: ClassVar[str] = "joint_elasticity"
+    stiffness: Positive
+    damping: NotNegative = 0.0
+    rotor_inertia: Positive
+
+    def transmission(self) -> Transmission:
+        """Itself."""
+        return self
+
+    def torque(self, twist: float, twist_rate: float) -> float:
+        """T [Nm or N].
+
+        Parameters
+        ----------
+        twist : float
+            θ - q [rad or m]
+        twist_rate : float
+            θ̇ - q̇ [rad/s or m/s]
+        """
+        return self.stiffness * twist + self.damping * twist_rate
+
+    def torque_slopes(self, twist: float, twist_rate: float) -> tuple[float, float]:
+        """K and D.
+
+        Parameters
+        ----------
+        twist : float
+            θ - q [rad or m]
+        twist_rate : float
+            θ̇ - q̇ [rad/s or m/s]
+        """
+        return self.stiffness, self.damping
+
+    def twist_at_rest(self, torque: float) -> float:
+        """Twist T / K [rad or m].
+
+        Parameters
+        ----------
+        torque : float
+            T [Nm or N]
+        """
+        return torque / self.stiffness
 
 
 class Backlash(JointEffect):
