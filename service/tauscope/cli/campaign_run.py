@@ -8,8 +8,8 @@ import typer
 from pydantic import ValidationError
 
 from tauscope.cli.diagnose_summary import show_diagnosis
-from tauscope.cli.identify_summary import show_identification
 from tauscope.cli.output_files import write_file
+from tauscope.cli.result_summary import show_identification
 from tauscope.cli.terminal import output, plain, shown_progress
 from tauscope.errors import ExportError
 from tauscope.tasks import campaign

@@ -106,7 +106,7 @@ def excite(
     corners = [parse_numbers(text, "--box", 6) for text in box or ()]
     tool_m = parse_numbers(tool, "--tool", 3)
     noise = None if noise_std is None else parse_numbers(noise_std, "--noise-std")
-    from tauscope.cli.excite_summary import show_design
+    from tauscope.cli.result_summary import show_design
     from tauscope.cli.task_run import make_request, run_task
     from tauscope.cli.terminal import output
     from tauscope.tasks import design_excitation as task

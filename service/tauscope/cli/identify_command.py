@@ -55,7 +55,7 @@ def identify(
     explains recordings that were held out.
     """
     fields = {"cutoff_hz": parse_cutoff(cutoff), **reading.fields()}
-    from tauscope.cli.identify_summary import show_identification
+    from tauscope.cli.result_summary import show_identification
     from tauscope.cli.task_run import export_outputs, make_request, name_files, run_task
     from tauscope.cli.terminal import output
     from tauscope.export.formats import EXPORT_FILES

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tauscope.cli.doctor_summary import check_drives, require_sound, show_finding
+from tauscope.cli.device_run import check_drives, require_sound, show_finding
 from tauscope.cli.terminal import output, plain, table
 from tauscope.number_text import ABSENT, counted, given
 from tauscope.report.table import Table

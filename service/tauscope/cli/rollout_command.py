@@ -44,7 +44,7 @@ def rollout(
     Without loops or commands it gets the recorded torque, and a weak stabiliser holds it.
     """
     options = reading.options()
-    from tauscope.cli.rollout_summary import show_rollout
+    from tauscope.cli.result_summary import show_rollout
     from tauscope.cli.task_run import name_files, run_task
     from tauscope.cli.terminal import output
     from tauscope.tasks import rollout as task

@@ -130,7 +130,7 @@ def run(
 
     options = make_request(RunOptions, **asdict(arguments))
     if dry_run:
-        from tauscope.cli.bus_summary import show_frames
+        from tauscope.cli.device_run import show_frames
 
         show_frames(robot, backend, trajectory, options)
         return

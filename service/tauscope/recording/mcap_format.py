@@ -21,16 +21,16 @@ from tauscope.errors import RecordingError
 from tauscope.recording.inflation import count_plausible_records, require_plausible_inflation
 from tauscope.recording.joint_state_log import JointStateLog, MessageHandler
 from tauscope.recording.joint_state_topic import Choice
-from tauscope.recording.mcap_chunk import (
+from tauscope.recording.mcap_index import (
     MESSAGE,
     RECORD,
     UNREADABLE,
     DamageError,
     MessageSink,
     find_handler,
+    read_by_index,
     unpack_chunk,
 )
-from tauscope.recording.mcap_index import read_by_index
 from tauscope.recording.recording import Recording
 from tauscope.recording.row_check import MINIMUM_ROWS
 from tauscope.recording.words import reason

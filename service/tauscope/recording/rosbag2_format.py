@@ -10,10 +10,10 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from tauscope.errors import RecordingError
+from tauscope.recording.inflation import decompress_file
 from tauscope.recording.joint_state_log import JointStateLog
 from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.mcap_format import add_mcap
-from tauscope.recording.message_compression import decompress_file
 from tauscope.recording.recording import Recording
 from tauscope.recording.words import printable, reason
 

@@ -8,8 +8,7 @@ from tauscope.diagnosis.documents.result import FindingEntry, MismatchEntry
 from tauscope.diagnosis.documents.statement import DEVIATIONS, change_text
 from tauscope.diagnosis.model.held_out_change import SHOWN
 from tauscope.number_text import ABSENT, counted, percent, significant, with_uncertainty
-from tauscope.report.quantities import state_unit, torque_unit
-from tauscope.report.words import noise_ratio
+from tauscope.report.words import noise_ratio, state_unit, torque_unit
 from tauscope.robot import JointType
 
 VERDICTS = {

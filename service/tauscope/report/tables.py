@@ -3,9 +3,8 @@
 from tauscope.identification import IdentificationDocument
 from tauscope.number_text import ABSENT, percent, significant, with_uncertainty
 from tauscope.report.provenance import Provenance
-from tauscope.report.quantities import base_parameter_unit, torque_unit
 from tauscope.report.table import Table
-from tauscope.report.words import noise_ratio
+from tauscope.report.words import base_parameter_unit, noise_ratio, torque_unit
 from tauscope.robot import Robot
 
 _COEFFICIENTS = ("stiction", "stribeck", "viscous", "offset", "k_v", "delta")

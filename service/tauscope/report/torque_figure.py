@@ -5,8 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tauscope.recording.recording import Array
-from tauscope.report.decimation import envelope_indices
-from tauscope.report.series import TorqueSeries
+from tauscope.report.series import TorqueSeries, envelope_indices
 from tauscope.report.svg import BAND, INK, MEASURED, MUTED, PREDICTED, RESIDUAL, draw_svg
 
 HEIGHT_INCHES = 3.5

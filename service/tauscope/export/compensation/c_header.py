@@ -1,8 +1,15 @@
 """The compensation model as a C99 header that needs nothing but atan() of math.h; also compiles as C++."""
 
-from tauscope.export.compensation.identifiers import c_string, identifier
 from tauscope.export.compensation.model import CompensationModel
-from tauscope.export.compensation.source_table import COEFFICIENTS, UnitFunction, heading, row, unit_functions
+from tauscope.export.compensation.source_table import (
+    COEFFICIENTS,
+    UnitFunction,
+    c_string,
+    heading,
+    identifier,
+    row,
+    unit_functions,
+)
 
 _TWO_OVER_PI = "0.6366197723675814"
 """The shortest decimal that reads back as 2/π rounded to float64."""

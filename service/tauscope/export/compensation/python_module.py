@@ -1,8 +1,14 @@
 """The compensation model as a Python module that needs nothing but `math`."""
 
-from tauscope.export.compensation.identifiers import identifier
 from tauscope.export.compensation.model import CompensationModel
-from tauscope.export.compensation.source_table import COEFFICIENTS, UnitFunction, heading, row, unit_functions
+from tauscope.export.compensation.source_table import (
+    COEFFICIENTS,
+    UnitFunction,
+    heading,
+    identifier,
+    row,
+    unit_functions,
+)
 
 
 def to_python(model: CompensationModel) -> str:

@@ -19,11 +19,34 @@ from tauscope.recording.conditioning.position_noise import (
     lowest_limit,
     position_noise,
 )
-from tauscope.recording.conditioning.summary import ConditioningSummary
 from tauscope.recording.conditioning.timing import Timing, find_stretches, row_at
 from tauscope.recording.conditioning.uniform import Mask, Stretch, read_stretch, uniform_grid
 from tauscope.recording.recording import Array, Recording, Samples
 from tauscope.robot.robot import Robot
+
+
+@dataclass(frozen=True)
+class ConditioningSummary:
+    """What was done to one recording, for the result and its reader.
+
+    missed_torques : tuple of int
+        per joint, samples without a torque (filled in for filtering, not counted in the fit)
+    position_noise_std : tuple of float
+        per joint, standard deviation of the position noise over the whole spectrum [rad or m]
+    """
+
+    recording: str
+    samples: int
+    missed_positions: int
+    dropped: int
+    missed_torques: tuple[int, ...]
+    gaps: int
+    rate_hz: float
+    resampled: bool
+    averaged_periods: int
+    position_noise_std: tuple[float, ...]
+    velocity_source: tuple[str, ...]
+
 
 WINDOW_ROWS = 1 << 15
 """Rows conditioned at once: bounds memory whatever the recording's length."""

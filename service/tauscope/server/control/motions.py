@@ -9,10 +9,10 @@ from typing import Any
 from tauscope.errors import AcquisitionError
 from tauscope.server.control.run import RunWorkspace
 from tauscope.server.queue.excitation import ExcitationWorkspace
+from tauscope.server.queue.job_folder import Workspace
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.record import JobProblem, JobRecord, JobState
 from tauscope.server.queue.task_job import TaskWorkspace
-from tauscope.server.queue.workspace import Workspace
 
 Motion = Callable[[RunWorkspace, threading.Event], bool]
 """Sees to it that a run has its trajectory; False where the event, which asks to stop, came first.

@@ -23,9 +23,8 @@ from tauscope.runtime.record import (
 from tauscope.runtime.recovery import recover_run
 from tauscope.runtime.run_process import RunProcess
 from tauscope.runtime.states import RunState
-from tauscope.server.queue.job_folder import JobFolder
+from tauscope.server.queue.job_folder import JobFolder, read_stored, write_stored
 from tauscope.server.queue.record import EndedEvent, JobProblem, without_folders
-from tauscope.server.queue.stored import read_stored, write_stored
 from tauscope.strict_model import StrictModel
 from tauscope.tasks import run
 from tauscope.tasks.run import BackendChoice, recording_file

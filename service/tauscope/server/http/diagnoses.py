@@ -10,7 +10,6 @@ from tauscope.diagnosis.extended_model import LARGEST_FILE
 from tauscope.export.model_file import ModelFile
 from tauscope.server.http.openapi import binary_part, binary_parts
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
-from tauscope.server.http.saved_models import MODEL_FILE, keep_model
 from tauscope.server.http.services import Services
 from tauscope.server.http.tasks.answers import JobAnswer, JobLinks, require_document
 from tauscope.server.http.tasks.queued import QueuedTask
@@ -21,7 +20,14 @@ from tauscope.server.http.tasks.router import (
     result_document,
     text_document,
 )
-from tauscope.server.http.tasks.submission import RECORDINGS_EXAMPLE, Names, Received, RecordingsRequest
+from tauscope.server.http.tasks.submission import (
+    MODEL_FILE,
+    RECORDINGS_EXAMPLE,
+    Names,
+    Received,
+    RecordingsRequest,
+    keep_model,
+)
 from tauscope.server.models import PageAnswer
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.analyses import DiagnosisWorkspace

@@ -20,7 +20,7 @@ from tauscope.server.http.tasks.submission import RobotRequest
 from tauscope.server.models import PageAnswer
 from tauscope.server.problems import problem_responses
 from tauscope.server.queue.excitation import ExcitationWorkspace, write_trajectory_piece
-from tauscope.server.queue.stored import read_bytes
+from tauscope.server.queue.job_folder import read_bytes
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.trajectory.csv_format import PIECE_ROWS
 

@@ -9,11 +9,10 @@ from tauscope.identification import IdentificationDocument
 from tauscope.report.identification_plots import IdentificationPlots
 from tauscope.server.http.openapi import binary_parts
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
-from tauscope.server.http.saved_models import MODEL_FILE
 from tauscope.server.http.tasks.answers import JobAnswer, JobLinks
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import JobDocument, plots_document, report_document, result_document
-from tauscope.server.http.tasks.submission import RECORDINGS_EXAMPLE, Names, RecordingsRequest
+from tauscope.server.http.tasks.submission import MODEL_FILE, RECORDINGS_EXAMPLE, Names, RecordingsRequest
 from tauscope.server.models import PageAnswer
 from tauscope.server.queue.analyses import IdentificationWorkspace
 from tauscope.server.queue.task_job import OrderedRecording

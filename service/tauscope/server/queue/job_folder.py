@@ -1,14 +1,52 @@
-"""What every folder of work has, also that of a run: the present step, the events, and the wish to stop."""
+"""The folder of a job: its state, its events, and documents that outlive the service."""
 
+import json
 import logging
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TypeVar
 
-from pydantic import JsonValue
+from pydantic import JsonValue, ValidationError
 
-from tauscope.server.queue.record import JobEvent, ProgressEvent, StepEvent
+from tauscope.files import write_atomically
+from tauscope.server.queue.record import EndedEvent, JobEvent, JobRecord, ProgressEvent, StateEvent, StepEvent
 from tauscope.server.store.event_log import EventLog
+from tauscope.strict_model import StrictModel
+
+Stored = TypeVar("Stored", bound=StrictModel)
+
+
+def read_stored(path: Path, kind: type[Stored]) -> Stored | None:
+    """A stored model, or None where the file is missing or damaged."""
+    try:
+        return kind.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError):
+        return None
+
+
+def write_stored(path: Path, model: StrictModel) -> None:
+    """Keep a model."""
+    write_atomically(path, model.model_dump_json(indent=1).encode())
+
+
+def read_document(path: Path, schema: str) -> bytes | None:
+    """A JSON document as it was written, or None where the file is missing, damaged or of another schema."""
+    try:
+        content = path.read_bytes()
+        document = json.loads(content)
+    except (OSError, ValueError, RecursionError):
+        return None
+    return content if isinstance(document, dict) and document.get("schema") == schema else None
+
+
+def read_bytes(path: Path) -> bytes | None:
+    """A file as it was written, or None where it is missing."""
+    try:
+        return path.read_bytes()
+    except OSError:
+        return None
+
 
 _log = logging.getLogger("tauscope.jobs")
 
@@ -62,3 +100,46 @@ class JobFolder:
     def is_asked_to_stop(self) -> bool:
         """Whether the work was asked to stop, or its folder is gone."""
         return self._cancel.exists() or not self.folder.exists()
+
+
+class Workspace(JobFolder):
+    """A job in the queue: its state beside its step and its events.
+
+    ``state.json`` is written by whoever leads the job only, ``progress`` by the work only, ``events.jsonl`` by both;
+    input is written by whoever hands the job in, and never again.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """Look at a job's folder; nothing is opened yet."""
+        super().__init__(folder)
+        self._record = folder / "state.json"
+
+    def read_record(self) -> JobRecord | None:
+        """The job's state, or None where the file is missing or damaged."""
+        return read_stored(self._record, JobRecord)
+
+    def has_ended(self) -> bool:
+        """Whether nothing will happen to the job any more: it has ended, its state is damaged, or it is gone."""
+        record = self.read_record()
+        return record is None or record.state.is_end
+
+    def write_record(self, record: JobRecord) -> None:
+        """Keep the job's state, and tell it."""
+        write_stored(self._record, record)
+        self._tell_state(record)
+
+    def tell_lost_end(self) -> None:
+        """Tell the end of a job that ended when its events could not be written, or before there were events."""
+        record = self.read_record()
+        if record is None or not record.state.is_end:
+            return
+        if not self.has_told_end():
+            self._tell_state(record)
+
+    def _tell_state(self, record: JobRecord) -> None:
+        """The event of a state."""
+        time = record.ended or record.started or record.created
+        if record.state.is_end:
+            self.tell(EndedEvent(time=time, state=record.state, problem=record.problem))
+        else:
+            self.tell(StateEvent(time=time, state=record.state))

@@ -18,7 +18,7 @@ from tauscope.recording import (
     read_recording,
 )
 from tauscope.recording.recording import Array
-from tauscope.report.decimation import envelope_indices
+from tauscope.report.series import envelope_indices
 from tauscope.robot import Robot
 from tauscope.server.queue.record import without_folders
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from tauscope.errors import LimitExceededError, NotFoundError, TauscopeError
 from tauscope.server.queue.cluster_executor import ClusterUnavailableError
+from tauscope.server.queue.job_folder import Workspace
 from tauscope.server.queue.record import JobProblem, JobRecord, JobState
-from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.items import ItemStore
 
 Work = Callable[[Path], JobProblem | None]

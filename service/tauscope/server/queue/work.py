@@ -5,8 +5,8 @@ from pathlib import Path
 
 from tauscope.errors import TauscopeError
 from tauscope.files import is_disk_full
+from tauscope.server.queue.job_folder import Workspace
 from tauscope.server.queue.record import JobProblem, without_folders
-from tauscope.server.queue.workspace import Workspace
 
 STORAGE_FULL = JobProblem(
     code="storage-full", detail="the service's disk was full; remove recordings or items, and hand the job in again"

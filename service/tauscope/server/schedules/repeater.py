@@ -20,8 +20,8 @@ from tauscope.server.queue.analyses import (
     IdentificationOrder,
     IdentificationWorkspace,
 )
+from tauscope.server.queue.job_folder import Workspace
 from tauscope.server.queue.task_job import OrderedRecording, ordered_on_server, staged_workspace, submit_job
-from tauscope.server.queue.workspace import Workspace
 from tauscope.server.schedules.definition import RecordingChoice, ScheduleDefinition
 from tauscope.server.schedules.repository import ScheduleEntry
 from tauscope.server.store.items import ItemStore

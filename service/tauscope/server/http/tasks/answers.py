@@ -7,8 +7,8 @@ from pydantic import Field
 
 from tauscope.server.models import AnswerModel
 from tauscope.server.problems import Problem, ProblemError, make_problem
+from tauscope.server.queue.job_folder import Workspace
 from tauscope.server.queue.record import JobProblem, JobState
-from tauscope.server.queue.workspace import Workspace
 
 
 class Links(AnswerModel):

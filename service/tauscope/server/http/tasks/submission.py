@@ -11,18 +11,62 @@ from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.server.http.documents import JSON, media_type, parse_document, read_document, refuse_media_type
+from tauscope.errors import IdentificationError
+from tauscope.server.http.documents import (
+    JSON,
+    media_type,
+    parse_document,
+    read_document,
+    refuse_media_type,
+    to_json_text,
+)
 from tauscope.server.http.form import FORM, PartRule, ReceivedForm, receive_form
 from tauscope.server.http.openapi import Examples, binary_part, form_body, json_body, model_reference
 from tauscope.server.http.robots.files import keep_inline_robot, robot_part_rules
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.server.http.settings import Settings
 from tauscope.server.problems import ProblemError
-from tauscope.server.queue.task_job import Staged
-from tauscope.server.store.files import FILE_NAME_PATTERN, FILE_NAME_RULE, is_file_name
+from tauscope.server.queue.task_job import SAVED_MODEL, Staged, TaskWorkspace
+from tauscope.server.store.files import FILE_NAME_PATTERN, FILE_NAME_RULE, KeptFile, is_file_name
 from tauscope.server.store.items import ItemStore
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.task import ROLES
+
+MODEL_FILE = "model.json"
+
+
+def keep_model(
+    model: str | dict[str, Any] | None,
+    file: KeptFile | None,
+    workspace: TaskWorkspace[Any],
+    read: Callable[[str], bytes],
+) -> str | None:
+    """Put a model into its place in a job's folder; returns its name there.
+
+    Raises ProblemError where it came twice. Raises IdentificationError where it holds what JSON cannot.
+
+    Parameters
+    ----------
+    model : str or dict or None
+        identifier or document, as the request has it
+    file : KeptFile or None
+        part of the form, which lies in its place
+    read : callable
+        the model of an identifier
+    """
+    if file is not None and model is not None:
+        raise ProblemError("invalid-request", "the model came twice, as part model and in part request; send it once")
+    if file is not None or model is None:
+        return None if file is None else file.name
+    path: Path = workspace.uploads(SAVED_MODEL) / MODEL_FILE
+    if isinstance(model, str):
+        path.write_bytes(read(model))
+        return MODEL_FILE
+    text = to_json_text(model)
+    if text is None:
+        raise IdentificationError("model: holds NaN, infinity or text that is not Unicode; write plain numbers")
+    path.write_text(text, encoding="utf-8")
+    return MODEL_FILE
 
 
 class RobotRequest(StrictModel):

@@ -1,4 +1,4 @@
-"""``tauscope key``: keys made, listed and taken back."""
+"""``tauscope key`` and ``tauscope audit``: who may use the service, and who did."""
 
 import os
 from datetime import timedelta
@@ -6,6 +6,7 @@ from pathlib import Path
 
 import typer
 
+from tauscope.errors import TauscopeError
 from tauscope.server.auth.audit_log import AuditLog
 from tauscope.server.auth.keys import ApiKey, KeyFile, utc_now
 from tauscope.server.auth.scopes import parse_scope
@@ -51,3 +52,15 @@ def revoke_key(name: str, data: Path | None) -> None:
 def _note(folder: Path, action: str, key: ApiKey) -> None:
     """Leave an entry in the audit log, in the name of whoever is logged in."""
     AuditLog(folder).append(f"user {os.getuid()}", action, subject=key.name, key=key.id, scope=key.scope.value)
+
+
+def verify_audit(data: Path | None, head: str | None, file: Path | None) -> None:
+    """Check the log, and print the hash of its last entry. Raises TauscopeError if anything is wrong with it."""
+    log = AuditLog(data or default_data_folder())
+    if file is not None:
+        log.path = file
+    found = log.verify(head)
+    if found.fault is not None:
+        hint = f"the {found.entries} entries before it are whole; compare the file with a backup"
+        raise TauscopeError(f"{log.path}: {found.fault}; {hint}")
+    typer.echo(f"{found.entries} entries, none changed, moved or missing; the last one's hash is {found.head}")
