@@ -24,10 +24,7 @@ class AnswerTime:
     def late_ns(self, taken_ns: int) -> int:
         """How much later than usual an answer came [ns].
 
-        Parameters
-        ----------
-        taken_ns : int
-            from the question to the last byte or frame of the answer [ns]
+        `taken_ns`: from the question to the last byte or frame of the answer [ns].
         """
         self._taken_ns.append(taken_ns)
         return max(0, taken_ns - self.usual_ns)
@@ -41,13 +38,7 @@ class Clock(Protocol):
         ...
 
     def wait_until_ns(self, deadline_ns: int) -> int:
-        """Return at a deadline, or at once where it has passed.
-
-        Returns
-        -------
-        int
-            the instant of the return [ns]
-        """
+        """Return at a deadline, or at once where it has passed. Returns int: the instant of the return [ns]."""
         ...
 
 

@@ -40,10 +40,7 @@ def require_known_keys(joints: Sequence[DriveJoint], bus_keys: Sequence[str], ow
 
     Raises DriverError ``refused``, which names the joint and the key.
 
-    Parameters
-    ----------
-    joints : sequence of DriveJoint
-        base first; what they say of the bus stands on the first
+    `joints`: base first; what they say of the bus stands on the first.
     """
     first = joints[0]
     known = sorted({*bus_keys, *own_keys, *_KEYS_OF_ANY_BUS})
@@ -69,10 +66,7 @@ def read_whole(joint: DriveJoint, key: str, default: int | None, *, least: int, 
 
     Raises DriverError ``refused`` where it is none, or out of range.
 
-    Parameters
-    ----------
-    default : int or None
-        where the key is missing; None where it has to be there
+    `default`: where the key is missing; None where it has to be there.
     """
     value = joint.drive.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:

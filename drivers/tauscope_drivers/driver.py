@@ -113,10 +113,7 @@ class BusDriver(Driver):
 
         Raises DriverError where the port is missing, not permitted or taken.
 
-        Parameters
-        ----------
-        bit_rates : sequence of int or None
-            to try [bit/s]; the usual ones where None
+        `bit_rates`: to try [bit/s]; the usual ones where None.
         """
 
     @abstractmethod

@@ -47,10 +47,7 @@ def require_sensible(limits: DriveLimits, position: Array, labels: Sequence[str]
 
     Raises DriverError ``refused``, which names the joint and the limit.
 
-    Parameters
-    ----------
-    position : (n,) float64
-        where the arm stands [rad or m]
+    `position`: (n,), where the arm stands [rad or m].
     """
     joint_count = len(position)
     for name in ("position_low", "position_high", "velocity", "torque"):
@@ -92,12 +89,7 @@ class RunawayWatch:
     def look(self, position: Array, velocity: Array) -> Fault | None:
         """The first joint that leaves its limits; NaN leaves none.
 
-        Parameters
-        ----------
-        position : (n,) float64
-            [rad or m]
-        velocity : (n,) float64
-            [rad/s or m/s]
+        `position`: (n,) [rad or m]; `velocity`: (n,) [rad/s or m/s].
         """
         limits = self._limits
         with np.errstate(invalid="ignore"):
@@ -122,10 +114,7 @@ class TorqueWatch:
     def __init__(self, torque: Array) -> None:
         """Begin with a sound arm.
 
-        Parameters
-        ----------
-        torque : (n,) float64
-            largest torque; infinite where the drive limits it, or where there is no limit [Nm or N]
+        `torque`: (n,), largest torque; infinite where the drive limits it, or where there is no limit [Nm or N].
         """
         self._torque = torque
         self._over = np.zeros(len(torque), dtype=np.int64)
@@ -133,10 +122,7 @@ class TorqueWatch:
     def look(self, effort: Array) -> Fault | None:
         """The first joint beyond its limit for `PERSISTENCE` cycles; NaN is none.
 
-        Parameters
-        ----------
-        effort : (n,) float64
-            measured torque [Nm or N]
+        `effort`: (n,), measured torque [Nm or N].
         """
         with np.errstate(invalid="ignore"):
             over = np.abs(effort) > TORQUE_MARGIN * self._torque

@@ -59,10 +59,7 @@ def shape_constants(
 
     Raises RobotFileError where a shape constant that is needed is None.
 
-    Parameters
-    ----------
-    friction_shape : sequence of FrictionShape
-        K_v and δ, one entry a joint [s/rad or s/m]
+    `friction_shape`: K_v and δ, one entry a joint [s/rad or s/m].
     """
     constants: list[tuple[float, float]] = []
     for number, (coefficients, shape) in enumerate(zip(friction, friction_shape, strict=True), 1):
@@ -82,25 +79,12 @@ def _needed(slope: float | None, level: float, place: str) -> float:
 def smooth_sign(velocity: float, k_v: float) -> float:
     """A(v) = (2/π) arctan(K_v v), the continuous stand-in for sgn v, equation (8).
 
-    Parameters
-    ----------
-    velocity : float
-        v [rad/s or m/s]
-    k_v : float
-        K_v [s/rad or s/m]
+    `velocity`: v [rad/s or m/s]; `k_v`: K_v [s/rad or s/m].
     """
     return math.atan(k_v * velocity) / (0.5 * math.pi)
 
 
 def smooth_sign_slope(velocity: float, k_v: float) -> float:
-    """dA/dv = (2/π) K_v / (1 + (K_v v)²) [s/rad or s/m].
-
-    Parameters
-    ----------
-    velocity : float
-        v [rad/s or m/s]
-    k_v : float
-        K_v [s/rad or s/m]
-    """
+    """dA/dv = (2/π) K_v / (1 + (K_v v)²) [s/rad or s/m]. `velocity`: v [rad/s or m/s]; `k_v`: K_v [s/rad or s/m]."""
     scaled = k_v * velocity
     return k_v / (1.0 + scaled * scaled) / (0.5 * math.pi)

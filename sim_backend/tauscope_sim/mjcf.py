@@ -53,12 +53,8 @@ def read_chain(
 
     Raises RobotFileError if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip.
 
-    Parameters
-    ----------
-    path : Path or None
-        where the file lies, for the files that it names; None for text without files beside it
-    locked : mapping of str to float
-        position of joints that do not move [rad or m]
+    `path`: where the file lies, for the files that it names; None for text without files beside it; `locked`: position
+    of joints that do not move [rad or m].
     """
     return _Reader(compile_model(data, label, path), label, locked).chain(base, tip)
 

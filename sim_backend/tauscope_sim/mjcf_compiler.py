@@ -18,10 +18,7 @@ def compile_model(data: bytes, label: str, path: Path | None) -> mujoco.MjModel:
 
     Raises RobotFileError if MuJoCo refuses the file.
 
-    Parameters
-    ----------
-    path : Path or None
-        where the file lies, for the files that it names; None for text without files beside it
+    `path`: where the file lies, for the files that it names; None for text without files beside it.
     """
     try:
         with warnings.catch_warnings(action="ignore"):  # attributes that MuJoCo will remove one day

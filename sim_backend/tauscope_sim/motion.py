@@ -49,13 +49,7 @@ class FourierMotion:
     sine: Array
 
     def evaluate(self, time: Array) -> MotionSamples:
-        """Exact position, velocity and acceleration.
-
-        Parameters
-        ----------
-        time : (N,) float64
-            instants since the start of a period [s]
-        """
+        """Exact position, velocity and acceleration. `time`: (N,), instants since the start of a period [s]."""
         omega = 2.0 * np.pi / self.period_s * np.arange(1, self.cosine.shape[1] + 1)
         phase = np.multiply.outer(time, omega)
         cosine, sine = np.cos(phase), np.sin(phase)
@@ -80,10 +74,7 @@ def random_fourier_motion(
     hold at every instant, not only at samples. A limit that is not stated does not bind. Raises RobotFileError where a
     joint states no limit. Raises RecordingError where `period_s`, `harmonics` or `limit_fraction` is out of its range.
 
-    Parameters
-    ----------
-    period_s : float
-        duration of one period [s]
+    `period_s`: duration of one period [s].
     """
     if not (np.isfinite(period_s) and period_s > 0.0):
         raise RecordingError(f"period_s is {period_s}; give a positive duration")

@@ -46,10 +46,7 @@ class Scenario:
         Raises RobotFileError where the robot file lacks what the simulation needs. Raises ScenarioError where effects
         contradict one another or the robot.
 
-        Parameters
-        ----------
-        step_s : float
-            longest step of the integration [s]
+        `step_s`: longest step of the integration [s].
         """
         for effect in self.effects:
             effect.check(robot)

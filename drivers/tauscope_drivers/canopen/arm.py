@@ -125,10 +125,8 @@ class CanopenArm:
     ) -> ArmState:
         """Configure and commission every drive, arm its heartbeat consumer, take all to *operation enabled* together.
 
-        Parameters
-        ----------
-        cycle_s : float or None
-            time between two SYNCs, over which the drives interpolate; they keep the one that they know where None [s]
+        `cycle_s`: time between two SYNCs, over which the drives interpolate; they keep the one that they know where
+        None [s].
         """
         session = self._reached()
         if self._mode is not None:

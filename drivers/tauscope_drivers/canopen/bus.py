@@ -95,10 +95,7 @@ class CanBus:
 
         Raises DriverError ``lost`` where the bus does not take them.
 
-        Parameters
-        ----------
-        frames : iterable of (int, bytes)
-            identifier and payload of each, in their order
+        `frames`: iterable of (int, bytes), identifier and payload of each, in their order.
         """
         gathering = self._bus.gathering() if isinstance(self._bus, SerialAdapterBus) else nullcontext()
         try:
@@ -113,10 +110,7 @@ class CanBus:
 
         Raises DriverError ``lost`` where the bus is gone.
 
-        Returns
-        -------
-        bool
-            False where none came
+        Returns bool: False where none came.
         """
         self.beat()
         wait_s = max(0.0, (deadline_ns - time.monotonic_ns()) * 1e-9)
@@ -145,10 +139,7 @@ class CanBus:
     def start_heartbeat(self, period_s: float) -> None:
         """Be alive to the drives from now on, as long as `receive` or `beat` is called.
 
-        Parameters
-        ----------
-        period_s : float
-            time between heartbeats; 0 ends them [s]
+        `period_s`: time between heartbeats; 0 ends them [s].
         """
         self._heartbeat_period_ns = round(period_s * 1e9)
         self._next_heartbeat_ns = self._clock.now_ns()

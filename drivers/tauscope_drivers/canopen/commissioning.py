@@ -104,10 +104,7 @@ def commission_drive(
 
     Raises DriverError ``refused`` where the drive does not take a value.
 
-    Parameters
-    ----------
-    cycle_s : float or None
-        time between two SYNCs; the drive keeps the one that it knows where None [s]
+    `cycle_s`: time between two SYNCs; the drive keeps the one that it knows where None [s].
     """
     write = node.dictionary.write
     holds = stop_policy is StopPolicy.HOLD

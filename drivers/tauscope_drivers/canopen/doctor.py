@@ -179,10 +179,7 @@ def scan_bus(interface: str, channel: str, bit_rates: Sequence[int] | None = Non
     this disturbs a bus that is in use: name the rate where anything moves. Raises DriverError ``cannot-connect`` where
     the bus is missing, not permitted or taken.
 
-    Parameters
-    ----------
-    bit_rates : sequence of int or None
-        to try [bit/s]; the usual ones where None, one where the interface has a fixed one
+    `bit_rates`: to try [bit/s]; the usual ones where None, one where the interface has a fixed one.
     """
     if bit_rates is None:
         bit_rates = USUAL_BIT_RATES[:1] if interface in _FIXED_RATE else USUAL_BIT_RATES

@@ -86,10 +86,7 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
     which are sent as time passes, are shown once. Raises DriverError: ``refused``: a ``drive`` block or a limit is not
     possible.
 
-    Parameters
-    ----------
-    joints : sequence of DriveJoint
-        base first; each ``drive`` block has to state ``rated_torque_nm``
+    `joints`: base first; each ``drive`` block has to state ``rated_torque_nm``.
     """
     mode, limits, targets, cycle_s = request.mode, request.limits, request.targets, request.cycle_s
     configuration = read_configuration(joints)

@@ -31,12 +31,8 @@ class GlitchFilter:
     def believes_place(self, position: float, time_ns: int) -> bool:
         """Whether a position may be true.
 
-        Parameters
-        ----------
-        position : float
-            NaN where there is none, which is no lie [rad or m]
-        time_ns : int
-            instant of the reading, never before that of the last [ns]
+        `position`: NaN where there is none, which is no lie [rad or m]; `time_ns`: instant of the reading, never before
+        that of the last [ns].
         """
         if math.isnan(position):
             return True
@@ -46,13 +42,7 @@ class GlitchFilter:
         return not self._doubts_place
 
     def believes_speed(self, velocity: float) -> bool:
-        """Whether a velocity may be true.
-
-        Parameters
-        ----------
-        velocity : float
-            NaN where there is none, which is no lie [rad/s or m/s]
-        """
+        """Whether a velocity may be true. `velocity`: NaN where there is none, which is no lie [rad/s or m/s]."""
         self._doubts_speed = not self._doubts_speed and abs(velocity) > FASTEST * self.limit
         return not self._doubts_speed
 

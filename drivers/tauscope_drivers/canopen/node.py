@@ -103,13 +103,7 @@ class DriveNode:
 
     @staticmethod
     def on_bus(bus: CanBus, configuration: NodeConfiguration, joint: int) -> "DriveNode":
-        """A drive whose frames are listened to from now on.
-
-        Parameters
-        ----------
-        joint : int
-            number of its joint, from 1
-        """
+        """A drive whose frames are listened to from now on. `joint`: number of its joint, from 1."""
         node_id = configuration.node_id
         node = DriveNode(configuration, joint, bus.add_node(node_id), listen=bus.subscribe)
         node.use_plan(node.plan_for(ControlMode.POSITION))
@@ -197,12 +191,7 @@ class DriveNode:
 
         Raises DriverError ``refused`` where the target is beyond what the drive can be told.
 
-        Parameters
-        ----------
-        position : float
-            of the joint, finite [rad or m]
-        torque : float
-            of the joint, finite [Nm or N]
+        `position`: of the joint, finite [rad or m]; `torque`: of the joint, finite [Nm or N].
         """
         target = TARGETS[mode][self.mode_numbers[mode]]
         quantity = self.units.counts(position) if mode is ControlMode.POSITION else self.units.permille(torque)

@@ -87,10 +87,7 @@ TARGETS: Mapping[ControlMode, Mapping[int, DriveObject]] = {
 def select_modes(supported: int) -> dict[ControlMode, int]:
     """Mode of operation for each control mode that a drive has.
 
-    Parameters
-    ----------
-    supported : int
-        0x6502, in which bit n - 1 stands for mode n
+    `supported`: 0x6502, in which bit n - 1 stands for mode n.
     """
     found = {
         mode: next((number for number in targets if supported >> (number - 1) & 1), None)

@@ -74,12 +74,7 @@ class PdoSlots:
 def plan_pdos(slots: PdoSlots, target: DriveObject, optional: Iterable[DriveObject]) -> PdoPlan:
     """PDOs for a target and for all measurements.
 
-    Parameters
-    ----------
-    target : DriveObject
-        what the mode is commanded by
-    optional : iterable of DriveObject
-        measurements that the drive has beside the needed ones
+    `target`: what the mode is commanded by; `optional`: measurements that the drive has beside the needed ones.
     """
     received, not_received = _assign(slots.received, (objects.CONTROLWORD, target), ())
     sent, not_sent = _assign(slots.sent, MEASURED, tuple(optional))

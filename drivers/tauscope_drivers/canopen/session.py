@@ -30,14 +30,7 @@ class HostBrake:
     def __init__(self, position: Array, velocity: Array, begin_ns: int) -> None:
         """Begin at the present motion.
 
-        Parameters
-        ----------
-        position : (n,) float64
-            [rad or m]
-        velocity : (n,) float64
-            [rad/s or m/s]
-        begin_ns : int
-            present instant [ns]
+        `position`: (n,) [rad or m]; `velocity`: (n,) [rad/s or m/s]; `begin_ns`: present instant [ns].
         """
         self._position, self._velocity, self._begin_ns = position, velocity, begin_ns
 
@@ -122,10 +115,7 @@ class Session:
     def learn_cycle(self, cycle_s: float | None) -> None:
         """Settle in the control loop's own cycle from now on.
 
-        Parameters
-        ----------
-        cycle_s : float or None
-            of the loop; `SETTLING_CYCLE_S` where it is not known [s]
+        `cycle_s`: of the loop; `SETTLING_CYCLE_S` where it is not known [s].
         """
         self.settling_ns = round((SETTLING_CYCLE_S if cycle_s is None else cycle_s) * 1e9)
 
@@ -201,11 +191,5 @@ class Session:
 
 
 def stay_at(place: Array) -> Setpoint:
-    """Targets that neither move a joint nor push it.
-
-    Parameters
-    ----------
-    place : (n,) float64
-        where the joints are [rad or m]
-    """
+    """Targets that neither move a joint nor push it. `place`: (n,), where the joints are [rad or m]."""
     return Setpoint(place, np.zeros(len(place)))

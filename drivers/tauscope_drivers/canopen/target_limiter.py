@@ -60,13 +60,7 @@ class TargetLimiter:
     """
 
     def __init__(self, limits: DriveLimits, position: Array, cycle_s: float) -> None:
-        """Begin where the arm stands, at rest.
-
-        Parameters
-        ----------
-        position : (n,) float64
-            where the arm stands [rad or m]
-        """
+        """Begin where the arm stands, at rest. `position`: (n,), where the arm stands [rad or m]."""
         self._limits = limits
         rest, not_behind = np.zeros_like(position), np.zeros(len(position), dtype=np.bool_)
         self._before = self._reached = _Reached(position.copy(), rest, position.copy(), position.copy(), not_behind)

@@ -38,14 +38,8 @@ def read_rated_torque(
 
     Raises ValueError where neither unit fits, or it reads 0.
 
-    Parameters
-    ----------
-    value : int
-        as the drive states it [mNm or µNm]
-    torque_limit : float or None
-        of the joint; None where the robot file states none [Nm or N]
-    rated_current_ma : int or None
-        None where the drive states none [mA]
+    `value`: as the drive states it [mNm or µNm]; `torque_limit`: of the joint; None where the robot file states none
+    [Nm or N]; `rated_current_ma`: None where the drive states none [mA].
     """
     milli, micro = value * _MILLI, value * _MICRO
     if value <= 0:
@@ -90,13 +84,7 @@ class DriveUnits:
         return (counts - self.zero_count) * self.radians_per_count
 
     def counts(self, position: float) -> int:
-        """Nearest count of a joint position.
-
-        Parameters
-        ----------
-        position : float
-            finite [rad or m]
-        """
+        """Nearest count of a joint position. `position`: finite [rad or m]."""
         return round(position / self.radians_per_count) + self.zero_count
 
     def velocity(self, counts_per_second: int) -> float:
@@ -108,35 +96,20 @@ class DriveUnits:
         return permille * self.torque_per_permille
 
     def permille(self, torque: float) -> int:
-        """Nearest per mille of a joint torque.
-
-        Parameters
-        ----------
-        torque : float
-            finite [Nm or N]
-        """
+        """Nearest per mille of a joint torque. `torque`: finite [Nm or N]."""
         return round(torque / self.torque_per_permille)
 
     def torque_cap(self, torque: float) -> int:
         """Largest whole per mille within a torque limit (0x6072).
 
-        Parameters
-        ----------
-        torque : float
-            limit of the joint, infinite where there is none [Nm or N]
+        `torque`: limit of the joint, infinite where there is none [Nm or N].
         """
         most = abs(torque / self.torque_per_permille)
         return 0xFFFF if most >= 0xFFFF else math.floor(most)
 
 
 def drive_units(configuration: NodeConfiguration, rated_torque_nm: float) -> DriveUnits:
-    """The units of a drive and its gear.
-
-    Parameters
-    ----------
-    rated_torque_nm : float
-        at the motor shaft [Nm]
-    """
+    """The units of a drive and its gear. `rated_torque_nm`: at the motor shaft [Nm]."""
     turns = configuration.counts_per_turn * configuration.gear_ratio * configuration.direction
     permille = configuration.direction * rated_torque_nm * abs(configuration.gear_ratio) / 1000.0
     return DriveUnits(2.0 * math.pi / turns, configuration.zero_count, permille)

@@ -41,10 +41,7 @@ Array = NDArray[np.float64]
 def observe(session: Session, temperature: Array | None = None, *failures: Fault) -> ArmState:
     """State without moving anything, with the errors of servos that set their alert bit.
 
-    Parameters
-    ----------
-    temperature : (n,) float64 or None
-        where it was just read [°C]
+    `temperature`: (n,), where it was just read [°C].
     """
     reading = session.group.read_patiently()
     for joint, alert in enumerate(reading.alerts):
@@ -60,13 +57,7 @@ def observe(session: Session, temperature: Array | None = None, *failures: Fault
 
 
 def arm_state(session: Session, reading: GroupReading, temperature: Array) -> ArmState:
-    """State of a cycle.
-
-    Parameters
-    ----------
-    temperature : (n,) float64
-        where it was read in this cycle, else NaN [°C]
-    """
+    """State of a cycle. `temperature`: (n,), where it was read in this cycle, else NaN [°C]."""
     for joint, alert in enumerate(reading.alerts):
         if alert is not None:
             session.health.take_alert(joint, alert)
@@ -119,10 +110,7 @@ class DynamixelArm:
 
         Raises DriverError: ``refused``: a ``drive`` block is not valid.
 
-        Parameters
-        ----------
-        keeps_settings : bool
-            whether changes of EEPROM stay after the arm is let go
+        `keeps_settings`: whether changes of EEPROM stay after the arm is let go.
         """
         self._configuration = read_configuration(joints)
         self._clock = MonotonicClock() if clock is None else clock

@@ -46,10 +46,7 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
     series servo, a status packet is never lost, and every servo knows Fast Sync Read. Raises DriverError: ``refused``:
     a ``drive`` block, a limit or the watchdog's time is not possible.
 
-    Parameters
-    ----------
-    joints : sequence of DriveJoint
-        base first; each ``drive`` block has to name its model
+    `joints`: base first; each ``drive`` block has to name its model.
     """
     mode, limits, targets, cycle_s = request.mode, request.limits, request.targets, request.cycle_s
     configuration = read_configuration(joints)

@@ -82,12 +82,7 @@ class ServoGroup:
     def write_goals(self, goals: Sequence[int], speeds: Sequence[int]) -> None:
         """Write Goal Position of all servos, with Profile Velocity where that is its neighbour.
 
-        Parameters
-        ----------
-        goals : sequence of int
-            one a joint [counts]
-        speeds : sequence of int
-            one a joint [units]
+        `goals`: one a joint [counts]; `speeds`: one a joint [units].
         """
         for items, values in paced_goals(self.servos, goals, speeds):
             self._bus.sync_write(items, values)
@@ -197,12 +192,7 @@ def paced_goals(
 ) -> Iterator[tuple[list[Item], dict[int, list[int]]]]:
     """Items and values of the Sync Writes of a cycle's goals, one a family.
 
-    Parameters
-    ----------
-    goals : sequence of int
-        one a joint [counts]
-    speeds : sequence of int
-        one a joint [units]
+    `goals`: one a joint [counts]; `speeds`: one a joint [units].
     """
     for _, members in servo_families(servos):
         model = servos[members[0]].model

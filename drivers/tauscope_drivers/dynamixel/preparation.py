@@ -134,10 +134,7 @@ def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -
 
     Raises DriverError ``refused`` where the limit cannot be turned into current, or leaves none.
 
-    Parameters
-    ----------
-    torque : float
-        limit of the joint, infinite where there is none [Nm or N]
+    `torque`: limit of the joint, infinite where there is none [Nm or N].
     """
     cap = settings["Current Limit"]
     if servo.current_limit_ma is not None:
@@ -161,10 +158,7 @@ def velocity_cap(servo: JointServo, settings: Mapping[str, int], velocity: float
 
     Raises DriverError ``refused`` where the servo's own limit leaves no motion.
 
-    Parameters
-    ----------
-    velocity : float
-        limit of the joint, infinite where there is none [rad/s or m/s]
+    `velocity`: limit of the joint, infinite where there is none [rad/s or m/s].
     """
     cap, own = servo.units.velocity_cap(velocity), settings.get("Velocity Limit")
     if own is None:
@@ -181,10 +175,7 @@ def position_counts(
 ) -> tuple[int, int]:
     """Lowest and highest Goal Position within the joint's limits, and the servo's own where it applies them.
 
-    Parameters
-    ----------
-    low, high : float
-        limits of the joint, infinite where there are none [rad or m]
+    `low`, `high`: limits of the joint, infinite where there are none [rad or m].
     """
     lowest, highest = servo.units.counts_within(low, high)
     if mode is ControlMode.POSITION and servo.model.family.position_mode not in _MULTI_TURN_MODES:

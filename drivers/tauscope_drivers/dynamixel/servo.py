@@ -36,10 +36,7 @@ def make_servo(number: int, configuration: ServoConfiguration, identity: tuple[i
     Raises DriverError ``cannot-connect`` where not the model that the robot file names, one that senses no current or
     has no watchdog.
 
-    Parameters
-    ----------
-    number : int
-        of the joint, from 1
+    `number`: of the joint, from 1.
     """
     place = f"joint {configuration.joint} (servo {configuration.servo})"
     if identity is not None:

@@ -36,23 +36,11 @@ class Session:
     originals: tuple[OriginalSettings, ...] = ()
 
     def read(self, joint: int, names: Iterable[str]) -> dict[str, int]:
-        """Items of one servo.
-
-        Parameters
-        ----------
-        joint : int
-            index of the joint, from 0
-        """
+        """Items of one servo. `joint`: index of the joint, from 0."""
         return read_items(self.bus, self.servos[joint], names)
 
     def write(self, joint: int, name: str, value: int) -> None:
-        """Write an item of one servo and read it back.
-
-        Parameters
-        ----------
-        joint : int
-            index of the joint, from 0
-        """
+        """Write an item of one servo and read it back. `joint`: index of the joint, from 0."""
         servo = self.servos[joint]
         before = self.settings[joint].get(name)
         if self.originals and name in CHANGED and before not in (None, value):
@@ -90,13 +78,7 @@ class Session:
         )
 
     def carry_out(self, joint: int, writes: Iterable[RegisterWrite]) -> None:
-        """Write what a plan says, one after the other, each read back.
-
-        Parameters
-        ----------
-        joint : int
-            index of the joint, from 0
-        """
+        """Write what a plan says, one after the other, each read back. `joint`: index of the joint, from 0."""
         for write in writes:
             self.write(joint, write.item.name, write.value)
 

@@ -24,10 +24,7 @@ def stop_servos(
     that the change takes. These servos cannot damp: for `StopPolicy.DAMP` they hold, which gives way less. Raises
     DriverError where a servo could not be reached; the others are stopped.
 
-    Parameters
-    ----------
-    caps : sequence of int
-        most current with which each servo may hold [units]
+    `caps`: most current with which each servo may hold [units].
     """
     everybody = range(len(session.servos))
     session.health.expect_torque(False)

@@ -36,22 +36,13 @@ class ServoUnits:
         return (counts - self.zero_count) * self.radians_per_count
 
     def counts(self, position: float) -> int:
-        """Nearest count of a joint position.
-
-        Parameters
-        ----------
-        position : float
-            finite [rad or m]
-        """
+        """Nearest count of a joint position. `position`: finite [rad or m]."""
         return round(position / self.radians_per_count) + self.zero_count
 
     def counts_within(self, low: float, high: float) -> tuple[int, int]:
         """Lowest and highest whole count between two joint positions.
 
-        Parameters
-        ----------
-        low, high : float
-            infinite where there is no limit [rad or m]
+        `low`, `high`: infinite where there is no limit [rad or m].
         """
         ends = sorted((low / self.radians_per_count, high / self.radians_per_count))
         lowest = -MULTI_TURN_COUNTS if ends[0] == -math.inf else math.ceil(ends[0] - _ROUNDING) + self.zero_count
@@ -65,10 +56,7 @@ class ServoUnits:
     def velocity_cap(self, velocity: float) -> int:
         """Profile Velocity for a largest speed; 0, which means none, where there is none.
 
-        Parameters
-        ----------
-        velocity : float
-            positive, may be infinite [rad/s or m/s]
+        `velocity`: positive, may be infinite [rad/s or m/s].
         """
         most = velocity / abs(self.velocity_unit)
         return 0 if most > _LARGEST_PROFILE else max(1, math.floor(most))
@@ -78,22 +66,13 @@ class ServoUnits:
         return units * self.milliampere
 
     def current_units(self, torque: float) -> int:
-        """Nearest Goal Current for a joint torque.
-
-        Parameters
-        ----------
-        torque : float
-            finite [Nm or N]
-        """
+        """Nearest Goal Current for a joint torque. `torque`: finite [Nm or N]."""
         return round(torque / self._torque_per_unit())
 
     def current_cap(self, torque: float) -> int:
         """Largest whole Goal Current within a torque limit; 0x7FFF where there is no limit.
 
-        Parameters
-        ----------
-        torque : float
-            positive, may be infinite [Nm or N]
+        `torque`: positive, may be infinite [Nm or N].
         """
         if torque == math.inf:
             return 0x7FFF

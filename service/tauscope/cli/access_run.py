@@ -18,10 +18,7 @@ def add_key(name: str, scope: str, days: int, data: Path | None) -> None:
 
     Raises TauscopeError if the name is in use, or the file cannot be worked with.
 
-    Parameters
-    ----------
-    days : int
-        how long it holds, for good where 0 [days]
+    `days`: how long it holds, for good where 0 [days].
     """
     folder = data or default_data_folder()
     folder.mkdir(parents=True, exist_ok=True)

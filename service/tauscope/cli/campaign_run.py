@@ -22,10 +22,7 @@ def run_campaign(robot: Path, steps: Mapping[str, str], out: Path) -> None:
     Raises typer.BadParameter where an option is not valid. Raises TauscopeError where a step has no result, or the
     folder exists.
 
-    Parameters
-    ----------
-    steps : mapping of str to str
-        JSON by field of the request
+    `steps`: JSON by field of the request.
     """
     request = _request(robot, steps)
     try:

@@ -65,10 +65,7 @@ def leave_page(folder: Path, seconds: float = LEFT_FOR_S) -> LeftPage:
 
     Raises StoreError if that process ends instead, with what it said.
 
-    Parameters
-    ----------
-    seconds : float
-        after which it ends [s]
+    `seconds`: after which it ends [s].
     """
     process = subprocess.Popen(  # noqa: S603 - this program
         [sys.executable, "-m", __name__, str(folder.resolve()), str(seconds)],

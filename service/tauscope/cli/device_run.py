@@ -131,10 +131,7 @@ def show_devices(backend: str, port: str, bit_rates: Sequence[int] | None) -> No
 
     Raises AcquisitionError where nobody answers, or the port is missing, not permitted or taken.
 
-    Parameters
-    ----------
-    bit_rates : sequence of int or None
-        to try [bit/s]; the usual ones where None
+    `bit_rates`: to try [bit/s]; the usual ones where None.
     """
     found: list[FoundDevice] = []
     with shown_progress() as told, translate_driver_errors():

@@ -33,10 +33,7 @@ def run_job(name: str, data: Path | None, database: str | None, timeout_s: float
     Raises NotFoundError if there is no such schedule. Raises StoreError if nothing was started, it did not succeed, or
     its end did not come in time.
 
-    Parameters
-    ----------
-    timeout_s : float
-        how long its end is waited for [s]
+    `timeout_s`: how long its end is waited for [s].
     """
     folder = data or default_data_folder()
     if not folder.is_dir():

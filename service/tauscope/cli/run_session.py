@@ -52,10 +52,7 @@ def keep_recording(result: run.Result, out: Path) -> bool:
 
     Raises ExportError if there is such a file by now, or it cannot be written.
 
-    Returns
-    -------
-    bool
-        False where nothing was recorded
+    Returns bool: False where nothing was recorded.
     """
     recording = result.recording(out.suffix.lower().removeprefix("."))
     if recording is not None:

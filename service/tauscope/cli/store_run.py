@@ -109,10 +109,7 @@ def prune_store(
 
     Raises StoreError if the database cannot be used, or something cannot be removed.
 
-    Parameters
-    ----------
-    days : float
-        age [days]
+    `days`: age [days].
     """
     rule = RetentionRule(timedelta(days=days), frozenset(kinds or FOLDERS), recordings)
     with open_store(data, database) as store:

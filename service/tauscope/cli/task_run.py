@@ -39,12 +39,8 @@ def run_task(
     Raises typer.BadParameter where files are given twice, or an output would destroy an input. Raises TauscopeError
     where the data or the robot cannot answer.
 
-    Parameters
-    ----------
-    asked : sequence of (Path or None, str)
-        files to write, each with the name of its output
-    show : callable or None
-        shows the result on the terminal
+    `asked`: sequence of (Path, str), files to write, each with the name of its output; `show`: shows the result on the
+    terminal.
     """
     outputs = [(path, name) for path, name in asked if path is not None]
     paths, robot_file = tuple(path for path, _ in outputs), Path(request.robot)

@@ -49,12 +49,8 @@ def actuator_elements(
 
     Raises ExportError if the number of gains is not one, nor that of the joints.
 
-    Parameters
-    ----------
-    names : sequence of str
-        names of the joints as quoted attribute values
-    rotors : sequence of float
-        reflected rotor inertias, one a joint [kg m² or kg]
+    `names`: names of the joints as quoted attribute values; `rotors`: reflected rotor inertias, one a joint [kg m² or
+    kg].
     """
     if choice.kind is ActuatorKind.MOTOR:
         return [_motor(joint, name) for joint, name in zip(robot.joints, names, strict=True)], []
@@ -76,10 +72,7 @@ def joint_gains(
 
     Raises ExportError if the number of gains is not one, nor that of the joints.
 
-    Parameters
-    ----------
-    rotors : sequence of float
-        reflected rotor inertias, one a joint [kg m² or kg]
+    `rotors`: reflected rotor inertias, one a joint [kg m² or kg].
     """
     count, notes = robot.joint_count, []
     for option, values in (("kp", choice.kp), ("kv", choice.kv)):

@@ -75,10 +75,7 @@ def make_export(export_format: ExportFormat, model: ExportModel, choice: Actuato
     Controllers get the delivered friction; simulators the physically consistent links with the friction that fits them.
     Raises ExportError if the format cannot hold this model.
 
-    Parameters
-    ----------
-    choice : ActuatorChoice or None
-        actuators of an MJCF; None writes torque motors
+    `choice`: actuators of an MJCF; None writes torque motors.
     """
     match export_format:
         case ExportFormat.JSON:

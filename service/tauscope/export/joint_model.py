@@ -57,14 +57,7 @@ def joint_models(
 ) -> dict[str, JointModel]:
     """The whole robot's model by the labels of its segments, as the exports take it.
 
-    Parameters
-    ----------
-    links : sequence of LinkInertia
-        one a segment
-    friction : sequence of JointFriction
-        one a joint
-    rotor_inertia : sequence of float or None, length n, optional
-        identified rotor inertias [kg m² or kg]
+    `links`: one a segment; `friction`: one a joint; `rotor_inertia`: identified rotor inertias [kg m² or kg].
     """
     rotors = [None] * robot.joint_count if rotor_inertia is None else rotor_inertia
     own = {link: joint for joint, link in enumerate(robot.own_links)}
@@ -97,10 +90,7 @@ def dry_friction_and_damping(joint: str, friction: JointFriction) -> tuple[float
 
     Raises ExportError if a coefficient is not finite.
 
-    Returns
-    -------
-    tuple of two float
-        dry friction [Nm or N], damping [Nm s/rad or N s/m]
+    Returns tuple of two float: dry friction [Nm or N], damping [Nm s/rad or N s/m].
     """
     check_friction(joint, friction)
     return max(0.0, friction.stiction + friction.stribeck), max(0.0, friction.viscous)

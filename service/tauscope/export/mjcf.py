@@ -90,10 +90,7 @@ def to_mjcf(model: ExportModel, choice: ActuatorChoice = MOTORS) -> MjcfModel:
 def passive_elements(joint: int, extras: JointExtras, names: list[str]) -> list[str]:
     """Passive torques of a joint, which have no control input and whose motor is switched off.
 
-    Parameters
-    ----------
-    names : list of str
-        of the joints, as quoted attribute values
+    `names`: of the joints, as quoted attribute values.
     """
     return [
         f'<dcmotor joint={names[joint]} resistance="1.0" motorconst="0.0 0.0" input="none" {each}/>'
@@ -114,13 +111,7 @@ def _followers(robot: Robot, names: list[str]) -> list[str]:
 
 
 def tendon_elements(added: Additions, names: list[str]) -> list[str]:
-    """Friction on the sum or difference of two joints' motion.
-
-    Parameters
-    ----------
-    names : list of str
-        of the joints, as quoted attribute values
-    """
+    """Friction on the sum or difference of two joints' motion. `names`: of the joints, as quoted attribute values."""
     lines: list[str] = []
     for dry, damping, factors in added.tendons:
         lines.append(f'<fixed damping="{numbers(damping)}" frictionloss="{numbers(dry)}">')

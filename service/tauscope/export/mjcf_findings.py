@@ -69,10 +69,7 @@ def numbers(*values: float | np.float64) -> str:
 def add_findings(model: ExportModel, *, without: Collection[str] = ()) -> Additions:
     """Everything that MuJoCo can hold of a model's findings, and a note on each of the others.
 
-    Parameters
-    ----------
-    without : collection of str
-        ids of effects that are left out, since they change more than joints and bodies
+    `without`: ids of effects that are left out, since they change more than joints and bodies.
     """
     extras = [JointExtras() for _ in model.robot.joints]
     added = Additions(model.robot, list(model.links), model.friction, extras)
@@ -193,13 +190,7 @@ WRITERS: Mapping[str, Callable[[Additions, FoundEffect], str | None]] = {
 
 
 def effects_in(model: ExportModel, included: Sequence[str], why: str) -> list[str]:
-    """Notes on the findings that a format does not hold.
-
-    Parameters
-    ----------
-    included : sequence of str
-        ids of the effects that it holds
-    """
+    """Notes on the findings that a format does not hold. `included`: ids of the effects that it holds."""
     names = [joint.name for joint in model.robot.joints]
     left = [found for found in model.effects if found.effect.id not in (*included, *IN_THE_MODEL)]
     return [f"{found.effect.name(names)} is not included: {why}. {_values(found)}" for found in left]

@@ -42,10 +42,7 @@ def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel], remarks: 
     their mass is taken off the link that carries them. Raises ExportError if the file is not a URDF, a joint is not in
     it or does not move, or a link cannot exist.
 
-    Parameters
-    ----------
-    remarks : sequence of str
-        further lines of the comment
+    `remarks`: further lines of the comment.
     """
     data, label = _read(source)
     text = XmlText(data, label)

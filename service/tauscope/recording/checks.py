@@ -69,10 +69,7 @@ def check_recording(
 
     Raises RecordingError where the file cannot be read or breaks a rule.
 
-    Parameters
-    ----------
-    joint_count : int or None
-        joints that the recording must have; None where any number is welcome
+    `joint_count`: joints that the recording must have; None where any number is welcome.
     """
     reading = reading.for_robot(robot)
     joints = None if robot is None else [joint.name for joint in robot.joints]

@@ -146,10 +146,7 @@ def find_columns(header: Sequence[str], file: str, *, counts_rows: bool = False)
 
     Raises RecordingError where a required column is missing, a name appears twice, a joint's number leaves a gap.
 
-    Parameters
-    ----------
-    counts_rows : bool
-        whether t is the number of the row, and the header's first name is no column of the file
+    `counts_rows`: whether t is the number of the row, and the header's first name is no column of the file.
     """
     where = _positions(header, file)
     if "t" not in where:
@@ -181,10 +178,7 @@ def require_joint_count(found: int, expected: int | None, file: str) -> None:
 
     Raises RecordingMismatchError where the numbers differ.
 
-    Parameters
-    ----------
-    expected : int or None
-        joints of the robot; None where any number is welcome
+    `expected`: joints of the robot; None where any number is welcome.
     """
     if expected is None or found == expected:
         return

@@ -22,12 +22,7 @@ _FREE = ("temp", "period")
 def read_units_row(names: Sequence[str], cells: Sequence[str]) -> dict[str, str] | None:
     """Units as a robot file states them, None where a cell holds no unit of its column.
 
-    Parameters
-    ----------
-    names : sequence of str
-        columns of CONTRACT.md
-    cells : sequence of str
-        cells of the row, one for each of them
+    `names`: columns of CONTRACT.md; `cells`: cells of the row, one for each of them.
     """
     units: dict[str, str] = {}
     for name, cell in zip(names, cells, strict=True):
@@ -140,10 +135,7 @@ def _elements(cell: str) -> list[str]:
 def find_first_row(lines: Sequence[bytes], sign: bytes | None) -> tuple[int, Dialect] | None:
     """The first line of numbers and its dialect; None where there is none.
 
-    Parameters
-    ----------
-    sign : bytes or None
-        delimiter, None where the lines show it
+    `sign`: delimiter, None where the lines show it.
     """
     for index, line in enumerate(lines):
         if line.strip().startswith(b"#"):

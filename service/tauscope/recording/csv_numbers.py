@@ -27,10 +27,8 @@ _SHOWN_CHARACTERS = 40
 def parse_quickly(text: bytes, delimiter: bytes, width: int, source: Sequence[int]) -> Array | None:
     """Parse a block of complete lines, or decline.
 
-    Returns
-    -------
-    (rows, len(source)) float64 or None
-        None where a line is not exactly `width` decimal numbers, NaN or empty fields: comments, text, anything unusual
+    Returns (rows, len(source)) or None, None where a line is not exactly `width` decimal numbers, NaN or empty fields:
+    comments, text, anything unusual.
     """
     if b"\r" in text:
         text = text.replace(b"\r\n", b"\n")
@@ -81,10 +79,7 @@ def parse_number(field: bytes, file: str, line: int, column: str) -> float:
 
     Raises RecordingError where the text is not a number, or is infinite.
 
-    Parameters
-    ----------
-    line : int
-        its line, counted from 1
+    `line`: its line, counted from 1.
     """
     text = field.strip(b" \t")
     if not text or _MISSED.fullmatch(text):

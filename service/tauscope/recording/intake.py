@@ -35,10 +35,7 @@ class RowIntake:
     ) -> None:
         """Prepare for the first block.
 
-        Parameters
-        ----------
-        spool_above_bytes : int
-            size above which the rows go to a temporary file [bytes]
+        `spool_above_bytes`: size above which the rows go to a temporary file [bytes].
         """
         self._file = file
         self._conversion = Conversion.design(names, effort_kind, reading)
@@ -60,10 +57,7 @@ class RowIntake:
 
         Raises RecordingError, which names the row and the column at fault.
 
-        Parameters
-        ----------
-        block : (rows, columns) float64
-            as the file has them
+        `block`: (rows, columns), as the file has them.
         """
         self._check(block, place)
         rows = np.append(self._tail_rows, np.arange(self._rows, self._rows + len(block)))

@@ -77,10 +77,7 @@ class JointStateLayout:
     def decode(self, messages: Sequence[bytes]) -> JointStates | None:
         """Decode a batch at once, or decline.
 
-        Returns
-        -------
-        JointStates or None
-            None where one of the messages has another layout
+        Returns JointStates or None: None where one of the messages has another layout.
         """
         if any(len(message) != self._size for message in messages):
             return None
@@ -173,13 +170,7 @@ class CdrCursor:
         return value.decode("utf-8")
 
     def numbers(self) -> Array:
-        """A sequence of numbers.
-
-        Returns
-        -------
-        (n,) float64
-            as the message has them
-        """
+        """A sequence of numbers. Returns (n,), as the message has them."""
         count = self.length()
         if count:
             self._align(8)

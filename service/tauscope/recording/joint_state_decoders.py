@@ -22,10 +22,7 @@ _EFFORTS = ("effort", "torque", "current")
 def find_decoder(type_name: str, encoding: str, schema: bytes) -> Decoder | None:
     """The decoder of a topic's messages, None where they are no joint states.
 
-    Parameters
-    ----------
-    schema : bytes
-        of the type, empty where the log has none
+    `schema`: of the type, empty where the log has none.
     """
     if (type_name, encoding) == ("foxglove.JointStates", "protobuf"):
         return decode_foxglove_protobuf(schema)

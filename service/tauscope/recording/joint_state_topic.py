@@ -130,13 +130,7 @@ class JointStateTopic:
         self._wanted = choice.joint_names
 
     def add(self, log_time: int, message: bytes) -> None:
-        """Take the next message.
-
-        Parameters
-        ----------
-        log_time : int
-            when it was logged [ns]
-        """
+        """Take the next message. `log_time`: when it was logged [ns]."""
         self.messages += 1
         if self.fault is not None:
             return

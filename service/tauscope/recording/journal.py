@@ -71,10 +71,7 @@ class JournalWriter:
 
         Raises OSError where the disk does not take them.
 
-        Parameters
-        ----------
-        rows : (k,) of `journal_row_type`
-            the cycles, oldest first
+        `rows`: (k,) of `journal_row_type`, the cycles, oldest first.
         """
         before = self._file.tell()
         for row in rows:
@@ -96,13 +93,7 @@ class JournalWriter:
             self._flush()
 
     def write_event(self, time_ns: int, event: Mapping[str, Any]) -> None:
-        """Write what happened.
-
-        Parameters
-        ----------
-        time_ns : int
-            when, by the clock of the rows [ns]
-        """
+        """Write what happened. `time_ns`: when, by the clock of the rows [ns]."""
         self._add(EVENT_TOPIC, time_ns + self.header.epoch_offset_ns, to_json(dict(event), inf_nan_mode="null"))
 
     def close(self) -> None:

@@ -85,10 +85,7 @@ def recover_mcap(path: Path, choice: Choice) -> Salvage:
 def scan_mcap(path: Path, sink: MessageSink) -> str | None:
     """Hand the messages of an MCAP file over, in the order of the file, up to its end or its first damage.
 
-    Returns
-    -------
-    str or None
-        why reading stopped before the file's end, None where it is whole
+    Returns str or None: why reading stopped before the file's end, None where it is whole.
     """
     with path.open("rb") as file:
         try:

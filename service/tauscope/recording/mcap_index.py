@@ -123,10 +123,7 @@ def read_by_index(file: BinaryIO, size: int, sink: MessageSink) -> bool:
 
     Raises DamageError where a chunk is not as the index says.
 
-    Returns
-    -------
-    bool
-        False, and nothing was handed over, where the file has no sound index or most of it is wanted
+    Returns bool: False, and nothing was handed over, where the file has no sound index or most of it is wanted.
     """
     try:
         summary = _read_summary(file, size)

@@ -21,10 +21,7 @@ def decode_foxglove_protobuf(schema: bytes) -> Callable[[bytes], JointState]:
 
     Raises ValueError where the schema cannot be read; so does the decoder where a message is no JointStates.
 
-    Parameters
-    ----------
-    schema : bytes
-        FileDescriptorSet of the type; empty for the numbers that Foxglove publishes
+    `schema`: FileDescriptorSet of the type; empty for the numbers that Foxglove publishes.
     """
     numbers = _field_numbers(schema)
     states, state = numbers.get("JointStates", _STATES), numbers.get("JointState", _STATE)

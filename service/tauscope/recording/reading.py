@@ -45,10 +45,7 @@ def read_recording(
     Raises RecordingError where the file cannot be read or breaks a rule; the message names the place. Raises
     RecordingMismatchError where the recording has other joints than asked for.
 
-    Parameters
-    ----------
-    joint_count : int or None
-        joints that the recording must have; None where any number is welcome, or as many as `joint_names`
+    `joint_count`: joints that the recording must have; None where any number is welcome, or as many as `joint_names`.
     """
     path, name = Path(path), printable(str(path), _LONGEST_PATH)
     names = tuple(joint_names) if joint_names is not None else None

@@ -53,17 +53,8 @@ class Recording:
     def samples(self, start: int = 0, stop: int | None = None) -> Samples:
         """Samples start:stop, as read-only views of the table where its columns allow.
 
-        Parameters
-        ----------
-        start : int
-            first sample, counted from 0
-        stop : int or None
-            the one after the last; None for the end
-
-        Returns
-        -------
-        Samples
-            the columns that the recording has; None for the others
+        `start`: first sample, counted from 0; `stop`: the one after the last; None for the end. Returns Samples: the
+        columns that the recording has; None for the others.
         """
         first, last, _ = slice(start, stop).indices(len(self.table))
         block = self.table.rows(first, max(first, last))
@@ -91,15 +82,8 @@ class Recording:
         Raises RecordingMismatchError where the efforts have another number of joints than the robot. Raises
         RecordingError where commands were recorded, and no actuator has made torque of them.
 
-        Parameters
-        ----------
-        effort : (N, n) float64
-            `Samples.effort` of this recording [Nm or N, or drive units]
-
-        Returns
-        -------
-        (N, n) float64
-            joint torque [Nm or N]
+        `effort`: (N, n), `Samples.effort` of this recording [Nm or N, or drive units]. Returns (N, n), joint torque [Nm
+        or N].
         """
         if self.effort_kind is EffortKind.COMMAND:
             raise RecordingError(

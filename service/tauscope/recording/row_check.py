@@ -28,10 +28,7 @@ class RowCheck:
 
         Raises RecordingError, which names the row and the column at fault.
 
-        Parameters
-        ----------
-        block : (rows, columns) float64
-            the rows
+        `block`: (rows, columns), the rows.
         """
         if not len(block):
             return
@@ -62,12 +59,7 @@ def require_rising(time: Array, previous: float, file: str, place: Callable[[int
 
     Raises RecordingError, which names the row.
 
-    Parameters
-    ----------
-    time : (rows,) float64
-        stamps [s]
-    previous : float
-        the stamp before them [s]
+    `time`: (rows,), stamps [s]; `previous`: the stamp before them [s].
     """
     is_up = np.diff(time, prepend=previous) > 0
     if is_up.all():

@@ -171,10 +171,7 @@ def friction_figure(
 ) -> str:
     """Draw the friction of every joint over velocity.
 
-    Parameters
-    ----------
-    units : sequence of (str, str)
-        units of velocity and of torque, one pair a joint
+    `units`: sequence of (str, str), units of velocity and of torque, one pair a joint.
     """
     columns = min(COLUMNS, max(len(curves), 2))
     rows = math.ceil(len(curves) / columns)

@@ -51,13 +51,7 @@ class FrictionCurve:
 
 
 def friction_curve(identification: Identification, series: Sequence[TorqueSeries], joint: int) -> FrictionCurve:
-    """The curve of one joint.
-
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    """
+    """The curve of one joint. `joint`: joint index, from 0."""
     speed = np.concatenate([one.velocity[:, joint] for one in series])
     residual = np.concatenate([one.residual[:, joint] for one in series])
     seen = (float(speed.min()), float(speed.max()))

@@ -19,15 +19,7 @@ def envelope_indices(values: Array, most: int) -> NDArray[np.intp]:
 
     No peak is lost. NaN are passed over, but a bucket that holds nothing else keeps one of them, so that the gap shows.
 
-    Parameters
-    ----------
-    values : (N,) float64
-        the curve
-
-    Returns
-    -------
-    (M,) intp
-        increasing indices, M ≤ max(most, 2)
+    `values`: (N,), the curve. Returns (M,) intp, increasing indices, M ≤ max(most, 2).
     """
     count = len(values)
     if count <= most:

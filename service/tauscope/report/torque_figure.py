@@ -20,12 +20,7 @@ ENLARGED_SHARE = 0.1
 def torque_figure(name: str, series: TorqueSeries, joint: int, noise_std: float, unit: str) -> str:
     """Draw one joint's torque and residual, whole and enlarged where they differ most.
 
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    noise_std : float
-        σ of the sensor noise [Nm or N]
+    `joint`: joint index, from 0; `noise_std`: σ of the sensor noise [Nm or N].
     """
     enlarged = worst_part(series.residual[:, joint], ENLARGED_SHARE)
 
@@ -50,13 +45,7 @@ def torque_figure(name: str, series: TorqueSeries, joint: int, noise_std: float,
 
 
 def torque_columns(series: TorqueSeries, joint: int) -> dict[str, list[float]]:
-    """Numbers of the drawing: the samples that keep the residual's look.
-
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    """
+    """Numbers of the drawing: the samples that keep the residual's look. `joint`: joint index, from 0."""
     kept = envelope_indices(series.residual[:, joint], MOST_POINTS_ENLARGED)
     columns = {"time": series.time, "measured": series.measured[:, joint], "model": series.predicted[:, joint]}
     return {name: values[kept].tolist() for name, values in columns.items()}
@@ -65,10 +54,7 @@ def torque_columns(series: TorqueSeries, joint: int) -> dict[str, list[float]]:
 def worst_part(residual: Array, share: float) -> slice:
     """The stretch of this share of a residual whose mean square is greatest.
 
-    Parameters
-    ----------
-    residual : (N,) float64
-        NaN where nothing was measured
+    `residual`: (N,), NaN where nothing was measured.
     """
     length = min(max(int(len(residual) * share), 2), len(residual))
     total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(residual) ** 2)])

@@ -12,10 +12,7 @@ def read_bounded(path: Path, limit: int) -> bytes:
 
     Raises RobotFileError if the file is missing, not a regular file, empty, too large or not readable.
 
-    Parameters
-    ----------
-    limit : int
-        largest size that is accepted [bytes]
+    `limit`: largest size that is accepted [bytes].
     """
     try:
         mode = path.stat().st_mode

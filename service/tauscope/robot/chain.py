@@ -74,12 +74,8 @@ def default_ends_note(label: str, kind: str, base: str, tip: str, joints: Sequen
 def rigid_branch_note(label: str, joints: Sequence[str], mass: float, following: Sequence[str] = ()) -> ResultWarning:
     """Which joints beside the chain count as rigid, and what they carry.
 
-    Parameters
-    ----------
-    mass : float
-        of all bodies that these joints move [kg]
-    following : sequence of str
-        those of them that would follow a joint of the chain
+    `mass`: of all bodies that these joints move [kg]; `following`: those of them that would follow a joint of the
+    chain.
     """
     more = f" and {len(joints) - MOST_NAMES} more" if len(joints) > MOST_NAMES else ""
     names = ", ".join(map(shown, joints[:MOST_NAMES])) + more

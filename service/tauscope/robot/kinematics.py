@@ -16,17 +16,8 @@ def link_placements(chain: Robot | Sequence[Segment], q: Array) -> Array:
 
     Raises RecordingMismatchError if `q` has not one column a joint.
 
-    Parameters
-    ----------
-    chain : Robot or sequence of Segment
-        the arm, or its segments, base first
-    q : (N, n) float64
-        joint position [rad or m]
-
-    Returns
-    -------
-    (N, m, 4, 4) float64
-        homogeneous transforms; [:, j] is link frame j + 1 in the base frame [m]
+    `chain`: the arm, or its segments, base first; `q`: (N, n), joint position [rad or m]. Returns (N, m, 4, 4),
+    homogeneous transforms; [:, j] is link frame j + 1 in the base frame [m].
     """
     segments = chain.segments if isinstance(chain, Robot) else tuple(chain)
     position = np.asarray(q, dtype=np.float64)
@@ -46,13 +37,7 @@ def link_placements(chain: Robot | Sequence[Segment], q: Array) -> Array:
 
 
 def homogeneous(placement: Placement) -> Array:
-    """The homogeneous transform [[R, p], [0, 1]], shape (4, 4).
-
-    Parameters
-    ----------
-    placement : Placement
-        R and p [m]
-    """
+    """The homogeneous transform [[R, p], [0, 1]], shape (4, 4). `placement`: R and p [m]."""
     transform = np.eye(4)
     transform[:3, :3] = placement.rotation
     transform[:3, 3] = placement.translation

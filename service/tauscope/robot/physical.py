@@ -34,10 +34,7 @@ def pseudo_inertia(link: LinkInertia) -> Array:
 def find_defect(link: LinkInertia, tolerance: float = ROUNDING) -> str | None:
     """Why no rigid body has these parameters; None where a body can have them.
 
-    Parameters
-    ----------
-    tolerance : float
-        violation that is allowed, relative to the largest entry of the inertia
+    `tolerance`: violation that is allowed, relative to the largest entry of the inertia.
     """
     offset = float(np.linalg.norm(link.first_moment))
     if link.mass < 0.0:
@@ -100,10 +97,7 @@ def repair_text(stated: LinkInertia, body: LinkInertia) -> str | None:
 def about_centre(link: LinkInertia) -> Array:
     """Inertia about the centre of mass: I_c = I - (hᵀh 1 - h hᵀ)/m, equation (5) reversed; I itself without mass.
 
-    Returns
-    -------
-    (3, 3) float64
-        I_c [kg m²]
+    Returns (3, 3), I_c [kg m²].
     """
     if link.mass == 0.0:
         return link.inertia

@@ -60,10 +60,7 @@ class RecordingLayout:
 def find_fault(units: Mapping[str, str], rate_hz: float | None) -> tuple[str, str] | None:
     """The column, or ``rate_hz``, whose unit cannot be used, and the reason; None where all can be.
 
-    Parameters
-    ----------
-    rate_hz : float or None
-        samples a second [Hz]
+    `rate_hz`: samples a second [Hz].
     """
     for column, unit in units.items():
         match = _COLUMN.fullmatch(column)

@@ -164,13 +164,7 @@ class LinkInertia:
 
     @staticmethod
     def from_vector(vector: NDArray[np.float64]) -> "LinkInertia":
-        """The link of ten standard parameters.
-
-        Parameters
-        ----------
-        vector : (10,) float64
-            in the order of `STANDARD_PARAMETERS`
-        """
+        """The link of ten standard parameters. `vector`: (10,), in the order of `STANDARD_PARAMETERS`."""
         xx, yy, zz, xy, xz, yz, mass, *first_moment = (float(value) for value in vector)
         inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         return LinkInertia(mass, np.array(first_moment), inertia)
@@ -312,13 +306,7 @@ class Robot:
         return tuple(name if link in own else f"{name} at link {link + 1}" for link, name in enumerate(names))
 
     def joint_of_link(self, link: int) -> Joint:
-        """The joint that moves a link.
-
-        Parameters
-        ----------
-        link : int
-            index of the link, from 0
-        """
+        """The joint that moves a link. `link`: index of the link, from 0."""
         return self.joints[self.couplings[link].joint]
 
     @property

@@ -81,12 +81,8 @@ def read_mjcf_chain(
     Raises RobotFileError if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip. Raises
     MissingExtraError where MuJoCo is not installed.
 
-    Parameters
-    ----------
-    path : Path or None
-        where the file lies, for the files that it names; None for text without files beside it
-    locked : mapping of str to float, or None
-        position of joints that do not move [rad or m]
+    `path`: where the file lies, for the files that it names; None for text without files beside it; `locked`: position
+    of joints that do not move [rad or m].
     """
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         with require_extra(f"{label}: reading an MJCF"):

@@ -47,10 +47,7 @@ def read_urdf_chain(
 
     Raises RobotFileError if the URDF is not valid, or no chain of movable joints runs from base to tip.
 
-    Parameters
-    ----------
-    locked : mapping of str to float, or None
-        position of joints that do not move [rad or m]
+    `locked`: position of joints that do not move [rad or m].
     """
     findings: list[Finding] = []
     tree = parse_urdf(data, label, findings)

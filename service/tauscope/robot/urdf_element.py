@@ -59,10 +59,7 @@ def number(label: str, element: Element, key: str, default: float | None = None)
 
     Raises RobotFileError if the attribute is missing or not a finite number.
 
-    Parameters
-    ----------
-    default : float or None
-        value where the attribute is absent; None where it must be there
+    `default`: value where the attribute is absent; None where it must be there.
     """
     text = element.get(key)
     if text is None:
@@ -85,10 +82,7 @@ def vector(label: str, element: Element | None, key: str, default: tuple[float, 
 
     Raises RobotFileError if the attribute does not hold three numbers.
 
-    Parameters
-    ----------
-    element : Element or None
-        the element; None where the whole element is absent
+    `element`: the element; None where the whole element is absent.
     """
     text = None if element is None else element.get(key)
     if text is None:

@@ -18,14 +18,8 @@ ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 def inertia_about_frame(mass: float, centre: Placement, inertia: np.ndarray) -> LinkInertia:
     """Inertial parameters about a link frame, equation (5): I' = R I Rᵀ + m (sᵀs 1 - s sᵀ).
 
-    Parameters
-    ----------
-    mass : float
-        m [kg]
-    centre : Placement
-        the centre-of-mass frame seen from the link frame: R and s [m]
-    inertia : (3, 3) float64
-        I about the centre of mass, in the centre-of-mass frame [kg m²]
+    `mass`: m [kg]; `centre`: the centre-of-mass frame seen from the link frame: R and s [m]; `inertia`: (3, 3), I about
+    the centre of mass, in the centre-of-mass frame [kg m²].
     """
     s, rotation = centre.translation, centre.rotation
     shifted = rotation @ inertia @ rotation.T + mass * (s @ s * np.eye(3) - np.outer(s, s))
@@ -39,12 +33,8 @@ def lumped_inertia(
 
     Raises RobotFileError if an `<inertial>` is incomplete or not made of numbers.
 
-    Parameters
-    ----------
-    link : int
-        index of the link, from 0
-    bodies : iterable of (Element, Placement)
-        link elements, with the placement of each in the frame of the link that they move with
+    `link`: index of the link, from 0; `bodies`: iterable of (Element, Placement), link elements, with the placement of
+    each in the frame of the link that they move with.
     """
     vectors, repairs = [], []
     for body, placement in bodies:

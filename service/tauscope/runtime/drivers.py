@@ -123,12 +123,7 @@ def make_backend(name: str, robot: Robot, settings: Mapping[str, Any], *, folder
     Raises AcquisitionError where there is no such backend, or a setting or a ``drive`` block is not valid. Raises
     MissingExtraError where the backend's optional dependencies are not installed.
 
-    Parameters
-    ----------
-    settings : mapping
-        the driver's own
-    folder : Path or None
-        for files of the driver's own
+    `settings`: the driver's own; `folder`: for files of the driver's own.
     """
     driver = find_driver(name)
     for key in settings:

@@ -37,10 +37,7 @@ class GuardedArm:
         Raises GuardViolationError where the guard objects; nothing was sent. Raises DriverError where the backend
         cannot.
 
-        Parameters
-        ----------
-        due_ns : int
-            when it was to be sent [ns]
+        `due_ns`: when it was to be sent [ns].
         """
         violation = self._guard.check(self.state, setpoint, self._backend.clock.now_ns(), due_ns)
         if violation is not None:

@@ -99,10 +99,7 @@ def chosen_stop_policy(
     An arm that is released is held first. Raises AcquisitionError where the robot file states no policy, or several; or
     the device cannot do it by itself.
 
-    Parameters
-    ----------
-    capabilities : Capabilities or None
-        what the device can do by itself; None where it is not known yet
+    `capabilities`: what the device can do by itself; None where it is not known yet.
     """
     wanted = options.stop_policy or _stated_policy(joints)
     policy = StopPolicy.HOLD if wanted == RELEASE else StopPolicy(wanted)

@@ -26,15 +26,8 @@ def predict_torque(robot: Robot, position: Array, velocity: Array, acceleration:
 
     Friction is left out where its coefficients or its shape are not stated.
 
-    Parameters
-    ----------
-    position, velocity, acceleration : (N, n) float64
-        the motion [rad or m, and per s, per s²]
-
-    Returns
-    -------
-    (N, n) float64 or None
-        [Nm or N]
+    `position`, `velocity`, `acceleration`: (N, n), the motion [rad or m, and per s, per s²]. Returns (N, n) or None [Nm
+    or N].
     """
     parameters = _parameters(robot)
     if parameters is None:
@@ -50,15 +43,8 @@ def predict_torque(robot: Robot, position: Array, velocity: Array, acceleration:
 def compute_inertia(robot: Robot, position: Array) -> tuple[Array, int] | None:
     """Joint-space inertia H along a motion; None where the robot file has no model.
 
-    Parameters
-    ----------
-    position : (N, n) float64
-        the motion [rad or m]
-
-    Returns
-    -------
-    (K, n, n) float64 and int, or None
-        H at every s-th posture, and s: so many that memory stays small [kg m², kg m, kg]
+    `position`: (N, n), the motion [rad or m]. Returns (K, n, n) and int, or None, H at every s-th posture, and s: so
+    many that memory stays small [kg m², kg m, kg].
     """
     parameters = _parameters(robot)
     if parameters is None:
@@ -135,10 +121,7 @@ def make_plan(
 
     Raises AcquisitionError where the motion does not fit the arm or its limits, or the arm stands outside them.
 
-    Parameters
-    ----------
-    start : (n,) float64
-        where the arm stands [rad or m]
+    `start`: (n,), where the arm stands [rad or m].
     """
     _require_fitting(robot, trajectory, start, capabilities)
     rate_hz = choose_rate_hz(options, capabilities)

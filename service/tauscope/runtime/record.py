@@ -193,15 +193,7 @@ class RecordKeeper:
     def close(self, patience_s: float = FLUSH_S) -> str | None:
         """Wait for the last record to reach the disk.
 
-        Parameters
-        ----------
-        patience_s : float
-            how long [s]
-
-        Returns
-        -------
-        str or None
-            why it did not, None where it did
+        `patience_s`: how long [s]. Returns str or None: why it did not, None where it did.
         """
         with self._changed:
             self._is_closed = True

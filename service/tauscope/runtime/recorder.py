@@ -49,23 +49,11 @@ class Recorder(Protocol):
         ...
 
     def put(self, row: NDArray[np.void]) -> None:
-        """Take a cycle.
-
-        Parameters
-        ----------
-        row : (1,) of `journal_row_type`
-            the cycle; copied
-        """
+        """Take a cycle. `row`: (1,) of `journal_row_type`, the cycle; copied."""
         ...
 
     def event(self, time_ns: int, event: Mapping[str, Any]) -> None:
-        """Take an event.
-
-        Parameters
-        ----------
-        time_ns : int
-            when, by the clock of the rows [ns]
-        """
+        """Take an event. `time_ns`: when, by the clock of the rows [ns]."""
         ...
 
     def close(self) -> str | None:
@@ -88,26 +76,14 @@ class DirectRecorder:
         self.lost = 0
 
     def put(self, row: NDArray[np.void]) -> None:
-        """Take a cycle.
-
-        Parameters
-        ----------
-        row : (1,) of `journal_row_type`
-            the cycle; copied
-        """
+        """Take a cycle. `row`: (1,) of `journal_row_type`, the cycle; copied."""
         self._rows[self._count] = row[0]
         self._count += 1
         if self._count == len(self._rows):
             self._write()
 
     def event(self, time_ns: int, event: Mapping[str, Any]) -> None:
-        """Take an event.
-
-        Parameters
-        ----------
-        time_ns : int
-            when, by the clock of the rows [ns]
-        """
+        """Take an event. `time_ns`: when, by the clock of the rows [ns]."""
         self._write()
         self._writer.write_event(time_ns, event)
 
@@ -176,24 +152,12 @@ class RecorderProcess:
             raise _cannot_open(self._path, str(answer.get("problem") or "its writer ended"))
 
     def put(self, row: NDArray[np.void]) -> None:
-        """Take a cycle.
-
-        Parameters
-        ----------
-        row : (1,) of `journal_row_type`
-            the cycle; copied
-        """
+        """Take a cycle. `row`: (1,) of `journal_row_type`, the cycle; copied."""
         self._row[:] = row.view(np.uint8)
         self._send(self._buffer)
 
     def event(self, time_ns: int, event: Mapping[str, Any]) -> None:
-        """Take an event.
-
-        Parameters
-        ----------
-        time_ns : int
-            when, by the clock of the rows [ns]
-        """
+        """Take an event. `time_ns`: when, by the clock of the rows [ns]."""
         content = event_frame(time_ns, dict(event))
         if len(content) <= _LARGEST_FRAME:
             self._send(content)

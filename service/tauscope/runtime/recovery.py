@@ -49,10 +49,7 @@ def recover_runs(folder: Path, *, patience_s: float = PATIENCE_S) -> tuple[RunRe
     A run whose owner lives is left to its owner. Nothing is ever moved by this. Raises AcquisitionError where a record
     is damaged, or cannot be written.
 
-    Parameters
-    ----------
-    patience_s : float
-        time that a control process whose owner is gone gets to stop its arm [s]
+    `patience_s`: time that a control process whose owner is gone gets to stop its arm [s].
     """
     runs = sorted(path.parent for path in folder.glob(f"*/{RUN_FILE}"))
     recovered = (recover_run(run, patience_s=patience_s) for run in runs)
@@ -66,15 +63,8 @@ def recover_run(
 
     Raises AcquisitionError where the record is damaged, or cannot be written.
 
-    Parameters
-    ----------
-    patience_s : float
-        time that a control process whose owner is gone gets to stop its arm [s]
-
-    Returns
-    -------
-    RunRecord or None
-        the new record; None where the run has ended by itself or goes on
+    `patience_s`: time that a control process whose owner is gone gets to stop its arm [s]. Returns RunRecord or None:
+    the new record; None where the run has ended by itself or goes on.
     """
     record = read_record(folder)
     if record.state.is_end or (not is_own and record.owner is not None and record.owner.is_alive):

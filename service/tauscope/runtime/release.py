@@ -25,10 +25,7 @@ _LOOK_S = 0.05
 def release_settled(backend: Backend, state: ArmState) -> ArmState:
     """Hold an arm until it stands still, then let go of it; one that moves, or is not seen, stays held.
 
-    Parameters
-    ----------
-    state : ArmState
-        of an arm that was just stopped to hold
+    `state`: of an arm that was just stopped to hold.
     """
     clock = backend.clock
     begin_ns = since_ns = clock.now_ns()

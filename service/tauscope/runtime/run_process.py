@@ -102,10 +102,7 @@ class RunProcess:
         Raises TimeoutError where it has not ended by then. Raises AcquisitionError where its record cannot be read or
         written.
 
-        Parameters
-        ----------
-        timeout_s : float or None
-            how long; for good where None [s]
+        `timeout_s`: how long; for good where None [s].
         """
         if not self._has_ended.wait(timeout_s):
             raise TimeoutError(f"{self.folder}: the run has not ended within {timeout_s:g} s")

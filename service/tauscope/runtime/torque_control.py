@@ -27,12 +27,7 @@ class TorqueControl:
     def __init__(self, plan: Plan, inertia: Array, stride: int, bandwidth_rad_s: float) -> None:
         """Set the gains.
 
-        Parameters
-        ----------
-        inertia : (K, n, n) float64
-            H at every `stride`-th cycle of the plan [kg m², kg m, kg]
-        bandwidth_rad_s : float
-            ω [rad/s]
+        `inertia`: (K, n, n), H at every `stride`-th cycle of the plan [kg m², kg m, kg]; `bandwidth_rad_s`: ω [rad/s].
         """
         largest = np.diagonal(inertia, axis1=1, axis2=2).max(axis=0)
         self._inertia, self._stride = inertia + _LEAST_INERTIA * np.diag(largest), stride
@@ -70,10 +65,7 @@ def torque_control(robot: Robot, plan: Plan, bandwidth_rad_s: float) -> TorqueCo
 
     Raises AcquisitionError where the robot file has no model to take the gains from, or the rate is too low.
 
-    Parameters
-    ----------
-    bandwidth_rad_s : float
-        ω [rad/s]
+    `bandwidth_rad_s`: ω [rad/s].
     """
     found = compute_inertia(robot, plan.position)
     if found is None:

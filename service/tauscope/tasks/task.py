@@ -133,13 +133,7 @@ class Progress(Protocol):
     """Hears which step goes on; may raise to end the task."""
 
     def __call__(self, step: str, percent: float | None = None, figures: Mapping[str, Any] = {}, /) -> None:
-        """Hear of a step, or of how far it is.
-
-        Parameters
-        ----------
-        percent : float or None
-            how much is done; None at the beginning of a step
-        """
+        """Hear of a step, or of how far it is. `percent`: how much is done; None at the beginning of a step."""
         ...
 
 
@@ -259,10 +253,7 @@ def model_origin(robot: Robot, recordings: Sequence[Recording], provenance: Prov
 def command_words(verb: str, robot: str, **options: Any) -> tuple[str, ...]:
     """The command line that does the same, with every option spelled out; outputs are left to whoever repeats it.
 
-    Parameters
-    ----------
-    **options
-        by the name of the option; `recordings` has none, an empty tuple is left out
+    `**options`: by the name of the option; `recordings` has none, an empty tuple is left out.
     """
     words = ["tauscope", verb, robot]
     for name, value in options.items():

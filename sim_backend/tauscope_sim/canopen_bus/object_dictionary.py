@@ -67,13 +67,7 @@ class ObjectDictionary:
         writable: bool = True,
         hook: WriteHook | None = None,
     ) -> Entry:
-        """Add an entry.
-
-        Parameters
-        ----------
-        size : int
-            1, 2 or 4 [bytes]
-        """
+        """Add an entry. `size`: 1, 2 or 4 [bytes]."""
         entry = self.entries[index, subindex] = Entry(size, value, signed, writable, hook)
         return entry
 

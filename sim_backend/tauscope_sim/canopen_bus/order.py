@@ -67,13 +67,7 @@ class CanOrder:
         return PseudoTerminal(self.port) if self._interface is None else CanSocket(self._interface)
 
     def build(self, now_s: float) -> CanEmulator:
-        """The emulator.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """The emulator. `now_s`: present instant [s]."""
         robot = read_robot(Path(self.robot))
         scenario = Scenario() if self.scenario is None else read_scenario(Path(self.scenario), robot)
         drives = []

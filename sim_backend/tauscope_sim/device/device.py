@@ -114,10 +114,7 @@ class SimulatedDevice:
     def advance_to(self, time_ns: int) -> None:
         """Let time pass: every tick up to and at an instant is carried out.
 
-        Parameters
-        ----------
-        time_ns : int
-            device time; one that has passed changes nothing [ns]
+        `time_ns`: device time; one that has passed changes nothing [ns].
         """
         last = (time_ns - self._start_ns) // TICK_NS
         while self._tick <= last:
@@ -145,10 +142,7 @@ class SimulatedDevice:
 
         Raises DriverError: ``refused`` or ``fault``.
 
-        Parameters
-        ----------
-        watchdog_s : float
-            time without setpoints after which it does [s]
+        `watchdog_s`: time without setpoints after which it does [s].
         """
         if self._activity in COMMANDED:
             raise refused("the arm is enabled already; stop it before enabling it again")
@@ -167,10 +161,7 @@ class SimulatedDevice:
 
         Raises DriverError: ``not-enabled`` or ``refused``.
 
-        Parameters
-        ----------
-        sent_ns : int or None
-            when it was sent, by the device's clock; None for now [ns]
+        `sent_ns`: when it was sent, by the device's clock; None for now [ns].
         """
         if self._enabling is None:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the arm is not enabled; enable it before sending setpoints")

@@ -63,13 +63,7 @@ class Drives:
         self._commanded_torque = None
 
     def command(self, activity: Activity, setpoint: Setpoint, arrival: float) -> None:
-        """Take a setpoint that is due.
-
-        Parameters
-        ----------
-        arrival : float
-            when it arrived [ticks]
-        """
+        """Take a setpoint that is due. `arrival`: when it arrived [ticks]."""
         if activity is Activity.TRACKING:
             self._target.follow(setpoint.position, setpoint.torque, arrival)
         else:
@@ -105,10 +99,8 @@ class Drives:
 
         A joint that could not be stopped any more within its range counts as outside already.
 
-        Returns
-        -------
-        tuple of FaultCode, int and str, or None
-            the fault, the joint's number counted from 1, and what happened
+        Returns tuple of FaultCode, int and str, or None: the fault, the joint's number counted from 1, and what
+        happened.
         """
         speed = np.abs(motion.velocity)
         if (speed > self._fastest).any():

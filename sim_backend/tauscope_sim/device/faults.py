@@ -65,23 +65,14 @@ class Injection:
     size: float = 0.0
 
     def active_at(self, time_ns: int) -> bool:
-        """Whether it acts at an instant.
-
-        Parameters
-        ----------
-        time_ns : int
-            device time [ns]
-        """
+        """Whether it acts at an instant. `time_ns`: device time [ns]."""
         return self.start_ns <= time_ns and (self.duration_ns is None or time_ns < self.start_ns + self.duration_ns)
 
 
 def device_fault(code: FaultCode, joint: int | None, detail: str) -> Fault:
     """The fault as the protocol of `drivers` states it.
 
-    Parameters
-    ----------
-    joint : int or None
-        joint number, counted from 1; None for the whole arm
+    `joint`: joint number, counted from 1; None for the whole arm.
     """
     return Fault(code.value, joint, detail, REMEDIES[code])
 
@@ -134,13 +125,7 @@ class Disturbances:
         self._injections.append(injection)
 
     def update(self, time_ns: int) -> None:
-        """Renew what acts at an instant.
-
-        Parameters
-        ----------
-        time_ns : int
-            device time [ns]
-        """
+        """Renew what acts at an instant. `time_ns`: device time [ns]."""
         if not self._injections:
             return
         for values in (self.heat, self.lost, self.overloaded):

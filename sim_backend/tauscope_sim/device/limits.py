@@ -18,10 +18,7 @@ def checked_limits(limits: DriveLimits, position: Array) -> DriveLimits:
     Raises DriverError ``refused``: wrong shapes, not-a-number, an empty range, no room to move, or an arm outside its
     range.
 
-    Parameters
-    ----------
-    position : (n,) float64
-        where the arm stands [rad or m]
+    `position`: (n,), where the arm stands [rad or m].
     """
     count = len(position)
     arrays: dict[str, Array] = {}

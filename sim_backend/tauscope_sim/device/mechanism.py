@@ -24,10 +24,7 @@ REACH = 1.0
 def resting_posture(robot: Robot) -> Array:
     """Zero, or the end of each joint's range nearest to it; elsewhere where a joint has next to no inertia there.
 
-    Returns
-    -------
-    (n,) float64
-        position [rad or m]
+    Returns (n,), position [rad or m].
     """
     ranges = np.array([joint.limits.position or (-np.inf, np.inf) for joint in robot.joints])
     nearest = np.clip(0.0, ranges[:, 0], ranges[:, 1])
@@ -142,10 +139,7 @@ class Mechanism:
         The torque of a reading is the mean of those before and after the tick, which belongs to the tick's own instant.
         Raises ScenarioError where the motion grows beyond all bounds; the arm is at rest then.
 
-        Parameters
-        ----------
-        torque : (n,) float64
-            of the drives from this tick on [Nm or N]
+        `torque`: (n,), of the drives from this tick on [Nm or N].
         """
         self._take(0.5 * (self._torque + torque), tick)
         self._torque = torque

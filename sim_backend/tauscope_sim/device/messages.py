@@ -43,10 +43,7 @@ def decode_document(body: bytes) -> dict[str, Any]:
 def encode_setpoint(sent_ns: int, setpoint: Setpoint) -> bytes:
     """Instant, then position and torque, 2 n numbers.
 
-    Parameters
-    ----------
-    sent_ns : int
-        present instant of the machine's monotonic clock [ns]
+    `sent_ns`: present instant of the machine's monotonic clock [ns].
     """
     return _INSTANT.pack(sent_ns) + np.concatenate([setpoint.position, setpoint.torque]).astype("<f8").tobytes()
 
@@ -101,13 +98,7 @@ def decode_error(body: bytes) -> DriverError:
 
 
 def encode_enable(mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> bytes:
-    """A request to enable; infinite limits go as text.
-
-    Parameters
-    ----------
-    watchdog_s : float
-        time of the watchdog [s]
-    """
+    """A request to enable; infinite limits go as text. `watchdog_s`: time of the watchdog [s]."""
     document = {
         "mode": mode.value,
         "stop_policy": stop_policy.value,

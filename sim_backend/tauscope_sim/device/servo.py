@@ -65,13 +65,7 @@ class Servo:
         self._age = _TICKS_PER_STIFFNESS
 
     def set_torque_limit(self, limit: Array) -> None:
-        """Cap the torque below what the motors can give.
-
-        Parameters
-        ----------
-        limit : (n,) float64
-            cap; infinite where there is none [Nm or N]
-        """
+        """Cap the torque below what the motors can give. `limit`: (n,), cap; infinite where there is none [Nm or N]."""
         self._limit = np.minimum(limit, self._motor_limit)
 
     def begin(self) -> None:
@@ -82,10 +76,7 @@ class Servo:
     def absorb(self, feed_forward: Array) -> None:
         """Keep a feed-forward torque that is about to end, so that nothing jerks.
 
-        Parameters
-        ----------
-        feed_forward : (n,) float64
-            torque of the host [Nm or N]
+        `feed_forward`: (n,), torque of the host [Nm or N].
         """
         self._integral = self.capped(self._integral + feed_forward)
 
@@ -120,24 +111,13 @@ class Servo:
     def damp(self, position: Array, velocity: Array) -> Array:
         """Torque against motion, (n,) [Nm or N].
 
-        Parameters
-        ----------
-        position : (n,) float64
-            q, for H(q) [rad or m]
-        velocity : (n,) float64
-            q̇ [rad/s or m/s]
+        `position`: (n,), q, for H(q) [rad or m]; `velocity`: (n,), q̇ [rad/s or m/s].
         """
         damping, _, _ = self._renew(position)
         return self.capped(-DAMPING * damping.dot(velocity))
 
     def capped(self, torque: Array) -> Array:
-        """Torque within the limit, (n,) [Nm or N].
-
-        Parameters
-        ----------
-        torque : (n,) float64
-            wanted [Nm or N]
-        """
+        """Torque within the limit, (n,) [Nm or N]. `torque`: (n,), wanted [Nm or N]."""
         return np.minimum(np.maximum(torque, -self._limit), self._limit)
 
     def _renew(self, position: Array) -> tuple[Array, Array, Array]:

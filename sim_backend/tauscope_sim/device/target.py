@@ -77,12 +77,7 @@ class Target:
     def limit(self, low: Array, high: Array, fastest: Array) -> None:
         """Keep the target within limits from now on; a target that is outside the range may stay where it is.
 
-        Parameters
-        ----------
-        low, high : (n,) float64
-            range [rad or m]
-        fastest : (n,) float64
-            speed limit [rad/s or m/s]
+        `low`, `high`: (n,), range [rad or m]; `fastest`: (n,), speed limit [rad/s or m/s].
         """
         self._low, self._high = np.minimum(low, self.position), np.maximum(high, self.position)
         self._fastest = fastest
@@ -95,14 +90,8 @@ class Target:
     def follow(self, position: Array, feed_forward: Array | None, arrival: float) -> None:
         """Take a setpoint of the host.
 
-        Parameters
-        ----------
-        position : (n,) float64
-            as the host asks [rad or m]
-        feed_forward : (n,) float64 or None
-            torque that belongs to it; None for none [Nm or N]
-        arrival : float
-            when it arrived [ticks]
+        `position`: (n,), as the host asks [rad or m]; `feed_forward`: (n,), torque that belongs to it; None for none
+        [Nm or N]; `arrival`: when it arrived [ticks].
         """
         if self._braking:
             self._spline.restart(self._resting_point())

@@ -59,12 +59,8 @@ def start_device(
 
     Raises DriverError ``cannot-connect`` where the process did not start, with its own message.
 
-    Parameters
-    ----------
-    start_position : sequence of n float or None
-        where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m]
-    linger_s : float
-        how long the process goes on without a host [s]
+    `start_position`: where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m];
+    `linger_s`: how long the process goes on without a host [s].
     """
     socket, trace, log = folder / "device.sock", folder / "device.csv", folder / "device.log"
     if len(os.fsencode(socket)) > _LONGEST_SOCKET_PATH:

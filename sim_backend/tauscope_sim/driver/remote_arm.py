@@ -125,10 +125,7 @@ class RemoteSimulatedArm:
     ) -> ArmState:
         """Take the arm under power where it stands; see `drivers.Backend`.
 
-        Parameters
-        ----------
-        watchdog_s : float
-            time without `exchange` after which it does [s]
+        `watchdog_s`: time without `exchange` after which it does [s].
         """
         del cycle_s
         return self._state_after(FrameKind.ENABLE, encode_enable(mode, limits, stop_policy, watchdog_s))

@@ -33,10 +33,7 @@ class VirtualClock:
     def wait_until_ns(self, deadline_ns: int) -> int:
         """Let the device live up to a deadline, and return there; at once where it has passed.
 
-        Parameters
-        ----------
-        deadline_ns : int
-            absolute instant [ns]
+        `deadline_ns`: absolute instant [ns].
         """
         if deadline_ns > self._now_ns:
             self._now_ns = deadline_ns
@@ -104,10 +101,7 @@ class SimulatedArm:
     ) -> ArmState:
         """Take the arm under power where it stands; see `drivers.Backend`.
 
-        Parameters
-        ----------
-        watchdog_s : float
-            time without `exchange` after which it does, in virtual time [s]
+        `watchdog_s`: time without `exchange` after which it does, in virtual time [s].
         """
         del cycle_s
         self._require_connection()

@@ -34,12 +34,7 @@ class MovedArm(Protocol):
     def advance(self, torque: Array, duration_s: float) -> None:
         """Move on under a constant torque.
 
-        Parameters
-        ----------
-        torque : (n,) float64
-            of the motors, at the joints [Nm or N]
-        duration_s : float
-            for how long [s]
+        `torque`: (n,), of the motors, at the joints [Nm or N]; `duration_s`: for how long [s].
         """
         ...
 
@@ -102,12 +97,7 @@ class Pendulums:
     def advance(self, torque: Array, duration_s: float) -> None:
         """Move on under a constant torque, by the semi-implicit Euler method.
 
-        Parameters
-        ----------
-        torque : (n,) float64
-            [Nm]
-        duration_s : float
-            for how long [s]
+        `torque`: (n,) [Nm]; `duration_s`: for how long [s].
         """
         load = self._damping * self._velocity + self._weight * np.sin(self._position)
         self._velocity += duration_s * (torque - load) / self._inertia

@@ -28,13 +28,7 @@ class AnswerFaults:
     seconds: float = 0.0
 
     def apply(self, frame: bytes, due_s: float) -> list[tuple[float, bytes]]:
-        """An answer as it arrives: not at all, once or twice.
-
-        Parameters
-        ----------
-        due_s : float
-            when it would arrive [s]
-        """
+        """An answer as it arrives: not at all, once or twice. `due_s`: when it would arrive [s]."""
         if self.kind is None or self.count <= 0:
             return [(due_s, frame)]
         self.count -= 1
@@ -89,10 +83,7 @@ class EmulatedBus:
     def hear(self, data: bytes, now_s: float) -> list[Instruction]:
         """Instructions in the bytes of a master; every servo that is there hears them, which contents its watchdog.
 
-        Parameters
-        ----------
-        now_s : float
-            when [s]
+        `now_s`: when [s].
         """
         instructions = self._parser.feed(data)
         if instructions:
@@ -101,13 +92,7 @@ class EmulatedBus:
         return instructions
 
     def answer(self, instructions: Iterable[Instruction], now_s: float) -> list[Delivery]:
-        """Carry instructions out and answer them.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """Carry instructions out and answer them. `now_s`: present instant [s]."""
         deliveries: list[Delivery] = []
         for instruction in instructions:
             end_s = max(now_s, self._free_s) + self._wire_s(instruction.length)
@@ -118,13 +103,7 @@ class EmulatedBus:
         return deliveries
 
     def run_faults(self, now_s: float) -> None:
-        """Let the faults happen that are due.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """Let the faults happen that are due. `now_s`: present instant [s]."""
         self.schedule.run(now_s, lambda fault: self._carry_out(fault, now_s))
 
     def _carry_out(self, fault: InjectedFault, now_s: float) -> None:

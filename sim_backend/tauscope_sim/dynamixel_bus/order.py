@@ -56,13 +56,7 @@ class DynamixelOrder:
         return PseudoTerminal(self.port)
 
     def build(self, now_s: float) -> DynamixelEmulator:
-        """The emulator.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """The emulator. `now_s`: present instant [s]."""
         arm = self._arm()
         servos = [EmulatedServo(servo, seed=joint) for joint, servo in enumerate(self.servos)]
         bus = EmulatedBus(servos, fast_sync_read=self.fast_sync_read, paced=self.paced and not self.stepped)

@@ -82,13 +82,7 @@ class EmulatedServo:
         return self.memory.get("Return Delay Time") * 2e-6
 
     def hear(self, now_s: float) -> None:
-        """An instruction went over the bus: the watchdog begins anew.
-
-        Parameters
-        ----------
-        now_s : float
-            when [s]
-        """
+        """An instruction went over the bus: the watchdog begins anew. `now_s`: when [s]."""
         self._heard_s = now_s
 
     def write(self, address: int, data: bytes) -> None:
@@ -159,14 +153,7 @@ class EmulatedServo:
     def demand(self, position: float, now_s: float, duration_s: float) -> Demand:
         """What the servo wants of its joint for the next stretch of time.
 
-        Parameters
-        ----------
-        position : float
-            of the joint [rad or m]
-        now_s : float
-            present instant [s]
-        duration_s : float
-            since the last call [s]
+        `position`: of the joint [rad or m]; `now_s`: present instant [s]; `duration_s`: since the last call [s].
         """
         if not self.has_torque:
             self._heard_s = now_s
@@ -180,14 +167,7 @@ class EmulatedServo:
     def take_motion(self, position: float, velocity: float, torque: float) -> None:
         """See the joint, and the torque that the servo exerts on it.
 
-        Parameters
-        ----------
-        position : float
-            [rad or m]
-        velocity : float
-            [rad/s or m/s]
-        torque : float
-            [Nm or N]
+        `position`: [rad or m]; `velocity`: [rad/s or m/s]; `torque`: [Nm or N].
         """
         # Torque is that of the period that ends here; position and velocity are taken at its middle too.
         before, speed_before = self._motion or (position, velocity)
@@ -198,10 +178,7 @@ class EmulatedServo:
     def sense(self, now_s: float, part: float = 1.0) -> None:
         """Show the present measurement in the control table: position, velocity and current of one instant.
 
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
+        `now_s`: present instant [s].
         """
         older, newer = self._means(0), self._means(1)
         position, velocity, current = ((1.0 - part) * old + part * new for old, new in zip(older, newer, strict=True))

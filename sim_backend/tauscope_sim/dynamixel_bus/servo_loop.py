@@ -48,13 +48,7 @@ class ServoLoop:
         self._target = self._held = None
 
     def hold(self, position: float) -> None:
-        """Stop here until `release` or `resume`.
-
-        Parameters
-        ----------
-        position : float
-            where it stands [rad or m]
-        """
+        """Stop here until `release` or `resume`. `position`: where it stands [rad or m]."""
         self._held = position
 
     def resume(self) -> None:
@@ -64,12 +58,7 @@ class ServoLoop:
     def demand(self, position: float, duration_s: float) -> Demand:
         """What the servo wants now.
 
-        Parameters
-        ----------
-        position : float
-            of the joint, as the encoder sees it [rad or m]
-        duration_s : float
-            since the last demand [s]
+        `position`: of the joint, as the encoder sees it [rad or m]; `duration_s`: since the last demand [s].
         """
         memory, unit = self._memory, abs(self._specification.torque_per_unit)
         limit = memory.get("Current Limit")

@@ -17,10 +17,7 @@ def compliant_transmissions(effects: Sequence[PhysicalEffect], rotor_inertia: Ar
 
     Raises ScenarioError where two effects make the same joint compliant, or both give it a rotor.
 
-    Parameters
-    ----------
-    rotor_inertia : (n,) float64
-        that effects give to the motors of rigid joints [kg m² or kg]
+    `rotor_inertia`: (n,), that effects give to the motors of rigid joints [kg m² or kg].
     """
     found: dict[int, Transmission] = {}
     for transmission in (effect.transmission() for effect in effects):
@@ -73,10 +70,7 @@ class Compliance:
     def twist_at_rest(self, load: list[float]) -> list[float]:
         """Twist of each compliant joint at rest [rad or m].
 
-        Parameters
-        ----------
-        load : list of float
-            torque that the links need, one a joint [Nm or N]
+        `load`: torque that the links need, one a joint [Nm or N].
         """
         return [part.twist_at_rest(load[joint]) for joint, _, part in self._parts]
 

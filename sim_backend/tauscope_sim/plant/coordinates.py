@@ -24,13 +24,7 @@ class Coordinates:
         return self.joint_count + len(self.compliant)
 
     def motor(self, joint: int) -> int:
-        """Place of a joint's motor.
-
-        Parameters
-        ----------
-        joint : int
-            counted from 0
-        """
+        """Place of a joint's motor. `joint`: counted from 0."""
         if joint in self.compliant:
             return self.joint_count + self.compliant.index(joint)
         return joint

@@ -116,24 +116,12 @@ class EquationsOfMotion:
         return [state for term in self._terms for state in term.initial_states()]
 
     def begin(self, time: float) -> None:
-        """Let the terms take note that an interval without events begins.
-
-        Parameters
-        ----------
-        time : float
-            its first instant [s]
-        """
+        """Let the terms take note that an interval without events begins. `time`: its first instant [s]."""
         for term in self._terms:
             term.begin(time, self.bodies)
 
     def temperature(self, states: list[float], ambient: float) -> Array:
-        """Temperature of the joints, (n,) [°C].
-
-        Parameters
-        ----------
-        ambient : float
-            temperature of joints that no term heats [°C]
-        """
+        """Temperature of the joints, (n,) [°C]. `ambient`: temperature of joints that no term heats [°C]."""
         temperature = np.full(self.coordinates.joint_count, ambient)
         for term in self._heating:
             term.report_temperature(states, temperature)
@@ -142,12 +130,7 @@ class EquationsOfMotion:
     def evaluate(self, time: float, vector: list[float], drive: list[float]) -> list[float]:
         """Rate of change of y = [p, v, z], 2N + m numbers.
 
-        Parameters
-        ----------
-        time : float
-            t [s]
-        drive : list of float
-            u, torque of the drives on the joint's side, one a joint [Nm or N]
+        `time`: t [s]; `drive`: u, torque of the drives on the joint's side, one a joint [Nm or N].
         """
         size = self._size
         link_side = self._sum_forces(time, vector)
@@ -184,10 +167,7 @@ class EquationsOfMotion:
     def load_at(self, time: float, vector: list[float]) -> list[float]:
         """Torque h + c + link that links need from their transmissions when they do not accelerate [Nm or N].
 
-        Parameters
-        ----------
-        time : float
-            t [s]
+        `time`: t [s].
         """
         return self._sum_forces(time, vector)
 

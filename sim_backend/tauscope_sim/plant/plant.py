@@ -28,15 +28,7 @@ def settled(equations: EquationsOfMotion, motor_position: Array) -> Array:
 
     Raises ScenarioError where a transmission is too soft to carry its link.
 
-    Parameters
-    ----------
-    motor_position : (n,) float64
-        θ [rad or m]
-
-    Returns
-    -------
-    (2N + m,) float64
-        y: positions, zero velocities, the effects' initial states
+    `motor_position`: (n,), θ [rad or m]. Returns (2N + m,), y: positions, zero velocities, the effects' initial states.
     """
     compliant = list(equations.coordinates.compliant)
     position = np.concatenate([motor_position, motor_position[compliant]])
@@ -166,10 +158,7 @@ class Plant:
 
         Raises ScenarioError where that is no place, or a transmission is too soft to carry its link.
 
-        Parameters
-        ----------
-        position : (n,) float64
-            of the motors, in joint units [rad or m]
+        `position`: (n,), of the motors, in joint units [rad or m].
         """
         motors = np.asarray(position, dtype=np.float64)
         if motors.shape != (self.joint_count,) or not np.all(np.isfinite(motors)):
@@ -186,12 +175,7 @@ class Plant:
 
         Raises ScenarioError where the duration is negative, or the motion grows beyond all bounds.
 
-        Parameters
-        ----------
-        motor_torque : (n,) float64
-            of the drives, on the joint's side of the gear [Nm or N]
-        duration_s : float
-            how long [s]
+        `motor_torque`: (n,), of the drives, on the joint's side of the gear [Nm or N]; `duration_s`: how long [s].
         """
         if not duration_s >= 0.0:
             raise ScenarioError(f"duration_s is {duration_s}; time passes forwards only")

@@ -105,15 +105,7 @@ def friction_torque(friction: JointFriction, velocity: NDArray[np.float64] | flo
 
     Seed paper, equations (7) and (8).
 
-    Parameters
-    ----------
-    velocity : array_like of float64
-        v [rad/s or m/s]
-
-    Returns
-    -------
-    array of float64
-        torque of the shape of `velocity` [Nm or N]
+    `velocity`: v [rad/s or m/s]. Returns array of: torque of the shape of `velocity` [Nm or N].
     """
     v = np.asarray(velocity, dtype=np.float64)
     step = np.arctan(friction.k_v * v) * (2.0 / np.pi)

@@ -38,22 +38,13 @@ class BandFilter(Protocol):
         ...
 
     def reduce(self, values: Array) -> Array:
-        """Values (..., N) filtered and decimated to (..., M).
-
-        Parameters
-        ----------
-        values : (..., N) float64
-            signals, time last
-        """
+        """Values (..., N) filtered and decimated to (..., M). `values`: (..., N), signals, time last."""
         ...
 
     def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Which of the M outputs rest on measured samples, (..., N) → (..., M).
 
-        Parameters
-        ----------
-        measured : (..., N) bool
-            where a sample was measured
+        `measured`: (..., N), where a sample was measured.
         """
         ...
 
@@ -73,23 +64,11 @@ class AllPass:
     rate_hz: float
 
     def reduce(self, values: Array) -> Array:
-        """Values as they are.
-
-        Parameters
-        ----------
-        values : (..., N) float64
-            signals, time last
-        """
+        """Values as they are. `values`: (..., N), signals, time last."""
         return values
 
     def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """The mask as it is.
-
-        Parameters
-        ----------
-        measured : (..., N) bool
-            where a sample was measured
-        """
+        """The mask as it is. `measured`: (..., N), where a sample was measured."""
         return measured
 
     def filtered_white(self, lags: int) -> None:
@@ -117,13 +96,8 @@ class Decimator:
     def design(rate_hz: float, cutoff_hz: float) -> "Decimator":
         """The decimator for one band.
 
-        Parameters
-        ----------
-        rate_hz : float
-            sampling rate of the signals [Hz]
-        cutoff_hz : float
-            where half the amplitude is left [Hz]; full stop from 1.5 times that on, at or below the new Nyquist
-            frequency
+        `rate_hz`: sampling rate of the signals [Hz]; `cutoff_hz`: where half the amplitude is left [Hz]; full stop from
+        1.5 times that on, at or below the new Nyquist frequency.
         """
         factor = max(1, int(rate_hz / (3.0 * cutoff_hz) + 1e-9))
         length, beta = signal.kaiserord(STOP_BAND_DB, 2.0 * cutoff_hz / rate_hz)
@@ -135,15 +109,7 @@ class Decimator:
     def reduce(self, values: Array) -> Array:
         """Signals filtered and decimated; only outputs whose whole kernel lies inside the signal.
 
-        Parameters
-        ----------
-        values : (..., N) float64
-            signals, time last
-
-        Returns
-        -------
-        (..., M) float64
-            M = (N - K) // D + 1, or 0 where N < K
+        `values`: (..., N), signals, time last. Returns (..., M), M = (N - K) // D + 1, or 0 where N < K.
         """
         blocks = len(self.kernel) // self.factor
         outputs = self._outputs(values.shape[-1])
@@ -164,10 +130,7 @@ class Decimator:
     def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Outputs that rest on measured samples: see `MASKED_FRACTION` and `BRIDGED_FRACTION`.
 
-        Parameters
-        ----------
-        measured : (..., N) bool
-            where a sample was measured
+        `measured`: (..., N), where a sample was measured.
         """
         if measured.all():
             return np.ones((*measured.shape[:-1], self._outputs(measured.shape[-1])), dtype=bool)
@@ -212,25 +175,14 @@ class HarmonicBand:
 
     @staticmethod
     def design(rate_hz: float, period_samples: int, cutoff_hz: float) -> "HarmonicBand":
-        """The band of a period.
-
-        Parameters
-        ----------
-        rate_hz : float
-            sampling rate [Hz]
-        cutoff_hz : float
-            highest frequency kept [Hz]
-        """
+        """The band of a period. `rate_hz`: sampling rate [Hz]; `cutoff_hz`: highest frequency kept [Hz]."""
         harmonics = min(int(cutoff_hz * period_samples / rate_hz + 1e-9), (period_samples - 1) // 2)
         return HarmonicBand(period_samples, harmonics, (2 * harmonics + 1) * rate_hz / period_samples)
 
     def reduce(self, values: Array) -> Array:
         """Signals of one period, band-limited and resampled to 2h + 1 points.
 
-        Parameters
-        ----------
-        values : (..., N) float64
-            one period, time last
+        `values`: (..., N), one period, time last.
         """
         spectrum = np.fft.rfft(values, axis=-1)[..., : self.harmonics + 1]
         count = 2 * self.harmonics + 1
@@ -239,10 +191,7 @@ class HarmonicBand:
     def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """All True where the whole period was measured, but for `MASKED_FRACTION`: a harmonic needs all of it.
 
-        Parameters
-        ----------
-        measured : (..., N) bool
-            where a sample was measured in at least one period
+        `measured`: (..., N), where a sample was measured in at least one period.
         """
         whole = measured.mean(axis=-1, keepdims=True) >= 1.0 - MASKED_FRACTION
         return np.broadcast_to(whole, (*measured.shape[:-1], 2 * self.harmonics + 1))

@@ -107,10 +107,7 @@ class Conditioner:
     def as_one_motion(self, state_hz: Array | None) -> "Conditioner":
         """The same recording with no period averaged: each repetition of a motion counts as the motion that it was.
 
-        Parameters
-        ----------
-        state_hz : (n,) float64 or None
-            cut-off of the motion's own smoothing, joint by joint [Hz]; by the common band's where None
+        `state_hz`: (n,), cut-off of the motion's own smoothing, joint by joint [Hz]; by the common band's where None.
         """
         return replace(self, timing=replace(self.timing, runs=()), state_hz=state_hz)
 
@@ -146,10 +143,7 @@ class Conditioner:
 
         Raises RecordingError where the band is so narrow that nothing of the recording is left.
 
-        Parameters
-        ----------
-        cutoff_hz : float or None
-            cut-off of the band that torque and regressor share [Hz]; None for no filter
+        `cutoff_hz`: cut-off of the band that torque and regressor share [Hz]; None for no filter.
         """
         found = False
         for rows in self.timing.rows:
@@ -166,10 +160,7 @@ class Conditioner:
     def summary(self, cutoff_hz: float | None) -> ConditioningSummary:
         """Counts of what was missing and what was averaged.
 
-        Parameters
-        ----------
-        cutoff_hz : float or None
-            the band [Hz]; whether periods are averaged depends on it
+        `cutoff_hz`: the band [Hz]; whether periods are averaged depends on it.
         """
         missed, resampled = np.zeros(self.robot.joint_count, int), False
         for samples in self.usable_samples():

@@ -86,14 +86,8 @@ class Trim:
     def design(rate_hz: float, cutoff_hz: float | None, state_hz: Array | None = None) -> "Trim":
         """Band and margin for a cut-off.
 
-        Parameters
-        ----------
-        rate_hz : float
-            sampling rate [Hz]
-        cutoff_hz : float or None
-            of the common band [Hz]; None for no filter
-        state_hz : (n,) float64 or None
-            of the motion's own smoothing, joint by joint [Hz]; `state_cutoff` where None
+        `rate_hz`: sampling rate [Hz]; `cutoff_hz`: of the common band [Hz]; None for no filter; `state_hz`: (n,), of
+        the motion's own smoothing, joint by joint [Hz]; `state_cutoff` where None.
         """
         margin = 2 * DIFFERENCE_MARGIN
         if cutoff_hz is None or cutoff_hz >= OPEN_BAND_FRACTION * rate_hz:
@@ -120,12 +114,7 @@ class Trim:
 def state_cutoff(rate_hz: float, cutoff_hz: float | None) -> float:
     """Cut-off of the motion's own smoothing for a given common band.
 
-    Parameters
-    ----------
-    rate_hz : float
-        sampling rate [Hz]
-    cutoff_hz : float or None
-        of the common band [Hz]; None for no filter
+    `rate_hz`: sampling rate [Hz]; `cutoff_hz`: of the common band [Hz]; None for no filter.
     """
     return rate_hz / 2.0 if cutoff_hz is None else min(STATE_BAND_RATIO * cutoff_hz, rate_hz / 2.0)
 
@@ -133,10 +122,7 @@ def state_cutoff(rate_hz: float, cutoff_hz: float | None) -> float:
 def transient_motion(stretch: Stretch, trim: Trim, source: MotionSource) -> Motion | None:
     """Smoothed and differentiated motion of a stretch, edges trimmed.
 
-    Returns
-    -------
-    Motion or None
-        None where the stretch is too short for one output of the band
+    Returns Motion or None: None where the stretch is too short for one output of the band.
     """
     rate, count = stretch.rate_hz, len(stretch.position)
     if not trim.outputs(count):
@@ -170,10 +156,7 @@ def transient_motion(stretch: Stretch, trim: Trim, source: MotionSource) -> Moti
 def average_motion(periods: Periods, cutoff_hz: float | None, source: MotionSource) -> Motion:
     """One period for all: positions averaged, differentiated by their Fourier series, torques kept apart.
 
-    Parameters
-    ----------
-    cutoff_hz : float or None
-        of the common band [Hz]; None for no filter
+    `cutoff_hz`: of the common band [Hz]; None for no filter.
     """
     rate, count = periods.rate_hz, periods.position.shape[1]
     cutoff = state_cutoff(rate, cutoff_hz)

@@ -95,13 +95,7 @@ class MotionSource:
     quieter_from_hz: Array | None = None
 
     def in_band(self, cutoff_hz: float | None) -> "MotionSource":
-        """The sources of a band.
-
-        Parameters
-        ----------
-        cutoff_hz : float or None
-            of the common band [Hz]; None for no filter
-        """
+        """The sources of a band. `cutoff_hz`: of the common band [Hz]; None for no filter."""
         if self.quieter_from_hz is None:
             return self
         band = np.inf if cutoff_hz is None else cutoff_hz

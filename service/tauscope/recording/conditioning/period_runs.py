@@ -51,14 +51,8 @@ class PeriodRun:
     def within(self, rows: tuple[int, int], begin_s: float, end_s: float, interval_s: float) -> "PeriodRun":
         """What of the run lies within a stretch; its `count` is 0 where nothing does.
 
-        Parameters
-        ----------
-        rows : (int, int)
-            rows of the stretch
-        begin_s, end_s : float
-            instants of its first sample and of the end of its last one [s]
-        interval_s : float
-            time from sample to sample [s]
+        `rows`: (int, int), rows of the stretch; `begin_s`, `end_s`: instants of its first sample and of the end of its
+        last one [s]; `interval_s`: time from sample to sample [s].
         """
         slack = STEP_TOLERANCE * interval_s
         start = self.start_s if self.start_s > begin_s - slack else begin_s
@@ -76,12 +70,8 @@ class PeriodRun:
     def progress(self, origin_s: float, elapsed: Array) -> Array:
         """Index of the period plus the part of it that is over, (N,); NaN outside the run.
 
-        Parameters
-        ----------
-        origin_s : float
-            an instant [s]; kept apart because epoch seconds would cost digits
-        elapsed : (N,) float64
-            time since then [s]
+        `origin_s`: an instant [s]; kept apart because epoch seconds would cost digits; `elapsed`: (N,), time since then
+        [s].
         """
         since = (origin_s - self.start_s) + elapsed
         slack = WHOLE_PERIOD * self.length_s
@@ -108,14 +98,8 @@ class PeriodLabels:
     def runs(self, rows: tuple[int, int], begin_s: float, end_s: float, interval_s: float) -> Iterator[PeriodRun]:
         """The runs of periods of equal length within one stretch of a recording.
 
-        Parameters
-        ----------
-        rows : (int, int)
-            the stretch, as first and one-past-last row
-        begin_s, end_s : float
-            instants of its first sample and of the end of its last one [s]
-        interval_s : float
-            time from sample to sample [s]
+        `rows`: (int, int), the stretch, as first and one-past-last row; `begin_s`, `end_s`: instants of its first
+        sample and of the end of its last one [s]; `interval_s`: time from sample to sample [s].
         """
         first = max(int(np.searchsorted(self.row, rows[0], side="right")) - 1, 0)
         last = int(np.searchsorted(self.row, rows[1]))

@@ -81,11 +81,8 @@ class Periods:
 def split_periods(stretch: Stretch, refine: bool = False) -> Periods | None:
     """The complete repeated periods of a stretch.
 
-    Returns
-    -------
-    Periods or None
-        as many whole periods as the longest repeated part holds, counted from where it begins, which may be anywhere
-        in a period; None where it holds fewer than two
+    Returns Periods or None: as many whole periods as the longest repeated part holds, counted from where it begins,
+    which may be anywhere in a period; None where it holds fewer than two.
     """
     if stretch.period is None or len(stretch.period) < 3:
         return None
@@ -121,10 +118,8 @@ def _align(stretch: Stretch, first: int, length: float, count: int) -> Periods |
 def with_turns_removed(periods: Periods, joint_types: Sequence[JointType]) -> Periods | None:
     """The periods with their joints' advance from one to the next known, and whole turns taken out of the positions.
 
-    Returns
-    -------
-    Periods or None
-        None where a joint ends a period elsewhere than it began: gravity then differs from period to period
+    Returns Periods or None: None where a joint ends a period elsewhere than it began: gravity then differs from period
+    to period.
     """
     steps = periods.count - 1
     centre = periods.position.mean(axis=1)

@@ -36,13 +36,7 @@ class ZeroRuns:
         self._runs: list[list[tuple[int, int]]] = [[] for _ in range(len(scales) + 1)]
 
     def add(self, samples: Samples, first: int) -> None:
-        """Take the next rows.
-
-        Parameters
-        ----------
-        first : int
-            row of the first of them
-        """
+        """Take the next rows. `first`: row of the first of them."""
         zero = samples.effort == 0.0
         if not zero.any():
             return

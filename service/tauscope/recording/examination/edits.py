@@ -96,24 +96,12 @@ def _interpolate(values: Array, time: Array, doubtful: NDArray[np.bool_], longes
 
 
 def row_numbers(ranges: Rows) -> Numbers:
-    """Row numbers of ranges, (m,).
-
-    Parameters
-    ----------
-    ranges : (k, 2) int64
-        start:stop
-    """
+    """Row numbers of ranges, (m,). `ranges`: (k, 2) int64, start:stop."""
     return np.concatenate([NO_NUMBERS, *(np.arange(start, stop) for start, stop in ranges)])
 
 
 def join_ranges(rows: Numbers) -> Rows:
-    """Ranges start:stop of ascending row numbers, (k, 2).
-
-    Parameters
-    ----------
-    rows : (m,) int64
-        rows, ascending, each once
-    """
+    """Ranges start:stop of ascending row numbers, (k, 2). `rows`: (m,) int64, rows, ascending, each once."""
     if not len(rows):
         return NO_ROWS
     edges = np.flatnonzero(np.diff(rows, prepend=rows[0] - 2, append=rows[-1] + 2) != 1)
@@ -121,11 +109,5 @@ def join_ranges(rows: Numbers) -> Rows:
 
 
 def find_runs(mask: NDArray[np.bool_]) -> Rows:
-    """Ranges start:stop in which a mask is true, (k, 2).
-
-    Parameters
-    ----------
-    mask : (N,) bool
-        one value a row
-    """
+    """Ranges start:stop in which a mask is true, (k, 2). `mask`: (N,), one value a row."""
     return np.flatnonzero(np.diff(mask, prepend=False, append=False)).reshape(-1, 2)

@@ -106,10 +106,7 @@ def _returns(surprise: Array, a: int, b: int) -> bool:
 def _count_frozen(steps: Array, calm: Array, k: int) -> int:
     """Repeated rows before a step that makes up for them; 0 where it does not.
 
-    Parameters
-    ----------
-    calm : (N,) float64
-        the steps without jumps, from which speeds are taken [rad or m]
+    `calm`: (N,), the steps without jumps, from which speeds are taken [rad or m].
     """
     before, after = np.flatnonzero(steps[:k])[-CHANGES:], k + 1 + np.flatnonzero(steps[k + 1 :])[:CHANGES]
     if not len(before) or not len(after) or before[-1] == k - 1:

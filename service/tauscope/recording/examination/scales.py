@@ -123,13 +123,7 @@ def measure_efforts(sketch: Sketch) -> list[EffortScale]:
 
 
 def unwrap_steps(steps: Array, *, is_wrapped: bool) -> Array:
-    """Steps of an angle without the turn that a wrap adds.
-
-    Parameters
-    ----------
-    steps : (N,) float64
-        changes from row to row [rad]
-    """
+    """Steps of an angle without the turn that a wrap adds. `steps`: (N,), changes from row to row [rad]."""
     if not is_wrapped:
         return steps
     is_wrap = np.abs(np.abs(steps) - ONE_TURN) < LARGEST_STEP  # two turns at once are a spike
@@ -137,37 +131,19 @@ def unwrap_steps(steps: Array, *, is_wrapped: bool) -> Array:
 
 
 def is_new(values: Array) -> NDArray[np.bool_]:
-    """Whether a value is another than the one before, (N,).
-
-    Parameters
-    ----------
-    values : (N,) float64
-        a signal
-    """
+    """Whether a value is another than the one before, (N,). `values`: (N,), a signal."""
     return np.diff(values, prepend=np.nan) != 0.0
 
 
 def neighbours_median(values: Array) -> Array:
-    """Median of the seven values around each one, (N,); the ends are repeated.
-
-    Parameters
-    ----------
-    values : (N,) float64
-        a signal
-    """
+    """Median of the seven values around each one, (N,); the ends are repeated. `values`: (N,), a signal."""
     from scipy.ndimage import median_filter  # slow to import, and a control process reads no recordings
 
     return median_filter(values, size=2 * NEIGHBOURS + 1, mode="nearest")
 
 
 def neighbour_windows(values: Array) -> Array:
-    """Each value with its neighbours, (N, 7), mirrored at the ends.
-
-    Parameters
-    ----------
-    values : (N,) float64
-        a signal
-    """
+    """Each value with its neighbours, (N, 7), mirrored at the ends. `values`: (N,), a signal."""
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, NEIGHBOURS, mode="reflect"), 2 * NEIGHBOURS + 1)
 
 
@@ -176,10 +152,7 @@ def distance_beyond(windows: Array) -> Array:
 
     The range leaves the highest and the lowest neighbour out, which may be a spike, too. A step lies within it.
 
-    Parameters
-    ----------
-    windows : (N, 7) float64
-        values and their neighbours
+    `windows`: (N, 7), values and their neighbours.
     """
     values = windows[:, NEIGHBOURS]
     others = np.sort(np.delete(windows, NEIGHBOURS, axis=1), axis=1)

@@ -57,10 +57,7 @@ class JointDefects:
     def position_edit(self, count: int, lost: Numbers) -> ColumnEdit:
         """Edit of the position of a recording of `count` rows: jumps are relative to the longest piece.
 
-        Parameters
-        ----------
-        lost : (m,) int64
-            further rows to be masked
+        `lost`: (m,) int64, further rows to be masked.
         """
         where, offsets = NO_NUMBERS, np.empty(0)
         if self.jumps or self.wraps:
@@ -96,10 +93,7 @@ class Defects:
 def find_defects(recording: Recording, types: list[JointType]) -> Defects:
     """Find a recording's defects in memory that grows with their number only.
 
-    Parameters
-    ----------
-    types : list of JointType
-        of the joints: only revolute ones wrap
+    `types`: of the joints: only revolute ones wrap.
     """
     sketch = Sketch.of(recording)
     positions, efforts = measure_positions(sketch, types), measure_efforts(sketch)
@@ -183,10 +177,7 @@ class _Scan:
 def _sum_jumps(jumps: list[tuple[int, float]], where: Numbers, count: int) -> Array:
     """Offset from each of some rows on, (m,): the sum of the jumps up to there, 0 in the longest piece between them.
 
-    Parameters
-    ----------
-    where : (m,) int64
-        rows, ascending
+    `where`: (m,) int64, rows, ascending.
     """
     ordered = sorted(jumps)
     starts = np.array([0, *(row for row, _ in ordered)], dtype=np.int64)

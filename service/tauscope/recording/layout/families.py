@@ -60,13 +60,7 @@ def find_families(header: Sequence[str], joint_names: Sequence[str] | None) -> l
 
 
 def fill_template(template: str, index: int, name: str | None) -> str:
-    """The column of a joint.
-
-    Parameters
-    ----------
-    index : int
-        counted from 0
-    """
+    """The column of a joint. `index`: counted from 0."""
     filled = template.replace(FROM_ZERO, str(index)).replace(FROM_ONE, str(index + 1))
     return filled if name is None else filled.replace(BY_NAME, name)
 

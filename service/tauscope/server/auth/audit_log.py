@@ -27,13 +27,7 @@ GENESIS = "0" * 64
 
 
 def chained_line(previous: Mapping[str, Any] | None, content: Mapping[str, Any]) -> bytes:
-    """The line that follows another one.
-
-    Parameters
-    ----------
-    previous : mapping or None
-        the entry before; None for the first
-    """
+    """The line that follows another one. `previous`: the entry before; None for the first."""
     entry = {
         "number": 1 if previous is None else previous["number"] + 1,
         **content,

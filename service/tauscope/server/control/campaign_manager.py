@@ -57,10 +57,7 @@ class CampaignManager(Manager[CampaignRunner]):
     def stop(self, identifier: str) -> JobState | None:
         """Stop a campaign: takes no lock, waits for nothing, may be called any number of times.
 
-        Returns
-        -------
-        JobState or None
-            where the campaign stood; None where nothing of it goes on
+        Returns JobState or None: where the campaign stood; None where nothing of it goes on.
         """
         runner = self._threads.find(identifier)
         if runner is None:

@@ -194,10 +194,7 @@ class Leases:
 
         Raises LeasedError if somebody has it and it is not taken. Raises BusyError if it moves without a lease.
 
-        Parameters
-        ----------
-        ttl_s : float
-            how long it lasts without a sign of life [s]
+        `ttl_s`: how long it lasts without a sign of life [s].
         """
         with self._lock:
             present = self._present(device)

@@ -55,10 +55,7 @@ def wait_for_end(workspace: Workspace, stop: threading.Event) -> JobRecord | Non
 
     Raises AcquisitionError if the job's state is damaged, or the job was removed.
 
-    Returns
-    -------
-    JobRecord or None
-        in an end state; None where the event came first
+    Returns JobRecord or None: in an end state; None where the event came first.
     """
     while not stop.is_set():
         record = workspace.read_record()

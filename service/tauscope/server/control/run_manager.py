@@ -48,10 +48,7 @@ class RunManager(Manager[RunSupervisor]):
         Raises BusyError if somebody else has the arm; the folder stays staged. Raises LeaseError if the arm may not be
         moved by that leave; the folder stays staged.
 
-        Parameters
-        ----------
-        holder : str or None
-            who has the arm already, to whom the run belongs; None where the run takes the arm itself
+        `holder`: who has the arm already, to whom the run belongs; None where the run takes the arm itself.
         """
         workspace = RunWorkspace(staged)
         request = workspace.read_order()
@@ -79,10 +76,7 @@ class RunManager(Manager[RunSupervisor]):
     def stop(self, identifier: str) -> Live | None:
         """Stop a run, in whatever state it is: takes no lock, waits for nothing, may be called any number of times.
 
-        Returns
-        -------
-        Live or None
-            where the run stood; None where it does not go on
+        Returns Live or None: where the run stood; None where it does not go on.
         """
         supervisor = self._threads.find(identifier)
         if supervisor is None:

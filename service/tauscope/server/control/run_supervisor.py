@@ -41,10 +41,7 @@ class ControlProcess(Protocol):
 
         Raises TimeoutError if it has not come by then.
 
-        Parameters
-        ----------
-        timeout_s : float or None
-            how long; for good where None [s]
+        `timeout_s`: how long; for good where None [s].
         """
         ...
 

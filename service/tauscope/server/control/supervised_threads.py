@@ -94,10 +94,7 @@ class Manager(Generic[S]):
 
         Raises NotFoundError if there is no such item.
 
-        Returns
-        -------
-        bool
-            False where the item is active
+        Returns bool: False where the item is active.
         """
         if self._threads.find(identifier) is not None:
             return False

@@ -54,10 +54,7 @@ def stamp(kind: str, folder: Path) -> str:
 def find_changed_file(folder: Path, artefacts: tuple[FileMetadata, ...], *, deep: bool) -> str | None:
     """The first file of an item that is not what it was when the item ended.
 
-    Returns
-    -------
-    str or None
-        its path below the folder; None where all are as they were
+    Returns str or None: its path below the folder; None where all are as they were.
     """
     for file in artefacts:
         path = folder / file.path

@@ -52,10 +52,7 @@ class Trend:
 def fit_trend(points: Sequence[TrendPoint]) -> Trend | None:
     """The line through all points, by weighted least squares.
 
-    Returns
-    -------
-    Trend or None
-        None where fewer than three points, or all at one time, tell no slope
+    Returns Trend or None: None where fewer than three points, or all at one time, tell no slope.
     """
     if len(points) < 3:
         return None
@@ -91,10 +88,7 @@ class ParameterTrend:
 def parameter_trends(models: Sequence[tuple[ModelEntry, IdentificationDocument]]) -> list[ParameterTrend]:
     """Every parameter that the newest model tells, over all models that tell it.
 
-    Parameters
-    ----------
-    models : sequence of (ModelEntry, IdentificationDocument)
-        every model that was ever active, the oldest first
+    `models`: sequence of (ModelEntry, IdentificationDocument), every model that was ever active, the oldest first.
     """
     told = [(entry, {each.name: each for each in extract_parameters(document)}) for entry, document in models]
     trends = []

@@ -34,10 +34,7 @@ async def read_document(request: Request, kind: type[Model], limit: int) -> Mode
 
     Raises ProblemError if the body is not as the model wants it. Raises LimitExceededError if it is too large.
 
-    Parameters
-    ----------
-    limit : int
-        largest body [bytes]
+    `limit`: largest body [bytes].
     """
     content = bytearray()
     async for piece in request.stream():

@@ -40,13 +40,7 @@ Methods = Sequence[tuple[re.Pattern[str], frozenset[str]]]
 
 
 def collect_methods(routers: Iterable[tuple[str, APIRouter]]) -> Methods:
-    """The methods of all routes.
-
-    Parameters
-    ----------
-    routers : iterable of (str, APIRouter)
-        each with the prefix of its paths
-    """
+    """The methods of all routes. `routers`: iterable of (str, APIRouter), each with the prefix of its paths."""
     return tuple(
         (compile_path(prefix + route.path)[0], frozenset(route.methods or ()))
         for prefix, router in routers

@@ -40,10 +40,7 @@ class Answers(Protocol):
 
         Raises OSError if that has to be written down and cannot be.
 
-        Returns
-        -------
-        bool
-            False where the request was begun before
+        Returns bool: False where the request was begun before.
         """
         ...
 
@@ -121,13 +118,7 @@ class MemoryAnswers(Answers):
     """Answers none of which is ever written to a disk."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """Begin without any.
-
-        Parameters
-        ----------
-        clock : callable
-            by which they age [s]
-        """
+        """Begin without any. `clock`: by which they age [s]."""
         self._clock = clock
         self._lock = threading.Lock()
         self._kept: dict[str, tuple[float, KeptAnswer | None]] = {}

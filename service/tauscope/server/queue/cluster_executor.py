@@ -45,10 +45,7 @@ class LoopThread:
     def stop(self, within_s: float) -> None:
         """End the thread, with whatever its clients still had under way.
 
-        Parameters
-        ----------
-        within_s : float
-            how long to wait for its end [s]
+        `within_s`: how long to wait for its end [s].
         """
         if self._loop is not None:
             self._loop.add_callback(self._stopping.set)
@@ -86,10 +83,7 @@ class ClusterExecutor(Executor):
 
         Raises StoreError if it does not answer, or Dask is not installed.
 
-        Parameters
-        ----------
-        wait_s : float
-            how long `submit` waits for a scheduler that is away [s]
+        `wait_s`: how long `submit` waits for a scheduler that is away [s].
         """
         self._address, self._wait_s = address, wait_s
         self._width = 1

@@ -51,10 +51,7 @@ def write_trajectory_piece(workspace: TaskWorkspace[Any], rate_hz: float, start:
     Raises NotFoundError if the file is missing. Raises ExcitationError if the file was damaged. Raises
     LimitExceededError if the CSV would be too long.
 
-    Parameters
-    ----------
-    rate_hz : float
-        samples a second [Hz]
+    `rate_hz`: samples a second [Hz].
     """
     try:
         content, order = workspace.trajectory.read_bytes(), workspace.read_order()

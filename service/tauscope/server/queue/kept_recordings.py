@@ -28,10 +28,7 @@ def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport
 
     Raises RecordingError if it cannot be read or breaks a rule; the message calls the file by its name alone.
 
-    Parameters
-    ----------
-    joint_count : int or None
-        joints that it must have; None where any number is welcome
+    `joint_count`: joints that it must have; None where any number is welcome.
     """
     try:
         report = check_recording(path, joint_count)

@@ -67,10 +67,8 @@ class QueuedJob:
         An earlier attempt may have written it and failed after that, as on a disk that became full in between. Raises
         OSError if the disk does not take it.
 
-        Returns
-        -------
-        bool
-            whether the job is in that state now; False where it may not be, its record is damaged, or it is gone
+        Returns bool: whether the job is in that state now; False where it may not be, its record is damaged, or it is
+        gone.
         """
         try:
             workspace = Workspace(self.folder)
@@ -197,10 +195,7 @@ class JobQueue:
         Cancelled work stops at its next step; what it still does until then is dropped. Raises NotFoundError if there
         is no such job.
 
-        Returns
-        -------
-        bool
-            True where the job was removed
+        Returns bool: True where the job was removed.
         """
         with self._lock:
             if self.cancel(kind, identifier):
@@ -214,10 +209,7 @@ class JobQueue:
 
         Raises NotFoundError if there is no such job.
 
-        Returns
-        -------
-        bool
-            False where it had ended, or its record is damaged
+        Returns bool: False where it had ended, or its record is damaged.
         """
         with self._lock:
             job, workspace = QueuedJob(kind, identifier), Workspace(kind.items.folder(identifier))

@@ -176,10 +176,7 @@ class JobFiles:
 def perform_job(workspace: TaskWorkspace[Any], server_recordings: Path) -> JobProblem | None:
     """Do a job, as a worker process does it.
 
-    Returns
-    -------
-    JobProblem or None
-        why there is no result; None where there is one
+    Returns JobProblem or None: why there is no result; None where there is one.
     """
     folders = (*map(workspace.uploads, (*workspace.roles, SAVED_MODEL)), workspace.robot, server_recordings)
 
@@ -231,10 +228,7 @@ def submit_job(
 
     Raises QueueFullError if too many jobs are waiting.
 
-    Parameters
-    ----------
-    put_robot : callable
-        writes the robot's files into a folder
+    `put_robot`: writes the robot's files into a folder.
     """
     with staged_workspace(kind.items, workspace) as staged:
         put_robot(staged.robot)

@@ -20,10 +20,7 @@ class StoppedError(Exception):
 def do_work(workspace: Workspace, work: Callable[[], None], *folders: Path) -> JobProblem | None:
     """Do the work of a job, and say why it has no result.
 
-    Returns
-    -------
-    JobProblem or None
-        why there is no result; None where there is one
+    Returns JobProblem or None: why there is no result; None where there is one.
     """
     try:
         work()

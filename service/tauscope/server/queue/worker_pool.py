@@ -44,12 +44,7 @@ class WorkerPool(Executor):
     def __init__(self, workers: int, *, deadline_s: float | None = None, memory_bytes: int | None = None) -> None:
         """Make the pool; no process is started before it is needed.
 
-        Parameters
-        ----------
-        deadline_s : float or None
-            how long a call may take [s]
-        memory_bytes : int or None
-            data that a process may hold [bytes]
+        `deadline_s`: how long a call may take [s]; `memory_bytes`: data that a process may hold [bytes].
         """
         self._deadline_s, self._memory_bytes = deadline_s, memory_bytes
         self._condition = threading.Condition()

@@ -48,10 +48,7 @@ class Repeater:
 
         Raises NothingToDoError if there is no new recording. Raises TauscopeError if it cannot be started.
 
-        Returns
-        -------
-        (str, str)
-            kind and identifier of what was started
+        Returns (str, str), kind and identifier of what was started.
         """
         definition = ScheduleDefinition.model_validate(dict(entry.definition), strict=False)
         if definition.kind == "campaign":
@@ -136,10 +133,7 @@ def make_schedule(
 
     Raises NotFoundError if there is no such item, or its files are damaged.
 
-    Parameters
-    ----------
-    site : str or None
-        of the data folder whose service does it; None for whichever comes first
+    `site`: of the data folder whose service does it; None for whichever comes first.
     """
     workspace = _WORKSPACES[definition.kind](repeater.items(definition.kind).folder(like))
     order = workspace.read_order()

@@ -119,10 +119,8 @@ class ScheduleRepository:
     def claim(self, entry: ScheduleEntry, next_due: datetime | None, now: datetime) -> int | None:
         """Take the firing of a schedule on that is due; once only, whoever else tries.
 
-        Returns
-        -------
-        int or None
-            number of the firing; None where somebody else has it, or the schedule was changed meanwhile
+        Returns int or None: number of the firing; None where somebody else has it, or the schedule was changed
+        meanwhile.
         """
         with self._database.writing() as session:
             moved = session.execute(
@@ -150,10 +148,7 @@ class ScheduleRepository:
     def claim_asked(self, now: datetime, number: int | None = None) -> tuple[int, ScheduleEntry] | None:
         """Take a firing on that was asked for; once only, whoever else tries.
 
-        Returns
-        -------
-        (int, ScheduleEntry) or None
-            number and schedule; None where there is none
+        Returns (int, ScheduleEntry) or None, number and schedule; None where there is none.
         """
         query = select(Firing).join(Schedule).where(Firing.state == "asked", self._is_mine()).order_by(Firing.id)
         if number is not None:
@@ -170,13 +165,7 @@ class ScheduleRepository:
         return self._move(Firing.id == number, "asked", state="withdrawn", reason="nobody took it on in time") > 0
 
     def finish(self, number: int, state: str, reason: str | None = None, item: tuple[str, str] | None = None) -> None:
-        """Write down what came of a firing.
-
-        Parameters
-        ----------
-        item : (str, str) or None
-            kind and identifier of what was started
-        """
+        """Write down what came of a firing. `item`: (str, str), kind and identifier of what was started."""
         kind, identifier = item or (None, None)
         values = {"reason": reason, "item_kind": kind, "item_identifier": identifier}
         self._move(Firing.id == number, "claimed", state=state, **values)

@@ -61,13 +61,7 @@ class IncomingFile:
     """A file that is being written under a hidden name, until `finish` or `discard`."""
 
     def __init__(self, folder: Path, name: str, limit: int) -> None:
-        """Begin an empty file.
-
-        Parameters
-        ----------
-        limit : int
-            largest size that is accepted [bytes]
-        """
+        """Begin an empty file. `limit`: largest size that is accepted [bytes]."""
         descriptor, path = tempfile.mkstemp(dir=folder, prefix=".incoming-")
         self._file = os.fdopen(descriptor, "wb")
         self._hash = hashlib.sha256()

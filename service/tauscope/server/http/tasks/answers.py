@@ -92,10 +92,7 @@ def require_document(content: bytes | None, identifier: str) -> bytes:
 
     Raises ProblemError if it is damaged.
 
-    Parameters
-    ----------
-    content : bytes or None
-        as its folder holds it; None where it is damaged
+    `content`: as its folder holds it; None where it is damaged.
     """
     if content is None:
         raise ProblemError("damaged", f"the result of {identifier} is missing or damaged; hand it in again")

@@ -45,14 +45,8 @@ def keep_model(
 
     Raises ProblemError where it came twice. Raises IdentificationError where it holds what JSON cannot.
 
-    Parameters
-    ----------
-    model : str or dict or None
-        identifier or document, as the request has it
-    file : KeptFile or None
-        part of the form, which lies in its place
-    read : callable
-        the model of an identifier
+    `model`: identifier or document, as the request has it; `file`: part of the form, which lies in its place; `read`:
+    the model of an identifier.
     """
     if file is not None and model is not None:
         raise ProblemError("invalid-request", "the model came twice, as part model and in part request; send it once")
@@ -173,10 +167,7 @@ def request_body(
 ) -> dict[str, Any]:
     """The body of such a request, for the OpenAPI document.
 
-    Parameters
-    ----------
-    examples : mapping of str to (str, plain data)
-        summary and value by name
+    `examples`: mapping of str to (str, plain data), summary and value by name.
     """
     parts = {
         "request": model_reference(kind),
