@@ -64,13 +64,7 @@ def shift_command(time: Array, command: Array, delay: float, rate_hz: float | No
 
 
 def command_torque(robot: Robot, samples: Samples, delays: Sequence[float]) -> Array:
-    """Torque that the loops of all joints make, (N, n) [Nm or N].
-
-    Parameters
-    ----------
-    delays : sequence of float
-        one a joint [s]
-    """
+    """Torque that the loops of all joints make, (N, n) [Nm or N]. `delays`: one a joint [s]."""
     torque = np.full(samples.position.shape, np.nan)
     for joint, delay in enumerate(delays):
         torque[:, joint] = joint_torque(robot, samples, joint, delay)

@@ -46,13 +46,7 @@ class Client:
         self, url: str = "http://127.0.0.1:8000", key: str | None = None, *, timeout_s: float = 30.0,
         ca_file: Path | None = None,
     ) -> None:  # fmt: skip
-        """Name the service; nothing is sent yet.
-
-        Parameters
-        ----------
-        timeout_s : float
-            how long each step of a request may take [s]
-        """
+        """Name the service; nothing is sent yet. `timeout_s`: how long each step of a request may take [s]."""
         self._transport = Transport(url, key, timeout_s, ca_file)
 
     def is_ready(self) -> bool:
@@ -111,10 +105,7 @@ class Client:
 
         Raises TimeoutError if it has not ended by then.
 
-        Parameters
-        ----------
-        timeout_s : float or None
-            how long; for good where None [s]
+        `timeout_s`: how long; for good where None [s].
         """
         last = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
@@ -142,10 +133,7 @@ class Client:
     def lease(self, robot: str, *, backend: str | None = None, ttl_s: float = 10.0, take: bool = False) -> HeldLease:
         """Take an arm; use the result as a context, within which it is kept.
 
-        Parameters
-        ----------
-        ttl_s : float
-            time after which the arm stops when this program is gone [s]
+        `ttl_s`: time after which the arm stops when this program is gone [s].
         """
         wanted = {"robot": robot, "backend": backend, "ttl_s": ttl_s, "take": take}
         taken = self._create("leases", LeaseAnswer, json_content(wanted))

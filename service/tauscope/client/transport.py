@@ -41,10 +41,7 @@ class Transport:
 
         Raises ValueError if that is no address, or a key would go over the network in clear.
 
-        Parameters
-        ----------
-        timeout_s : float
-            how long each step of a request may take [s]
+        `timeout_s`: how long each step of a request may take [s].
         """
         parts = urlsplit(url)
         if parts.scheme not in ("http", "https") or not parts.hostname or parts.path.strip("/") or parts.query:
@@ -117,12 +114,8 @@ def json_content(document: Any) -> Content:
 def form_content(document: Any, files: Sequence[tuple[str, Path]]) -> Content:
     """A form of a JSON part and files.
 
-    Parameters
-    ----------
-    document : dict or None
-        for the part ``request``; None for a form without it
-    files : sequence of (str, Path)
-        name of the part, and the file
+    `document`: for the part ``request``; None for a form without it; `files`: sequence of (str, Path), name of the
+    part, and the file.
     """
     boundary = uuid.uuid4().hex
     parts: list[bytes | Path] = []

@@ -121,10 +121,7 @@ def _invert(mass: Array) -> Array:
 def _brake(inverse: Array, velocity: Array, most: Array) -> Array:
     """Velocity after dry friction, which stops a joint and never turns it round, (n, S, V).
 
-    Parameters
-    ----------
-    most : (n, S, V) float64
-        largest impulse of friction [Nm s or N s]
+    `most`: (n, S, V), largest impulse of friction [Nm s or N s].
     """
     impulse, out = np.zeros_like(velocity), velocity.copy()
     for _ in range(SWEEPS if len(velocity) > 1 else 1):

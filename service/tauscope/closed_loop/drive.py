@@ -48,13 +48,7 @@ class Drive(Protocol):
     is_closed: bool
 
     def torque(self, step: int, position: Array, velocity: Array) -> Array:
-        """Torque at a step, (n,) [Nm or N].
-
-        Parameters
-        ----------
-        position, velocity : (n,) float64
-            q, q̇ of the simulated arm
-        """
+        """Torque at a step, (n,) [Nm or N]. `position`, `velocity`: (n,), q, q̇ of the simulated arm."""
         ...
 
 
@@ -82,10 +76,7 @@ class LoopDrive:
     def __init__(self, loops: Sequence[Actuator], recording: Recording, time: Array, *, is_damped: bool) -> None:
         """Put the commands, supplies and gains on the steps.
 
-        Parameters
-        ----------
-        is_damped : bool
-            whether torque includes the loops' damping; where not, the plant has it
+        `is_damped`: whether torque includes the loops' damping; where not, the plant has it.
         """
         self._damped = 1.0 if is_damped else 0.0
         samples = recording.samples()
@@ -101,13 +92,7 @@ class LoopDrive:
         )
 
     def torque(self, step: int, position: Array, velocity: Array) -> Array:
-        """Torque at a step, (n,) [Nm or N].
-
-        Parameters
-        ----------
-        position, velocity : (n,) float64
-            q, q̇ of the simulated arm
-        """
+        """Torque at a step, (n,) [Nm or N]. `position`, `velocity`: (n,), q, q̇ of the simulated arm."""
         out = np.empty(len(self._loops))
         for joint, loop in enumerate(self._loops):
             measured = position[joint] if loop.kind == "position" else velocity[joint]
@@ -137,13 +122,7 @@ class TorqueDrive:
         self.squares, self.steps = np.zeros(len(inertia)), 0
 
     def torque(self, step: int, position: Array, velocity: Array) -> Array:
-        """Torque at a step, (n,) [Nm or N].
-
-        Parameters
-        ----------
-        position, velocity : (n,) float64
-            q, q̇ of the simulated arm
-        """
+        """Torque at a step, (n,) [Nm or N]. `position`, `velocity`: (n,), q, q̇ of the simulated arm."""
         motion = self._motion
         ahead, faster = motion.position[step] - position, motion.velocity[step] - velocity
         added = self._stiffness * ahead + self._damping * faster

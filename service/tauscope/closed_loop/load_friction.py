@@ -32,17 +32,8 @@ class LoadFriction:
     def level(self, load: Array, direction: Array) -> Array:
         """Level of dry friction.
 
-        Parameters
-        ----------
-        load : (n,) float64 or (n, S, V) float64
-            torque of the rigid body [Nm or N]
-        direction : (n,) float64 or (n, S, V) float64
-            sign of the motion
-
-        Returns
-        -------
-        (n,) float64 or (n, S, V) float64
-            [Nm or N]
+        `load`: (n,) or (n, S, V), torque of the rigid body [Nm or N]; `direction`: (n,) or (n, S, V), sign of the
+        motion. Returns (n,) or (n, S, V) [Nm or N].
         """
         size = np.abs(load)
         return np.where(direction * load > 0.0, self.driving * size, self.braking) * size

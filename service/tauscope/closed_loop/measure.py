@@ -17,10 +17,7 @@ MOVES = 0.05
 def rms_error(measured: Array, simulated: Array) -> Array:
     """Root mean square of the position error per joint, (n,) [rad or m].
 
-    Parameters
-    ----------
-    measured, simulated : (N, n) float64
-        q of the real and of the simulated arm [rad or m]; NaN where it was missed
+    `measured`, `simulated`: (N, n), q of the real and of the simulated arm [rad or m]; NaN where it was missed.
     """
     return np.sqrt(np.nanmean((simulated - measured) ** 2, axis=0))
 
@@ -28,10 +25,7 @@ def rms_error(measured: Array, simulated: Array) -> Array:
 def worst_error(measured: Array, simulated: Array) -> Array:
     """Largest position error per joint, (n,) [rad or m].
 
-    Parameters
-    ----------
-    measured, simulated : (N, n) float64
-        q of the real and of the simulated arm [rad or m]; NaN where it was missed
+    `measured`, `simulated`: (N, n), q of the real and of the simulated arm [rad or m]; NaN where it was missed.
     """
     return np.nanmax(np.abs(simulated - measured), axis=0)
 
@@ -39,12 +33,8 @@ def worst_error(measured: Array, simulated: Array) -> Array:
 def lag(time: Array, measured: Array, simulated: Array) -> Array:
     """Delay of the real motion behind the simulated one, (n,) [s]: that at which both differ least.
 
-    Parameters
-    ----------
-    time : (N,) float64
-        [s]
-    measured, simulated : (N, n) float64
-        q of the real and of the simulated arm [rad or m]; NaN where it was missed
+    `time`: (N,) [s]; `measured`, `simulated`: (N, n), q of the real and of the simulated arm [rad or m]; NaN where it
+    was missed.
     """
     step = float(np.median(np.diff(time)))
     reach = int(LONGEST_LAG_S / step)

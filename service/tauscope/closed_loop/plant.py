@@ -54,11 +54,8 @@ def make_plant(mjcf: str, joints: Sequence[str], damping: Array) -> Plant:
 
     Raises MissingExtraError where MuJoCo is not installed. Raises TauscopeError where no simulator is registered.
 
-    Parameters
-    ----------
-    damping : (n,) float64
-        torque per velocity of the loops, which MuJoCo integrates implicitly as it does an actuator's kv
-        [Nm s/rad or N s/m]
+    `damping`: (n,), torque per velocity of the loops, which MuJoCo integrates implicitly as it does an actuator's kv
+    [Nm s/rad or N s/m].
     """
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         with require_extra("tauscope rollout"):

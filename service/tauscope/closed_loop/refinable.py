@@ -104,30 +104,11 @@ class RefinableModel:
         return [loss] if self._is_warmed else []
 
     def clip(self, values: Array) -> Array:
-        """Parameters within their bounds.
-
-        Parameters
-        ----------
-        values : (..., P) float64
-
-        Returns
-        -------
-        (..., P) float64
-        """
+        """Parameters within their bounds. `values`: (..., P). Returns (..., P)."""
         return np.maximum(values, [term.least for term in self.terms])
 
     def errors(self, values: Array) -> Array:
-        """Position errors on the segments.
-
-        Parameters
-        ----------
-        values : (V, P) float64
-
-        Returns
-        -------
-        (K, n, S, V) float64
-            [rad or m]
-        """
+        """Position errors on the segments. `values`: (V, P). Returns (K, n, S, V) [rad or m]."""
         with np.errstate(all="ignore"):  # models that no arm can have may fly off
             found = simulate_segments(self._model.robot, self._loops, self.segments, self._variants(values))
         return np.nan_to_num(np.clip(found - self.segments.position[..., None], -LOST, LOST), nan=LOST)
@@ -154,12 +135,7 @@ class RefinableModel:
         )
 
     def model_of(self, values: Array) -> tuple[ExportModel, LoadFriction, tuple[Actuator, ...]]:
-        """The model of parameters, its friction by load, and its loops.
-
-        Parameters
-        ----------
-        values : (P,) float64
-        """
+        """The model of parameters, its friction by load, and its loops. `values`: (P,)."""
         found = self._variants(values[None])
         friction = tuple(
             replace(law, stiction=float(stiction), viscous=float(viscous), offset=float(offset))

@@ -76,12 +76,7 @@ def refine_model(
 
     Raises RecordingError where no recording is long enough.
 
-    Parameters
-    ----------
-    model : ExportModel
-        without findings
-    loops : sequence of Actuator
-        one a joint, with their delays
+    `model`: without findings; `loops`: one a joint, with their delays.
     """
     arm = RefinableModel(model, tuple(loops), Segments.of(recordings, loops))
     progress(f"refine {len(arm.terms)} parameters on {arm.segments.count} segments")

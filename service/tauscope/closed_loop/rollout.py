@@ -117,12 +117,8 @@ def roll_out(
     Raises RecordingMismatchError where the model is of another arm, or nothing states a model. Raises TauscopeError
     where a recording holds neither commands for loops nor torque, or there is no simulator.
 
-    Parameters
-    ----------
-    exports : sequence of ExportModel
-        of a model file, as `read_export_models` reads it; empty where the robot file's own model is judged alone
-    training : sequence of Recording
-        with commands, by which the model without findings is refined; the other recordings judge it
+    `exports`: of a model file, as `read_export_models` reads it; empty where the robot file's own model is judged
+    alone; `training`: with commands, by which the model without findings is refined; the other recordings judge it.
     """
     models = _models(robot, exports)
     known = exports[-1].robot if exports else None

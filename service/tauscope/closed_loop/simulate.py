@@ -20,10 +20,7 @@ def simulate_motion(
 
     Raises TauscopeError where the recording holds no torque for a joint.
 
-    Parameters
-    ----------
-    horizon_s : float or None
-        time between restarts at the real state [s]; None starts once
+    `horizon_s`: time between restarts at the real state [s]; None starts once.
     """
     steps = len(motion.time)
     every = steps if horizon_s is None else max(round(horizon_s / STEP_S), 1)

@@ -78,20 +78,14 @@ class BaseParameters:
     def is_independent(self, index: int) -> bool:
         """Whether a base parameter is one standard parameter alone: its row of B is zero.
 
-        Parameters
-        ----------
-        index : int
-            base parameter, from 0
+        `index`: base parameter, from 0.
         """
         return not np.any(self.combination[index])
 
     def outward(self, joint: int) -> slice:
         """Base parameters of the links that a joint moves: from its own link's first one to the last of all.
 
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
+        `joint`: joint index, from 0.
         """
         return slice(
             int(np.searchsorted(self.independent_columns, len(STANDARD_PARAMETERS) * self.first_links[joint])), None
@@ -100,15 +94,7 @@ class BaseParameters:
     def project(self, parameters: Array) -> Array:
         """Values of the base parameters, Θ* = Θ_L + B Θ_K, equation (14).
 
-        Parameters
-        ----------
-        parameters : (10 n,) float64
-            Θ, ten standard parameters a link
-
-        Returns
-        -------
-        (m,) float64
-            Θ*
+        `parameters`: (10 n,), Θ, ten standard parameters a link. Returns (m,), Θ*.
         """
         return parameters[self.independent_columns] + self.combination @ parameters[self.dependent_columns]
 

@@ -80,14 +80,8 @@ class ChainMotion:
     def links(self, q: Array, qd: Array, qdd: Array) -> Iterator[LinkMotion]:
         """Motion of link 1, 2, … n in turn.
 
-        Parameters
-        ----------
-        q : (n, N) float64
-            joint position [rad or m], a contiguous row a joint
-        qd : (n, N) float64
-            joint velocity
-        qdd : (n, N) float64
-            joint acceleration
+        `q`: (n, N), joint position [rad or m], a contiguous row a joint; `qd`: (n, N), joint velocity; `qdd`: (n, N),
+        joint acceleration.
         """
         moving = _Frame(self._blocks, self._scratch, self._field, self._products, samples=q.shape[1])
         moving.rest(self._gravity)

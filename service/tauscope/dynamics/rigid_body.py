@@ -46,17 +46,8 @@ def inverse_dynamics(robot: Robot, parameters: Array, q: Array, qd: Array, qdd: 
 def gravity_torque(robot: Robot, parameters: Array, q: Array) -> Array:
     """Torque c(q) that holds the arm against gravity, the last term of the seed paper's equation (1).
 
-    Parameters
-    ----------
-    parameters : (10 m,) float64
-        Θ, ten standard parameters a link
-    q : (N, n) float64
-        joint position [rad or m]
-
-    Returns
-    -------
-    (N, n) float64
-        joint torque or force [Nm or N]
+    `parameters`: (10 m,), Θ, ten standard parameters a link; `q`: (N, n), joint position [rad or m]. Returns (N, n),
+    joint torque or force [Nm or N].
     """
     rest = np.zeros_like(q)
     return inverse_dynamics(robot, parameters, q, rest, rest)
@@ -67,17 +58,8 @@ def mass_matrix(robot: Robot, parameters: Array, q: Array) -> Array:
 
     J_j holds the joint screws of link j (`tauscope.dynamics.chain_motion`), G_j its inertia about its frame's origin.
 
-    Parameters
-    ----------
-    parameters : (10 m,) float64
-        Θ, ten standard parameters a link
-    q : (N, n) float64
-        joint position [rad or m]
-
-    Returns
-    -------
-    (N, n, n) float64
-        symmetric, and positive definite where the links are physically possible [kg m², kg m, kg]
+    `parameters`: (10 m,), Θ, ten standard parameters a link; `q`: (N, n), joint position [rad or m]. Returns (N, n, n),
+    symmetric, and positive definite where the links are physically possible [kg m², kg m, kg].
     """
     joints = robot.joint_count
     inertias = [_spatial_inertia(link) for link in _links(parameters)]

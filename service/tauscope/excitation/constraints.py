@@ -61,10 +61,7 @@ class KinematicUsage:
     def signed(self, x: Array) -> tuple[Array, Array, Array]:
         """Position, velocity and acceleration as parts of their limits, -1 to 1 within; (K, n) each.
 
-        Parameters
-        ----------
-        x : (n, columns) float64
-            centre and coefficients
+        `x`: (n, columns), centre and coefficients.
         """
         motion = self._grid.motion(x)
         place = (motion.position - self._limits.middle) / self._limits.half_range
@@ -79,20 +76,14 @@ class KinematicUsage:
     def largest(self, x: Array) -> Array:
         """Largest usage of position, velocity and acceleration at any instant, (3, n).
 
-        Parameters
-        ----------
-        x : (n, columns) float64
-            centre and coefficients
+        `x`: (n, columns), centre and coefficients.
         """
         return np.stack([np.abs(part).max(axis=0) for part in self.signed(x)])
 
     def fitted(self, x: Array, fraction: float = 1.0) -> Array:
         """The nearest series of the same shape within the limits: amplitudes taken back, then centres shifted.
 
-        Parameters
-        ----------
-        x : (n, columns) float64
-            centre and coefficients
+        `x`: (n, columns), centre and coefficients.
         """
         place, velocity, acceleration = self.signed(x)
         swing = place - x[:, 0]
@@ -109,12 +100,7 @@ class KinematicUsage:
     def smooth(self, x: Array, scale: Array) -> SmoothMaximum:
         """Smooth largest usages, position, velocity, acceleration of every joint.
 
-        Parameters
-        ----------
-        x : (n, columns) float64
-            centre and coefficients
-        scale : (3 n,) float64
-            factors that make them exact at the present motion
+        `x`: (n, columns), centre and coefficients; `scale`: (3 n,), factors that make them exact at the present motion.
         """
         joints = len(x)
         values = np.empty(3 * joints)
@@ -154,10 +140,7 @@ class StateUsage:
     def usages(self, motion: MotionSamples, base: Array | None = None) -> list[Array]:
         """Usage of torque, then of workspace, as far as they are constrained; (N, n) and (N, obstacles × points).
 
-        Parameters
-        ----------
-        base : (n, m, N) float64 or None
-            base regressor of the same motion, where the caller has it
+        `base`: (n, m, N), base regressor of the same motion, where the caller has it.
         """
         parts = []
         if self.torque is not None:
@@ -189,12 +172,8 @@ class StateUsage:
     def smooth_values(self, motion: MotionSamples, base: Array, scale: Array) -> Array:
         """Smooth largest usages over all samples and joints, or points, (count,).
 
-        Parameters
-        ----------
-        base : (n, m, N) float64
-            base regressor of the same motion
-        scale : (count,) float64
-            factors that make them exact at the present motion
+        `base`: (n, m, N), base regressor of the same motion; `scale`: (count,), factors that make them exact at the
+        present motion.
         """
         parts = self.usages(motion, base)
         return np.array([smooth_maximum(p.reshape(-1, 1), s)[0][0] for p, s in zip(parts, scale, strict=True)])
@@ -202,12 +181,8 @@ class StateUsage:
     def smooth_gradients(self, motion: MotionSamples, base: Array, scale: Array) -> list[MotionGradient]:
         """Derivatives of `smooth_values` by the motion.
 
-        Parameters
-        ----------
-        base : (n, m, N) float64
-            base regressor of the same motion
-        scale : (count,) float64
-            factors that make them exact at the present motion
+        `base`: (n, m, N), base regressor of the same motion; `scale`: (count,), factors that make them exact at the
+        present motion.
         """
         parts = self.usages(motion, base)
         weights = [smooth_maximum(p.reshape(-1, 1), s)[1].reshape(p.shape) for p, s in zip(parts, scale, strict=True)]
@@ -222,17 +197,8 @@ class StateUsage:
 def smooth_maximum(usage: Array, scale: float | Array = 1.0) -> tuple[Array, Array]:
     """The p-norm mean of usages over time and its derivatives.
 
-    Parameters
-    ----------
-    usage : (N, C) float64
-        not negative
-    scale : float or (C,) float64
-        factors
-
-    Returns
-    -------
-    tuple of (C,) and (N, C) float64
-        values, and derivatives of value c by usage [:, c]
+    `usage`: (N, C), not negative; `scale`: float or (C,), factors. Returns tuple of (C,) and (N, C), values, and
+    derivatives of value c by usage [:, c].
     """
     top = np.maximum(usage.max(axis=0), 1e-12)
     powers = (usage / top) ** (POWER - 1.0)

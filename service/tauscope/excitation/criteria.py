@@ -47,10 +47,7 @@ class CriterionValue:
 def criterion_value(criterion: Criterion, information: Array, information_weight: float = 0.0) -> CriterionValue:
     """A criterion, its gradient, and the condition number, from one eigenvalue decomposition.
 
-    Parameters
-    ----------
-    information : (p, p) float64
-        A = LᵀL, symmetric
+    `information`: (p, p), A = LᵀL, symmetric.
     """
     values, vectors = np.linalg.eigh(information)
     low, high = float(values[0]), float(values[-1])

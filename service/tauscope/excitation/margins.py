@@ -62,10 +62,7 @@ def trajectory_margins(
 ) -> Margins:
     """Margins over a whole trajectory.
 
-    Parameters
-    ----------
-    available : (n,) float64
-        torque that may be used, infinite where there is no limit [Nm or N]
+    `available`: (n,), torque that may be used, infinite where there is no limit [Nm or N].
     """
     usage = np.zeros((3, trajectory.joint_count))
     torque = np.zeros(trajectory.joint_count)

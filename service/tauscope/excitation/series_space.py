@@ -54,13 +54,7 @@ class SeriesSpace:
         return self.joint_count * self.columns
 
     def series(self, x: Array) -> FourierSeries:
-        """The series of a vector.
-
-        Parameters
-        ----------
-        x : (n, columns) float64
-            centre and coefficients
-        """
+        """The series of a vector. `x`: (n, columns), centre and coefficients."""
         limits, free = self._limits, self.harmonics - 1
         speed = limits.velocity[:, None]
         return FourierSeries(
@@ -109,13 +103,7 @@ class SeriesGrid:
         return len(self._bases[0])
 
     def motion(self, x: Array) -> MotionSamples:
-        """Position, velocity and acceleration at the instants.
-
-        Parameters
-        ----------
-        x : (n, columns) float64
-            centre and coefficients
-        """
+        """Position, velocity and acceleration at the instants. `x`: (n, columns), centre and coefficients."""
         limits = self._limits
         position, velocity, acceleration = (basis @ x[:, 1:].T * limits.velocity for basis in self._bases)
         return MotionSamples(position + limits.middle + limits.half_range * x[:, 0], velocity, acceleration)

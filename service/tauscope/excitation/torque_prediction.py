@@ -54,10 +54,7 @@ class TorquePrediction:
     def torque(self, motion: MotionSamples, base: Array | None = None) -> Array:
         """Bound of |τ| at every sample, (N, n) [Nm or N].
 
-        Parameters
-        ----------
-        base : (n, m, N) float64 or None
-            `ExcitationRegressor.base_regressor` of the same motion, where the caller has it
+        `base`: (n, m, N), `ExcitationRegressor.base_regressor` of the same motion, where the caller has it.
         """
         base = self._regressor.base_regressor(motion) if base is None else base
         return self._rounded(self._rigid(base), self._small) + self._friction(motion)
@@ -65,22 +62,15 @@ class TorquePrediction:
     def usage(self, motion: MotionSamples, base: Array | None = None) -> Array:
         """Part of the available torque that is used at every sample, (N, n); zero where there is no limit.
 
-        Parameters
-        ----------
-        base : (n, m, N) float64 or None
-            `ExcitationRegressor.base_regressor` of the same motion, where the caller has it
+        `base`: (n, m, N), `ExcitationRegressor.base_regressor` of the same motion, where the caller has it.
         """
         return self.torque(motion, base) / self.available
 
     def pull_back(self, motion: MotionSamples, base: Array, weight: Array) -> MotionGradient:
         """Derivatives by the motion of Σ weight · usage.
 
-        Parameters
-        ----------
-        base : (n, m, N) float64
-            `ExcitationRegressor.base_regressor` of the same motion
-        weight : (N, n) float64
-            derivative by `usage`
+        `base`: (n, m, N), `ExcitationRegressor.base_regressor` of the same motion; `weight`: (N, n), derivative by
+        `usage`.
         """
         rigid = self._rigid(base)
         by_torque = weight / self.available

@@ -44,10 +44,7 @@ class Choice:
     def predict(self, inputs: Inputs, target: Array, judged: Inputs) -> Array:
         """Learn from all training rows, and predict others, (J,).
 
-        Parameters
-        ----------
-        target : (R,) float64
-            what is to be predicted of the training rows [Nm or N]
+        `target`: (R,), what is to be predicted of the training rows [Nm or N].
         """
         total = np.zeros(len(judged.columns))
         for each in self.members:
@@ -73,10 +70,7 @@ def choose_black_box(inputs: Inputs, target: Array, splits: Sequence[Folds], lea
 
     Of several splits, the one by which most is predicted: motion may be told by other recordings, or by its neighbours.
 
-    Parameters
-    ----------
-    target : (R,) float64
-        what is to be predicted [Nm or N]
+    `target`: (R,), what is to be predicted [Nm or N].
     """
     choices = [_stack(inputs, target, folds, learners) for folds in splits]
     return min(choices, key=lambda each: each.error)

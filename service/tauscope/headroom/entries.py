@@ -21,10 +21,7 @@ def require_black_box(held_out: int) -> None:
     Raises MissingExtraError where scikit-learn is not installed. Raises IdentificationError where no recording is held
     out.
 
-    Parameters
-    ----------
-    held_out : int
-        number of held-out recordings
+    `held_out`: number of held-out recordings.
     """
     with require_extra("tauscope diagnose --headroom"):
         import sklearn  # noqa: F401

@@ -53,13 +53,7 @@ class Inputs:
     own: int
 
     def at(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> "Inputs":
-        """Some of the rows.
-
-        Parameters
-        ----------
-        rows : (R,) bool or (k,) int
-            mask or places
-        """
+        """Some of the rows. `rows`: (R,) or (k,) int, mask or places."""
         return Inputs(self.columns[rows], self.own)
 
 
@@ -68,10 +62,7 @@ def joint_inputs(motion: MotionRows, joint: int) -> Inputs:
 
     And the travel of the joint since its last reversal.
 
-    Parameters
-    ----------
-    joint : int
-        index, from 0
+    `joint`: index, from 0.
     """
     order = [joint, *(other for other in range(len(motion.position)) if other != joint)]
     now = (motion.position, motion.velocity, motion.acceleration, motion.load)
@@ -82,13 +73,7 @@ def joint_inputs(motion: MotionRows, joint: int) -> Inputs:
 
 
 def shifted(values: Array, step: int) -> Array:
-    """Signals some rows later, the row at the end repeated, (n, M).
-
-    Parameters
-    ----------
-    values : (n, M) float64
-        evenly spaced rows
-    """
+    """Signals some rows later, the row at the end repeated, (n, M). `values`: (n, M), evenly spaced rows."""
     places = np.clip(np.arange(values.shape[-1]) + step, 0, values.shape[-1] - 1)
     return values[..., places]
 
@@ -96,10 +81,7 @@ def shifted(values: Array, step: int) -> Array:
 def travel_since_reversal(position: Array, velocity: Array) -> Array:
     """Way since the velocity last changed its sign, with that sign, (M,) [rad or m].
 
-    Parameters
-    ----------
-    position, velocity : (M,) float64
-        of one joint
+    `position`, `velocity`: (M,), of one joint.
     """
     turns = np.flatnonzero(np.diff(np.signbit(velocity), prepend=np.signbit(velocity[:1])))
     last = np.searchsorted(turns, np.arange(len(position)), side="right")

@@ -66,10 +66,7 @@ def write_trajectory(trajectory: Trajectory, path: str | Path, *, rate_hz: float
 
     Raises ExcitationError for another suffix, or where the file cannot be written.
 
-    Parameters
-    ----------
-    rate_hz : float
-        samples a second of a CSV file [Hz]
+    `rate_hz`: samples a second of a CSV file [Hz].
     """
     path = Path(path)
     suffix = path.suffix.lower()

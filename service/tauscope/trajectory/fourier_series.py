@@ -74,13 +74,7 @@ class FourierSeries:
         return 2.0 * np.pi / self.period_s * np.arange(1.0, self.harmonics + 1.0)
 
     def evaluate(self, time: Array) -> MotionSamples:
-        """Exact position, velocity and acceleration.
-
-        Parameters
-        ----------
-        time : (N,) float64
-            instants since the start of a period [s]
-        """
+        """Exact position, velocity and acceleration. `time`: (N,), instants since the start of a period [s]."""
         omega = self.frequencies
         phase = np.multiply.outer(time, omega)
         cosine, sine = np.cos(phase), np.sin(phase)

@@ -136,15 +136,8 @@ class Trajectory:
 
         Raises ExcitationError for a rate that is not positive, or absurd.
 
-        Parameters
-        ----------
-        rate_hz : float
-            samples a second [Hz]
-
-        Returns
-        -------
-        TrajectorySamples
-            instants k / rate from 0 to the first one at which the motion has ended
+        `rate_hz`: samples a second [Hz]. Returns TrajectorySamples: instants k / rate from 0 to the first one at which
+        the motion has ended.
         """
         return self.evaluate(np.arange(self.count_samples(rate_hz)) / rate_hz)
 
@@ -165,10 +158,7 @@ class Trajectory:
     def evaluate(self, time: Array) -> TrajectorySamples:
         """The trajectory at given instants; before its start and after its end it stands still.
 
-        Parameters
-        ----------
-        time : (N,) float64
-            ascending instants since the start [s]
+        `time`: (N,), ascending instants since the start [s].
         """
         shape = (len(time), self.joint_count)
         result = TrajectorySamples(time, np.empty(shape), np.empty(shape), np.empty(shape), np.full(len(time), np.nan))
@@ -196,10 +186,7 @@ def ramp(start: Array, end: Array, limits: MotionLimits, *, fraction: float = RA
     Its duration is known before it runs, and it stays between the two postures: where both are within the position
     limits, so is all of it. Raises ExcitationError for a posture that is not finite or has another number of joints.
 
-    Parameters
-    ----------
-    start, end : (n,) float64
-        postures [rad or m]
+    `start`, `end`: (n,), postures [rad or m].
     """
     start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     joints = len(limits.velocity)
@@ -215,10 +202,7 @@ def ramp(start: Array, end: Array, limits: MotionLimits, *, fraction: float = RA
 def whole_steps(duration_s: float) -> float:
     """A duration rounded up to `TIME_STEP_S`, so that what follows begins at a sample of all usual rates.
 
-    Parameters
-    ----------
-    duration_s : float
-        shortest duration [s]
+    `duration_s`: shortest duration [s].
     """
     steps_a_second = round(1.0 / TIME_STEP_S)
     return float(np.ceil(duration_s * steps_a_second - 1e-9) / steps_a_second)
