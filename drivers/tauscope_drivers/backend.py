@@ -44,12 +44,9 @@ class StopPolicy(StrEnum):
 class DriveLimits:
     """What the drives themselves enforce, set before torque is switched on; infinite where there is no limit.
 
-    position_low, position_high : (n,) float64
-        range of the joint [rad or m]
-    velocity : (n,) float64
-        largest speed [rad/s or m/s]
-    torque : (n,) float64
-        largest torque [Nm or N]
+    `position_low`, `position_high`: (n,), range of the joint [rad or m].
+    `velocity`: (n,), largest speed [rad/s or m/s].
+    `torque`: (n,), largest torque [Nm or N].
     """
 
     position_low: Array
@@ -62,12 +59,10 @@ class DriveLimits:
 class Capabilities:
     """What a backend can do, known without motion.
 
-    watchdog_range_s : tuple of two float
-        shortest and longest time of the device's watchdog [s]
-    policies_by_mode : mapping of ControlMode to frozenset of StopPolicy, or None
-        ways to stop that the device carries out itself in each mode, where they differ; None where every mode has all
-    remarks : tuple of str
-        what the drives do not have, and what is done in place of it; known once the arm is connected
+    `watchdog_range_s`: shortest and longest time of the device's watchdog [s].
+    `policies_by_mode`: ways to stop that the device carries out itself in each mode, where they differ; None where
+        every mode has all.
+    `remarks`: what the drives do not have, and what is done in place of it; known once the arm is connected.
     """
 
     joint_count: int

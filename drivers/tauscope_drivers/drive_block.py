@@ -14,15 +14,11 @@ _KEYS_OF_ANY_BUS = ("stop_policy",)
 class DriveJoint:
     """A joint as a driver sees it.
 
-    gear_ratio : float
-        motor turns per joint turn
-    torque_per_unit : float or None
-        joint torque for one unit that the drive measures, signed as the robot file's ``sign`` and ``torque_constant``
-        are; None where it does not say [Nm or N]
-    torque_limit, velocity_limit : float or None
-        of the joint; None where the robot file states none [Nm or N, rad/s or m/s]
-    position_range : tuple of two float, or None
-        lowest and highest; None where the robot file states none [rad or m]
+    `gear_ratio`: motor turns per joint turn.
+    `torque_per_unit`: joint torque for one unit that the drive measures, signed as the robot file's ``sign`` and
+        ``torque_constant`` are; None where it does not say [Nm or N].
+    `torque_limit`, `velocity_limit`: of the joint; None where the robot file states none [Nm or N, rad/s or m/s].
+    `position_range`: lowest and highest; None where the robot file states none [rad or m].
     """
 
     name: str

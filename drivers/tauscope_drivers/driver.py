@@ -42,10 +42,8 @@ class Connection:
 class ArmDescription:
     """An arm as a driver is told of it.
 
-    robot : object
-        the whole robot as Tauscope reads it, for a driver that simulates it
-    folder : Path or None
-        for files of the driver's own
+    `robot`: the whole robot as Tauscope reads it, for a driver that simulates it.
+    `folder`: for files of the driver's own.
     """
 
     joints: tuple[DriveJoint, ...]

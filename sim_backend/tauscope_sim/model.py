@@ -119,14 +119,10 @@ def _weigh(body: mujoco.MjsBody, link: LinkInertia) -> None:
 class BodyInertia:
     """Inertia of a body in MuJoCo's terms.
 
-    mass : float
-        m, above zero [kg]
-    centre : (3,) float64
-        centre of mass in the link frame [m]
-    quaternion : (4,) float64
-        (w, x, y, z) of the principal axes in the link frame
-    moments : (3,) float64
-        principal moments about the centre of mass, ascending, above zero [kg m²]
+    `mass`: m, above zero [kg].
+    `centre`: (3,), centre of mass in the link frame [m].
+    `quaternion`: (4,), (w, x, y, z) of the principal axes in the link frame.
+    `moments`: (3,), principal moments about the centre of mass, ascending, above zero [kg m²].
     """
 
     mass: float

@@ -20,8 +20,7 @@ LEAST_HARMONICS = 2
 class MotionSamples:
     """A motion at given instants.
 
-    position, velocity, acceleration : (N, n) float64
-        q, q̇, q̈ [rad or m, and per s, per s²]
+    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈ [rad or m, and per s, per s²].
     """
 
     position: Array
@@ -33,14 +32,10 @@ class MotionSamples:
 class FourierMotion:
     """A finite Fourier series a joint, the form of the paper's section 5.2 about a centre position.
 
-    period_s : float
-        duration of one period, 2π/ω_f [s]
-    centre : (n,) float64
-        mean position [rad or m]
-    cosine : (n, M) float64
-        a_l, velocity amplitude of the cosine of harmonic l [rad/s or m/s]
-    sine : (n, M) float64
-        b_l, velocity amplitude of the sine of harmonic l [rad/s or m/s]
+    `period_s`: duration of one period, 2π/ω_f [s].
+    `centre`: (n,), mean position [rad or m].
+    `cosine`: (n, M), a_l, velocity amplitude of the cosine of harmonic l [rad/s or m/s].
+    `sine`: (n, M), b_l, velocity amplitude of the sine of harmonic l [rad/s or m/s].
     """
 
     period_s: float

@@ -42,18 +42,12 @@ def rigid_body_torque(model: mujoco.MjModel, position: Array, velocity: Array, a
 class SimulatedRecording:
     """A simulated measurement together with the truth behind it.
 
-    time : (N,) float64
-        instants, uniform, from zero [s]
-    position : (N, n) float64
-        q as the encoder reports it [rad or m]
-    torque : (N, n) float64
-        τ as measured: exact torque plus noise [Nm or N]
-    exact : MotionSamples
-        q, q̇, q̈ without noise, (N, n) each
-    torque_exact : (N, n) float64
-        τ without noise, friction included [Nm or N]
-    period : (N,) int64
-        index of the repeated period, from zero
+    `time`: (N,), instants, uniform, from zero [s].
+    `position`: (N, n), q as the encoder reports it [rad or m].
+    `torque`: (N, n), τ as measured: exact torque plus noise [Nm or N].
+    `exact`: q, q̇, q̈ without noise, (N, n) each.
+    `torque_exact`: (N, n), τ without noise, friction included [Nm or N].
+    `period`: (N,) int64, index of the repeated period, from zero.
     """
 
     time: Array

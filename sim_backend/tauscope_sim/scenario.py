@@ -22,14 +22,10 @@ def _zero() -> Array:
 class Scenario:
     """What differs from the robot file, and how well the sensors see it; ``Scenario()`` conceals nothing.
 
-    torque_noise_std : (n,) or () float64
-        standard deviation of the recorded torque's white noise [Nm or N]
-    position_noise_std : (n,) or () float64
-        of the recorded position's [rad or m]
-    encoder_step : (n,) or () float64
-        resolution to which positions are recorded, zero for none [rad or m]
-    command_latency_s : float
-        time from a setpoint's arrival to its effect [s]
+    `torque_noise_std`: (n,) or (), standard deviation of the recorded torque's white noise [Nm or N].
+    `position_noise_std`: (n,) or (), of the recorded position's [rad or m].
+    `encoder_step`: (n,) or (), resolution to which positions are recorded, zero for none [rad or m].
+    `command_latency_s`: time from a setpoint's arrival to its effect [s].
     """
 
     effects: tuple[Effect, ...] = ()

@@ -41,8 +41,7 @@ MOST_EFFECTS = 200
 class ScenarioDocument(Document):
     """The scenario file's keys.
 
-    command_latency : float
-        [s]
+    `command_latency`: [s].
     """
 
     torque_noise_std: NotNegativeNumbers = Field(default_factory=single_zero)

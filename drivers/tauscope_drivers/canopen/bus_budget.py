@@ -18,10 +18,8 @@ _SYNC_BYTES = 0
 class CycleFrames:
     """Cyclic frames of one node.
 
-    received_bytes : tuple of int
-        payloads of its RPDOs [bytes]
-    sent_bytes : tuple of int
-        payloads of its TPDOs [bytes]
+    `received_bytes`: payloads of its RPDOs [bytes].
+    `sent_bytes`: payloads of its TPDOs [bytes].
     """
 
     received_bytes: tuple[int, ...]

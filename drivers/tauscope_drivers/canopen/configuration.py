@@ -37,10 +37,8 @@ _NODE_KEYS = ("node_id", "counts_per_turn", "zero_count", "direction", "rated_to
 class NodeConfiguration:
     """One drive.
 
-    rated_torque_nm : float or None
-        at the motor shaft, in place of what the drive states (0x6076): makers scale it differently [Nm]
-    torque_limit : float or None
-        of the joint; None where there is none [Nm or N]
+    `rated_torque_nm`: at the motor shaft, in place of what the drive states (0x6076): makers scale it differently [Nm].
+    `torque_limit`: of the joint; None where there is none [Nm or N].
     """
 
     node_id: int
@@ -57,8 +55,7 @@ class NodeConfiguration:
 class BusConfiguration:
     """The bus and the drives on it, in the order of the joints.
 
-    serial_baud : float or None
-        of an adapter on a true serial line [bit/s]
+    `serial_baud`: of an adapter on a true serial line [bit/s].
     """
 
     nodes: tuple[NodeConfiguration, ...]

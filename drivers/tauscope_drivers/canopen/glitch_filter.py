@@ -18,8 +18,7 @@ class GlitchFilter:
 
     One reading is doubted at a time: a joint that truly runs away, or whose encoder jumped, gives the next one too.
 
-    limit : float
-        speed limit of the joint; infinite as long as nothing is doubted [rad/s or m/s]
+    `limit`: speed limit of the joint; infinite as long as nothing is doubted [rad/s or m/s].
     """
 
     def __init__(self) -> None:

@@ -46,12 +46,9 @@ Listener = Callable[[int, Callable[[int, bytes], None]], None]
 class Measurement:
     """Of a joint, by its drive; NaN where it did not come.
 
-    position : float
-        [rad or m]
-    velocity : float
-        [rad/s or m/s]
-    effort : float
-        torque at the joint [Nm or N]
+    `position`: [rad or m].
+    `velocity`: [rad/s or m/s].
+    `effort`: torque at the joint [Nm or N].
     """
 
     position: float
@@ -63,20 +60,13 @@ class Measurement:
 class DriveNode:
     """A drive on the bus.
 
-    joint : int
-        number of its joint, from 1
-    last_position : float
-        of the joint when it last answered: the place to stay at, never a measurement [rad or m]
-    last_velocity : float
-        of the joint when it last told one [rad/s or m/s]
-    present : frozenset of DriveObject
-        optional objects that it has
-    mode_numbers : mapping of ControlMode to int
-        mode of operation for each control mode that it has
-    held : dict
-        of DriveObject to int: values of other objects in its RPDOs of fixed mapping
-    stays_stopped : bool
-        whether it keeps its power after a quick stop
+    `joint`: number of its joint, from 1.
+    `last_position`: of the joint when it last answered: the place to stay at, never a measurement [rad or m].
+    `last_velocity`: of the joint when it last told one [rad/s or m/s].
+    `present`: optional objects that it has.
+    `mode_numbers`: mode of operation for each control mode that it has.
+    `held`: values of other objects in its RPDOs of fixed mapping.
+    `stays_stopped`: whether it keeps its power after a quick stop.
     """
 
     configuration: NodeConfiguration

@@ -28,12 +28,9 @@ _KNOWN = {
 class PdoSlot:
     """A PDO that a drive has.
 
-    number : int
-        from 0
-    fixed : tuple of DriveObject or None
-        its objects, where its mapping cannot be written; None where it can
-    entries : int
-        most objects that it takes
+    `number`: from 0.
+    `fixed`: its objects, where its mapping cannot be written; None where it can.
+    `entries`: most objects that it takes.
     """
 
     number: int
@@ -54,8 +51,7 @@ class Pdo:
 class PdoPlan:
     """All PDOs of a drive that are used.
 
-    missing : tuple of DriveObject
-        needed, and in none of them
+    `missing`: needed, and in none of them.
     """
 
     received: tuple[Pdo, ...]

@@ -68,10 +68,8 @@ def rate_limited_by(configuration: BusConfiguration) -> str:
 class Session:
     """An arm's drives, reached.
 
-    answer_ns : int
-        time that drives get to answer SYNC in the control loop [ns]
-    settling_ns : int
-        cycle while drives change state: that of the control loop, once it is known [ns]
+    `answer_ns`: time that drives get to answer SYNC in the control loop [ns].
+    `settling_ns`: cycle while drives change state: that of the control loop, once it is known [ns].
     """
 
     bus: CanBus

@@ -28,14 +28,10 @@ _ARRIVED = 1e-6
 class _Reached:
     """What a cycle has come to.
 
-    position, velocity : (n,) float64
-        targets sent, and how fast a drive in time goes there
-    begin : (n,) float64
-        where drives were by then
-    wanted : (n,) float64
-        targets asked for
-    behind : (n,) bool
-        joints that are still on their way to them
+    `position`, `velocity`: (n,), targets sent, and how fast a drive in time goes there.
+    `begin`: (n,), where drives were by then.
+    `wanted`: (n,), targets asked for.
+    `behind`: (n,), joints that are still on their way to them.
     """
 
     position: Array

@@ -21,10 +21,8 @@ _LARGEST_NM = 100.0
 class RatedTorque:
     """A motor's rated torque.
 
-    nm : float
-        at the motor shaft [Nm]
-    remark : str
-        why another unit than the standard's is taken; empty where it is the standard's
+    `nm`: at the motor shaft [Nm].
+    `remark`: why another unit than the standard's is taken; empty where it is the standard's.
     """
 
     nm: float
@@ -68,11 +66,10 @@ def _expect(gear_ratio: float, torque_limit: float | None, rated_current_ma: int
 class DriveUnits:
     """What one unit of a drive means at the joint.
 
-    radians_per_count : float
-        2π ÷ (counts a motor turn × gear ratio), signed where the drive turns the other way round than the joint; metres
-        a count on prismatic joints [rad or m]
-    torque_per_permille : float
-        joint torque for one part in thousand of the motor's rated torque (0x6076), signed likewise [Nm or N]
+    `radians_per_count`: 2π ÷ (counts a motor turn × gear ratio), signed where the drive turns the other way round than
+        the joint; metres a count on prismatic joints [rad or m].
+    `torque_per_permille`: joint torque for one part in thousand of the motor's rated torque (0x6076), signed likewise
+        [Nm or N].
     """
 
     radians_per_count: float

@@ -88,12 +88,9 @@ _FAST_SERVO_BYTES = 4
 class Answers:
     """What came of one question to many servos.
 
-    asked_ns : int
-        instant at which the question had left [ns, by the bus' clock]
-    late_ns : int
-        how much later than usual the last answer came [ns]
-    beyond_ns : int
-        how much longer than bus and adapter should take for it [ns]
+    `asked_ns`: instant at which the question had left [ns, by the bus' clock].
+    `late_ns`: how much later than usual the last answer came [ns].
+    `beyond_ns`: how much longer than bus and adapter should take for it [ns].
     """
 
     asked_ns: int

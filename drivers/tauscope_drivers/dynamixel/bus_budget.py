@@ -27,8 +27,7 @@ _READ_BYTES = 14
 class CycleTraffic:
     """What goes over the bus in one cycle.
 
-    health_bytes : int
-        that one servo is asked for besides; 0 for no such read [bytes]
+    `health_bytes`: that one servo is asked for besides; 0 for no such read [bytes].
     """
 
     servos: int
@@ -66,10 +65,8 @@ class CycleTraffic:
 class BusTiming:
     """How fast a bus is.
 
-    return_delay_s : float
-        largest Return Delay Time of the servos [s]
-    latency_s : float
-        latency timer of the adapter; 0 on a plain serial line [s]
+    `return_delay_s`: largest Return Delay Time of the servos [s].
+    `latency_s`: latency timer of the adapter; 0 on a plain serial line [s].
     """
 
     baud: float

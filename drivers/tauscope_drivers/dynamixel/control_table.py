@@ -27,8 +27,7 @@ BYTES_BEFORE_STATE = 3
 class Item:
     """An entry of a control table.
 
-    size : int
-        [bytes]
+    `size`: [bytes].
     """
 
     name: str
@@ -55,8 +54,7 @@ def encode_items(items: Iterable[Item], values: Iterable[int]) -> bytes:
 class Block:
     """A stretch of a control table that is read at once.
 
-    length : int
-        [bytes]
+    `length`: [bytes].
     """
 
     address: int
@@ -74,12 +72,9 @@ class Block:
 class ServoModel:
     """A model of servo.
 
-    counts_per_radian : float
-        of the horn [1/rad]
-    velocity_unit : float
-        one unit of Present Velocity [rad/s]
-    current_unit : CurrentUnit or None
-        one unit of Present Current; None where no source states it
+    `counts_per_radian`: of the horn [1/rad].
+    `velocity_unit`: one unit of Present Velocity [rad/s].
+    `current_unit`: one unit of Present Current; None where no source states it.
     """
 
     number: int

@@ -30,12 +30,9 @@ from tauscope_drivers.state import Setpoint
 class Bounds:
     """Ranges of the goals, in units of the servos, one a joint.
 
-    low, high : tuple of int
-        of Goal Position [counts]
-    current : tuple of int
-        of Goal Current, either sign [units]
-    velocity : tuple of int
-        of Profile Velocity, 0 for none [units]
+    `low`, `high`: of Goal Position [counts].
+    `current`: of Goal Current, either sign [units].
+    `velocity`: of Profile Velocity, 0 for none [units].
     """
 
     low: tuple[int, ...]

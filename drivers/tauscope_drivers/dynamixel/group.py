@@ -25,16 +25,11 @@ _CURRENT, _VELOCITY, _POSITION = STATE_ITEMS
 class GroupReading:
     """What the servos measured in one cycle; NaN for who did not answer in it.
 
-    position : (n,) float64
-        [rad or m]
-    velocity : (n,) float64
-        [rad/s or m/s]
-    current : (n,) float64
-        [mA]
-    alerts : tuple of bool or None
-        alert bit of each servo; None for who did not answer
-    late_ns : int
-        how much later than the bus takes the last answer came [ns]
+    `position`: (n,) [rad or m].
+    `velocity`: (n,) [rad/s or m/s].
+    `current`: (n,) [mA].
+    `alerts`: alert bit of each servo; None for who did not answer.
+    `late_ns`: how much later than the bus takes the last answer came [ns].
     """
 
     time_ns: int

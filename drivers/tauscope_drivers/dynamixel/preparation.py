@@ -44,12 +44,9 @@ class RegisterWrite:
 class ServoTask:
     """What a servo shall do once it has torque.
 
-    current_cap : int
-        most current [units]
-    velocity_cap : int
-        largest speed of its target while it tracks positions, 0 for none [units]
-    present : int
-        Present Position [counts]
+    `current_cap`: most current [units].
+    `velocity_cap`: largest speed of its target while it tracks positions, 0 for none [units].
+    `present`: Present Position [counts].
     """
 
     mode: ControlMode

@@ -12,8 +12,7 @@ from tauscope_drivers.errors import DriverError, DriverErrorKind
 class JointServo:
     """A servo and what its numbers mean.
 
-    number : int
-        of the joint, from 1
+    `number`: of the joint, from 1.
     """
 
     number: int

@@ -13,15 +13,12 @@ MULTI_TURN_COUNTS = 1_048_575
 class ServoUnits:
     """What one unit of a servo means at its joint.
 
-    radians_per_count : float
-        joint position for one count, negative where the servo is mounted the other way round [rad or m]
-    velocity_unit : float
-        joint velocity for one unit of Present Velocity, signed likewise [rad/s or m/s]
-    milliampere : float
-        current for one unit of Present Current, signed likewise [mA]
-    torque_per_milliampere : float or None
-        joint torque for one milliampere; None where the robot file does not say, for no maker's figure exists
-        [Nm/mA or N/mA]
+    `radians_per_count`: joint position for one count, negative where the servo is mounted the other way round [rad or
+        m].
+    `velocity_unit`: joint velocity for one unit of Present Velocity, signed likewise [rad/s or m/s].
+    `milliampere`: current for one unit of Present Current, signed likewise [mA].
+    `torque_per_milliampere`: joint torque for one milliampere; None where the robot file does not say, for no maker's
+        figure exists [Nm/mA or N/mA].
     """
 
     radians_per_count: float

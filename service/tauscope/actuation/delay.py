@@ -27,10 +27,8 @@ SEEN = 3.0
 class Delay:
     """Delay of one joint's command.
 
-    value : float
-        [s]
-    std : float or None
-        standard error [s]; None where it is stated
+    `value`: [s].
+    `std`: standard error [s]; None where it is stated.
     """
 
     value: float

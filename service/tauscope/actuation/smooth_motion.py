@@ -27,12 +27,9 @@ REST = 0.02
 class SmoothMotion:
     """Motion on a uniform grid.
 
-    time : (N,) float64
-        [s]
-    position, velocity, acceleration : (N, n) float64
-        q, q̇, q̈
-    rate, band : float
-        sampling rate, and band of the comparison [Hz]
+    `time`: (N,) [s].
+    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈.
+    `rate`, `band`: sampling rate, and band of the comparison [Hz].
     """
 
     samples: Samples

@@ -68,8 +68,7 @@ Report = Annotated[Path | None, name_output("Write a page to read, figures inclu
 class LayoutArguments:
     """How the columns of a recording are read.
 
-    rate_hz : float or None
-        samples a second where t counts samples [Hz]
+    `rate_hz`: samples a second where t counts samples [Hz].
     """
 
     units: Annotated[

@@ -40,8 +40,7 @@ Start = Annotated[
 class RunArguments:
     """How a run is made: fields of `RunOptions`.
 
-    rate_hz : float or None
-        cycles a second [Hz]
+    `rate_hz`: cycles a second [Hz].
     """
 
     mode: Annotated[Literal["position", "torque"], typer.Option(help="Who closes the loop: drives or host.")] = (

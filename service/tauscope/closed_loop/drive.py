@@ -24,14 +24,10 @@ STATE_BAND_HZ = 15.0
 class RecordedMotion:
     """A recording on the steps of a rollout.
 
-    time : (K,) float64
-        of the steps [s]
-    position, velocity : (K, n) float64
-        of the real arm [rad or m, rad/s or m/s]
-    rows : (N,) float64
-        instants of the recording [s]
-    measured : (N, n) float64
-        q at these instants; NaN where it was missed
+    `time`: (K,), of the steps [s].
+    `position`, `velocity`: (K, n), of the real arm [rad or m, rad/s or m/s].
+    `rows`: (N,), instants of the recording [s].
+    `measured`: (N, n), q at these instants; NaN where it was missed.
     """
 
     name: str

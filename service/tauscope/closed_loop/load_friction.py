@@ -20,10 +20,8 @@ and a friction that takes more than half of any further load would make the two 
 class LoadFriction:
     """Coefficients of all joints.
 
-    driving : (n,) float64 or (n, 1, V) float64
-        μ_d [1/Nm or 1/N]
-    braking : (n,) float64 or (n, 1, V) float64
-        μ_b [1]
+    `driving`: (n,) or (n, 1, V), μ_d [1/Nm or 1/N].
+    `braking`: (n,) or (n, 1, V), μ_b [1].
     """
 
     driving: Array

@@ -33,14 +33,10 @@ PER_BODY, PER_JOINT = 5, 5
 class Term:
     """One parameter.
 
-    start, prior_std : float
-        mean and standard error of its prior; infinite without one
-    scale : float
-        of its steps
-    least : float
-        lower bound
-    is_optional : bool
-        whether a model does without it: zero then
+    `start`, `prior_std`: mean and standard error of its prior; infinite without one.
+    `scale`: of its steps.
+    `least`: lower bound.
+    `is_optional`: whether a model does without it: zero then.
     """
 
     name: str

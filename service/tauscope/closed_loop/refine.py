@@ -48,12 +48,9 @@ class RefinedTerm:
 class Refined:
     """A refined model.
 
-    loops : tuple of Actuator
-        with torque per volt that falls with temperature, where that was recorded
-    left_out : tuple of str
-        terms that are not significant
-    before, after : float
-        rms position error of the segments over all joints [rad or m]
+    `loops`: with torque per volt that falls with temperature, where that was recorded.
+    `left_out`: terms that are not significant.
+    `before`, `after`: rms position error of the segments over all joints [rad or m].
     """
 
     model: ExportModel

@@ -40,8 +40,7 @@ Progress = Callable[[str], None]
 class Trace:
     """One recording and its simulations.
 
-    simulated : dict of str to (N, n) float64
-        positions by model, from one start [rad or m]
+    `simulated`: dict of str to (N, n), positions by model, from one start [rad or m].
     """
 
     motion: RecordedMotion

@@ -53,16 +53,12 @@ _UNITS = (slice(0, 6), slice(6, 7), slice(7, 10))
 class BaseParameters:
     """The base parameters Θ* = Θ_L + B Θ_K of an arm, equation (14), m of them.
 
-    independent_columns : (m,) int
-        j_L: the standard parameter that leads each base parameter, counted over all links from 0
-    dependent_columns : (k,) int
-        j_K: standard parameters that appear in combinations only
-    unidentifiable_columns : (u,) int
-        standard parameters that no motion of the arm shows
-    combination : (m, k) float64
-        B, equation (12)
-    first_links : tuple of int, length n
-        first link that each joint moves, from 0
+    `independent_columns`: (m,) int, j_L: the standard parameter that leads each base parameter, counted over all links
+        from 0.
+    `dependent_columns`: (k,) int, j_K: standard parameters that appear in combinations only.
+    `unidentifiable_columns`: (u,) int, standard parameters that no motion of the arm shows.
+    `combination`: (m, k), B, equation (12).
+    `first_links`: first link that each joint moves, from 0.
     """
 
     independent_columns: Columns

@@ -45,14 +45,11 @@ _ALIGNMENT = 64
 class LinkMotion(NamedTuple):
     """Motion of link j in link frame j: views that hold until the next link is asked for.
 
-    screw_angular, screw_linear : three (j, N) float64
-        w_i and v_i of the j joints met so far
-    angular_velocity, angular_acceleration, acceleration : three (N,) float64
-        ω [rad/s], ω̇ [rad/s²], a [m/s²] of the origin, minus gravity
-    products : three (N,) float64
-        ω_y ω_z, ω_x ω_z, ω_x ω_y [rad²/s²]
-    field : three rows of three (N,) float64
-        M = S(ω̇) + S(ω)² [1/s²]
+    `screw_angular`, `screw_linear`: three (j, N), w_i and v_i of the j joints met so far.
+    `angular_velocity`, `angular_acceleration`, `acceleration`: three (N,), ω [rad/s], ω̇ [rad/s²], a [m/s²] of the
+        origin, minus gravity.
+    `products`: three (N,), ω_y ω_z, ω_x ω_z, ω_x ω_y [rad²/s²].
+    `field`: three rows of three (N,), M = S(ω̇) + S(ω)² [1/s²].
     """
 
     screw_angular: Vectors

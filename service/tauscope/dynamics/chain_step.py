@@ -23,16 +23,10 @@ ABOUT_Z: Plane = (0, 1)
 class Step:
     """Constants of one segment: turns and offsets before the joint's motion and after it.
 
-    Attributes
-    ----------
-    angle : float
-        turn about the joint's axis that is added to its position, where it is revolute [rad]
-    turns_before, turns_after : list of (Plane, float, float)
-        constant turns: plane, cosine, sine
-    before : three floats
-        translation of the placement before the joint, in frame j-1 [m]
-    after : three floats
-        translation of the placement after the joint, in frame j [m]
+    `angle`: turn about the joint's axis that is added to its position, where it is revolute [rad].
+    `turns_before`, `turns_after`: list of (Plane, float, float), constant turns: plane, cosine, sine.
+    `before`: translation of the placement before the joint, in frame j-1 [m].
+    `after`: translation of the placement after the joint, in frame j [m].
     """
 
     def __init__(self, segment: Segment) -> None:

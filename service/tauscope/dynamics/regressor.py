@@ -72,10 +72,8 @@ def torque_regressor(robot: Robot, q: Array, qd: Array, qdd: Array, *, columns: 
 class TorqueRegressor:
     """The torque regressor of one robot with its work buffers, for callers that go through a recording in pieces.
 
-    Parameters
-    ----------
-    columns : (C,) int or None
-        the standard parameters wanted, ascending, counted over all links from 0; all of them where None
+    `columns`: (C,) int, the standard parameters wanted, ascending, counted over all links from 0; all of them where
+        None.
     """
 
     def __init__(self, robot: Robot, *, columns: Columns | None = None, chunk: int = CHUNK) -> None:

@@ -40,10 +40,7 @@ class Screws(NamedTuple):
 class RegressorGradient:
     """Gradients of functions of the torque regressor of one robot.
 
-    Parameters
-    ----------
-    columns : (C,) int or None
-        the standard parameters that the regressor has columns for, ascending; all of them where None
+    `columns`: (C,) int, the standard parameters that the regressor has columns for, ascending; all of them where None.
     """
 
     def __init__(self, robot: Robot, *, columns: Columns | None = None, capacity: int) -> None:

@@ -37,10 +37,8 @@ RANDOM_STATES = 256
 class SmoothMaximum:
     """Smooth stand-ins of the largest usages.
 
-    values : (C,) float64
-        one a constraint
-    jacobian : (C, n, columns) float64
-        their derivatives by the vector x
+    `values`: (C,), one a constraint.
+    `jacobian`: (C, n, columns), their derivatives by the vector x.
     """
 
     values: Array
@@ -122,12 +120,8 @@ class KinematicUsage:
 class StateUsage:
     """Usage of what depends on the whole state: predicted torque and workspace.
 
-    Parameters
-    ----------
-    torque : TorquePrediction or None
-        None where there is no prior model or no torque limit
-    workspace : WorkspaceUsage or None
-        None where nothing is forbidden
+    `torque`: None where there is no prior model or no torque limit.
+    `workspace`: None where nothing is forbidden.
     """
 
     def __init__(

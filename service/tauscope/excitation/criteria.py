@@ -34,8 +34,7 @@ class Criterion(StrEnum):
 class CriterionValue:
     """A criterion at one information matrix.
 
-    gradient : (p, p) float64
-        derivative of `cost` by A, symmetric
+    `gradient`: (p, p), derivative of `cost` by A, symmetric.
     """
 
     own: float

@@ -27,10 +27,9 @@ ACTIVE_CLEARANCE_M = 0.005
 class ExcitationDesign:
     """A designed excitation.
 
-    history : tuple of (int, int, float, float)
-        start, iteration, criterion's value as the optimiser sees it, largest violation of a constraint
-    seconds : float
-        time that the optimiser took [s]
+    `history`: tuple of (int, int, float, float), start, iteration, criterion's value as the optimiser sees it, largest
+        violation of a constraint.
+    `seconds`: time that the optimiser took [s].
     """
 
     trajectory: Trajectory

@@ -41,8 +41,7 @@ class ColumnScaling(StrEnum):
 class MotionGradient:
     """Derivatives of a scalar by a motion.
 
-    position, velocity, acceleration : (N, n) float64
-        by q, q̇ and q̈ of every sample
+    `position`, `velocity`, `acceleration`: (N, n), by q, q̇ and q̈ of every sample.
     """
 
     position: Array
@@ -53,13 +52,10 @@ class MotionGradient:
 class ExcitationRegressor:
     """The regressor L of a motion, joint by joint, its information matrix and the way back from it.
 
-    Parameters
-    ----------
-    noise_std : (n,) float64 or None
-        expected torque noise of each joint, by which its rows are divided [Nm or N]; equal weights where None
-    steepest : (n,) float64 or None
-        largest K_v that the samples resolve: a steeper sign function is taken so, for a gradient that means something
-        [s/rad or s/m]; None for the curve as it is
+    `noise_std`: (n,), expected torque noise of each joint, by which its rows are divided [Nm or N]; equal weights where
+        None.
+    `steepest`: (n,), largest K_v that the samples resolve: a steeper sign function is taken so, for a gradient that
+        means something [s/rad or s/m]; None for the curve as it is.
     """
 
     def __init__(

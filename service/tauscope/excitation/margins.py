@@ -30,12 +30,11 @@ ROUNDING = 1e-6
 class Margins:
     """What is left of every limit, as part of the limit; negative where it is exceeded.
 
-    position, velocity, acceleration : (n,) float64
-        of each joint's limits; position counts from the middle of the range
-    torque : (n,) float64 or None
-        of the torque that may be used, by the prior model; infinite where there is no limit, None without a model
-    workspace_m : float or None
-        smallest clearance of joint origins and tool from floor and boxes [m]; None where nothing is forbidden
+    `position`, `velocity`, `acceleration`: (n,), of each joint's limits; position counts from the middle of the range.
+    `torque`: (n,), of the torque that may be used, by the prior model; infinite where there is no limit, None without a
+        model.
+    `workspace_m`: smallest clearance of joint origins and tool from floor and boxes [m]; None where nothing is
+        forbidden.
     """
 
     position: Array

@@ -18,8 +18,7 @@ Array = NDArray[np.float64]
 class Objective:
     """What is minimised.
 
-    scaling : (p,) float64
-        what each column is divided by
+    `scaling`: (p,), what each column is divided by.
     """
 
     criterion: Criterion

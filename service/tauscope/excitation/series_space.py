@@ -22,15 +22,9 @@ class SeriesSpace:
     Row j is (centre, coefficients): the centre as part of half the position range away from its middle, the
     coefficients as parts of the speed limit. All entries are of order one.
 
-    Parameters
-    ----------
-    period_s : float
-        fundamental period [s]
+    `period_s`: fundamental period [s].
 
-    Raises
-    ------
-    ExcitationError
-        for too few harmonics
+    Raises ExcitationError for too few harmonics.
     """
 
     def __init__(self, limits: MotionLimits, period_s: float, harmonics: int) -> None:
@@ -87,10 +81,7 @@ class SeriesSpace:
 class SeriesGrid:
     """Motion at fixed instants as a linear function of the vector x, and the way back.
 
-    Parameters
-    ----------
-    bases : three (K, 2 (M - 1)) float64
-        position, velocity and acceleration per coefficient
+    `bases`: three (K, 2 (M - 1)), position, velocity and acceleration per coefficient.
     """
 
     def __init__(self, limits: MotionLimits, bases: tuple[Array, Array, Array]) -> None:

@@ -47,8 +47,7 @@ SCALING_STATES = 512
 class Setting:
     """One robot's limits, predictions and spaces.
 
-    available : (n,) float64
-        torque that may be used, infinite where there is no limit [Nm or N]
+    `available`: (n,), torque that may be used, infinite where there is no limit [Nm or N].
     """
 
     robot: Robot

@@ -23,12 +23,8 @@ class TorquePrediction:
     Friction counts with the larger of stiction and Coulomb level whatever the direction: near a reversal it acts
     either way, and the sum is an upper bound of |τ|.
 
-    Parameters
-    ----------
-    velocity : (n,) float64
-        speed limits [rad/s or m/s]
-    available : (n,) float64
-        torque that may be used, infinite where there is no limit [Nm or N]
+    `velocity`: (n,), speed limits [rad/s or m/s].
+    `available`: (n,), torque that may be used, infinite where there is no limit [Nm or N].
     """
 
     def __init__(

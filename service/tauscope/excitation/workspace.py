@@ -24,8 +24,7 @@ STILL_M = 1e-9
 class Box:
     """A forbidden box, its sides along the axes of the base frame.
 
-    low, high : (3,) float64
-        opposite corners [m]
+    `low`, `high`: (3,), opposite corners [m].
     """
 
     low: Array
@@ -45,10 +44,8 @@ class Box:
 class Workspace:
     """What the arm's joint origins and tool have to keep clear of.
 
-    floor_m : float or None
-        lowest height z in the base frame [m]; None where there is no floor
-    tool_m : (3,) float64
-        tool point in the last link's frame [m]
+    `floor_m`: lowest height z in the base frame [m]; None where there is no floor.
+    `tool_m`: (3,), tool point in the last link's frame [m].
     """
 
     floor_m: float | None = None

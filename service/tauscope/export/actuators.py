@@ -27,10 +27,8 @@ class ActuatorKind(StrEnum):
 class ActuatorChoice:
     """Which actuators are written, and gains that go before those of the user's own MJCF.
 
-    kp : tuple of float
-        one for all joints or one a joint [Nm/rad or N/m]; empty where not given
-    kv : tuple of float
-        likewise [Nm s/rad or N s/m]
+    `kp`: one for all joints or one a joint [Nm/rad or N/m]; empty where not given.
+    `kv`: likewise [Nm s/rad or N s/m].
     """
 
     kind: ActuatorKind = ActuatorKind.MOTOR

@@ -20,10 +20,8 @@ from tauscope.robot.messages import one_line, shown
 class JointModel:
     """One joint's part of the model; None leaves what the file says as it is.
 
-    rotor_inertia : float or None
-        the motor's inertia reflected to the joint [kg m² or kg]
-    branch : LinkInertia or None
-        the part of the link that the file has on moving joints beside the chain
+    `rotor_inertia`: the motor's inertia reflected to the joint [kg m² or kg].
+    `branch`: the part of the link that the file has on moving joints beside the chain.
     """
 
     link: LinkInertia | None = None
@@ -36,12 +34,9 @@ class JointModel:
 class CentredInertia:
     """A link as simulators want it.
 
-    mass : float
-        m [kg]
-    centre : (3,) float64
-        centre of mass in the link frame [m]
-    inertia : (3, 3) float64
-        about the centre of mass, along the axes of the link frame [kg m²]
+    `mass`: m [kg].
+    `centre`: (3,), centre of mass in the link frame [m].
+    `inertia`: (3, 3), about the centre of mass, along the axes of the link frame [kg m²].
     """
 
     mass: float

@@ -31,10 +31,8 @@ NEWER = "needs MuJoCo 3.8 or later"
 class JointExtras:
     """Attributes that findings add to the elements of one joint.
 
-    dry_friction : float
-        taken off frictionloss, since bristles have it [Nm or N]
-    passive : list of str
-        attributes of passive dcmotor elements
+    `dry_friction`: taken off frictionloss, since bristles have it [Nm or N].
+    `passive`: attributes of passive dcmotor elements.
     """
 
     attributes: dict[str, str] = field(default_factory=dict)
@@ -48,8 +46,7 @@ class JointExtras:
 class Additions:
     """Changes that findings make to a file.
 
-    left : list of FoundEffect
-        findings that MuJoCo cannot hold
+    `left`: findings that MuJoCo cannot hold.
     """
 
     robot: Robot

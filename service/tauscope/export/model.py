@@ -30,10 +30,8 @@ from tauscope.version import tauscope_version
 class FoundEffect:
     """An effect with its values, in the arm's own torque.
 
-    coefficients : (c,) float64
-        linear coefficients
-    shape : (k,) float64
-        shape parameters
+    `coefficients`: (c,), linear coefficients.
+    `shape`: (k,), shape parameters.
     """
 
     effect: Effect
@@ -45,8 +43,7 @@ class FoundEffect:
 class Origin:
     """Where a model came from.
 
-    is_mjcf : bool
-        whether the links' frames are bodies of an MJCF
+    `is_mjcf`: whether the links' frames are bodies of an MJCF.
     """
 
     sources: tuple[RecordingSource, ...]
@@ -61,12 +58,9 @@ class Origin:
 class ExportModel:
     """Bodies that can exist, friction for simulators and for controllers, and findings.
 
-    links : tuple of LinkInertia
-        one a segment
-    friction, delivered_friction : tuple of JointFriction
-        one a joint: beside these bodies, and as delivered
-    rotor_inertia : tuple of float or None
-        one a joint [kg m² or kg]
+    `links`: one a segment.
+    `friction`, `delivered_friction`: one a joint: beside these bodies, and as delivered.
+    `rotor_inertia`: one a joint [kg m² or kg].
     """
 
     robot: Robot

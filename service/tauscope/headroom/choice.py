@@ -21,8 +21,7 @@ Folds = NDArray[np.intp]
 class Member:
     """One black box at its best size, and what its predictions are multiplied by.
 
-    weight : float
-        0 where it predicts nothing of motion that it has not learned from
+    `weight`: 0 where it predicts nothing of motion that it has not learned from.
     """
 
     learner: Learner
@@ -34,8 +33,7 @@ class Member:
 class Choice:
     """Black boxes whose weighted predictions are added.
 
-    error : float
-        Σ e² of rows that are predicted from other motion, relative to that of the rows themselves
+    `error`: Σ e² of rows that are predicted from other motion, relative to that of the rows themselves.
     """
 
     error: float

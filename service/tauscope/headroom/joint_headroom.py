@@ -32,9 +32,8 @@ STANDARD_ERRORS = 2.0
 class JointHeadroom:
     """Rms of a joint's held-out residual [Nm or N], and what the black box predicts of it; NaN without a black box.
 
-    share, share_std : float
-        part of the explained model's residual energy that the black box predicts, and its standard error over blocks;
-        negative where it predicts worse
+    `share`, `share_std`: part of the explained model's residual energy that the black box predicts, and its standard
+        error over blocks; negative where it predicts worse.
     """
 
     plain: float

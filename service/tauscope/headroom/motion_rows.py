@@ -12,18 +12,13 @@ from tauscope.recording.recording import Array
 class MotionRows:
     """Evenly spaced rows of one piece of motion, in the band in which models and torque are compared.
 
-    recording : int
-        number of the recording
-    time : (M,) float64
-        since the beginning of the recording [s]
-    progress : (M,) float64
-        part of the recording's motion that is over, 0 to 1; alike in every repetition of a motion
-    position, velocity, acceleration, load : (n, M) float64
-        q, q̇, q̈ and the rigid-body torque [SI]
-    torque, plain, explained : (n, M) float64
-        measured, by the nominal model, and by the model with all findings [Nm or N]
-    used : (n, M) bool
-        rows that rest on measured torque
+    `recording`: number of the recording.
+    `time`: (M,), since the beginning of the recording [s].
+    `progress`: (M,), part of the recording's motion that is over, 0 to 1; alike in every repetition of a motion.
+    `position`, `velocity`, `acceleration`, `load`: (n, M), q, q̇, q̈ and the rigid-body torque [SI].
+    `torque`, `plain`, `explained`: (n, M), measured, by the nominal model, and by the model with all findings [Nm or
+        N].
+    `used`: (n, M), rows that rest on measured torque.
     """
 
     recording: int
@@ -43,10 +38,8 @@ class MotionRows:
 class Inputs:
     """Rows by the columns that a black box learns from.
 
-    columns : (R, d) float64
-        those of the joint itself first
-    own : int
-        how many these are
+    `columns`: (R, d), those of the joint itself first.
+    `own`: how many these are.
     """
 
     columns: Array

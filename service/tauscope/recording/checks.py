@@ -32,10 +32,8 @@ class Periods:
 class RecordingReport:
     """What `check_recording` found.
 
-    duration_s : float
-        from the first to the last sample [s]
-    rate_hz : float
-        1 / median step [Hz]
+    `duration_s`: from the first to the last sample [s].
+    `rate_hz`: 1 / median step [Hz].
     """
 
     name: str

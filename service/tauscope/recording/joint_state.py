@@ -28,10 +28,8 @@ _NANOSECONDS = 1_000_000_000
 class JointState:
     """One message.
 
-    stamp : int
-        time of measurement [ns]
-    position, velocity, effort : (n,) float64
-        empty where the publisher does not know them
+    `stamp`: time of measurement [ns].
+    `position`, `velocity`, `effort`: (n,), empty where the publisher does not know them.
     """
 
     stamp: int
@@ -45,10 +43,8 @@ class JointState:
 class JointStates:
     """Messages of one layout.
 
-    stamp : (N,) int64
-        time of measurement [ns]
-    position, velocity, effort : (N, n) or (N, 0) float64
-        one row a message
+    `stamp`: (N,) int64, time of measurement [ns].
+    `position`, `velocity`, `effort`: (N, n) or (N, 0), one row a message.
     """
 
     stamp: NDArray[np.int64]

@@ -96,12 +96,9 @@ Batch: TypeAlias = tuple[Rows, JointStates]
 class Choice:
     """What the user wants out of a log.
 
-    joint_count : int or None
-        joints that the recording must have; None where any number is welcome
-    spool_above_bytes : int
-        size above which the rows go to a temporary file [bytes]
-    packed_bytes : int or None
-        size of the log, by which its messages are plausible [bytes]; None where any are
+    `joint_count`: joints that the recording must have; None where any number is welcome.
+    `spool_above_bytes`: size above which the rows go to a temporary file [bytes].
+    `packed_bytes`: size of the log, by which its messages are plausible [bytes]; None where any are.
     """
 
     file: str

@@ -25,10 +25,8 @@ LONGEST_HOLD = 1.5
 class Journal:
     """What a journal holds.
 
-    rows : (N,) of `journal_row_type`
-        the cycles, oldest first
-    damage : str or None
-        why reading stopped before the file's end, None where the file is whole
+    `rows`: (N,) of `journal_row_type`, the cycles, oldest first.
+    `damage`: why reading stopped before the file's end, None where the file is whole.
     """
 
     header: JournalHeader

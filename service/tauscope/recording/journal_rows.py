@@ -25,10 +25,8 @@ class Phase(IntEnum):
 class JournalHeader:
     """What all rows of a journal have in common.
 
-    rate_hz : float
-        cycles a second that were asked for [Hz]
-    epoch_offset_ns : int
-        to be added to a row's time to make it nanoseconds since 1970 [ns]
+    `rate_hz`: cycles a second that were asked for [Hz].
+    `epoch_offset_ns`: to be added to a row's time to make it nanoseconds since 1970 [ns].
     """
 
     robot: str

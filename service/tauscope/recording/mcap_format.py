@@ -45,8 +45,7 @@ _COPY_BYTES = 2**20
 class Salvage:
     """What was read of a file that may be damaged.
 
-    damage : str or None
-        why reading stopped, None where the file is whole
+    `damage`: why reading stopped, None where the file is whole.
     """
 
     recording: Recording

@@ -20,12 +20,9 @@ __all__ = ["Array", "EffortKind", "Recording", "Samples", "Table"]
 class Recording:
     """One continuous motion as it was measured.
 
-    notes : tuple of ResultWarning
-        warnings without its name
-    effort_std : tuple of float
-        relative standard error of each joint's effort as a whole; empty where it was measured
-    is_examined : bool
-        whether units and samples were looked at, so that they need not be again
+    `notes`: warnings without its name.
+    `effort_std`: relative standard error of each joint's effort as a whole; empty where it was measured.
+    `is_examined`: whether units and samples were looked at, so that they need not be again.
     """
 
     name: str

@@ -24,16 +24,12 @@ BEYOND = 1.15
 class FrictionCurve:
     """τ_f(v) = τ_s A(K_v v) + τ_sc A(δ v) + τ_v v + offset of one joint.
 
-    velocity : (G,) float64
-        v, increasing, densest about zero [rad/s or m/s]
-    torque : (G,) float64
-        τ_f [Nm or N]
-    std : (G,) float64
-        its standard error, from the covariance of all its coefficients and shape constants [Nm or N]
-    seen : (float, float)
-        least and greatest velocity in the recordings [rad/s or m/s]
-    bin_velocity, bin_torque : (B,) float64
-        mean velocity, and mean of measured torque less the rigid body's, in velocity bins
+    `velocity`: (G,), v, increasing, densest about zero [rad/s or m/s].
+    `torque`: (G,), τ_f [Nm or N].
+    `std`: (G,), its standard error, from the covariance of all its coefficients and shape constants [Nm or N].
+    `seen`: (float, float), least and greatest velocity in the recordings [rad/s or m/s].
+    `bin_velocity`, `bin_torque`: (B,), mean velocity, and mean of measured torque less the rigid body's, in velocity
+        bins.
     """
 
     velocity: Array

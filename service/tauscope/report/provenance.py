@@ -18,8 +18,7 @@ LIBRARIES = ("tauscope", "numpy", "scipy", "clarabel")
 class InputFile:
     """One file that was read.
 
-    sha256 : str
-        of its bytes, in hexadecimal
+    `sha256`: of its bytes, in hexadecimal.
     """
 
     role: str
@@ -32,8 +31,7 @@ class InputFile:
 class Provenance:
     """Where a result comes from.
 
-    versions : tuple of (str, str)
-        name and version of what computed it
+    `versions`: tuple of (str, str), name and version of what computed it.
     """
 
     command: tuple[str, ...]

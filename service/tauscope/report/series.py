@@ -43,14 +43,10 @@ MOST_PIECES = 8
 class TorqueSeries:
     """One continuous piece of a recording beside what the model says.
 
-    time : (N,) float64
-        [s]
-    velocity : (N, n) float64
-        smoothed q̇ [rad/s or m/s]
-    measured : (N, n) float64
-        measured torque, NaN where none was measured [Nm or N]
-    predicted : (N, n) float64
-        torque of the model [Nm or N]
+    `time`: (N,) [s].
+    `velocity`: (N, n), smoothed q̇ [rad/s or m/s].
+    `measured`: (N, n), measured torque, NaN where none was measured [Nm or N].
+    `predicted`: (N, n), torque of the model [Nm or N].
     """
 
     recording: str

@@ -21,24 +21,15 @@ MOST_NAMES = 4
 class Chain:
     """Joints, segments and bodies from the base to the tip.
 
-    segment_names : tuple of str
-        the file's joint of each segment
-    segments : tuple of Segment
-        one a joint, and one for each joint that follows another
-    links : tuple of LinkInertia, or None
-        one a segment, about the link frame; zero for a link without inertia, None where no link has one
-    friction : tuple of FrictionCoefficients, or None
-        one a joint; None where no joint states it
-    rotor_inertia : tuple of float, or None
-        one a joint [kg m² or kg]; None where no joint states it
-    link_names : tuple of tuple of str
-        links of the file that make up each link
-    branches : tuple of LinkInertia
-        the part of each link that an export leaves where the file has it
-    actuators : tuple of Actuator or None
-        one a joint; None where the file has none
-    gravity : (3,) float64, or None
-        in the base frame [m/s²]; None where the file states none
+    `segment_names`: the file's joint of each segment.
+    `segments`: one a joint, and one for each joint that follows another.
+    `links`: one a segment, about the link frame; zero for a link without inertia, None where no link has one.
+    `friction`: one a joint; None where no joint states it.
+    `rotor_inertia`: one a joint [kg m² or kg]; None where no joint states it.
+    `link_names`: links of the file that make up each link.
+    `branches`: the part of each link that an export leaves where the file has it.
+    `actuators`: one a joint; None where the file has none.
+    `gravity`: (3,),, in the base frame [m/s²]; None where the file states none.
     """
 
     base: str

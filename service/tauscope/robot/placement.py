@@ -66,14 +66,10 @@ def rotation_of_z_to(axis: Array) -> Array:
 class DenavitHartenbergRow:
     """One row of Denavit-Hartenberg parameters.
 
-    theta : float
-        θ; a revolute joint's position adds to it [rad]
-    d : float
-        along z; a prismatic joint's position adds to it [m]
-    a : float
-        along x [m]
-    alpha : float
-        α, about x [rad]
+    `theta`: θ; a revolute joint's position adds to it [rad].
+    `d`: along z; a prismatic joint's position adds to it [m].
+    `a`: along x [m].
+    `alpha`: α, about x [rad].
     """
 
     theta: float

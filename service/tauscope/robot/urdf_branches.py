@@ -32,10 +32,7 @@ class Master:
 class JointMotions:
     """How the joints of a URDF move, where some of them are locked.
 
-    Parameters
-    ----------
-    locked : mapping of str to float
-        position by the name of a joint [rad or m]
+    `locked`: position by the name of a joint [rad or m].
     """
 
     def __init__(self, tree: UrdfTree, locked: Mapping[str, float], path: Iterable[UrdfJoint]) -> None:

@@ -28,8 +28,7 @@ Place = tuple[str | int, ...]
 class YamlContent:
     """Plain data of a YAML document.
 
-    lines : dict of tuple to int
-        for each entry's place the line, from 1, on which it stands
+    `lines`: for each entry's place the line, from 1, on which it stands.
     """
 
     data: Any

@@ -45,10 +45,8 @@ class Rule(StrEnum):
 class Violation:
     """One find_objection.
 
-    joint : str or None
-        name of the joint; None where it concerns the whole arm
-    value : float or None
-        what was found, in the rule's unit; None where it is no number
+    `joint`: name of the joint; None where it concerns the whole arm.
+    `value`: what was found, in the rule's unit; None where it is no number.
     """
 
     rule: Rule
@@ -88,20 +86,13 @@ _ROOM = 1.05
 class GuardLimits:
     """Limits of every joint; infinite where there is none.
 
-    position_low, position_high : (n,) float64
-        range of the targets [rad or m]
-    velocity : (n,) float64
-        largest speed of the targets [rad/s or m/s]
-    acceleration : (n,) float64
-        deceleration on which braking can count [rad/s² or m/s²]
-    torque : (n,) float64
-        largest commanded torque [Nm or N]
-    following : (n,) float64
-        largest distance between target and arm [rad or m]
-    position_margin : (n,) float64
-        how far outside the range the arm itself may be found [rad or m]
-    temperature_c : float
-        hottest motor [°C]
+    `position_low`, `position_high`: (n,), range of the targets [rad or m].
+    `velocity`: (n,), largest speed of the targets [rad/s or m/s].
+    `acceleration`: (n,), deceleration on which braking can count [rad/s² or m/s²].
+    `torque`: (n,), largest commanded torque [Nm or N].
+    `following`: (n,), largest distance between target and arm [rad or m].
+    `position_margin`: (n,), how far outside the range the arm itself may be found [rad or m].
+    `temperature_c`: hottest motor [°C].
     """
 
     joints: tuple[str, ...]

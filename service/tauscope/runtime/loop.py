@@ -50,14 +50,10 @@ class GuardedArm:
 class Cycles:
     """What the loop does to each cycle, and what it keeps of all of them.
 
-    control : TorqueControl or None
-        closes the loop in torque mode; None where the drives do
-    worst_following : (n,) float64
-        largest distance of arm and target so far [rad or m]
-    late : (n,) int64
-        readings whose instant is not known
-    kept : int
-        samples of the motion, with an answer of every joint
+    `control`: closes the loop in torque mode; None where the drives do.
+    `worst_following`: (n,), largest distance of arm and target so far [rad or m].
+    `late`: (n,) int64, readings whose instant is not known.
+    `kept`: samples of the motion, with an answer of every joint.
     """
 
     plan: Plan

@@ -70,18 +70,12 @@ _ROUNDING = 1e-9
 class Plan:
     """Targets of every cycle, from where the arm stands to the end of the motion.
 
-    rate_hz : float
-        cycles a second [Hz]
-    period_ns : int
-        time between cycles [ns]
-    position, velocity : (N, n) float64
-        targets [rad or m, and per s]
-    torque : (N, n) float64
-        what the model predicts, within the torque limits; zero where there is no model [Nm or N]
-    period : (N,) float64
-        index of the excitation period, NaN outside the repeated part
-    phase : (N,) int64
-        ramp or motion, as in `tauscope.recording.journal_rows.Phase`
+    `rate_hz`: cycles a second [Hz].
+    `period_ns`: time between cycles [ns].
+    `position`, `velocity`: (N, n), targets [rad or m, and per s].
+    `torque`: (N, n), what the model predicts, within the torque limits; zero where there is no model [Nm or N].
+    `period`: (N,), index of the excitation period, NaN outside the repeated part.
+    `phase`: (N,) int64, ramp or motion, as in `tauscope.recording.journal_rows.Phase`.
     """
 
     rate_hz: float

@@ -75,8 +75,7 @@ class Request(CampaignOptions):
 class Result:
     """What came of it.
 
-    recordings : tuple of Path
-        the training recording, and the held-out one where there is one
+    `recordings`: the training recording, and the held-out one where there is one.
     """
 
     recordings: tuple[Path, ...]

@@ -97,8 +97,7 @@ class Request(TaskRequest):
 class Result:
     """What came of it.
 
-    refusal : ExcitationError or None
-        why the next motion cannot be planned within the robot's limits
+    `refusal`: why the next motion cannot be planned within the robot's limits.
     """
 
     request: Request

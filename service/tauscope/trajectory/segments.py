@@ -51,8 +51,7 @@ class Segment(Protocol):
 class FourierSegment:
     """Whole periods of a Fourier series.
 
-    first_period : int or None
-        index of the first repeat in a recording's column `period`; None where it is not to be counted
+    `first_period`: index of the first repeat in a recording's column `period`; None where it is not to be counted.
     """
 
     series: FourierSeries
@@ -86,10 +85,8 @@ class FourierSegment:
 class MoveSegment:
     """A straight minimum-jerk move from posture to posture: q = q_0 + (q_1 - q_0)(10 s³ - 15 s⁴ + 6 s⁵), s = t/T.
 
-    start, end : (n,) float64
-        postures [rad or m]
-    duration_s : float
-        T [s]
+    `start`, `end`: (n,), postures [rad or m].
+    `duration_s`: T [s].
     """
 
     start: Array
@@ -121,10 +118,8 @@ class PathSegment:
 
     It visits only postures that the series visits: where that keeps clear of obstacles, so does this.
 
-    from_s, to_s : float
-        instants of the series at which it begins and ends [s]
-    duration_s : float
-        how long it takes [s]
+    `from_s`, `to_s`: instants of the series at which it begins and ends [s].
+    `duration_s`: how long it takes [s].
     """
 
     series: FourierSeries
@@ -158,10 +153,8 @@ class PathSegment:
 class SampledSegment:
     """A motion given by samples, between them the quintic that meets position, velocity and acceleration at both.
 
-    time : (K,) float64
-        instants of the samples, from 0, increasing [s]
-    label : (K,) float64 or None
-        index of the repeated excitation period from each sample on, NaN outside; None where there is none
+    `time`: (K,), instants of the samples, from 0, increasing [s].
+    `label`: (K,), index of the repeated excitation period from each sample on, NaN outside; None where there is none.
     """
 
     time: Array

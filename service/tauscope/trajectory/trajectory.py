@@ -44,12 +44,9 @@ MOST_SAMPLES = 50_000_000
 class TrajectorySamples:
     """A trajectory at given instants.
 
-    time : (N,) float64
-        instants since the start [s]
-    position, velocity, acceleration : (N, n) float64
-        q, q̇, q̈ [rad or m, and per s, per s²]
-    period : (N,) float64
-        index of the repeated excitation period, counted from 0; NaN outside the repeated part
+    `time`: (N,), instants since the start [s].
+    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈ [rad or m, and per s, per s²].
+    `period`: (N,), index of the repeated excitation period, counted from 0; NaN outside the repeated part.
     """
 
     time: Array
@@ -63,9 +60,8 @@ class TrajectorySamples:
 class DesignRecord:
     """How a trajectory was made and what it is good for.
 
-    margins : mapping of str to tuple of float or None
-        for each kind of limit (``position``, ``velocity``, ``acceleration``, ``torque``) the part of the limit that is
-        left, one a joint; None where there is no limit
+    `margins`: for each kind of limit (``position``, ``velocity``, ``acceleration``, ``torque``) the part of the limit
+        that is left, one a joint; None where there is no limit.
     """
 
     criterion: str
@@ -79,10 +75,8 @@ class DesignRecord:
 class Trajectory:
     """A motion of all joints, piece after piece, twice continuously differentiable, at rest at both ends.
 
-    limits : MotionLimits or None
-        limits that it was made to keep; None where nobody knows
-    design : DesignRecord or None
-        how it was made; None for a motion from elsewhere
+    `limits`: limits that it was made to keep; None where nobody knows.
+    `design`: how it was made; None for a motion from elsewhere.
     """
 
     robot: str

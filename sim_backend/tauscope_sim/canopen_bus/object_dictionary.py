@@ -50,8 +50,7 @@ class Entry:
 class ObjectDictionary:
     """All entries, by index and subindex.
 
-    entries : dict
-        of (index, subindex) to Entry
+    `entries`: of (index, subindex) to Entry.
     """
 
     entries: dict[tuple[int, int], Entry] = field(default_factory=dict)

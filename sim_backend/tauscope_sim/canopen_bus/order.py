@@ -28,14 +28,10 @@ _SOCKET = "socketcan:"
 class CanOrder:
     """What to emulate.
 
-    start : tuple of float
-        where the joints stand [rad or m]
-    rated_torque_mnm : tuple of int
-        object 0x6076 of each drive, at the motor shaft [mNm]
-    torque_noise : float
-        standard deviation of what the drives measure of the torque [Nm or N]
-    bit_rate : int
-        of the bus [bit/s]
+    `start`: where the joints stand [rad or m].
+    `rated_torque_mnm`: object 0x6076 of each drive, at the motor shaft [mNm].
+    `torque_noise`: standard deviation of what the drives measure of the torque [Nm or N].
+    `bit_rate`: of the bus [bit/s].
     """
 
     module: ClassVar[str] = "tauscope_sim.canopen_bus"

@@ -53,19 +53,11 @@ class SimulatedDevice:
     drives stop it by its policy, with a fault, before it leaves its range or its speed limit; in position control they
     keep the target within both.
 
-    Parameters
-    ----------
-    start_position : (n,) float64 or None
-        where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m]
-    start_ns : int
-        device time at which it begins to exist [ns]
+    `start_position`: (n,), where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m].
+    `start_ns`: device time at which it begins to exist [ns].
 
-    Raises
-    ------
-    RobotFileError
-        where the robot file lacks what a simulation needs
-    ScenarioError
-        where the scenario does not fit the arm
+    Raises RobotFileError where the robot file lacks what a simulation needs.
+    Raises ScenarioError where the scenario does not fit the arm.
     """
 
     def __init__(

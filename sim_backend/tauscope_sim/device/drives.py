@@ -23,10 +23,8 @@ _MARGIN = 2e-3
 class Motion:
     """What the drives' own loop sees of the motors.
 
-    position : (n,) float64
-        in joint units, with the encoders' slip [rad or m]
-    velocity : (n,) float64
-        likewise [rad/s or m/s]
+    `position`: (n,), in joint units, with the encoders' slip [rad or m].
+    `velocity`: (n,), likewise [rad/s or m/s].
     """
 
     position: Array
@@ -36,10 +34,7 @@ class Motion:
 class Drives:
     """Servo and target of all joints.
 
-    Parameters
-    ----------
-    tick_s : float
-        time between two ticks [s]
+    `tick_s`: time between two ticks [s].
     """
 
     def __init__(self, robot: Robot, scenario: Scenario, motion: Motion, tick_s: float) -> None:

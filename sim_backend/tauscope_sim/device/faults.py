@@ -48,14 +48,10 @@ class Disturbance(StrEnum):
 class Injection:
     """One disturbance, for tests of what stands above the device.
 
-    joint : int
-        joint number, counted from 1
-    start_ns : int
-        device time at which it begins; one that has passed means now [ns]
-    duration_ns : int or None
-        how long it lasts; None for ever [ns]
-    size : float
-        rise of the temperature or slip of the encoder [K; rad or m]
+    `joint`: joint number, counted from 1.
+    `start_ns`: device time at which it begins; one that has passed means now [ns].
+    `duration_ns`: how long it lasts; None for ever [ns].
+    `size`: rise of the temperature or slip of the encoder [K; rad or m].
     """
 
     kind: Disturbance

@@ -51,14 +51,10 @@ VELOCITY_BANDWIDTH = 2.0 * np.pi * 20.0
 class Sample:
     """The true state that one reading is taken from.
 
-    time_s : float
-        instant, by the plant's clock [s]
-    position : (n,) float64
-        of the motors, in joint units [rad or m]
-    velocity : (n,) float64
-        likewise [rad/s or m/s]
-    torque : (n,) float64
-        of the motors on the joint's side [Nm or N]
+    `time_s`: instant, by the plant's clock [s].
+    `position`: (n,), of the motors, in joint units [rad or m].
+    `velocity`: (n,), likewise [rad/s or m/s].
+    `torque`: (n,), of the motors on the joint's side [Nm or N].
     """
 
     time_s: float
@@ -73,10 +69,7 @@ class Readings:
     Position and torque are what `Scenario.sensors` makes of them. Velocity is the drive's estimate: exact where the
     encoder is, else with white noise as large as the encoder's error times `VELOCITY_BANDWIDTH`.
 
-    Raises
-    ------
-    ScenarioError
-        where a sensor's effect contradicts the robot
+    Raises ScenarioError where a sensor's effect contradicts the robot.
     """
 
     def __init__(self, scenario: Scenario, robot: Robot) -> None:
@@ -102,19 +95,11 @@ class Readings:
 class Mechanism:
     """Plant and sensors.
 
-    Parameters
-    ----------
-    start_position : (n,) float64 or None
-        where the arm stands; None is `resting_posture` [rad or m]
-    tick_s : float
-        time between two ticks [s]
+    `start_position`: (n,), where the arm stands; None is `resting_posture` [rad or m].
+    `tick_s`: time between two ticks [s].
 
-    Raises
-    ------
-    RobotFileError
-        where the robot file lacks what a simulation needs
-    ScenarioError
-        where the scenario does not fit the arm
+    Raises RobotFileError where the robot file lacks what a simulation needs.
+    Raises ScenarioError where the scenario does not fit the arm.
     """
 
     def __init__(self, robot: Robot, scenario: Scenario, start_position: ArrayLike | None, tick_s: float) -> None:

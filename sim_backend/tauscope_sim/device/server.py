@@ -44,8 +44,7 @@ _PEER = struct.Struct("3i")
 class Punctuality:
     """How well the device kept to the machine's clock.
 
-    largest_lag_ns : int
-        the latest of them [ns]
+    `largest_lag_ns`: the latest of them [ns].
     """
 
     overruns: int = 0
@@ -76,10 +75,7 @@ class DeviceServer:
     A host whose connection ends while it has the arm under power counts as silent: the watchdog's stop is carried out
     at once.
 
-    Parameters
-    ----------
-    linger_s : float
-        how long it goes on without a host [s]
+    `linger_s`: how long it goes on without a host [s].
     """
 
     def __init__(self, device: SimulatedDevice, listener: socket.socket, trace: TraceWriter, linger_s: float) -> None:

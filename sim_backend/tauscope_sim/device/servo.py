@@ -41,10 +41,7 @@ class Servo:
 
     The integral is slower where the transmission is compliant: there it works against the damping of the link.
 
-    Parameters
-    ----------
-    tick_s : float
-        time between two ticks [s]
+    `tick_s`: time between two ticks [s].
     """
 
     def __init__(self, robot: Robot, inertia: InertiaSchedule, tick_s: float) -> None:

@@ -41,12 +41,9 @@ class SetpointSpline:
     While a setpoint is overdue the target goes on as it moved; cycles that the host skipped are filled in on a
     parabola. Time is counted in ticks.
 
-    Parameters
-    ----------
-    position : (n,) float64
-        where the target stands [rad or m]
-    period : float or None
-        time between setpoints, where the host has told it: a drive that knows it does not have to find it [ticks]
+    `position`: (n,), where the target stands [rad or m].
+    `period`: time between setpoints, where the host has told it: a drive that knows it does not have to find it
+        [ticks].
     """
 
     def __init__(self, position: Array, period: float | None = None) -> None:

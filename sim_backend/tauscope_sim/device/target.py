@@ -38,18 +38,11 @@ class Target:
 
     Setpoints that move within the limits are followed exactly. One that leaps is approached with bounded acceleration.
 
-    Parameters
-    ----------
-    position : (n,) float64
-        where it begins [rad or m]
-    velocity : (n,) float64
-        how it moves there; zero for an arm at rest [rad/s or m/s]
-    acceleration : (n,) float64
-        with which it catches up with setpoints that leapt [rad/s² or m/s²]
-    tick_s : float
-        time between two ticks [s]
-    period : float or None
-        time between setpoints, where the host has told it [ticks]
+    `position`: (n,), where it begins [rad or m].
+    `velocity`: (n,), how it moves there; zero for an arm at rest [rad/s or m/s].
+    `acceleration`: (n,), with which it catches up with setpoints that leapt [rad/s² or m/s²].
+    `tick_s`: time between two ticks [s].
+    `period`: time between setpoints, where the host has told it [ticks].
     """
 
     def __init__(

@@ -49,10 +49,7 @@ class RemoteSimulatedArm:
     The device keeps its own watchdog: it stops the arm when this process is killed, stopped or cut off. A reply that
     does not come in time leaves not-a-number in the state of that cycle; `ArmState.enabled` is then as last known.
 
-    Parameters
-    ----------
-    reply_timeout_s : float
-        how long one cycle waits for its reply [s]
+    `reply_timeout_s`: how long one cycle waits for its reply [s].
     """
 
     def __init__(self, path: Path, joint_count: int, *, reply_timeout_s: float = 0.02) -> None:

@@ -14,12 +14,8 @@ from tauscope_sim.scenario import Scenario
 class VirtualClock:
     """The clock of a simulated device; waiting carries the device forward.
 
-    Parameters
-    ----------
-    start_ns : int
-        its first instant [ns]
-    advance : callable
-        lets the device live up to an instant [ns]
+    `start_ns`: its first instant [ns].
+    `advance`: lets the device live up to an instant [ns].
     """
 
     def __init__(self, start_ns: int, advance: Callable[[int], None]) -> None:
@@ -46,17 +42,10 @@ class SimulatedArm:
 
     The device lives as long as this object: it keeps its place, its stop and its faults while disconnected.
 
-    Parameters
-    ----------
-    start_position : (n,) float64 or None
-        where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m]
+    `start_position`: (n,), where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m].
 
-    Raises
-    ------
-    RobotFileError
-        where the robot file lacks what a simulation needs
-    ScenarioError
-        where the scenario does not fit the arm
+    Raises RobotFileError where the robot file lacks what a simulation needs.
+    Raises ScenarioError where the scenario does not fit the arm.
     """
 
     def __init__(

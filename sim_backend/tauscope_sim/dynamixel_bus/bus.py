@@ -19,8 +19,7 @@ from tauscope_sim.emulation.fault_kit import FaultKind, FaultSchedule, InjectedF
 class AnswerFaults:
     """What is to happen to the next answers of one servo.
 
-    kind : FaultKind or None
-        None for nothing
+    `kind`: None for nothing.
     """
 
     kind: FaultKind | None = None

@@ -18,8 +18,7 @@ _library = Protocol2PacketHandler()
 class Instruction:
     """What a master asks.
 
-    length : int
-        of the frame on the wire [bytes]
+    `length`: of the frame on the wire [bytes].
     """
 
     servo: int

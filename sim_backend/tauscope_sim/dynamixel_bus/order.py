@@ -17,12 +17,9 @@ from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal
 class DynamixelOrder:
     """What to emulate.
 
-    start : tuple of float
-        where the joints stand [rad or m]
-    weight : float
-        m g l of the pendulums [Nm]
-    latency_s : float
-        latency of the adapter [s]
+    `start`: where the joints stand [rad or m].
+    `weight`: m g l of the pendulums [Nm].
+    `latency_s`: latency of the adapter [s].
     """
 
     module: ClassVar[str] = "tauscope_sim.dynamixel_bus"

@@ -12,14 +12,10 @@ CURRENT_MODE, POSITION_MODE, EXTENDED_MODE, CURRENT_BASED_MODE = 0, 3, 4, 5
 class Demand:
     """What a servo wants of its joint until its loop runs again.
 
-    position : float
-        target [rad or m]
-    speed : float
-        of the target [rad/s or m/s]
-    torque : float
-        where it does not track [Nm or N]
-    cap : float
-        most that it exerts [Nm or N]
+    `position`: target [rad or m].
+    `speed`: of the target [rad/s or m/s].
+    `torque`: where it does not track [Nm or N].
+    `cap`: most that it exerts [Nm or N].
     """
 
     tracks: bool

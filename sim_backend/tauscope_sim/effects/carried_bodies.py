@@ -21,12 +21,9 @@ Array = NDArray[np.float64]
 class Payload(Effect):
     """A body fixed to the last link.
 
-    mass : float
-        m [kg]
-    offset : list of float
-        r [m]
-    moments : list of float
-        diagonal of I [kg m²]
+    `mass`: m [kg].
+    `offset`: r [m].
+    `moments`: diagonal of I [kg m²].
     """
 
     effect_id: ClassVar[str] = "payload"
@@ -58,16 +55,11 @@ class Payload(Effect):
 class PayloadChange(Payload):
     """A body at the last link while start ≤ t < end.
 
-    mass : float
-        m [kg]
-    offset : list of float
-        r [m]
-    moments : list of float
-        diagonal of I [kg m²]
-    start : float
-        when it is picked up; zero or less: it is there from the beginning [s]
-    end : float or None
-        when it is dropped; never where None [s]
+    `mass`: m [kg].
+    `offset`: r [m].
+    `moments`: diagonal of I [kg m²].
+    `start`: when it is picked up; zero or less: it is there from the beginning [s].
+    `end`: when it is dropped; never where None [s].
     """
 
     effect_id: ClassVar[str] = "payload_change"
@@ -108,10 +100,8 @@ class _Change(Term):
 class RotorInertia(JointEffect):
     """τ = J q̈.
 
-    joint : int
-        its number, counted from 1
-    inertia : float
-        J, the rotor's inertia times the square of the gear ratio [kg m² or kg]
+    `joint`: its number, counted from 1.
+    `inertia`: J, the rotor's inertia times the square of the gear ratio [kg m² or kg].
     """
 
     effect_id: ClassVar[str] = "rotor_inertia"

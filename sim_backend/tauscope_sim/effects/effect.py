@@ -58,8 +58,7 @@ class Effect(ScenarioEntry):
 class JointEffect(Effect):
     """An effect of one joint.
 
-    joint : int
-        its number, counted from 1
+    `joint`: its number, counted from 1.
     """
 
     joint: JointNumber
@@ -77,10 +76,8 @@ class JointEffect(Effect):
 class SmoothSignEffect(JointEffect):
     """An effect of one joint in which A(v) = (2/π) arctan(K_v v) stands for the sign of velocity.
 
-    joint : int
-        its number, counted from 1
-    k_v : float or None
-        K_v; that of the joint's friction_shape where None [s/rad or s/m]
+    `joint`: its number, counted from 1.
+    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
     """
 
     k_v: Positive | None = None

@@ -12,14 +12,10 @@ from tauscope_sim.plant.term import Transmission
 class JointElasticity(JointEffect):
     """T = K (θ - q) + D (θ̇ - q̇).
 
-    joint : int
-        its number, counted from 1
-    stiffness : float
-        K [Nm/rad or N/m]
-    damping : float
-        D [Nm s/rad or N s/m]
-    rotor_inertia : float
-        J [kg m² or kg]
+    `joint`: its number, counted from 1.
+    `stiffness`: K [Nm/rad or N/m].
+    `damping`: D [Nm s/rad or N s/m].
+    `rotor_inertia`: J [kg m² or kg].
     """
 
     effect_id: ClassVar[str] = "joint_elasticity"
@@ -47,16 +43,11 @@ class JointElasticity(JointEffect):
 class Backlash(JointEffect):
     """T = k x max(0, 1 + c sgn(x) δ̇) beyond a dead zone.
 
-    joint : int
-        its number, counted from 1
-    gap : float
-        b, total lost motion [rad or m]
-    contact_stiffness : float
-        k, of teeth and transmission together [Nm/rad or N/m]
-    contact_damping : float
-        c [s/rad or s/m]
-    rotor_inertia : float
-        reflected inertia of the motor [kg m² or kg]
+    `joint`: its number, counted from 1.
+    `gap`: b, total lost motion [rad or m].
+    `contact_stiffness`: k, of teeth and transmission together [Nm/rad or N/m].
+    `contact_damping`: c [s/rad or s/m].
+    `rotor_inertia`: reflected inertia of the motor [kg m² or kg].
     """
 
     effect_id: ClassVar[str] = "backlash"

@@ -13,12 +13,9 @@ from tauscope_sim.friction import smooth_sign, smooth_sign_slope
 class CoulombFriction(FrictionLaw):
     """τ = c A(v).
 
-    joint : int
-        its number, counted from 1
-    k_v : float or None
-        K_v; that of the joint's friction_shape where None [s/rad or s/m]
-    level : float
-        c [Nm or N]
+    `joint`: its number, counted from 1.
+    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
+    `level`: c [Nm or N].
     """
 
     effect_id: ClassVar[str] = "coulomb_friction"
@@ -40,10 +37,8 @@ class CoulombFriction(FrictionLaw):
 class ViscousFriction(JointLaw):
     """τ = c v.
 
-    joint : int
-        its number, counted from 1
-    coefficient : float
-        c [Nm s/rad or N s/m]
+    `joint`: its number, counted from 1.
+    `coefficient`: c [Nm s/rad or N s/m].
     """
 
     effect_id: ClassVar[str] = "viscous_friction"
@@ -58,14 +53,10 @@ class ViscousFriction(JointLaw):
 class StribeckFriction(FrictionLaw):
     """τ = c A(v) exp(-(|v|/v_s)^α).
 
-    joint : int
-        its number, counted from 1
-    k_v : float or None
-        K_v; that of the joint's friction_shape where None [s/rad or s/m]
-    amplitude : float
-        c [Nm or N]
-    velocity : float
-        v_s [rad/s or m/s]
+    `joint`: its number, counted from 1.
+    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
+    `amplitude`: c [Nm or N].
+    `velocity`: v_s [rad/s or m/s].
     """
 
     effect_id: ClassVar[str] = "stribeck_friction"
@@ -95,12 +86,9 @@ class StribeckFriction(FrictionLaw):
 class AsymmetricCoulomb(FrictionLaw):
     """τ = c A(v) for v > 0, else 0.
 
-    joint : int
-        its number, counted from 1
-    k_v : float or None
-        K_v; that of the joint's friction_shape where None [s/rad or s/m]
-    amplitude : float
-        c: friction of positive motion less that of negative motion [Nm or N]
+    `joint`: its number, counted from 1.
+    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
+    `amplitude`: c: friction of positive motion less that of negative motion [Nm or N].
     """
 
     effect_id: ClassVar[str] = "asymmetric_coulomb"
@@ -122,10 +110,8 @@ class AsymmetricCoulomb(FrictionLaw):
 class AsymmetricViscous(JointLaw):
     """τ = c max(v, 0).
 
-    joint : int
-        its number, counted from 1
-    amplitude : float
-        c: coefficient of positive motion less that of negative motion [Nm s/rad or N s/m]
+    `joint`: its number, counted from 1.
+    `amplitude`: c: coefficient of positive motion less that of negative motion [Nm s/rad or N s/m].
     """
 
     effect_id: ClassVar[str] = "asymmetric_viscous"
@@ -147,10 +133,8 @@ LEAST_SPEED = 1e-3
 class NonlinearViscous(JointLaw):
     """τ = c sgn(v) |v|^p.
 
-    joint : int
-        its number, counted from 1
-    amplitude : float
-        c, friction at 1 rad/s or 1 m/s [Nm or N]
+    `joint`: its number, counted from 1.
+    `amplitude`: c, friction at 1 rad/s or 1 m/s [Nm or N].
     """
 
     effect_id: ClassVar[str] = "nonlinear_viscous"
@@ -173,14 +157,10 @@ class NonlinearViscous(JointLaw):
 class PositionDependentFriction(FrictionLaw):
     """τ = c A(v) sin(k q + φ).
 
-    joint : int
-        its number, counted from 1
-    k_v : float or None
-        K_v; that of the joint's friction_shape where None [s/rad or s/m]
-    amplitude : float
-        c [Nm or N]
-    phase : float
-        φ [rad]
+    `joint`: its number, counted from 1.
+    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
+    `amplitude`: c [Nm or N].
+    `phase`: φ [rad].
     """
 
     effect_id: ClassVar[str] = "position_dependent_friction"

@@ -17,10 +17,8 @@ from tauscope_sim.effects.fields import JointNumber, zero_vector
 class BaseTilt(Effect):
     """g → R_x(α) R_y(β) g.
 
-    about_x : float
-        α [rad]
-    about_y : float
-        β [rad]
+    `about_x`: α [rad].
+    `about_y`: β [rad].
     """
 
     effect_id: ClassVar[str] = "base_tilt"
@@ -42,12 +40,9 @@ class BaseTilt(Effect):
 class KinematicError(Effect):
     """A displaced link frame.
 
-    link : int
-        j, counted from 1
-    translation : list of float
-        d [m]
-    rotation : list of float
-        r [rad]
+    `link`: j, counted from 1.
+    `translation`: d [m].
+    `rotation`: r [rad].
     """
 
     effect_id: ClassVar[str] = "kinematic_error"

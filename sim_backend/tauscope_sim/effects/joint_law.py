@@ -27,8 +27,7 @@ class Side(StrEnum):
 class JointLaw(JointEffect):
     """An effect τ(q, v) of one joint; q and v are the motor's, or the link's where it acts on that side.
 
-    joint : int
-        its number, counted from 1
+    `joint`: its number, counted from 1.
     """
 
     side: ClassVar[Side] = Side.MOTOR
@@ -46,10 +45,8 @@ class JointLaw(JointEffect):
 class FrictionLaw(SmoothSignEffect, JointLaw):
     """A friction law τ(q, v) of one joint that uses A(v).
 
-    joint : int
-        its number, counted from 1
-    k_v : float or None
-        K_v; that of the joint's friction_shape where None [s/rad or s/m]
+    `joint`: its number, counted from 1.
+    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
     """
 
     side: ClassVar[Side] = Side.FRICTION

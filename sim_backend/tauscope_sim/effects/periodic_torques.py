@@ -18,10 +18,8 @@ from tauscope_sim.plant.term import Forces, Moment, Slopes, Term
 class AngleHarmonics(JointEffect):
     """s(q) = Σ a_i sin(k_i q' + φ_i), with q' = q, or gear ratio × q where it is periodic in the motor's angle.
 
-    joint : int
-        its number, counted from 1
-    phase : list of float
-        φ_i, a number or one an order [rad]
+    `joint`: its number, counted from 1.
+    `phase`: φ_i, a number or one an order [rad].
     """
 
     amplitude: Numbers
@@ -60,12 +58,9 @@ class AngleHarmonics(JointEffect):
 class Cogging(AngleHarmonics, JointLaw):
     """τ = Σ a_i sin(k_i q' + φ_i).
 
-    joint : int
-        its number, counted from 1
-    amplitude : list of float
-        a_i, a number or one an order [Nm or N]
-    phase : list of float
-        φ_i, a number or one an order [rad]
+    `joint`: its number, counted from 1.
+    `amplitude`: a_i, a number or one an order [Nm or N].
+    `phase`: φ_i, a number or one an order [rad].
     """
 
     effect_id: ClassVar[str] = "cogging"
@@ -79,12 +74,9 @@ class Cogging(AngleHarmonics, JointLaw):
 class TorqueRipple(AngleHarmonics):
     """τ = L Σ a_i sin(k_i q' + φ_i).
 
-    joint : int
-        its number, counted from 1
-    amplitude : list of float
-        a_i, a number or one an order [Nm/Nm]
-    phase : list of float
-        φ_i, a number or one an order [rad]
+    `joint`: its number, counted from 1.
+    `amplitude`: a_i, a number or one an order [Nm/Nm].
+    `phase`: φ_i, a number or one an order [rad].
     """
 
     effect_id: ClassVar[str] = "torque_ripple"

@@ -11,12 +11,9 @@ from tauscope_sim.effects.joint_law import JointLaw, Law, Side
 class JointSpring(JointLaw):
     """τ = k (q - q₀), between two links: the transmission carries it.
 
-    joint : int
-        its number, counted from 1
-    stiffness : float
-        k [Nm/rad or N/m]
-    rest : float
-        q₀, where the spring is slack [rad or m]
+    `joint`: its number, counted from 1.
+    `stiffness`: k [Nm/rad or N/m].
+    `rest`: q₀, where the spring is slack [rad or m].
     """
 
     effect_id: ClassVar[str] = "joint_spring"
@@ -36,12 +33,9 @@ LEAST_STRETCH = 1e-6
 class CableForce(JointLaw):
     """τ = ±k max(±(q - q_c), 0)^p, between two links: the transmission carries it.
 
-    joint : int
-        its number, counted from 1
-    stiffness : float
-        k [Nm/rad^p or N/m^p]
-    angle : float
-        q_c, where it begins [rad or m]
+    `joint`: its number, counted from 1.
+    `stiffness`: k [Nm/rad^p or N/m^p].
+    `angle`: q_c, where it begins [rad or m].
     """
 
     effect_id: ClassVar[str] = "cable_force"
@@ -71,10 +65,8 @@ class CableForce(JointLaw):
 class TorqueOffset(JointLaw):
     """τ = c.
 
-    joint : int
-        its number, counted from 1
-    torque : float
-        c [Nm or N]
+    `joint`: its number, counted from 1.
+    `torque`: c [Nm or N].
     """
 
     effect_id: ClassVar[str] = "torque_offset"

@@ -17,8 +17,7 @@ Array = NDArray[np.float64]
 class TorqueGainError(SensorEffect):
     """τ_recorded = gain τ.
 
-    joint : int
-        its number, counted from 1
+    `joint`: its number, counted from 1.
     """
 
     effect_id: ClassVar[str] = "torque_gain_error"
@@ -46,10 +45,8 @@ class _Gain:
 class TorqueSaturation(SensorEffect):
     """τ_recorded = c tanh(τ/c), or τ clipped to ±c.
 
-    joint : int
-        its number, counted from 1
-    level : float
-        c [Nm or N]
+    `joint`: its number, counted from 1.
+    `level`: c [Nm or N].
     """
 
     effect_id: ClassVar[str] = "torque_saturation"
@@ -83,10 +80,8 @@ LONGEST_DELAY = 1.0
 class TimeDelay(SensorEffect):
     """τ_recorded(t) = τ(t - d).
 
-    delay : float
-        d, by which torque is late relative to position; negative: position is late [s]
-    joint : int or None
-        its number, counted from 1; all joints where None
+    `delay`: d, by which torque is late relative to position; negative: position is late [s].
+    `joint`: its number, counted from 1; all joints where None.
     """
 
     effect_id: ClassVar[str] = "time_delay"

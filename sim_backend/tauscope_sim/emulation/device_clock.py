@@ -19,8 +19,7 @@ ALL_STEPS = ceil(LONGEST_CATCH_UP_S / STEP_S)
 class DeviceClock:
     """How far devices have come; what a machine that stood still made them miss is lost, and told.
 
-    lost_s : float
-        time that was never stepped through [s]
+    `lost_s`: time that was never stepped through [s].
     """
 
     def __init__(self, now_s: float) -> None:

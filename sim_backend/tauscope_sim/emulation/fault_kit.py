@@ -36,10 +36,9 @@ class FaultKind(StrEnum):
 class InjectedFault:
     """One fault.
 
-    at_s : float
-        when, by the emulator's clock, and in what a test asks for counted from then; at once where that has passed [s]
-    seconds : float
-        how late, or how long [s]
+    `at_s`: when, by the emulator's clock, and in what a test asks for counted from then; at once where that has passed
+        [s].
+    `seconds`: how late, or how long [s].
     """
 
     kind: FaultKind

@@ -41,10 +41,7 @@ def compliant_transmissions(effects: Sequence[PhysicalEffect], rotor_inertia: Ar
 class Compliance:
     """All compliant transmissions of an arm.
 
-    Parameters
-    ----------
-    transmissions : mapping of int to Transmission
-        by joint, counted from 0
+    `transmissions`: by joint, counted from 0.
     """
 
     def __init__(self, transmissions: Mapping[int, Transmission], coordinates: Coordinates) -> None:

@@ -11,8 +11,7 @@ class Coordinates:
     joints stand behind the links: N = n + number of compliant joints. All in joint units: a motor's angle is divided by
     its gear ratio.
 
-    compliant : tuple of int
-        joints whose transmission gives way, counted from 0, ascending
+    `compliant`: joints whose transmission gives way, counted from 0, ascending.
     """
 
     joint_count: int

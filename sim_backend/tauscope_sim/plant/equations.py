@@ -34,10 +34,7 @@ class _Law(NamedTuple):
 class StaticFriction(Term):
     """Friction τ_f = τ_s (2/π) arctan(K_v v) + τ_sc (2/π) arctan(δ v) + τ_v v of every joint, v the motor's velocity.
 
-    Raises
-    ------
-    RobotFileError
-        where a shape constant that is needed is missing
+    Raises RobotFileError where a shape constant that is needed is missing.
     """
 
     def __init__(
@@ -78,12 +75,8 @@ class EquationsOfMotion:
 
         H(q) q̈ + h + c + link = T,      J θ̈ + friction + motor + T (1 + g) + |T| f = u.
 
-    Raises
-    ------
-    RobotFileError
-        where the robot file lacks what the simulation needs
-    ScenarioError
-        where effects contradict one another
+    Raises RobotFileError where the robot file lacks what the simulation needs.
+    Raises ScenarioError where effects contradict one another.
     """
 
     def __init__(self, robot: Robot, effects: Sequence[PhysicalEffect]) -> None:

@@ -75,18 +75,12 @@ SHORTEST_PART = 2.0**-12
 class PlantState:
     """Where the plant is, in joint units; every array a copy.
 
-    time : float
-        since the arm was placed [s]
-    motor_position : (n,) float64
-        of the motors, divided by the gear ratio [rad or m]
-    motor_velocity : (n,) float64
-        likewise [rad/s or m/s]
-    link_position : (n,) float64
-        q; the motor's own where the transmission is rigid [rad or m]
-    link_velocity : (n,) float64
-        q̇ [rad/s or m/s]
-    temperature : (n,) float64
-        of the joints [°C]
+    `time`: since the arm was placed [s].
+    `motor_position`: (n,), of the motors, divided by the gear ratio [rad or m].
+    `motor_velocity`: (n,), likewise [rad/s or m/s].
+    `link_position`: (n,), q; the motor's own where the transmission is rigid [rad or m].
+    `link_velocity`: (n,), q̇ [rad/s or m/s].
+    `temperature`: (n,), of the joints [°C].
     """
 
     time: float
@@ -104,17 +98,10 @@ class Plant:
     estimated error is below `TOLERANCE` × (step_s / `STEP`)²: halving `step_s` halves every sub-step, and the result
     converges with the square of `step_s`. No step crosses an instant at which an effect begins or ends.
 
-    Parameters
-    ----------
-    step_s : float
-        longest step of the integration [s]
+    `step_s`: longest step of the integration [s].
 
-    Raises
-    ------
-    RobotFileError
-        where the robot file lacks what the simulation needs
-    ScenarioError
-        where effects contradict one another or the robot
+    Raises RobotFileError where the robot file lacks what the simulation needs.
+    Raises ScenarioError where effects contradict one another or the robot.
     """
 
     def __init__(self, robot: Robot, effects: Sequence[PhysicalEffect] = (), *, step_s: float = STEP) -> None:

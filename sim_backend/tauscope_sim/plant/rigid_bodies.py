@@ -18,10 +18,7 @@ class RigidBodies:
 
     Where segments follow joints, q_segments = A q + b, and H = Aᵀ H_segments A, h + c = Aᵀ (h + c)_segments.
 
-    Parameters
-    ----------
-    rotor_inertia : (n,) float64
-        reflected inertia of the motors of rigid joints, added to the diagonal of H [kg m² or kg]
+    `rotor_inertia`: (n,), reflected inertia of the motors of rigid joints, added to the diagonal of H [kg m² or kg].
     """
 
     def __init__(self, robot: Robot, rotor_inertia: Array) -> None:

@@ -153,10 +153,8 @@ logging.getLogger(eds.__name__).setLevel(logging.ERROR)
 class DescribedObject:
     """One entry of the object dictionary as a file describes it.
 
-    value : bytes or None
-        the same as it is transferred, little end first; None where it is not of its type
-    default : int or None
-        value as delivered; None where the file states none, or no whole number
+    `value`: the same as it is transferred, little end first; None where it is not of its type.
+    `default`: value as delivered; None where the file states none, or no whole number.
     """
 
     name: str
@@ -179,12 +177,9 @@ class DescribedObject:
 class DeviceFile:
     """What a file says of a drive.
 
-    objects : mapping
-        of (index, subindex) to DescribedObject
-    vendor, product, revision : int or None
-        identity; None where it states none
-    node_id : int or None
-        that a DCF is made for; None where it states none
+    `objects`: of (index, subindex) to DescribedObject.
+    `vendor`, `product`, `revision`: identity; None where it states none.
+    `node_id`: that a DCF is made for; None where it states none.
     """
 
     name: str

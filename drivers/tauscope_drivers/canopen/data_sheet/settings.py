@@ -36,8 +36,7 @@ class Setting:
 class Settings:
     """The values of a DCF file; none of an EDS file.
 
-    torque_cap : int or None
-        largest torque (0x6072), which the driver sets itself and never above this [‰ of the rated torque]
+    `torque_cap`: largest torque (0x6072), which the driver sets itself and never above this [‰ of the rated torque].
     """
 
     written: tuple[Setting, ...]

@@ -15,10 +15,8 @@ _RATED_TORQUE = "rated_torque_nm"
 class DriveUnits:
     """What one drive unit means at the joint; None where the robot file and the recording do not tell.
 
-    torque_per_milliampere : float or None
-        joint torque per mA of recorded current, sign of the wiring included [Nm or N per mA]
-    torque_per_permille : float or None
-        joint torque per 1/1000 of the motor's rated torque, sign included [Nm per ‰]
+    `torque_per_milliampere`: joint torque per mA of recorded current, sign of the wiring included [Nm or N per mA].
+    `torque_per_permille`: joint torque per 1/1000 of the motor's rated torque, sign included [Nm per ‰].
     """
 
     torque_per_milliampere: float | None = None

@@ -20,16 +20,11 @@ EQUATION = "tau = stiction*(2/pi)*atan(k_v*v) + stribeck*(2/pi)*atan(delta*v) + 
 class JointFriction:
     """Friction of one joint and the constant beside it, equations (7), (8).
 
-    stiction, stribeck : float
-        τ_s, τ_sc [Nm or N]; their sum is the Coulomb level at speed
-    viscous : float
-        τ_v [Nm s/rad or N s/m]
-    offset : float
-        constant torque [Nm or N]
-    k_v : float
-        K_v, slope of the smooth sign [s/rad or s/m]
-    delta : float or None
-        δ, shape of the Stribeck effect [s/rad or s/m]; None where the joint has none
+    `stiction`, `stribeck`: τ_s, τ_sc [Nm or N]; their sum is the Coulomb level at speed.
+    `viscous`: τ_v [Nm s/rad or N s/m].
+    `offset`: constant torque [Nm or N].
+    `k_v`: K_v, slope of the smooth sign [s/rad or s/m].
+    `delta`: δ, shape of the Stribeck effect [s/rad or s/m]; None where the joint has none.
     """
 
     stiction: float
@@ -44,8 +39,7 @@ class JointFriction:
 class JointCompensation:
     """One joint of a compensation model.
 
-    type : JointType
-        revolute (rad, Nm) or prismatic (m, N)
+    `type`: revolute (rad, Nm) or prismatic (m, N).
     """
 
     name: str

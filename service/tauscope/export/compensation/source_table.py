@@ -39,8 +39,7 @@ COEFFICIENTS = ("stiction", "stribeck", "viscous", "offset", "k_v", "delta")
 class UnitFunction:
     """A function that gives the friction in one unit.
 
-    torque_per_unit : tuple of float, length n
-        what one unit means at each joint [Nm or N]
+    `torque_per_unit`: what one unit means at each joint [Nm or N].
     """
 
     suffix: str

@@ -57,8 +57,7 @@ class BandFilter(Protocol):
 class AllPass:
     """No filter at all: for motion measured so cleanly that nothing needs to be cut.
 
-    rate_hz : float
-        sampling rate of what goes in and comes out [Hz]
+    `rate_hz`: sampling rate of what goes in and comes out [Hz].
     """
 
     rate_hz: float
@@ -79,10 +78,8 @@ class AllPass:
 class Decimator:
     """Linear-phase low-pass (Kaiser window) evaluated only at every `factor`-th sample.
 
-    kernel : (K,) float64
-        symmetric impulse response of unit sum; K is a multiple of `factor`
-    rate_hz : float
-        sampling rate after decimation [Hz]
+    `kernel`: (K,), symmetric impulse response of unit sum; K is a multiple of `factor`.
+    `rate_hz`: sampling rate after decimation [Hz].
 
     Written as one matrix product per group of signals: with X the signal in blocks of D samples,
     y[m] = Σ_b (X H)[m+b, b], H the kernel in K/D columns. That is several times quicker than a convolution.
@@ -165,8 +162,7 @@ def _in_long_gaps(measured: NDArray[np.bool_], bridged: int) -> NDArray[np.bool_
 class HarmonicBand:
     """The band of one averaged period: its harmonics up to the cut-off, sampled just often enough to hold them.
 
-    rate_hz : float
-        sampling rate of the output [Hz]
+    `rate_hz`: sampling rate of the output [Hz].
     """
 
     period_samples: int

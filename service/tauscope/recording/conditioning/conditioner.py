@@ -29,10 +29,8 @@ from tauscope.robot.robot import Robot
 class ConditioningSummary:
     """What was done to one recording, for the result and its reader.
 
-    missed_torques : tuple of int
-        per joint, samples without a torque (filled in for filtering, not counted in the fit)
-    position_noise_std : tuple of float
-        per joint, standard deviation of the position noise over the whole spectrum [rad or m]
+    `missed_torques`: per joint, samples without a torque (filled in for filtering, not counted in the fit).
+    `position_noise_std`: per joint, standard deviation of the position noise over the whole spectrum [rad or m].
     """
 
     recording: str

@@ -22,21 +22,15 @@ from tauscope.recording.recording import Array
 class Motion:
     """One piece of conditioned motion with the torque that went with it.
 
-    time : (N,) float64
-        [s]; of the first period where periods were averaged
-    position, velocity, acceleration : (N, n) float64
-        smoothed q, q̇, q̈ at the recorded rate
-    torque : (P, N, n) float64
-        measured joint torque of every repetition; P = 1 where nothing was averaged
-    measured : (P, N, n) bool
-        where that torque was measured and not filled in
-    rate_hz : float
-        sampling rate of all of these [Hz]
-    period : (N,) float64 or None
-        progress through the repeated excitation, where it is known and not averaged: index of the period plus the part
-        of it that is over
-    scatter : (n,) float64 or None
-        standard deviation of the positions from period to period [rad or m]; None where nothing was averaged
+    `time`: (N,) [s]; of the first period where periods were averaged.
+    `position`, `velocity`, `acceleration`: (N, n), smoothed q, q̇, q̈ at the recorded rate.
+    `torque`: (P, N, n), measured joint torque of every repetition; P = 1 where nothing was averaged.
+    `measured`: (P, N, n), where that torque was measured and not filled in.
+    `rate_hz`: sampling rate of all of these [Hz].
+    `period`: (N,), progress through the repeated excitation, where it is known and not averaged: index of the period
+        plus the part of it that is over.
+    `scatter`: (n,), standard deviation of the positions from period to period [rad or m]; None where nothing was
+        averaged.
     """
 
     time: Array
@@ -70,11 +64,9 @@ class Motion:
 class Trim:
     """The band of one recording's transient motion, and the samples that it costs.
 
-    cutoff_hz : float or None
-        of the band [Hz]; None where it is open
-    state_hz : float or (n,) float64
-        cut-off of the motion's own smoothing, of each joint if they differ [Hz]; the sampling rate where nothing is
-        smoothed
+    `cutoff_hz`: of the band [Hz]; None where it is open.
+    `state_hz`: float or (n,), cut-off of the motion's own smoothing, of each joint if they differ [Hz]; the sampling
+        rate where nothing is smoothed.
     """
 
     band: AllPass | Decimator

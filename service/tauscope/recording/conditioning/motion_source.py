@@ -81,12 +81,9 @@ class Source(StrEnum):
 class MotionSource:
     """What every joint's motion is made from, and the band that it stands.
 
-    velocity, acceleration : (n,) bool
-        whether the recorded signal is used for q̇, for q̈
-    limits_hz : (n,) float64
-        widest band in which q̈ keeps to `NOISE_SHARE`; infinite where it does everywhere
-    quieter_from_hz : (n,) float64 or None
-        band from which on the recorded velocity is the quieter source; infinite where it never is
+    `velocity`, `acceleration`: (n,), whether the recorded signal is used for q̇, for q̈.
+    `limits_hz`: (n,), widest band in which q̈ keeps to `NOISE_SHARE`; infinite where it does everywhere.
+    `quieter_from_hz`: (n,), band from which on the recorded velocity is the quieter source; infinite where it never is.
     """
 
     velocity: np.ndarray
@@ -169,12 +166,9 @@ def _quieter_bands(stretches: Sequence[Stretch], noise: PositionNoise) -> Array 
 class _VelocityFit:
     """q̇_recorded = g q̇ - d q̈ + offset.
 
-    delay, delay_std : float
-        d and its standard error [s]
-    offset : float
-        relative to the rms of the velocity
-    misfit : float
-        rms of the rest [rad/s or m/s]
+    `delay`, `delay_std`: d and its standard error [s].
+    `offset`: relative to the rms of the velocity.
+    `misfit`: rms of the rest [rad/s or m/s].
     """
 
     gain: float

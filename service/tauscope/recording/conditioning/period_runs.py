@@ -33,8 +33,7 @@ WHOLE_PERIOD = 1e-6
 class PeriodRun:
     """Consecutive periods of one length.
 
-    rows : (int, int)
-        rows of the stretch in which it lies
+    `rows`: (int, int), rows of the stretch in which it lies.
     """
 
     rows: tuple[int, int]
@@ -83,12 +82,9 @@ class PeriodRun:
 class PeriodLabels:
     """Column `period` of a recording, kept as its steps.
 
-    time : (K,) float64
-        instants at which the label changes, the first sample's own first [s]
-    label : (K,) float64
-        the label from then on; NaN outside the repeated part
-    row : (K,) int
-        rows at which it changes
+    `time`: (K,), instants at which the label changes, the first sample's own first [s].
+    `label`: (K,), the label from then on; NaN outside the repeated part.
+    `row`: (K,) int, rows at which it changes.
     """
 
     time: Array

@@ -50,16 +50,11 @@ LEAST_WIDTH = 1e-15
 class Periods:
     """P complete periods of N samples, aligned.
 
-    position, torque : (P, N, n) float64
-        q and τ of every period
-    measured : (P, N, n) bool
-        where the torque was measured
-    rows : (int, int)
-        the samples of the stretch that the periods cover
-    velocity, acceleration : (P, N, n) float64 or None
-        recorded q̇ and q̈, where the stretch has them
-    advance : (n,) float64 or None
-        how far each joint gets from one period to the next [rad or m]; None where nobody asked
+    `position`, `torque`: (P, N, n), q and τ of every period.
+    `measured`: (P, N, n), where the torque was measured.
+    `rows`: (int, int), the samples of the stretch that the periods cover.
+    `velocity`, `acceleration`: (P, N, n), recorded q̇ and q̈, where the stretch has them.
+    `advance`: (n,), how far each joint gets from one period to the next [rad or m]; None where nobody asked.
     """
 
     rate_hz: float

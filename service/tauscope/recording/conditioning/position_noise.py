@@ -49,14 +49,11 @@ DIFFERENCE_ORDER = 2
 class PositionNoise:
     """Noise of the measured positions.
 
-    density : (n,) float64
-        one-sided spectral density S_n [rad²/Hz or m²/Hz]
-    limit_hz : float or None
-        widest band in which the q̈ that is used keeps to `NOISE_SHARE`; None where the whole spectrum does
-    joint_limits_hz : (n,) float64
-        the same joint by joint; infinite where the whole spectrum does, or where the joint stands still
-    step : (n,) float64
-        step that the encoder rounds to [rad or m]; zero where it shows none
+    `density`: (n,), one-sided spectral density S_n [rad²/Hz or m²/Hz].
+    `limit_hz`: widest band in which the q̈ that is used keeps to `NOISE_SHARE`; None where the whole spectrum does.
+    `joint_limits_hz`: (n,), the same joint by joint; infinite where the whole spectrum does, or where the joint stands
+        still.
+    `step`: (n,), step that the encoder rounds to [rad or m]; zero where it shows none.
     """
 
     density: Array
@@ -69,14 +66,10 @@ class PositionNoise:
 class AccelerationSpectrum:
     """Spectrum of q̈ from some signal, and the noise in it.
 
-    frequency : (F,) float64
-        [Hz]
-    power : (F, n) float64
-        one-sided spectral density of q̈, with its noise
-    gain : (F,) float64
-        squared gain from the signal's noise to that of q̈
-    density : (n,) float64
-        one-sided spectral density of the signal's noise
+    `frequency`: (F,) [Hz].
+    `power`: (F, n), one-sided spectral density of q̈, with its noise.
+    `gain`: (F,), squared gain from the signal's noise to that of q̈.
+    `density`: (n,), one-sided spectral density of the signal's noise.
     """
 
     frequency: Array

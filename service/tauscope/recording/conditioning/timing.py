@@ -44,8 +44,7 @@ SHORTEST_STRETCH = 32
 class Timing:
     """How a recording was sampled.
 
-    rows : tuple of (int, int)
-        row ranges without a long gap, each at least `SHORTEST_STRETCH` complete rows
+    `rows`: tuple of (int, int), row ranges without a long gap, each at least `SHORTEST_STRETCH` complete rows.
     """
 
     rate_hz: float

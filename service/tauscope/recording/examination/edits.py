@@ -19,16 +19,11 @@ NO_ROWS: Rows = np.empty((0, 2), dtype=np.int64)
 class ColumnEdit:
     """Edits of one column.
 
-    blank : (k, 2) int64
-        rows start:stop that were never measured: NaN; ascending, disjoint
-    jumps : (m,) int64
-        rows from which on the column is off by a constant
-    offsets : (m,) float64
-        that constant: subtracted [rad or m]
-    hold : int
-        rows for which the source holds a value: those in between are on a straight line from one value to the next
-    fill : int
-        missed rows up to which a straight line is drawn
+    `blank`: (k, 2) int64, rows start:stop that were never measured: NaN; ascending, disjoint.
+    `jumps`: (m,) int64, rows from which on the column is off by a constant.
+    `offsets`: (m,), that constant: subtracted [rad or m].
+    `hold`: rows for which the source holds a value: those in between are on a straight line from one value to the next.
+    `fill`: missed rows up to which a straight line is drawn.
     """
 
     blank: Rows = field(default_factory=lambda: NO_ROWS)

@@ -40,12 +40,10 @@ REST_HOLDS = 4
 class JointDefects:
     """Defects of one joint's samples.
 
-    hold, effort_hold : int
-        rows for which position, effort are held; 1 where they are not
-    rows : dict of str to (m,) int64
-        rows, ascending: spikes, frozen, repeated of positions, zeros, stuck, effort_spikes of efforts
-    jumps, wraps : list of (int, float)
-        first row behind a jump, and its height [rad or m]
+    `hold`, `effort_hold`: rows for which position, effort are held; 1 where they are not.
+    `rows`: dict of str to (m,) int64, rows, ascending: spikes, frozen, repeated of positions, zeros, stuck,
+        effort_spikes of efforts.
+    `jumps`, `wraps`: list of (int, float), first row behind a jump, and its height [rad or m].
     """
 
     hold: int
@@ -79,10 +77,8 @@ class JointDefects:
 class Defects:
     """Defects of a recording's samples.
 
-    bunched : (m,) int64
-        rows whose stamp is that of a neighbour
-    alternate : bool
-        whether positions and efforts come in rows of their own
+    `bunched`: (m,) int64, rows whose stamp is that of a neighbour.
+    `alternate`: whether positions and efforts come in rows of their own.
     """
 
     joints: list[JointDefects]

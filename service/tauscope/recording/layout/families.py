@@ -24,14 +24,10 @@ LONGEST_NAME = 200
 class Family:
     """Columns of one quantity, one a joint.
 
-    template : str
-        name of the columns with a placeholder for the joint
-    columns : tuple of str
-        columns in the order of the joints: by number, of the robot, or of the file
-    is_regular : bool
-        whether the template gives the columns; zeros in front of a number it does not
-    is_guessed : bool
-        whether the joints' names are any part of the columns' names
+    `template`: name of the columns with a placeholder for the joint.
+    `columns`: columns in the order of the joints: by number, of the robot, or of the file.
+    `is_regular`: whether the template gives the columns; zeros in front of a number it does not.
+    `is_guessed`: whether the joints' names are any part of the columns' names.
     """
 
     template: str

@@ -40,10 +40,8 @@ def chained_line(previous: Mapping[str, Any] | None, content: Mapping[str, Any])
 class Verification:
     """What a log is worth.
 
-    head : str or None
-        hash of the last one; None where there is none
-    fault : str or None
-        the first thing that is wrong, one line; None where nothing is
+    `head`: hash of the last one; None where there is none.
+    `fault`: the first thing that is wrong, one line; None where nothing is.
     """
 
     entries: int

@@ -85,10 +85,8 @@ class Lease:
 
     Attributes are replaced one at a time and never need a lock to be read.
 
-    ttl_s : float
-        how long it lasts without a sign of life [s]
-    ends : float
-        when it ends, on the clock of `Leases` [s]
+    `ttl_s`: how long it lasts without a sign of life [s].
+    `ends`: when it ends, on the clock of `Leases` [s].
     """
 
     id: str

@@ -18,8 +18,7 @@ WEEK_S = 7 * 86400.0
 class TrendPoint:
     """A parameter in one identification.
 
-    value, std : float
-        estimate and its standard error [SI]
+    `value`, `std`: estimate and its standard error [SI].
     """
 
     time: datetime
@@ -31,10 +30,8 @@ class TrendPoint:
 class Trend:
     """The line through all points.
 
-    slope : float
-        change a week [SI/week]
-    change : float
-        of the line from the first point to the last [SI]
+    `slope`: change a week [SI/week].
+    `change`: of the line from the first point to the last [SI].
     """
 
     count: int
@@ -75,8 +72,7 @@ def fit_trend(points: Sequence[TrendPoint]) -> Trend | None:
 class ParameterTrend:
     """One parameter over time.
 
-    points : tuple of (str, TrendPoint)
-        identifier of each model, and what it says; the oldest first
+    `points`: tuple of (str, TrendPoint), identifier of each model, and what it says; the oldest first.
     """
 
     name: str

@@ -27,12 +27,9 @@ FORM = "multipart/form-data"
 class PartRule:
     """What a part of a form may be.
 
-    limit : int
-        largest size [bytes]
-    folder : Path or None
-        where its files are written; None for text that is kept in memory
-    default_name : str or None
-        name of a file that was sent without one; None where it has to have one
+    `limit`: largest size [bytes].
+    `folder`: where its files are written; None for text that is kept in memory.
+    `default_name`: name of a file that was sent without one; None where it has to have one.
     """
 
     limit: int

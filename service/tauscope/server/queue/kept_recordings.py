@@ -41,12 +41,9 @@ def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport
 class Understanding:
     """How a file is understood before anything is computed from it.
 
-    mapping : ColumnMapping or None
-        None for a log, which names its joints itself
-    report : RecordingReport or None
-        None where the file is refused
-    problem : str or None
-        why it is refused
+    `mapping`: None for a log, which names its joints itself.
+    `report`: None where the file is refused.
+    `problem`: why it is refused.
     """
 
     mapping: ColumnMapping | None

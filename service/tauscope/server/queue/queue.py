@@ -32,8 +32,7 @@ TOO_OFTEN = JobProblem(
 class JobKind:
     """A kind of job: where its folders lie and what is done with them.
 
-    is_heavy : bool
-        whether its work takes minutes: where there are several slots, one stays free of such work
+    `is_heavy`: whether its work takes minutes: where there are several slots, one stays free of such work.
     """
 
     items: ItemStore

@@ -21,8 +21,7 @@ UNDECIDED = ("asked", "claimed")
 class ScheduleEntry:
     """A schedule.
 
-    site : str or None
-        of the data folder whose service does it; None for whichever comes first
+    `site`: of the data folder whose service does it; None for whichever comes first.
     """
 
     name: str
@@ -38,8 +37,7 @@ class ScheduleEntry:
 class FiringEntry:
     """One time that a schedule was due.
 
-    item : (str, str) or None
-        kind and identifier of what was started
+    `item`: (str, str), kind and identifier of what was started.
     """
 
     number: int

@@ -16,8 +16,7 @@ _TAIL = 2**16
 class LoggedEvent:
     """One line of a log.
 
-    number : int
-        of the line, from 1: who has read it goes on with the next
+    `number`: of the line, from 1: who has read it goes on with the next.
     """
 
     number: int

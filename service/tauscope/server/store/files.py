@@ -47,8 +47,7 @@ _PIECE = 2**20
 class KeptFile:
     """A file that arrived as a whole.
 
-    sha256 : str
-        of its bytes, in hexadecimal
+    `sha256`: of its bytes, in hexadecimal.
     """
 
     path: Path

@@ -27,10 +27,8 @@ _log = logging.getLogger("tauscope.store")
 class KnownHash:
     """What is known of a recording's bytes.
 
-    sha256 : str
-        of the bytes, in hexadecimal
-    kept : str or None
-        of the bytes that were sent or recorded; None for a file that an operator put there, and may change
+    `sha256`: of the bytes, in hexadecimal.
+    `kept`: of the bytes that were sent or recorded; None for a file that an operator put there, and may change.
     """
 
     sha256: str
@@ -131,8 +129,7 @@ class NameTakenError(RecordingError):
 class StoredRecording:
     """A recording that lies on the server.
 
-    sha256 : str or None
-        of its bytes, in hexadecimal; None where it was not computed yet
+    `sha256`: of its bytes, in hexadecimal; None where it was not computed yet.
     """
 
     name: str

@@ -44,12 +44,10 @@ def no_further(_received: Received[Any], _services: Services, _workspace: Any) -
 class QueuedTask:
     """What is special about such a resource.
 
-    further : callable
-        checks a request whose recordings are listed, and returns further fields of its order
-    further_parts : mapping of str to (str, int)
-        files of a form that are no recordings: their folder, and the largest size [bytes]
-    links : sequence of str
-        further routes that it links to, once it succeeded
+    `further`: checks a request whose recordings are listed, and returns further fields of its order.
+    `further_parts`: mapping of str to (str, int), files of a form that are no recordings: their folder, and the largest
+        size [bytes].
+    `links`: further routes that it links to, once it succeeded.
     """
 
     noun: str

@@ -57,10 +57,8 @@ class JobRobotAnswer(AnswerModel):
 class JobDocument:
     """An output of a task that has a route of its own.
 
-    output : str
-        its name among the outputs
-    missing : str or None
-        what is said where the task made none; None where it always makes one
+    `output`: its name among the outputs.
+    `missing`: what is said where the task made none; None where it always makes one.
     """
 
     name: str
@@ -118,16 +116,11 @@ class Folder(Protocol):
 class Resource:
     """What is special about a resource.
 
-    submit : callable
-        takes a request; returns the identifier
-    describe : callable
-        the answer, from services, identifier and the path of the interface
-    followed : callable
-        what has events
-    summary, words : str
-        of handing in
-    parts : mapping
-        files of a form beside the robot's
+    `submit`: takes a request; returns the identifier.
+    `describe`: the answer, from services, identifier and the path of the interface.
+    `followed`: what has events.
+    `summary`, `words`: of handing in.
+    `parts`: files of a form beside the robot's.
     """
 
     noun: str

@@ -16,8 +16,7 @@ from tauscope.server.store.recordings import StoredRecording
 class FileMetadata:
     """A file of an item.
 
-    sha256 : str
-        of its bytes, in hexadecimal
+    `sha256`: of its bytes, in hexadecimal.
     """
 
     path: str
@@ -39,8 +38,7 @@ class RecordingRole:
 class ItemMetadata:
     """An item as its folder shows it.
 
-    problem : (str, str) or None
-        code and detail: why it has no result
+    `problem`: (str, str), code and detail: why it has no result.
     """
 
     kind: str
