@@ -64,12 +64,12 @@ def shape_constants(
     constants: list[tuple[float, float]] = []
     for number, (coefficients, shape) in enumerate(zip(friction, friction_shape, strict=True), 1):
         place = f"joint {number}: friction_shape"
-        k_v = _needed(shape.k_v, coefficients.stiction, f"{place}.k_v")
-        constants.append((k_v, _needed(shape.delta, coefficients.stribeck, f"{place}.delta")))
+        k_v = _require(shape.k_v, coefficients.stiction, f"{place}.k_v")
+        constants.append((k_v, _require(shape.delta, coefficients.stribeck, f"{place}.delta")))
     return constants
 
 
-def _needed(slope: float | None, level: float, place: str) -> float:
+def _require(slope: float | None, level: float, place: str) -> float:
     """Return the slope, which may be missing only where the level that it shapes is zero."""
     if slope is None and level != 0.0:
         raise RobotFileError(f"{place} is missing; a simulation with friction needs it [s/rad or s/m]")

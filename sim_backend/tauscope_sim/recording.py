@@ -111,7 +111,7 @@ def simulate_recording(
     torque_noise, position_noise = rng.standard_normal(shape), rng.standard_normal(shape)
     return SimulatedRecording(
         time=np.arange(shape[0]) / rate_hz,
-        position=_quantised(exact.position + position_std * position_noise, step),
+        position=_quantise(exact.position + position_std * position_noise, step),
         torque=torque_exact + torque_std * torque_noise,
         exact=exact,
         torque_exact=torque_exact,
@@ -160,7 +160,7 @@ def _torque(
     return torque + static_friction_torque(samples.velocity, friction, shape)
 
 
-def _quantised(position: Array, step: Array) -> Array:
+def _quantise(position: Array, step: Array) -> Array:
     """Positions rounded to the encoder's step; joints with step zero as they are."""
     rounded = position.copy()
     coarse = step > 0.0

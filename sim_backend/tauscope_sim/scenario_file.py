@@ -82,7 +82,7 @@ class _Reader:
 
     def scenario(self, data: Any) -> Scenario:
         """The scenario of plain data."""
-        document = self._validated(ScenarioDocument, data, (), "")
+        document = self._validate(ScenarioDocument, data, (), "")
         entries = [self._entry(value, number) for number, value in enumerate(document.effects)]
         scenario = Scenario(
             effects=tuple(entry for entry in entries if isinstance(entry, Effect)),
@@ -108,7 +108,7 @@ class _Reader:
             hint = nearest(name, EFFECTS) if isinstance(name, str) else "write an effect id"
             raise self._error((*place, "effect"), "", f"unknown effect {shown(name)}; {hint}")
         keys = {key: self._joint_number(key, part) for key, part in value.items() if key != "effect"}
-        entry = self._validated(EFFECTS[name], keys, place, name)
+        entry = self._validate(EFFECTS[name], keys, place, name)
         try:
             entry.check(self._robot)
         except ScenarioError as error:
@@ -136,7 +136,7 @@ class _Reader:
         except ScenarioError as error:
             raise self._error(("effects",), "", str(error)) from error
 
-    def _validated(self, kind: type, data: Any, place: Place, name: str) -> Any:
+    def _validate(self, kind: type, data: Any, place: Place, name: str) -> Any:
         """The data as a validated document."""
         if not isinstance(data, Mapping):
             raise self._error(place, name, f"must be a mapping, but is {shown(data)}")

@@ -46,7 +46,7 @@ def record(arm: Robot, path: Path, seed: int, rate_hz: float = 100.0, periods: i
     return path
 
 
-def renamed(arm: Robot, name: str, joints: tuple[str, ...]) -> Robot:
+def rename_arm(arm: Robot, name: str, joints: tuple[str, ...]) -> Robot:
     """The same arm under other names."""
     return replace(
         arm, name=name, joints=tuple(replace(joint, name=new) for joint, new in zip(arm.joints, joints, strict=True))

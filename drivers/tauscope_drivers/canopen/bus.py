@@ -55,7 +55,7 @@ class CanBus:
         self._next_heartbeat_ns = 0
         self._claim: BusClaim | None = None
         try:
-            self._claim = _claimed(configuration) if bus is None else None
+            self._claim = _claim_interface(configuration) if bus is None else None
             self._bus = bus or open_interface(
                 configuration.interface, configuration.channel, configuration.bit_rate, configuration.options
             )
@@ -88,7 +88,7 @@ class CanBus:
                 can.Message(arbitration_id=identifier, data=data, is_extended_id=False), timeout=SEND_TIMEOUT_S
             )
         except (can.CanError, OSError, ValueError) as error:
-            raise self._lost(error) from error
+            raise self._report_loss(error) from error
 
     def send_together(self, frames: Iterable[tuple[int, bytes]]) -> None:
         """Send frames one after the other, with one write where the adapter takes that.
@@ -103,7 +103,7 @@ class CanBus:
                 for identifier, data in frames:
                     self.send(identifier, data)
         except (can.CanError, OSError, ValueError) as error:
-            raise self._lost(error) from error
+            raise self._report_loss(error) from error
 
     def receive(self, deadline_ns: int) -> bool:
         """Wait for one frame and hand it to its handler; the heartbeat is sent meanwhile when it is due.
@@ -119,7 +119,7 @@ class CanBus:
         try:
             message = self._bus.recv(wait_s)
         except (can.CanError, OSError, ValueError) as error:
-            raise self._lost(error) from error
+            raise self._report_loss(error) from error
         if message is None:
             return False
         if message.is_error_frame or message.is_extended_id or message.is_remote_frame:
@@ -168,14 +168,14 @@ class CanBus:
             self._claim.release()
             self._claim = None
 
-    def _lost(self, error: Exception) -> DriverError:
+    def _report_loss(self, error: Exception) -> DriverError:
         text = " ".join(str(error).split())
         return DriverError(
             DriverErrorKind.LOST, f"CAN bus {self._name} is gone ({text}); check the adapter and the cable"
         )
 
 
-def _claimed(configuration: BusConfiguration) -> BusClaim | None:
+def _claim_interface(configuration: BusConfiguration) -> BusClaim | None:
     """The claim on an interface that several programs may open; None where only one can."""
     if configuration.interface in ONE_PROCESS:
         return None

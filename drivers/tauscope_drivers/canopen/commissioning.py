@@ -49,7 +49,7 @@ def find_missing(node: DriveNode, file: DeviceFile) -> list[Setting]:
     Raises DriverError: ``refused``: it does not have their objects, or is under power; ``cannot-connect``: it does not
     answer.
     """
-    missing = [one for one in settings_of(file).written if _kept(node, file, one) != one.data]
+    missing = [one for one in settings_of(file).written if _read_setting(node, file, one) != one.data]
     if missing and decode_state(node.dictionary.read(objects.STATUSWORD)) in POWERED:
         raise DriverError(
             DriverErrorKind.REFUSED,
@@ -59,7 +59,7 @@ def find_missing(node: DriveNode, file: DeviceFile) -> list[Setting]:
     return missing
 
 
-def _kept(node: DriveNode, file: DeviceFile, setting: Setting) -> bytes:
+def _read_setting(node: DriveNode, file: DeviceFile, setting: Setting) -> bytes:
     """What the drive has where a setting goes."""
     with _refusals_named(node, file, setting):
         return node.dictionary.read_data(setting.entry)
@@ -69,7 +69,7 @@ def _give(node: DriveNode, file: DeviceFile, setting: Setting) -> None:
     """Write one value and read it back."""
     with _refusals_named(node, file, setting):
         node.dictionary.send_data(setting.entry, setting.data, setting.text)
-    if (kept := _kept(node, file, setting)) != setting.data:
+    if (kept := _read_setting(node, file, setting)) != setting.data:
         raise DriverError(
             DriverErrorKind.REFUSED,
             f"{node.place}: {setting.entry} was written as {setting.text}, as {file.name} has it, and reads back as "

@@ -127,12 +127,12 @@ def _examine_file(file: DeviceFile, place: str) -> list[Finding]:
         given = ", ".join(f"{one.entry} = {one.text}" for one in settings.written)
         findings.append(Finding(Severity.GOOD, place, f"{file.name} gives it, before each run: {given}"))
     for reason, described in settings.left_out.items():
-        detail = f"{file.name} has values that are not written ({reason}): {_listed_places(described)}"
+        detail = f"{file.name} has values that are not written ({reason}): {_list_places(described)}"
         findings.append(Finding(Severity.GOOD, place, detail))
     return findings
 
 
-def _listed_places(described: Sequence[DescribedObject]) -> str:
+def _list_places(described: Sequence[DescribedObject]) -> str:
     """Places in the object dictionary, the subindices of an index together."""
     subindices: dict[int, list[str]] = {}
     for one in described:

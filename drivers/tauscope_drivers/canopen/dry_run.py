@@ -91,7 +91,7 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
     mode, limits, targets, cycle_s = request.mode, request.limits, request.targets, request.cycle_s
     configuration = read_configuration(joints)
     require_targets(configuration, mode)
-    nodes = [_planned_node(number, wanted) for number, wanted in enumerate(configuration.nodes, 1)]
+    nodes = [_plan_node(number, wanted) for number, wanted in enumerate(configuration.nodes, 1)]
     require_sensible(limits, targets[0], [node.place for node, _ in nodes])
     yield _frame("connect", "all nodes: pre-operational", NMT_ID, bytes([NMT_PRE_OPERATIONAL, 0]))
     for node, _ in nodes:
@@ -111,7 +111,7 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
     yield from _cycle([node for node, _ in nodes], mode, "stop", word, targets[-1])
 
 
-def _planned_node(joint: int, configuration: NodeConfiguration) -> tuple[DriveNode, _PlannedDictionary]:
+def _plan_node(joint: int, configuration: NodeConfiguration) -> tuple[DriveNode, _PlannedDictionary]:
     """A drive that nobody has asked, in the units that the robot file states."""
     label = f"joint {joint} (node {configuration.node_id})"
     if configuration.rated_torque_nm is None:

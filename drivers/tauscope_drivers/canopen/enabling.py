@@ -31,7 +31,7 @@ def power_up(session: Session, mode: ControlMode) -> tuple[ArmState, Array]:
     (n,) float64
         targets that the drives stand at [rad or m]
     """
-    place = _settled_place(session, mode)
+    place = _read_settled_place(session, mode)
 
     def cycle() -> ArmState:
         for index, node in enumerate(session.nodes):
@@ -61,7 +61,7 @@ def _note_mode(node: DriveNode, mode: ControlMode) -> None:
         node.remarks += (remark,)
 
 
-def _settled_place(session: Session, mode: ControlMode) -> Array:
+def _read_settled_place(session: Session, mode: ControlMode) -> Array:
     """Where the joints are now, by process data, read before any drive changes its state.
 
     One that holds may be back under power with its first target: that must not be where it was when commissioning

@@ -159,7 +159,7 @@ class DriveNode:
 
     def remember(self, time_ns: int) -> None:
         """Keep state and place of this cycle for cycles without an answer; a frame that cannot be true is none."""
-        self.measurement = measured = self._measured()
+        self.measurement = measured = self._decode_measurements()
         if not self.glitches.believes_place(measured.position, time_ns):
             self._forget(objects.POSITION_ACTUAL)
         elif not math.isnan(measured.position):
@@ -227,16 +227,16 @@ class DriveNode:
         """Joint and node, for messages."""
         return f"joint {self.joint} (node {self.configuration.node_id})"
 
-    def _measured(self) -> Measurement:
+    def _decode_measurements(self) -> Measurement:
         """What this cycle's values say of the joint."""
 
-        def converted(entry: DriveObject, to_joint: Callable[[int], float]) -> float:
+        def convert(entry: DriveObject, to_joint: Callable[[int], float]) -> float:
             return to_joint(self.values[entry]) if entry in self.values else math.nan
 
         return Measurement(
-            position=converted(objects.POSITION_ACTUAL, self.units.position),
-            velocity=converted(objects.VELOCITY_ACTUAL, self.units.velocity),
-            effort=converted(objects.TORQUE_ACTUAL, self.units.torque),
+            position=convert(objects.POSITION_ACTUAL, self.units.position),
+            velocity=convert(objects.VELOCITY_ACTUAL, self.units.velocity),
+            effort=convert(objects.TORQUE_ACTUAL, self.units.torque),
         )
 
     def _learn_units(self) -> DriveUnits:
@@ -277,7 +277,7 @@ class DriveNode:
         """Drop a whole frame by one of its values."""
         gone = {entry for pdo in self.plan.sent if doubted in pdo.layout.objects for entry in pdo.layout.objects}
         self.values = {entry: value for entry, value in self.values.items() if entry not in gone}
-        self.measurement = self._measured()
+        self.measurement = self._decode_measurements()
 
     def _take_heartbeat(self, data: bytes) -> None:
         self.is_deaf = len(data) == 1 and data[0] & 0x7F != NMT_OPERATIONAL_STATE

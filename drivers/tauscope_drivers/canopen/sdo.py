@@ -111,7 +111,7 @@ class NodeDictionary:
         Raises DriverError: ``cannot-connect``: the node does not answer; ``refused``: it has no such entry.
         """
         try:
-            data = bytes(_transferred(lambda: self._client.upload(entry.index, entry.subindex)))
+            data = bytes(_retry_transfer(lambda: self._client.upload(entry.index, entry.subindex)))
         except (SdoError, can.CanError, OSError) as error:
             raise self._failure(f"{entry} cannot be read", error) from error
         return data[: entry.bits // 8] if entry.bits else data.rstrip(b"\0")
@@ -162,7 +162,7 @@ class NodeDictionary:
         Raises DriverError: ``cannot-connect``: the drive does not answer; ``refused``: it forbids the write.
         """
         try:
-            _transferred(lambda: self._client.download(entry.index, entry.subindex, data))
+            _retry_transfer(lambda: self._client.download(entry.index, entry.subindex, data))
         except (SdoError, can.CanError, OSError) as error:
             raise self._failure(f"{entry} = {text} cannot be written", error) from error
 
@@ -178,7 +178,7 @@ class NodeDictionary:
         )
 
 
-def _transferred(transfer: Callable[[], _Answer]) -> _Answer:
+def _retry_transfer(transfer: Callable[[], _Answer]) -> _Answer:
     """What a transfer comes to, which is begun again where it fails."""
     for _ in range(TRANSFERS - 1):
         try:

@@ -80,13 +80,13 @@ class TargetLimiter:
         way = np.minimum(self._limits.velocity, _FASTEST) * self._cycle_s
         reach = SPEED_MARGIN * (1.0 + _SLACK) * way
         behind = before.behind | (np.abs(wanted - before.position) > reach) | (np.abs(wanted - place) > reach)
-        position = np.where(behind, self._approached(before, wanted), wanted)
+        position = np.where(behind, self._approach(before, wanted), wanted)
         velocity = (position - before.position) / self._cycle_s
         is_too_far = behind & (np.abs(position - place) > way)
         position = np.where(is_too_far, place + np.copysign(way, position - place), position)
         return _Reached(position, velocity, place, wanted, behind & (np.abs(wanted - position) > _ARRIVED))
 
-    def _approached(self, before: _Reached, wanted: Array) -> Array:
+    def _approach(self, before: _Reached, wanted: Array) -> Array:
         """One step towards targets that are far, no faster beside them than can still be taken back in time."""
         gap = wanted - before.position
         fastest = np.minimum(self._limits.velocity, _FASTEST)

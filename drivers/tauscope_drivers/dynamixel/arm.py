@@ -179,7 +179,7 @@ class DynamixelArm:
         here, for a restart lets go of the joint. Servos of the Y series forget errors without one, and are told to.
         Raises DriverError: ``not-connected``, or ``fault`` where a fault stays.
         """
-        session = self._reached()
+        session = self._require_session()
         with self._watching_the_port():
             if self._mode is not None:
                 self.stop(self._policy)
@@ -218,7 +218,7 @@ class DynamixelArm:
             time between two goals, over which the servos go from one to the next; they leap where it is None, or too
             short for a bus that has to carry the speeds as well [s]
         """
-        session = self._reached()
+        session = self._require_session()
         self._require_possible(mode, stop_policy)
         with self._watching_the_port():
             session.read_health()
@@ -240,7 +240,7 @@ class DynamixelArm:
 
         Raises DriverError: ``not-enabled``, ``refused`` (nothing is sent), or ``lost``.
         """
-        session = self._reached()
+        session = self._require_session()
         if self._mode is None or self._bounds is None:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the arm is not enabled; enable it first")
         require_finite(setpoint, len(session.servos))
@@ -338,7 +338,7 @@ class DynamixelArm:
         """State of an arm that cannot be seen."""
         return blind_state(self._clock.now_ns(), len(self._configuration.servos), self._lost)
 
-    def _reached(self) -> Session:
+    def _require_session(self) -> Session:
         if self._session is None:
             raise DriverError(DriverErrorKind.NOT_CONNECTED, "the servos are not reached; connect first")
         return self._session

@@ -115,7 +115,7 @@ def _cycles(
             yield from _goals(servos, name, goals)
         else:
             pace = pace or GoalPace(servos, goals, bounds.velocity, cycle_s, 0)
-            yield from _paced_goals(servos, goals, pace.speeds(goals, round(cycle * cycle_s * 1e9)))
+            yield from _pace_goals(servos, goals, pace.speeds(goals, round(cycle * cycle_s * 1e9)))
         yield from _questions(servos, *turns[cycle % len(turns)])
 
 
@@ -134,7 +134,7 @@ def _goals(servos: Sequence[JointServo], name: str, goals: Sequence[int]) -> Ite
         yield _sync_write(items, {servos[index].servo: [goals[index]] for index in members})
 
 
-def _paced_goals(servos: Sequence[JointServo], goals: Sequence[int], speeds: Sequence[int]) -> Iterator[PlannedFrame]:
+def _pace_goals(servos: Sequence[JointServo], goals: Sequence[int], speeds: Sequence[int]) -> Iterator[PlannedFrame]:
     """Goals of a cycle with the speeds towards them."""
     for items, values in paced_goals(servos, goals, speeds):
         yield _sync_write(items, values)

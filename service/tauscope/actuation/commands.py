@@ -142,12 +142,12 @@ def _describe(
             "" if loop.servo or loop.unit != "register" else ", or state the servo in joints[].actuator.servo"
         )
         notes.append(ResultWarning(code="made-effort", joint=joint.name, text=text, remedy=remedy))
-        limited = max(_limited_share(loop, *pair, index) for pair in zip(made, commands, strict=True))
+        limited = max(_measure_limited_share(loop, *pair, index) for pair in zip(made, commands, strict=True))
         notes.append(_separate(joint.name, loop, limited, is_weighed=index in weighed))
     return notes
 
 
-def _limited_share(loop: Actuator, made: Recording, commands: Recording, joint: int) -> float:
+def _measure_limited_share(loop: Actuator, made: Recording, commands: Recording, joint: int) -> float:
     """Share of rows in which the bridge is at its duty limit; zero for a loop in SI."""
     if loop.unit != "register":
         return 0.0

@@ -94,7 +94,7 @@ def estimate_delays(robot: Robot, recordings: Sequence[Recording]) -> tuple[Dela
         grid = np.arange(0.0, LONGEST_S + STEP_S / 2, STEP_S)
         left, rows = np.zeros((len(open_), len(grid))), 0.0
         for recording in recordings:
-            squares, count = _unexplained(robot, recording, open_, grid)
+            squares, count = _sum_residual_squares(robot, recording, open_, grid)
             left, rows = left + squares, rows + count
         found = {joint: _least(grid, squares, rows) for joint, squares in zip(open_, left, strict=True)}
     sure = [each.value for each in found.values() if each.std is not None and each.std < FOUND_STD_S]
@@ -125,7 +125,9 @@ def _least(grid: Array, squares: Array, rows: float) -> Delay:
     return Delay(min(float(value), LONGEST_S) if value > SEEN * std else 0.0, std)
 
 
-def _unexplained(robot: Robot, recording: Recording, joints: Sequence[int], grid: Array) -> tuple[Array, float]:
+def _sum_residual_squares(
+    robot: Robot, recording: Recording, joints: Sequence[int], grid: Array
+) -> tuple[Array, float]:
     """Squares of torque that bodies and friction leave, (joints, delays), and independent rows behind them."""
     motion = SmoothMotion.of(recording)
     columns = np.asarray(base_parameters(robot).independent_columns)

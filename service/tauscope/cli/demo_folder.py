@@ -17,7 +17,7 @@ def prepare_folder(folder: Path, files: Sequence[str]) -> None:
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        ours = _listed(folder / MARK)
+        ours = _list_own(folder / MARK)
         for name in (MARK, *files):
             if name not in ours and (folder / name).exists():
                 raise ExportError(
@@ -31,7 +31,7 @@ def prepare_folder(folder: Path, files: Sequence[str]) -> None:
         raise ExportError(f"{folder}: cannot be written ({error.strerror or error}); choose another --out") from error
 
 
-def _listed(mark: Path) -> set[str]:
+def _list_own(mark: Path) -> set[str]:
     """Names that an earlier demo wrote down as its own, the mark included; none where the mark is not its own."""
     if not mark.is_file():
         return set()

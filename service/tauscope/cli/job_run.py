@@ -43,9 +43,9 @@ def run_job(name: str, data: Path | None, database: str | None, timeout_s: float
     if _is_free(folder):
         with open_services(settings) as services:
             firing = services.schedules.fire_now(name)
-            firing = _followed(firing, _fresh(services, firing.number), timeout_s)
+            firing = _follow(firing, _fresh(services, firing.number), timeout_s)
     else:
-        firing = _asked(name, folder, database, timeout_s)
+        firing = _ask_service(name, folder, database, timeout_s)
     _tell(name, firing)
 
 
@@ -70,7 +70,7 @@ def _is_free(folder: Path) -> bool:
     return True
 
 
-def _asked(name: str, folder: Path, database: str | None, timeout_s: float) -> FiringEntry:
+def _ask_service(name: str, folder: Path, database: str | None, timeout_s: float) -> FiringEntry:
     """Have the service that works with the folder do it."""
     with open_database(folder, database) as opened:
         book = ScheduleRepository(opened, site_identifier(folder), new_boot())
@@ -81,7 +81,7 @@ def _asked(name: str, folder: Path, database: str | None, timeout_s: float) -> F
         if book.withdraw(number):
             text = f"schedule {name}: no service took it on within {PATIENCE_S:g} s"
             raise StoreError(f"{text}; is the service of its site up, and does it fire schedules?")
-        return _followed(book.firing(number), lambda: book.firing(number), timeout_s)
+        return _follow(book.firing(number), lambda: book.firing(number), timeout_s)
 
 
 def _fresh(services: Services, number: int) -> Callable[[], FiringEntry]:
@@ -94,7 +94,7 @@ def _fresh(services: Services, number: int) -> Callable[[], FiringEntry]:
     return look
 
 
-def _followed(firing: FiringEntry, look: Callable[[], FiringEntry], timeout_s: float) -> FiringEntry:
+def _follow(firing: FiringEntry, look: Callable[[], FiringEntry], timeout_s: float) -> FiringEntry:
     """The firing when what it started has ended."""
     deadline = time.monotonic() + timeout_s
     while not firing.is_final:

@@ -109,7 +109,7 @@ class Client:
         """
         last = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
-            item = _parsed(self._transport.send("GET", item.links.self_), type(item))
+            item = _parse(self._transport.send("GET", item.links.self_), type(item))
             if str(item.state) in ENDS:
                 return item
             if lease is not None:
@@ -150,7 +150,7 @@ class Client:
 
     def stop(self, run: RunAnswer) -> StopAnswer:
         """Stop a run."""
-        return _parsed(self._transport.send("POST", run.links.stop), StopAnswer)
+        return _parse(self._transport.send("POST", run.links.stop), StopAnswer)
 
     def stop_everything(self) -> StopAllAnswer:
         """Stop every arm; needs no lease."""
@@ -165,18 +165,18 @@ class Client:
             "POST", f"{PREFIX}/{path}", headers=once, content=content
         )
         try:
-            return _parsed(send(), kind)
+            return _parse(send(), kind)
         except ApiError as error:
             if error.problem_code != "unreachable":
                 raise
-        return _parsed(send(), kind)
+        return _parse(send(), kind)
 
     def _post(self, path: str, kind: type[Model], content: Content) -> Model:
         """A POST that is sent once."""
-        return _parsed(self._transport.send("POST", f"{PREFIX}/{quote(path)}", content=content), kind)
+        return _parse(self._transport.send("POST", f"{PREFIX}/{quote(path)}", content=content), kind)
 
 
-def _parsed(answer: Answer, kind: type[Model]) -> Model:
+def _parse(answer: Answer, kind: type[Model]) -> Model:
     """An answer as its model; one of a newer service may hold more than we know."""
     try:
         return kind.model_validate_json(answer.body, extra="ignore")

@@ -181,7 +181,7 @@ def _models(robot: Robot, exports: Sequence[ExportModel]) -> list[RolloutModel]:
 def _complete_loops(robot: Robot, recordings: Sequence[Recording], known: Robot | None) -> tuple[Robot, bool]:
     """The robot with delays of its loops, and whether loops can close: commands of all joints are there."""
     loops = [joint.actuator for joint in robot.joints]
-    commands = [_as_commands(recording) for recording in recordings]
+    commands = [_take_commands(recording) for recording in recordings]
     if not all(loop is not None and loop.has_loop for loop in loops) or any(each is None for each in commands):
         return robot, False
     others = [None] * len(loops) if known is None else [joint.actuator for joint in known.joints]
@@ -216,7 +216,7 @@ def _fill(loop: Actuator, known: Actuator) -> Actuator:
     )
 
 
-def _as_commands(recording: Recording) -> Recording | None:
+def _take_commands(recording: Recording) -> Recording | None:
     """The recording with its commands in place of effort; None where a joint has none."""
     if recording.effort_kind is EffortKind.COMMAND:
         return recording
@@ -249,7 +249,7 @@ def _refine(
     model: ExportModel | None, loops: tuple[Actuator, ...], training: Sequence[Recording], progress: Progress
 ) -> Refined:
     """The refined model. Raises RecordingMismatchError where no commands reach loops."""
-    commands = [_as_commands(recording) for recording in training]
+    commands = [_take_commands(recording) for recording in training]
     lacking = [recording.name for recording, each in zip(training, commands, strict=True) if each is None]
     if not loops or model is None or lacking:
         raise RecordingMismatchError(

@@ -67,7 +67,7 @@ def trajectory_margins(
     torque = np.zeros(trajectory.joint_count)
     clearance = np.inf
     for segment in trajectory.segments:
-        motion, between = _looked_at(segment)
+        motion, between = _sample_extremes(segment)
         usage = np.maximum(usage, _kinematic_usage(segment, motion, between, limits))
         if states is not None and states.torque is not None:
             torque = np.maximum(torque, states.torque.torque(motion).max(axis=0) / available)
@@ -95,7 +95,7 @@ def require_within_limits(trajectory: Trajectory, robot: Robot, limits: MotionLi
         begin = 0.0
         worst = (-np.inf, 0.0, 0.0)
         for segment in trajectory.segments:
-            motion, _ = _looked_at(segment)
+            motion, _ = _sample_extremes(segment)
             values = getattr(motion, kind)[:, j]
             centre = limits.middle[j] if kind == "position" else 0.0
             at = int(np.argmax(np.abs(values - centre)))
@@ -118,7 +118,7 @@ def require_within_limits(trajectory: Trajectory, robot: Robot, limits: MotionLi
         )
 
 
-def _looked_at(segment: Segment) -> tuple[MotionSamples, float]:
+def _sample_extremes(segment: Segment) -> tuple[MotionSamples, float]:
     """A segment at instants that show its extremes, and the factor by which it may exceed them in between."""
     if isinstance(segment, FourierSegment):
         series = segment.series

@@ -53,7 +53,7 @@ class TorquePrediction:
         `base`: (n, m, N), `ExcitationRegressor.base_regressor` of the same motion, where the caller has it.
         """
         base = self._regressor.base_regressor(motion) if base is None else base
-        return self._rounded(self._rigid(base), self._small) + self._friction(motion)
+        return self._round_off(self._rigid(base), self._small) + self._friction(motion)
 
     def usage(self, motion: MotionSamples, base: Array | None = None) -> Array:
         """Part of the available torque that is used at every sample, (N, n); zero where there is no limit.
@@ -70,10 +70,10 @@ class TorquePrediction:
         """
         rigid = self._rigid(base)
         by_torque = weight / self.available
-        by_rigid = by_torque * rigid / self._rounded(rigid, self._small)
+        by_rigid = by_torque * rigid / self._round_off(rigid, self._small)
         columns = by_rigid.T[:, None, :] * self._base[None, :, None]
         gradient = self._regressor.pull_back_base(motion, columns)
-        speed = motion.velocity / self._rounded(motion.velocity, self._rest)
+        speed = motion.velocity / self._round_off(motion.velocity, self._rest)
         return MotionGradient(
             gradient.position, gradient.velocity + by_torque * self._viscous * speed, gradient.acceleration
         )
@@ -84,9 +84,9 @@ class TorquePrediction:
         return np.stack([self._base[at:] @ base[joint, at:] for joint, at in enumerate(first)], axis=1)
 
     def _friction(self, motion: MotionSamples) -> Array:
-        return self._level + self._viscous * self._rounded(motion.velocity, self._rest)
+        return self._level + self._viscous * self._round_off(motion.velocity, self._rest)
 
     @staticmethod
-    def _rounded(values: Array, small: Array) -> Array:
+    def _round_off(values: Array, small: Array) -> Array:
         """√(x² + ε²), never less than |x|."""
         return np.sqrt(values**2 + small**2)

@@ -81,8 +81,8 @@ def joint_gains(
     gains: list[tuple[float, float]] = []
     for joint, described in enumerate(robot.joints):
         stated = described.actuator
-        kp = _given(choice.kp, joint)
-        kv = _given(choice.kv, joint)
+        kp = _choose_gain(choice.kp, joint)
+        kv = _choose_gain(choice.kv, joint)
         if kp is None and stated is not None and stated.kind == "position" and stated.stiffness is not None:
             kp, kv = stated.stiffness, stated.damping if kv is None else kv
         if kp is None:
@@ -95,7 +95,7 @@ def joint_gains(
     return gains, notes
 
 
-def _given(values: tuple[float, ...], joint: int) -> float | None:
+def _choose_gain(values: tuple[float, ...], joint: int) -> float | None:
     """A gain that is given for all joints or for this one."""
     return None if not values else values[0] if len(values) == 1 else values[joint]
 

@@ -41,7 +41,7 @@ def to_mjcf(model: ExportModel, choice: ActuatorChoice = MOTORS) -> MjcfModel:
     added = add_findings(model)
     robot, labels = added.robot, model.robot.segment_labels
     models = joint_models(robot, added.links, model.friction, model.rotor_inertia)
-    names = [_quoted(labels[link]) for link in robot.own_links]
+    names = [_quote(labels[link]) for link in robot.own_links]
     notes: list[str] = []
     lines: list[str] = []
     own_joints = {link: joint for joint, link in enumerate(robot.own_links)}
@@ -68,14 +68,14 @@ def to_mjcf(model: ExportModel, choice: ActuatorChoice = MOTORS) -> MjcfModel:
     comment = "".join(f"\n    {comment_text(note).replace('--', '- -')}" for note in notes)
     text = "\n".join(
         [
-            f"<mujoco model={_quoted(robot.name)}>",
+            f"<mujoco model={_quote(robot.name)}>",
             f"  <!-- Model identified by Tauscope.{comment} -->",
             '  <compiler angle="radian" autolimits="true"/>',
             f'  <option gravity="{numbers(*robot.gravity)}"/>',
             "  <worldbody>",
             *lines,
             "  </worldbody>",
-            *_followers(robot, [_quoted(label) for label in labels]),
+            *_followers(robot, [_quote(label) for label in labels]),
             *(["  <tendon>", *(f"    {line}" for line in tendons), "  </tendon>"] if tendons else []),
             "  <actuator>",
             *(f"    {line}" for line in actuators),
@@ -135,7 +135,7 @@ def _body(
     position = segment.before.rotation @ segment.after.translation + segment.before.translation
     quaternion = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
     full = [inertia.inertia[row, column] for row, column in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-    name = _quoted(f"{label}_link")
+    name = _quote(f"{label}_link")
     return [
         f'<body name={name} pos="{numbers(*position)}" quat="{numbers(*quaternion)}">',
         f'  <inertial pos="{numbers(*inertia.centre)}" mass="{numbers(inertia.mass)}" fullinertia="{numbers(*full)}"/>',
@@ -160,7 +160,7 @@ def _joint(segment: Segment, label: str, model: JointModel, extras: JointExtras,
         attributes |= REST
     attributes["armature"] = numbers(_armature(label, model))
     written = " ".join(f'{key}="{value}"' for key, value in (attributes | extras.attributes).items())
-    return f"<joint name={_quoted(label)} {written}/>"
+    return f"<joint name={_quote(label)} {written}/>"
 
 
 def _armature(label: str, model: JointModel) -> float:
@@ -172,7 +172,7 @@ def _armature(label: str, model: JointModel) -> float:
     return armature
 
 
-def _quoted(name: str) -> str:
+def _quote(name: str) -> str:
     """A name as the value of an attribute."""
     from xml.sax.saxutils import quoteattr  # loads urllib and ssl
 

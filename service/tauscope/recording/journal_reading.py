@@ -76,7 +76,7 @@ def journal_recording(journal: Journal, name: str) -> Recording:
         name,
         (rows["time_ns"] - rows["time_ns"][0]) * 1e-9,
         rows["position"],
-        _at_samples(rows, 1e9 / header.rate_hz) if is_held else rows["effort"],
+        _sample_effort(rows, 1e9 / header.rate_hz) if is_held else rows["effort"],
         effort_kind=EffortKind.TORQUE if is_torque else EffortKind.CURRENT,
         velocity=_find_reported(rows["velocity"]),
         reference=_find_reported(rows["reference"]),
@@ -138,7 +138,7 @@ def _decode(messages: list[bytes]) -> JointStates:
     return states
 
 
-def _at_samples(rows: NDArray[np.void], period_ns: float) -> Array:
+def _sample_effort(rows: NDArray[np.void], period_ns: float) -> Array:
     """Effort at the instants of the samples, where drives hold it from one command to the next, (N, n).
 
     A drive reports what it has held until the sample: by itself that is half a cycle late. The next sample tells what

@@ -57,14 +57,14 @@ def _draw_panel(axis: Axes, entries: Sequence[BaseParameterEntry]) -> None:
         elinewidth=1.1,
         capsize=2.2,
     )
-    axis.set_yticks(places, [_shortened(entry.name) for entry in entries])
+    axis.set_yticks(places, [_shorten(entry.name) for entry in entries])
     axis.set_ylim(len(entries) - 0.4, -0.6)
     axis.grid(visible=False, axis="y")
     axis.tick_params(axis="y", length=0)
     axis.spines["left"].set_visible(False)
 
 
-def _shortened(name: str) -> str:
+def _shorten(name: str) -> str:
     """A label that leaves room for the drawing; the table has all of it."""
     return name if len(name) <= LONGEST_LABEL else name[: LONGEST_LABEL - 1] + "…"
 

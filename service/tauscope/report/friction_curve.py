@@ -54,7 +54,7 @@ def friction_curve(identification: Identification, series: Sequence[TorqueSeries
     largest = BEYOND * max(abs(seen[0]), abs(seen[1]), np.finfo(float).tiny)
     velocity = largest * np.linspace(-1.0, 1.0, GRID_POINTS) ** 3
     torque = _torque(identification, joint, velocity)
-    bins = _binned(speed, residual + _torque(identification, joint, speed))
+    bins = _bin(speed, residual + _torque(identification, joint, speed))
     return FrictionCurve(velocity, torque, _std(identification, joint, velocity), seen, *bins)
 
 
@@ -92,7 +92,7 @@ def _std(identification: Identification, joint: int, velocity: Array) -> Array:
     return np.sqrt(np.maximum(np.einsum("ig,ij,jg->g", stacked, covariance, stacked), 0.0))
 
 
-def _binned(velocity: Array, torque: Array) -> tuple[Array, Array]:
+def _bin(velocity: Array, torque: Array) -> tuple[Array, Array]:
     """Means in bins that are narrow about zero velocity, where friction changes most."""
     measured = np.isfinite(torque)
     velocity, torque = velocity[measured], torque[measured]

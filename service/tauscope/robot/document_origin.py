@@ -54,11 +54,11 @@ class DocumentOrigin:
             return kind.model_validate(self.data)
         except ValidationError as error:
             details = error.errors(include_url=False)
-        place, text = self._worded(details[0])
+        place, text = self._word(details[0])
         more = f" (the first of {len(details)} errors)" if len(details) > 1 else ""
         raise self.error(place, text + more)
 
-    def _worded(self, detail: ErrorDetails) -> tuple[Place, str]:
+    def _word(self, detail: ErrorDetails) -> tuple[Place, str]:
         """Place and words of one of pydantic's errors."""
         place: Place = tuple(detail["loc"])
         key = detail.get("ctx", {}).get("key")

@@ -74,7 +74,7 @@ def bounded_number(label: str, element: Element, key: str) -> float:
 
     Raises RobotFileError if the attribute is missing, not a number or beyond 1e9.
     """
-    return _bounded(label, element, key, number(label, element, key))
+    return _require_bounded(label, element, key, number(label, element, key))
 
 
 def vector(label: str, element: Element | None, key: str, default: tuple[float, float, float]) -> NDArray[np.float64]:
@@ -90,7 +90,7 @@ def vector(label: str, element: Element | None, key: str, default: tuple[float, 
     words = text.split()
     if len(words) != 3:
         raise urdf_error(label, element, f"{key}={shown(text)} must hold three numbers, but holds {len(words)}")
-    return np.array([_bounded(label, element, key, _real(label, element, key, word)) for word in words])
+    return np.array([_require_bounded(label, element, key, _real(label, element, key, word)) for word in words])
 
 
 def origin(label: str, element: Element, findings: list[Finding]) -> Placement:
@@ -110,7 +110,7 @@ def _real(label: str, element: Element, key: str, text: str) -> float:
     return value
 
 
-def _bounded(label: str, element: Element, key: str, value: float) -> float:
+def _require_bounded(label: str, element: Element, key: str, value: float) -> float:
     """A number of a size that SI quantities of an arm have."""
     if abs(value) > LARGEST_NUMBER:
         raise urdf_error(label, element, f"{key}={value:g} is beyond {LARGEST_NUMBER:g}; check the unit (SI)")

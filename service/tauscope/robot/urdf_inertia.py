@@ -41,7 +41,7 @@ def lumped_inertia(
         element = only_child(label, body, "inertial", findings)
         if element is None:
             continue
-        stated = _stated_inertia(label, body, element, findings)
+        stated = _read_inertia(label, body, element, findings)
         centre = compose(placement, origin(label, element, findings))
         used = nearest_body(stated)
         before, after = (inertia_about_frame(each.mass, centre, each.inertia) for each in (stated, used))
@@ -66,7 +66,7 @@ def stated_mass(tree: UrdfTree, link: str) -> float:
     return total
 
 
-def _stated_inertia(label: str, body: Element, element: Element, findings: list[Finding]) -> LinkInertia:
+def _read_inertia(label: str, body: Element, element: Element, findings: list[Finding]) -> LinkInertia:
     """An `<inertial>` as it stands, about the centre of mass."""
     parts = {kind: only_child(label, element, kind, findings) for kind in ("mass", "inertia")}
     place = one_line(f"{where(label, element)} of link {shown(body.get('name'))}")

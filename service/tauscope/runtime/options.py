@@ -91,7 +91,7 @@ def choose_rate_hz(options: RunOptions, capabilities: Capabilities) -> float:
     return options.rate_hz
 
 
-def chosen_stop_policy(
+def choose_stop_policy(
     options: RunOptions, joints: Sequence[Joint], capabilities: Capabilities | None = None
 ) -> StopPolicy:
     """How the arm is stopped: as the run says, else as the robot file's drives say, else under power where it is.
@@ -101,7 +101,7 @@ def chosen_stop_policy(
 
     `capabilities`: what the device can do by itself; None where it is not known yet.
     """
-    wanted = options.stop_policy or _stated_policy(joints)
+    wanted = options.stop_policy or _read_policy(joints)
     policy = StopPolicy.HOLD if wanted == RELEASE else StopPolicy(wanted)
     if capabilities is not None and policy not in (able := capabilities.policies_in(options.mode)):
         raise AcquisitionError(
@@ -119,7 +119,7 @@ def is_released(options: RunOptions, joints: Sequence[Joint]) -> bool:
     """
     if options.stop_policy not in (None, RELEASE):
         return False
-    is_stated = _stated_policy(joints) == RELEASE
+    is_stated = _read_policy(joints) == RELEASE
     if options.stop_policy == RELEASE and not is_stated:
         raise AcquisitionError(
             "stop policy release: the robot file does not state that the arm is safe without torque; state "
@@ -128,7 +128,7 @@ def is_released(options: RunOptions, joints: Sequence[Joint]) -> bool:
     return is_stated
 
 
-def _stated_policy(joints: Sequence[Joint]) -> str:
+def _read_policy(joints: Sequence[Joint]) -> str:
     stated: dict[str, str] = {}
     for joint in joints:
         value: Any = (joint.drive or {}).get("stop_policy")

@@ -82,8 +82,8 @@ def recover_run(
         if record.state.is_end:
             return None
         if was_asked_to_stop and record.state is RunState.CREATED:
-            return _written(folder, record.moved(RunState.STOPPING).moved(RunState.STOPPED))
-        return _interrupted(folder, record)
+            return _write(folder, record.moved(RunState.STOPPING).moved(RunState.STOPPED))
+        return _interrupt(folder, record)
     finally:
         lock.release()
 
@@ -98,7 +98,7 @@ def _see_to_its_end(control: ProcessName, patience_s: float) -> None:
         time.sleep(_POLL_S)
 
 
-def _interrupted(folder: Path, record: RunRecord) -> RunRecord:
+def _interrupt(folder: Path, record: RunRecord) -> RunRecord:
     """Save what there is and write the end of a run whose process is gone."""
     recording = None
     journal = folder / JOURNAL_FILE
@@ -107,10 +107,10 @@ def _interrupted(folder: Path, record: RunRecord) -> RunRecord:
         recording = save_recording(folder, is_whole=False, lost_rows=UNKNOWN_LOSS)
     detail = _NEVER_MOVED if record.state in _WITHOUT_POWER and recording is None else _GONE
     problem = record.problem or RunProblem(code=INTERRUPTED, detail=detail)
-    return _written(folder, record.moved(RunState.INTERRUPTED, problem=problem, recording=recording))
+    return _write(folder, record.moved(RunState.INTERRUPTED, problem=problem, recording=recording))
 
 
-def _written(folder: Path, record: RunRecord) -> RunRecord:
+def _write(folder: Path, record: RunRecord) -> RunRecord:
     """Keep a record."""
     try:
         write_record(folder, record)

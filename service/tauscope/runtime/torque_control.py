@@ -41,14 +41,14 @@ class TorqueControl:
 
     def torque(self, cycle: int, state: ArmState) -> Array:
         """Torque for a cycle [Nm or N], shape (n,)."""
-        position, velocity = self._observed(state)
+        position, velocity = self._observe(state)
         plan = self._plan
         wanted = self._proportional * (plan.position[cycle] - position)
         wanted += self._derivative * (plan.velocity[cycle] - velocity)
         torque = plan.torque[cycle] + self._inertia[cycle // self._stride] @ wanted
         return np.clip(torque, -plan.limits.torque, plan.limits.torque)
 
-    def _observed(self, state: ArmState) -> tuple[Array, Array]:
+    def _observe(self, state: ArmState) -> tuple[Array, Array]:
         """Position and velocity; velocity from positions, smoothed, where the drive reports none."""
         previous = state.position if self._position is None else self._position
         position = np.where(state.fresh, state.position, previous)

@@ -137,9 +137,9 @@ class Disturbances:
                 self.lost[joint] = True
             else:
                 self.overloaded[joint] = True
-        self._injections = [one for one in self._injections if not _over(one, time_ns)]
+        self._injections = [one for one in self._injections if not _is_over(one, time_ns)]
 
 
-def _over(injection: Injection, time_ns: int) -> bool:
+def _is_over(injection: Injection, time_ns: int) -> bool:
     """Whether it will never act again."""
     return injection.duration_ns is not None and time_ns >= injection.start_ns + injection.duration_ns

@@ -74,12 +74,12 @@ class FrameBuffer:
             end = _HEADER.size + length
             if len(self._bytes) < end:
                 break
-            frames.append(Frame(_known(kind), sequence, bytes(self._bytes[_HEADER.size : end])))
+            frames.append(Frame(_find_kind(kind), sequence, bytes(self._bytes[_HEADER.size : end])))
             del self._bytes[:end]
         return frames
 
 
-def _known(kind: int) -> FrameKind:
+def _find_kind(kind: int) -> FrameKind:
     """The kind of a number."""
     try:
         return FrameKind(kind)

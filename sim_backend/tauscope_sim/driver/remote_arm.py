@@ -133,7 +133,7 @@ class RemoteSimulatedArm:
         try:
             reply = self._request(FrameKind.EXCHANGE, body, self._reply_timeout_s)
         except TimeoutError:
-            return self._missed()
+            return self._miss()
         return self._state_of(reply)
 
     def stop(self, policy: StopPolicy) -> ArmState:
@@ -141,7 +141,7 @@ class RemoteSimulatedArm:
 
         Raises DriverError: ``lost`` where the device does not confirm.
         """
-        return self._missed() if self._socket is None else self._state_after(FrameKind.STOP, encode_stop(policy))
+        return self._miss() if self._socket is None else self._state_after(FrameKind.STOP, encode_stop(policy))
 
     def disconnect(self) -> None:
         """Let go of the device, which stops an arm that is still enabled by its own policy."""
@@ -177,11 +177,11 @@ class RemoteSimulatedArm:
         try:
             return self._request(kind, body)
         except TimeoutError as error:
-            raise self._lost(f"no reply within {_PATIENCE_S:g} s") from error
+            raise self._lose(f"no reply within {_PATIENCE_S:g} s") from error
 
     def _request(self, kind: FrameKind, body: bytes, timeout_s: float = _PATIENCE_S) -> Frame:
         """Send a request and wait for its reply; raises TimeoutError, and what the device refuses."""
-        connection = self._connected()
+        connection = self._require_connection()
         self._sequence = (self._sequence + 1) % 2**32
         deadline = time.monotonic() + timeout_s
         try:
@@ -193,12 +193,12 @@ class RemoteSimulatedArm:
         except TimeoutError:
             raise
         except (OSError, BrokenFrameError) as error:
-            raise self._lost(str(error)) from error
+            raise self._lose(str(error)) from error
         if reply.kind is FrameKind.ERROR:
             raise decode_error(reply.body)
         return reply
 
-    def _connected(self) -> socket.socket:
+    def _require_connection(self) -> socket.socket:
         """The connection; refuses where there is none."""
         if self._socket is None:
             raise DriverError(DriverErrorKind.NOT_CONNECTED, "the arm is not connected; connect it first")
@@ -222,16 +222,16 @@ class RemoteSimulatedArm:
         try:
             state = decode_state(reply.body)
         except BadMessageError as error:
-            raise self._lost(str(error)) from error
+            raise self._lose(str(error)) from error
         self._enabled = state.enabled
         return state
 
-    def _missed(self) -> ArmState:
+    def _miss(self) -> ArmState:
         """State of a cycle without an answer."""
         nothing = np.full(self._count, np.nan)
         return ArmState(self._clock.now_ns(), nothing, nothing, nothing, nothing, self._enabled)
 
-    def _lost(self, reason: str) -> DriverError:
+    def _lose(self, reason: str) -> DriverError:
         """Give the connection up."""
         self._close()
         return DriverError(

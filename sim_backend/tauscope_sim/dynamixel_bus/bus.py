@@ -136,11 +136,11 @@ class EmulatedBus:
         """Servos that hear now, in the order of their IDs."""
         return [self.servos[key] for key in sorted(self.servos) if now_s >= self._away_until_s[key]]
 
-    def _addressed(self, instruction: Instruction, now_s: float) -> list[EmulatedServo]:
+    def _find_addressed(self, instruction: Instruction, now_s: float) -> list[EmulatedServo]:
         present = self._present(now_s)
         return [servo for servo in present if instruction.servo in (servo.servo, BROADCAST_ID)]
 
-    def _listed(self, servos: Sequence[int], now_s: float) -> list[EmulatedServo]:
+    def _find_present(self, servos: Sequence[int], now_s: float) -> list[EmulatedServo]:
         """Present ones of a list, in its order."""
         present = {servo.servo: servo for servo in self._present(now_s)}
         return [present[key] for key in servos if key in present]
@@ -164,13 +164,15 @@ class EmulatedBus:
         return deliveries
 
     def _ping(self, instruction: Instruction, end_s: float) -> list[Delivery]:
-        servos = self._addressed(instruction, end_s)
+        servos = self._find_addressed(instruction, end_s)
         return self._answers([(servo, 0, servo.memory.read(0, 2) + servo.memory.read(6, 1)) for servo in servos], end_s)
 
     def _read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         if instruction.servo == BROADCAST_ID or len(instruction.parameters) != 4:
             return []
-        servos = [servo for servo in self._addressed(instruction, end_s) if servo.memory.get("Status Return Level")]
+        servos = [
+            servo for servo in self._find_addressed(instruction, end_s) if servo.memory.get("Status Return Level")
+        ]
         return self._answers([self._value(servo, *_words(instruction.parameters)) for servo in servos], end_s)
 
     def _value(self, servo: EmulatedServo, address: int, length: int) -> tuple[EmulatedServo, int, bytes]:
@@ -185,7 +187,7 @@ class EmulatedBus:
         for servo in self._followers(instruction.servo, end_s):
             if servo.servo != instruction.servo:
                 self._write_quietly(servo, address, data)
-        for servo in self._addressed(instruction, end_s):
+        for servo in self._find_addressed(instruction, end_s):
             level, error = servo.memory.get("Status Return Level"), 0
             try:
                 (servo.write if instruction.code == WRITE else servo.register)(address, data)
@@ -197,7 +199,7 @@ class EmulatedBus:
 
     def _act(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         parts: list[tuple[EmulatedServo, int, bytes]] = []
-        for servo in self._addressed(instruction, end_s):
+        for servo in self._find_addressed(instruction, end_s):
             error = 0
             try:
                 servo.act()
@@ -207,7 +209,7 @@ class EmulatedBus:
         return [] if instruction.servo == BROADCAST_ID else self._answers(parts, end_s)
 
     def _reboot(self, instruction: Instruction, end_s: float) -> list[Delivery]:
-        servos = self._addressed(instruction, end_s)
+        servos = self._find_addressed(instruction, end_s)
         heard = [] if instruction.servo == BROADCAST_ID else servos
         answers = self._answers([(servo, 0, b"") for servo in heard], end_s)
         for servo in servos:
@@ -216,7 +218,7 @@ class EmulatedBus:
 
     def _clear(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         parts: list[tuple[EmulatedServo, int, bytes]] = []
-        for servo in self._addressed(instruction, end_s):
+        for servo in self._find_addressed(instruction, end_s):
             error = 0
             try:
                 servo.clear(instruction.parameters)
@@ -226,12 +228,12 @@ class EmulatedBus:
         return [] if instruction.servo == BROADCAST_ID else self._answers(parts, end_s)
 
     def _refuse(self, instruction: Instruction, end_s: float) -> list[Delivery]:
-        servos = [] if instruction.servo == BROADCAST_ID else self._addressed(instruction, end_s)
+        servos = [] if instruction.servo == BROADCAST_ID else self._find_addressed(instruction, end_s)
         return self._answers([(servo, _UNKNOWN_INSTRUCTION, b"") for servo in servos], end_s)
 
     def _sync_read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         address, length = _words(instruction.parameters)
-        servos = self._listed(instruction.parameters[4:], end_s)
+        servos = self._find_present(instruction.parameters[4:], end_s)
         return self._answers([self._value(servo, address, length) for servo in servos], end_s)
 
     def _fast_sync_read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
@@ -266,7 +268,7 @@ class EmulatedBus:
         data = instruction.parameters
         parts: list[tuple[EmulatedServo, int, bytes]] = []
         for start in range(0, len(data) - 4, 5):
-            for servo in self._listed(data[start : start + 1], end_s):
+            for servo in self._find_present(data[start : start + 1], end_s):
                 parts.append(self._value(servo, *_words(data[start + 1 : start + 5])))
         return self._answers(parts, end_s)
 

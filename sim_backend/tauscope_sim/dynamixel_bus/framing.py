@@ -84,11 +84,11 @@ class InstructionParser:
 
 
 def _instruction(frame: list[int]) -> Instruction:
-    body = _without_stuffing(frame[7:-2])
+    body = _remove_stuffing(frame[7:-2])
     return Instruction(frame[4], body[0], bytes(body[1:]), len(frame))
 
 
-def _without_stuffing(stuffed: list[int]) -> list[int]:
+def _remove_stuffing(stuffed: list[int]) -> list[int]:
     """Byte by byte: FD after FF FF FD is left out."""
     plain: list[int] = []
     skipped = False

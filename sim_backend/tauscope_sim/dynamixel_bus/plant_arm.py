@@ -50,10 +50,10 @@ class PlantArm:
         tracking = np.array([demand.tracks for demand in demands])
         if tracking.any():
             goal = np.array([demand.position for demand in demands])
-            wanted = np.where(tracking, self._tracked(np.where(tracking, goal - self._position, 0.0)), wanted)
+            wanted = np.where(tracking, self._track(np.where(tracking, goal - self._position, 0.0)), wanted)
         return np.clip(wanted, -cap, cap)
 
-    def _tracked(self, error: Array) -> Array:
+    def _track(self, error: Array) -> Array:
         """Torque of the position loops."""
         if self._age == 0:
             matrix, _, load = self._inertia.at(self._position)

@@ -96,7 +96,7 @@ class EmulatorServer:
         By the machine's clock no answer waits for more than the step that is under way: a master takes what comes much
         later than usual for no sample.
         """
-        pieces, now_s = self._received()
+        pieces, now_s = self._receive()
         for piece, arrival_s in pieces:
             if self._emulator.hears(self._port.baud):
                 self._emulator.receive(piece, arrival_s)
@@ -110,7 +110,7 @@ class EmulatorServer:
         if arrived := self._emulator.due(self._now_s + (_AT_ONCE_S if self._order.stepped else 0.0)):
             self._port.write(arrived)
 
-    def _received(self) -> tuple[list[tuple[bytes, float]], float]:
+    def _receive(self) -> tuple[list[tuple[bytes, float]], float]:
         """What the master sent since the last call, each piece with its instant, and until when that is all [s]."""
         if self._arrivals is not None:
             pieces, until_ns = self._arrivals.take()

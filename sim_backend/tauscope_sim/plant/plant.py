@@ -38,7 +38,7 @@ def settled(equations: EquationsOfMotion, motor_position: Array) -> Array:
     for _ in range(MOST_ITERATIONS if compliant else 0):
         load, place = equations.load_at(0.0, vector.tolist()), vector[compliant]
         hanging = motor_position[compliant] - equations.compliance.twist_at_rest(load)
-        low, high = _narrowed(low, high, place, hanging)
+        low, high = _narrow(low, high, place, hanging)
         # a link that balances inside its backlash wishes itself from tooth to tooth: it is between the two
         between = (hanging <= low) | (hanging >= high)
         following = hanging.copy()
@@ -53,7 +53,7 @@ def settled(equations: EquationsOfMotion, motor_position: Array) -> Array:
     raise ScenarioError(f"joint {joint}: its transmission is too soft to carry the arm; give it more stiffness")
 
 
-def _narrowed(low: Array, high: Array, place: Array, hanging: Array) -> tuple[Array, Array]:
+def _narrow(low: Array, high: Array, place: Array, hanging: Array) -> tuple[Array, Array]:
     """Bounds of every link's place at rest; one that other links' moves have made wrong is given up."""
     up, down = hanging > place, hanging < place
     low, high = np.where(up, place, low), np.where(down, place, high)
@@ -125,7 +125,7 @@ class Plant:
     @property
     def motor_motion(self) -> tuple[Array, Array]:
         """Position and velocity of the motors, in joint units, each (n,) [rad or m, rad/s or m/s]."""
-        return self._of_motors(0), self._of_motors(self._coordinates.size)
+        return self._number_motors(0), self._number_motors(self._coordinates.size)
 
     @property
     def state(self) -> PlantState:
@@ -133,8 +133,8 @@ class Plant:
         count, size = self.joint_count, self._coordinates.size
         return PlantState(
             time=self._time,
-            motor_position=self._of_motors(0),
-            motor_velocity=self._of_motors(size),
+            motor_position=self._number_motors(0),
+            motor_velocity=self._number_motors(size),
             link_position=np.array(self._vector[:count]),
             link_velocity=np.array(self._vector[size : size + count]),
             temperature=self._equations.temperature(self._vector[2 * size :], AMBIENT),
@@ -205,7 +205,7 @@ class Plant:
             self._time = end if part == remaining else self._time + part
             self._part = min(max(part * _change(attempt.error), self._shortest), self._longest)
 
-    def _of_motors(self, first: int) -> Array:
+    def _number_motors(self, first: int) -> Array:
         """Numbers of the motors among the coordinates that begin at a place of the vector, (n,)."""
         return np.array([self._vector[first + place] for place in self._motors])
 

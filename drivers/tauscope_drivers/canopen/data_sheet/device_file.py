@@ -199,7 +199,7 @@ def read_device_file(path: Path, node_id: int) -> DeviceFile:
     except (SectionError, LookupError, ValueError, TypeError, AttributeError, OverflowError) as error:
         reason = " ".join(str(error.args[0] if error.args else error).split())[:120]
         raise DataSheetError(f"is no whole EDS or DCF file ({reason!a}); get it anew from the maker") from error
-    entries = {(variable.index, variable.subindex): _described(variable) for variable in _variables(dictionary)}
+    entries = {(variable.index, variable.subindex): _describe(variable) for variable in _variables(dictionary)}
     device = dictionary.device_information
     made_for = sections.get("DeviceComissioning", {}).get("NodeID")
     return DeviceFile(
@@ -237,7 +237,7 @@ def _variables(dictionary: ObjectDictionary) -> Iterator[ODVariable]:
             yield from entry.subindices.values()
 
 
-def _described(variable: ODVariable) -> DescribedObject:
+def _describe(variable: ODVariable) -> DescribedObject:
     text = getattr(variable, "value_raw", None)
     return DescribedObject(
         name=_printable(variable.name),
@@ -247,7 +247,7 @@ def _described(variable: ODVariable) -> DescribedObject:
         access=variable.access_type,
         is_mappable=variable.pdo_mappable,
         value_text=None if text is None else _printable(text),
-        value=None if text is None else _transferred(variable, text),
+        value=None if text is None else _encode_value(variable, text),
         default=variable.default if isinstance(variable.default, int) else None,
     )
 
@@ -257,7 +257,7 @@ def _printable(name: str) -> str:
     return "".join(letter if letter.isprintable() else "?" for letter in name)[:_LONGEST_NAME]
 
 
-def _transferred(variable: ODVariable, text: str) -> bytes | None:
+def _encode_value(variable: ODVariable, text: str) -> bytes | None:
     """A DCF's value as it goes over the bus; None where it is not of the object's type."""
     value = variable.value
     if value is None:

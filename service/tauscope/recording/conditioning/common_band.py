@@ -134,7 +134,7 @@ class Decimator:
         weight = np.abs(self.kernel)
         share = Decimator(weight / weight.sum(), self.factor, self.rate_hz)
         missed = share.reduce((~measured).astype(float))
-        in_long_gaps = share.reduce(_in_long_gaps(measured, self.factor // 4).astype(float))
+        in_long_gaps = share.reduce(_mark_long_gaps(measured, self.factor // 4).astype(float))
         return (in_long_gaps <= MASKED_FRACTION) & (missed <= BRIDGED_FRACTION)
 
     def filtered_white(self, lags: int) -> Array:
@@ -146,7 +146,7 @@ class Decimator:
         return max(0, (count - len(self.kernel)) // self.factor + 1)
 
 
-def _in_long_gaps(measured: NDArray[np.bool_], bridged: int) -> NDArray[np.bool_]:
+def _mark_long_gaps(measured: NDArray[np.bool_], bridged: int) -> NDArray[np.bool_]:
     """Samples (..., N) that were not measured and lie in a gap of more than `bridged` of them."""
     rows = measured.reshape(prod(measured.shape[:-1]), measured.shape[-1])
     result = np.zeros(rows.shape, dtype=bool)

@@ -49,10 +49,10 @@ def words_of(text: str) -> tuple[str, ...]:
 def find_families(header: Sequence[str], joint_names: Sequence[str] | None) -> list[Family]:
     """Families of a header: named by the robot's joints, numbered, or named by any word; one joint has no number."""
     header = [name for name in header if len(name) <= LONGEST_NAME]
-    named = _named_by(header, joint_names or ())
+    named = _find_named_families(header, joint_names or ())
     has_one = joint_names is None or len(joint_names) == 1
     single = [Family(name, (name,), is_guessed=True) for name in header if has_one and not _NUMBER.search(name)]
-    return [*named, *_find_numbered(header), *([] if named else _named_by_segments(header)), *single]
+    return [*named, *_find_numbered(header), *([] if named else _find_segment_families(header)), *single]
 
 
 def fill_template(template: str, index: int, name: str | None) -> str:
@@ -85,7 +85,7 @@ def _find_numbered(header: Sequence[str]) -> list[Family]:
     return found
 
 
-def _named_by(header: Sequence[str], joint_names: Sequence[str]) -> list[Family]:
+def _find_named_families(header: Sequence[str], joint_names: Sequence[str]) -> list[Family]:
     """Families that name every joint of the robot."""
     patterns = {
         name: re.compile(f"(?<![A-Za-z0-9]){re.escape(name)}(?![A-Za-z0-9])")
@@ -105,7 +105,7 @@ def _named_by(header: Sequence[str], joint_names: Sequence[str]) -> list[Family]
     ]
 
 
-def _named_by_segments(header: Sequence[str]) -> list[Family]:
+def _find_segment_families(header: Sequence[str]) -> list[Family]:
     """Families in which one segment is the joint: ``/states/elbow/position``, ``effort[elbow]``, ``elbow_pos``."""
     groups: dict[str, dict[str, str]] = {}
     for column in header:

@@ -97,7 +97,7 @@ class KeyFile:
             name=name,
             scope=scope,
             salt=salt,
-            hash=_hashed(salt, secret),
+            hash=_hash(salt, secret),
             created=now,
             expires=expires,
         )
@@ -136,7 +136,7 @@ def match_key(keys: tuple[ApiKey, ...], text: str) -> ApiKey | None:
     identifier, _, secret = rest.partition("_")
     found = next((key for key in keys if key.id == identifier), None)
     salt, expected = (_NOBODY[:32], _NOBODY) if found is None else (found.salt, found.hash)
-    is_right = hmac.compare_digest(_hashed(salt, secret), expected)
+    is_right = hmac.compare_digest(_hash(salt, secret), expected)
     return found if is_right and prefix == _PREFIX else None
 
 
@@ -145,7 +145,7 @@ def utc_now() -> datetime:
     return datetime.now(UTC)
 
 
-def _hashed(salt: str, secret: str) -> str:
+def _hash(salt: str, secret: str) -> str:
     """What is kept of a secret."""
     return hashlib.sha256(bytes.fromhex(salt) + secret.encode("utf-8", "surrogatepass")).hexdigest()
 
@@ -212,11 +212,11 @@ class KeyRing:
             stamp = self._file.stamp()
             if stamp != self._stamp:
                 keys = self._file.read()
-                self._keys, self._stamp = keys or self._revoked(), stamp
+                self._keys, self._stamp = keys or self._revoke_all(), stamp
         except (TauscopeError, OSError):
             _log.exception("the API keys could not be read again; those known so far count")
 
-    def _revoked(self) -> tuple[ApiKey, ...]:
+    def _revoke_all(self) -> tuple[ApiKey, ...]:
         """All known keys as revoked: their file was taken away."""
         return tuple(key.model_copy(update={"revoked": key.revoked or self._clock()}) for key in self._keys)
 

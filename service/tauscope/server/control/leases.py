@@ -198,7 +198,7 @@ class Leases:
             present = self._present(device)
             if present is not None:
                 if not take:
-                    raise self._leased(present)
+                    raise self._refuse_leased(present)
                 self._finish(present, f"{holder} took the arm")
             number = next_number(self._counter)
             lease = Lease(
@@ -287,7 +287,7 @@ class Leases:
         """Refuse an arm that somebody has a lease of. Raises LeasedError if somebody has."""
         present = self._present(device)
         if present is not None:
-            raise self._leased(present)
+            raise self._refuse_leased(present)
 
     def _present(self, device: str) -> Lease | None:
         """The lease that holds for an arm."""
@@ -301,7 +301,7 @@ class Leases:
             lease.is_armed = False
             self._on_end(lease, why)
 
-    def _leased(self, lease: Lease) -> LeasedError:
+    def _refuse_leased(self, lease: Lease) -> LeasedError:
         """Somebody has the arm."""
         left = self.seconds_left(lease)
         return LeasedError(

@@ -81,7 +81,7 @@ def _job(kind: str, workspace: Workspace, order: Any, read_result: Callable[[], 
     folder = workspace.folder
     mark, record = stamp(kind, folder), workspace.read_record()
     if record is None or order is None:
-        return _damaged(kind, folder, mark, "order.json" if order is None else "state.json")
+        return _describe_damage(kind, folder, mark, "order.json" if order is None else "state.json")
     facts = ItemMetadata(
         kind=kind,
         identifier=folder.name,
@@ -98,7 +98,7 @@ def _job(kind: str, workspace: Workspace, order: Any, read_result: Callable[[], 
         return facts
     content = read_result()
     if content is None:
-        return _damaged(kind, folder, mark, "result.json")
+        return _describe_damage(kind, folder, mark, "result.json")
     return replace(facts, figures=_figures(kind, json.loads(content)))
 
 
@@ -126,7 +126,7 @@ def _figures(kind: str, document: Mapping[str, Any]) -> dict[str, str | float | 
     return errors
 
 
-def _damaged(kind: str, folder: Path, mark: str, file: str) -> ItemMetadata:
+def _describe_damage(kind: str, folder: Path, mark: str, file: str) -> ItemMetadata:
     """An item that has lost a file without which nothing can be said of it."""
     detail = f"{folder.name}: {file} is missing or damaged; restore it from a backup, or remove it"
     created = identifier_time(folder.name)
@@ -163,7 +163,7 @@ def _run(folder: Path) -> ItemMetadata:
     workspace, mark = RunWorkspace(folder), stamp("run", folder)
     request, record = workspace.read_order(), workspace.read_run()
     if request is None or record is None:
-        return _damaged("run", folder, mark, "request.json" if request is None else "run.json")
+        return _describe_damage("run", folder, mark, "request.json" if request is None else "run.json")
     problem = workspace.problem()
     return ItemMetadata(
         kind="run",

@@ -156,9 +156,9 @@ class _Receiver:
             return
         filename = options.get(b"filename")
         name = rule.default_name if filename is None else filename.decode("utf-8", "replace")
-        self._file = IncomingFile(rule.folder, self._accepted_name(name), rule.limit)
+        self._file = IncomingFile(rule.folder, self._accept_name(name), rule.limit)
 
-    def _accepted_name(self, name: str | None) -> str:
+    def _accept_name(self, name: str | None) -> str:
         """The name of a file, if the form may have such a file."""
         files = self.form.files.setdefault(self._part, [])
         if name is None:

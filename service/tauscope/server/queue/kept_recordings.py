@@ -88,7 +88,7 @@ def read_kept_samples(path: Path, most: int) -> bytes:
     samples = recording.samples()
     effort = recording.effort_kind.value
     values = np.hstack([samples.position, samples.effort])
-    kept = _kept(values, most)
+    kept = _choose_rows(values, most)
     joints = range(1, recording.joint_count + 1)
     header = {
         "columns": ["t", *(f"q{j}" for j in joints), *(f"{effort}{j}" for j in joints)],
@@ -103,7 +103,7 @@ def read_kept_samples(path: Path, most: int) -> bytes:
     return len(text).to_bytes(4, "little") + text + columns.tobytes()
 
 
-def _kept(values: Array, most: int) -> NDArray[np.intp]:
+def _choose_rows(values: Array, most: int) -> NDArray[np.intp]:
     """Rows that keep every column's look."""
     if len(values) <= most:
         return np.arange(len(values))

@@ -60,7 +60,7 @@ class EventLog:
                 lines = file.read().split(b"\n")
         except OSError:
             return None
-        return _parsed(lines[-2]) if len(lines) > 1 else None
+        return _parse(lines[-2]) if len(lines) > 1 else None
 
     def follow(self, after: int = 0) -> "LogFollower":
         """A reader of what comes after a line."""
@@ -89,13 +89,13 @@ class LogFollower:
         events = []
         for line in whole.split(b"\n")[:-1]:
             self._number += 1
-            parsed = _parsed(line) if self._number > self._after else None
+            parsed = _parse(line) if self._number > self._after else None
             if parsed is not None:
                 events.append(LoggedEvent(self._number, parsed))
         return events
 
 
-def _parsed(line: bytes) -> dict[str, Any] | None:
+def _parse(line: bytes) -> dict[str, Any] | None:
     """The object of a line; None where the line is damaged."""
     try:
         content = json.loads(line)

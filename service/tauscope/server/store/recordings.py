@@ -198,7 +198,7 @@ class RecordingStore:
         known = self._hashes.of(name, status)
         if known is None:
             known = self._hashes.remember(name, status, hash_file(self.root / name))
-        return StoredRecording(name, status.st_size, _modified(status), known.sha256, known.is_damaged)
+        return StoredRecording(name, status.st_size, _read_modified(status), known.sha256, known.is_damaged)
 
     def digest(self, name: str) -> str:
         """The sha256 of a recording's bytes, in hexadecimal, for who will work with them.
@@ -224,7 +224,7 @@ class RecordingStore:
             except (NotFoundError, FileNotFoundError):
                 continue
             sha256, is_damaged = (None, False) if known is None else (known.sha256, known.is_damaged)
-            found.append(StoredRecording(entry.name, status.st_size, _modified(status), sha256, is_damaged))
+            found.append(StoredRecording(entry.name, status.st_size, _read_modified(status), sha256, is_damaged))
         return found
 
     def damaged(self, *, deep: bool) -> list[str]:
@@ -279,6 +279,6 @@ class RecordingStore:
         return True
 
 
-def _modified(status: os.stat_result) -> datetime:
+def _read_modified(status: os.stat_result) -> datetime:
     """When a file was last written."""
     return datetime.fromtimestamp(status.st_mtime, UTC)

@@ -57,7 +57,7 @@ def read_received_robot(folder: Path, file_name: str) -> Robot:
         _confine_files(folder, file_name)
         return read_robot(folder / file_name)
     except RobotFileError as error:
-        raise type(error)(_in_user_terms(str(error), folder)) from None
+        raise type(error)(_word_for_user(str(error), folder)) from None
 
 
 def check_received_robot(folder: Path, file_name: str) -> RobotReport:
@@ -69,8 +69,8 @@ def check_received_robot(folder: Path, file_name: str) -> RobotReport:
         _confine_files(folder, file_name)
         report = check_robot(folder / file_name)
     except RobotFileError as error:
-        raise type(error)(_in_user_terms(str(error), folder)) from None
-    findings = (replace(finding, where=_in_user_terms(finding.where, folder)) for finding in report.findings)
+        raise type(error)(_word_for_user(str(error), folder)) from None
+    findings = (replace(finding, where=_word_for_user(finding.where, folder)) for finding in report.findings)
     return replace(report, source=file_name, findings=tuple(findings))
 
 
@@ -128,6 +128,6 @@ def _multiply(text: str) -> float:
         return 1.0  # MuJoCo says better what is wrong
 
 
-def _in_user_terms(text: str, folder: Path) -> str:
+def _word_for_user(text: str, folder: Path) -> str:
     """A message without the server's folder; an inline robot has no file and no lines."""
     return without_folders(text, folder).replace(f"{INLINE_NAME}:1: ", "robot: ").replace(f"{INLINE_NAME}: ", "robot: ")

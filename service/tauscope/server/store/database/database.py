@@ -32,7 +32,7 @@ A transaction that only later turns out to write could not wait for the lock, be
 
 def open_engine(address: Path | str) -> Engine:
     """An engine; nothing is connected yet. Raises StoreError if it is no URL, or one of another kind of database."""
-    url = URL.create("sqlite", database=str(address)) if isinstance(address, Path) else _parsed(address)
+    url = URL.create("sqlite", database=str(address)) if isinstance(address, Path) else _parse_url(address)
     if url.get_backend_name() == "sqlite":
         engine = create_engine(url, connect_args={"timeout": TIMEOUT_S})
         event.listen(engine, "connect", _prepare_sqlite)
@@ -52,7 +52,7 @@ def shown_address(engine: Engine) -> str:
     return str(url.database) if url.get_backend_name() == "sqlite" else url.render_as_string(hide_password=True)
 
 
-def _parsed(text: str) -> URL:
+def _parse_url(text: str) -> URL:
     """The URL of a text; only the two kinds that are tested are taken."""
     hint = "write postgresql://user@host/name, or leave it out for SQLite in the data folder"
     try:
@@ -195,7 +195,7 @@ class Database:
         except IntegrityError:
             raise
         except (DBAPIError, PoolTimeoutError) as error:
-            raise StoreError(_described(shown_address(self._engine), error)) from error
+            raise StoreError(_describe_fault(shown_address(self._engine), error)) from error
 
 
 def _check_file(url: URL) -> None:
@@ -214,7 +214,7 @@ def _check_file(url: URL) -> None:
         raise StoreError(f"{path}: is damaged; {_DAMAGE_HINT}")
 
 
-def _described(address: str, error: Exception) -> str:
+def _describe_fault(address: str, error: Exception) -> str:
     """What is wrong with a database, and what to do."""
     reason = one_line(str(getattr(error, "orig", None) or error)).strip()
     lower = reason.lower()

@@ -43,7 +43,7 @@ def load_lines(engine: Engine, lines: Iterable[bytes]) -> None:
         tables = {table.name: table for table in _tables(connection)}
         for entry in rows:
             table = tables[entry["table"]]
-            values = {key: _typed(table.columns[key], value, connection) for key, value in entry["row"].items()}
+            values = {key: _convert_type(table.columns[key], value, connection) for key, value in entry["row"].items()}
             connection.execute(insert(table).values(**values))
         _advance_counters(connection, tables.values())
     upgrade(engine)
@@ -67,7 +67,7 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def _typed(column: Column[Any], value: Any, connection: Connection) -> Any:
+def _convert_type(column: Column[Any], value: Any, connection: Connection) -> Any:
     """A value as the database takes it."""
     if value is None or not isinstance(column.type, DateTime):
         return value
