@@ -15,7 +15,7 @@ from tauscope.server.http.campaigns import CampaignAnswer
 from tauscope.server.http.diagnoses import DiagnosisAnswer
 from tauscope.server.http.excitations import ExcitationAnswer
 from tauscope.server.http.identifications import IdentificationAnswer
-from tauscope.server.http.leases.models import LeaseAnswer, StopAllAnswer
+from tauscope.server.http.leases import LeaseAnswer, StopAllAnswer
 from tauscope.server.http.recordings.models import RecordingAnswer
 from tauscope.server.http.robots.models import RobotReportAnswer
 from tauscope.server.http.rollouts import RolloutAnswer

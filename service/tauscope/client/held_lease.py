@@ -5,7 +5,7 @@ from collections.abc import Callable
 from types import TracebackType
 
 from tauscope.client.transport import ApiError
-from tauscope.server.http.leases.models import LeaseAnswer
+from tauscope.server.http.leases import LeaseAnswer
 
 BEATS_A_TTL = 3.0
 """Heartbeats in the time that the lease lasts without one."""

@@ -30,13 +30,12 @@ from tauscope.report.diagnosis_words import (
     place_title,
     summary_sentences,
 )
-from tauscope.report.figures import difference_figure, motion_figure, shift_figure
-from tauscope.report.heat_map import heat_map, heat_table
+from tauscope.report.figures import difference_figure, heat_map, heat_table, motion_figure, shift_figure
 from tauscope.report.page import Card, Drawing, Fold, KeyFigure, Numbers, Page, Part, Section, render
-from tauscope.report.proof_figure import proof_figure
 from tauscope.report.provenance import Provenance
 from tauscope.report.table import csv_text
 from tauscope.report.tables import input_table
+from tauscope.report.torque_figure import proof_figure
 from tauscope.report.words import noise_words, torque_unit
 from tauscope.robot import JointType
 

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.actuator import Actuator
-from tauscope.robot.finding import Finding
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import Finding, one_line, shown
 from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Repair, Segment
 
 MOST_NAMES = 4

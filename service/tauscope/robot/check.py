@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.kinematics import homogeneous
+from tauscope.robot.messages import Finding, Severity
 from tauscope.robot.robot import Joint, JointLimits, JointType, Robot, Segment
 from tauscope.robot.robot_file import read_robot
 

@@ -1,8 +1,28 @@
-"""One-line messages: safe to print whatever the user's file holds."""
+"""Messages about a user's files: findings, and foreign text made fit for one line."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from difflib import get_close_matches
+from enum import StrEnum
 from itertools import islice
+
+
+class Severity(StrEnum):
+    """How much a finding matters: an error refuses, a warning may spoil results, the rest is good to know."""
+
+    ERROR = "error"
+    WARNING = "warning"
+    INFO = "info"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One remark on a robot."""
+
+    severity: Severity
+    where: str
+    text: str
+
 
 LONGEST_VALUE = 60
 LONGEST_MESSAGE = 600

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.actuator import Actuator
-from tauscope.robot.finding import Finding
+from tauscope.robot.messages import Finding
 from tauscope.robot.recording_layout import RecordingLayout
 
 STANDARD_PARAMETERS = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "m", "msx", "msy", "msz")

@@ -24,8 +24,7 @@ from tauscope.robot.document import (
     SegmentDocument,
 )
 from tauscope.robot.document_origin import DocumentOrigin
-from tauscope.robot.finding import Finding, Severity
-from tauscope.robot.messages import shown
+from tauscope.robot.messages import Finding, Severity, shown
 from tauscope.robot.physical import nearest_body, repair_text
 from tauscope.robot.placement import DenavitHartenbergRow, modified_segments, standard_segments
 from tauscope.robot.recording_layout import RecordingLayout

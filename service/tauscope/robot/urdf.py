@@ -17,8 +17,7 @@ from tauscope.result_warning import ResultWarning
 from tauscope.robot.chain import Chain, default_ends_note, rigid_branch_note
 from tauscope.robot.document import MOST_JOINTS
 from tauscope.robot.document_fields import LARGEST_NUMBER
-from tauscope.robot.finding import Finding, Severity
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import Finding, Severity, nearest, one_line, shown
 from tauscope.robot.placement import compose, rotation_of_z_to
 from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
 from tauscope.robot.urdf_branches import MOVING, JointMotions, Master, joint_axis

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tauscope.errors import RobotFileError
-from tauscope.robot.finding import Finding, Severity
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import Finding, Severity, nearest, one_line, shown
 from tauscope.robot.placement import rotation_about_z, rotation_of_z_to
 from tauscope.robot.robot import Coupling, Placement
 from tauscope.robot.urdf_element import number, only_child, urdf_error, vector, where

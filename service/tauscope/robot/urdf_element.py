@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from tauscope.errors import RobotFileError
 from tauscope.robot.document_fields import LARGEST_NUMBER
-from tauscope.robot.finding import Finding, Severity
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import Finding, Severity, one_line, shown
 from tauscope.robot.placement import rotation_of_roll_pitch_yaw
 from tauscope.robot.robot import Placement
 

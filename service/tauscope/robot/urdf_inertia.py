@@ -4,8 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from tauscope.robot.finding import Finding, Severity
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import Finding, Severity, one_line, shown
 from tauscope.robot.physical import nearest_body, repair_text
 from tauscope.robot.placement import compose
 from tauscope.robot.robot import LinkInertia, Placement, Repair

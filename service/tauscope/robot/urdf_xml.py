@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tauscope.robot.document_fields import LONGEST_NAME
-from tauscope.robot.finding import Finding, Severity
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import Finding, Severity, nearest, one_line, shown
 from tauscope.robot.urdf_element import EXPAND, Element, children, local_name, urdf_error, where
 from tauscope.robot.xml_text import parse_xml
 

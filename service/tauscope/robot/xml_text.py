@@ -10,8 +10,7 @@ import re
 from lxml import etree
 
 from tauscope.errors import RobotFileError
-from tauscope.robot.finding import Finding, Severity
-from tauscope.robot.messages import one_line
+from tauscope.robot.messages import Finding, Severity, one_line
 from tauscope.robot.urdf_element import Element
 
 LARGEST_XML = 16 * 1024 * 1024

@@ -10,11 +10,10 @@ from typing import Any, ClassVar
 from tauscope.robot import read_robot
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
 from tauscope_sim.canopen_bus.axis import AxisScale
-from tauscope_sim.canopen_bus.can_socket import CanSocket, SocketLine
 from tauscope_sim.canopen_bus.drive import EmulatedDrive
 from tauscope_sim.canopen_bus.driven_arm import DrivenArm
 from tauscope_sim.canopen_bus.emulator import CanEmulator
-from tauscope_sim.canopen_bus.serial_line import SerialLine
+from tauscope_sim.canopen_bus.lines import CanSocket, SerialLine, SocketLine
 from tauscope_sim.emulation.device_clock import STEP_S
 from tauscope_sim.emulation.emulator import Port
 from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal

@@ -6,7 +6,7 @@ from pkgutil import iter_modules
 from types import MappingProxyType
 
 from tauscope_sim.effects.effect import Effect, ScenarioEntry
-from tauscope_sim.effects.sensor_effect import Channel, SensorEffect
+from tauscope_sim.effects.sensor_effects import Channel, SensorEffect
 
 
 def _entries() -> Iterator[type[ScenarioEntry]]:

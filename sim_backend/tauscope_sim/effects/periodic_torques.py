@@ -7,9 +7,8 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import JointEffect
+from tauscope_sim.effects.effect import JointEffect, JointLaw, Law
 from tauscope_sim.effects.fields import Numbers, one_of, single_zero
-from tauscope_sim.effects.joint_law import JointLaw, Law
 from tauscope_sim.plant.coordinates import Coordinates
 from tauscope_sim.plant.loads import LARGEST_GAIN
 from tauscope_sim.plant.term import Forces, Moment, Slopes, Term

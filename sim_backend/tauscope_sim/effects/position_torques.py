@@ -4,8 +4,8 @@ from typing import Annotated, ClassVar
 
 from tauscope.robot.document_fields import Number, Positive
 from tauscope.robot.robot import Robot
+from tauscope_sim.effects.effect import JointLaw, Law, Side
 from tauscope_sim.effects.fields import Exponent, one_of
-from tauscope_sim.effects.joint_law import JointLaw, Law, Side
 
 
 class JointSpring(JointLaw):

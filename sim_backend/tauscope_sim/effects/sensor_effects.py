@@ -1,17 +1,50 @@
 """What sensors and drives make of the torque and the time: gains, limits, delays."""
 
 from collections import deque
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.robot.document_fields import Nonzero, Positive
 from tauscope.robot.robot import Robot
+from tauscope_sim.effects.effect import ScenarioEntry
 from tauscope_sim.effects.fields import JointNumber, one_of
-from tauscope_sim.effects.sensor_effect import Channel, SensorEffect
 
 Array = NDArray[np.float64]
+
+
+class Channel(Protocol):
+    """A sensor effect at work: it sees the samples in the order of time, and only those of the past."""
+
+    def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
+        """What is recorded in place of a sample.
+
+        Parameters
+        ----------
+        time : float
+            of the sample [s]
+        position : (n,) float64
+            [rad or m]
+        torque : (n,) float64
+            [Nm or N]
+
+        Returns
+        -------
+        position : (n,) float64
+            [rad or m]
+        torque : (n,) float64
+            [Nm or N]
+        """
+        ...
+
+
+class SensorEffect(ScenarioEntry):
+    """An effect between the arm and the recording."""
+
+    def channel(self, joint_count: int) -> Channel:
+        """The effect at work on an arm."""
+        raise NotImplementedError
 
 
 class TorqueGainError(SensorEffect):

@@ -18,12 +18,12 @@ from concealed.generator.transmissions import transmission_torque
 from tauscope.robot import Robot
 from tauscope_sim.effects import Effect
 from tauscope_sim.effects.carried_bodies import Payload, PayloadChange, RotorInertia
+from tauscope_sim.effects.effect import JointLaw
 from tauscope_sim.effects.elastic_transmissions import Backlash, JointElasticity
 from tauscope_sim.effects.external_contact import ExternalContact
 from tauscope_sim.effects.friction_coupling import FrictionCoupling
 from tauscope_sim.effects.friction_drift import FrictionDrift
 from tauscope_sim.effects.geometry_errors import BaseTilt, KinematicError
-from tauscope_sim.effects.joint_law import JointLaw
 from tauscope_sim.effects.load_dependent_friction import LoadDependentFriction
 from tauscope_sim.effects.periodic_torques import TorqueRipple
 from tauscope_sim.effects.presliding_hysteresis import PreslidingHysteresis

@@ -23,9 +23,8 @@ from tauscope.server.http.history import router as history
 from tauscope.server.http.identifications import IdentificationRequest
 from tauscope.server.http.identifications import router as identifications
 from tauscope.server.http.items import router as items
-from tauscope.server.http.leases.models import LeaseRequest
-from tauscope.server.http.leases.router import router as leases
-from tauscope.server.http.leases.router import stop_router
+from tauscope.server.http.leases import LeaseRequest, stop_router
+from tauscope.server.http.leases import router as leases
 from tauscope.server.http.methods import collect_methods, require_known_query
 from tauscope.server.http.openapi import install_openapi
 from tauscope.server.http.problem_handlers import install_problem_handlers

@@ -17,7 +17,7 @@ from tauscope.server.http.backends import BackendRequest, chosen_backend
 from tauscope.server.http.diagnoses import DIAGNOSES
 from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.identifications import IDENTIFICATIONS
-from tauscope.server.http.leases.router import permit_of
+from tauscope.server.http.leases import permit_of
 from tauscope.server.http.robots.files import read_received_robot
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.server.http.runs import find_run

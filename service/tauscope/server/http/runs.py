@@ -27,7 +27,7 @@ from tauscope.server.http.backends import BackendRequest, chosen_backend
 from tauscope.server.http.documents import file_answer, to_json_text
 from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.form import PartRule
-from tauscope.server.http.leases.router import permit_of
+from tauscope.server.http.leases import permit_of
 from tauscope.server.http.openapi import binary_part, file_contents
 from tauscope.server.http.robots.files import read_received_robot
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT

@@ -16,7 +16,7 @@ from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
 from tauscope.server.http.evidence import require_no_model
-from tauscope.server.http.leases.router import LeaseToken
+from tauscope.server.http.leases import LeaseToken
 from tauscope.server.http.openapi import Examples, file_contents
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robots.files import check_received_robot
