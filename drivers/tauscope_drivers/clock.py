@@ -13,7 +13,6 @@ class AnswerTime:
     """Compares how long each answer took with the median of the last ones."""
 
     def __init__(self) -> None:
-        """Nothing is known yet, and nothing is late."""
         self._taken_ns: deque[int] = deque(maxlen=REMEMBERED)
 
     @property
@@ -68,7 +67,6 @@ class CycleGrid:
     """Even instants, one a cycle, laid through the calls that were the earliest."""
 
     def __init__(self, cycle_s: float) -> None:
-        """The first call is in time."""
         self._period_ns = cycle_s * 1e9
         self._due_ns: int | None = None
 

@@ -82,7 +82,6 @@ class RunawayWatch:
     """Looks at every reading of an arm that is given torque."""
 
     def __init__(self, limits: DriveLimits) -> None:
-        """Begin with a sound arm."""
         self._limits = limits
         self._fast = np.zeros(len(limits.velocity), dtype=np.int64)
 

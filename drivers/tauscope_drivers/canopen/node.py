@@ -49,7 +49,6 @@ class GlitchFilter:
     """
 
     def __init__(self) -> None:
-        """Doubt nothing yet."""
         self.limit = math.inf
         self._believed: tuple[float, int] | None = None
         self._doubts_place = self._doubts_speed = False

@@ -22,7 +22,6 @@ class Turns:
     """
 
     def __init__(self, servos: Sequence[int], owed: Collection[int] = ()) -> None:
-        """Nothing has come yet."""
         self._place = {servo: place for place, servo in enumerate(servos)}
         self._list_owing = frozenset(owed)
         self._found: dict[int, Status] = {}
@@ -103,7 +102,6 @@ class ServoBus:
     """Speaks to the servos of one port; one thread's own."""
 
     def __init__(self, port: SerialPort, clock: Clock | None = None) -> None:
-        """Use a port, open or not yet."""
         self.port = port
         self._clock = MonotonicClock() if clock is None else clock
         self.return_delay_s = FACTORY_RETURN_DELAY_S

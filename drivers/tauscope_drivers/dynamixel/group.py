@@ -44,7 +44,6 @@ class ServoGroup:
     """All servos of an arm; servos of different families are asked one family after the other."""
 
     def __init__(self, bus: ServoBus, servos: Sequence[JointServo]) -> None:
-        """Nothing is asked yet."""
         self.servos = tuple(servos)
         self.fast = False
         self._bus = bus

@@ -17,7 +17,6 @@ class Health:
     """Faults and torque of all servos, as last read."""
 
     def __init__(self, servos: Sequence[JointServo]) -> None:
-        """Nothing is known yet."""
         count = len(servos)
         self.has_torque = np.zeros(count, dtype=np.bool_)
         self.is_latched = np.zeros(count, dtype=np.bool_)

@@ -35,7 +35,6 @@ class SerialPort(PortHandler):
     """An exclusive serial port; also usable with dynamixel-sdk's own packet handler."""
 
     def __init__(self, path: str, baud: int, slack_s: float = 0.002) -> None:
-        """Nothing is opened yet."""
         super().__init__(path)
         self.baudrate = baud
         self.latency_s = LEAST_LATENCY_S

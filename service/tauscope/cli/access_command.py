@@ -24,13 +24,7 @@ def add(
     days: Annotated[int, typer.Option(min=0, max=36500, help="How long it holds; 0: for good.")] = 365,
     data: DataFolder = None,
 ) -> None:
-    """Make a key and print it: it is kept nowhere else. From then on the service asks for keys.
-
-    Parameters
-    ----------
-    days : int
-        how long it holds [days]
-    """
+    """Make a key and print it: it is kept nowhere else. From then on the service asks for keys."""
     from tauscope.cli.access_run import add_key
 
     add_key(name, scope, days, data)

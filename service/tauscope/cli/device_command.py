@@ -75,11 +75,6 @@ def scan(
     """Show every device that answers on a bus.
 
     Moves nothing and writes nothing. Exit status 1 where nobody answers.
-
-    Parameters
-    ----------
-    bit_rate : list of int or None
-        to try [bit/s]
     """
     from tauscope.cli.device_run import show_devices
 

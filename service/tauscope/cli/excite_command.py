@@ -91,17 +91,6 @@ def excite(
 
     A finite Fourier series for every joint within the limits of position, velocity, acceleration, torque (predicted
     with the robot file's model) and space; repeated, then slow reversals, and the first period again.
-
-    Parameters
-    ----------
-    duration : float
-        length of one period [s]
-    floor : float or None
-        lowest height [m]
-    tool : str
-        tool point [m]
-    rate : float
-        samples a second of the CSV [Hz]
     """
     corners = [parse_numbers(text, "--box", 6) for text in box or ()]
     tool_m = parse_numbers(tool, "--tool", 3)

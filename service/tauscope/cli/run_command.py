@@ -114,11 +114,6 @@ def run(
     """Move an arm and record it.
 
     Ctrl-C stops the arm by its stop policy; what was recorded until then is kept, and the exit status is 1.
-
-    Parameters
-    ----------
-    start : str or None
-        where the simulated arm stands at first [rad or m]
     """
     posture = parse_posture(start)
     given = {"scenario": scenario, "start": start, "time": None if time == "virtual" else time}
@@ -148,13 +143,7 @@ def run(
 
 
 def parse_posture(text: str | None) -> tuple[float, ...] | None:
-    """Read the value of ``--start``.
-
-    Raises
-    ------
-    typer.BadParameter
-        for anything else
-    """
+    """Read the value of ``--start``. Raises typer.BadParameter for anything else."""
     if text is None:
         return None
     try:

@@ -68,11 +68,6 @@ def prune(
     """Remove what is old. Identifications of active models, and whatever is damaged, stay.
 
     No service may work with the folder meanwhile.
-
-    Parameters
-    ----------
-    older_than : float
-        age [days]
     """
     from tauscope.cli.store_run import prune_store
 

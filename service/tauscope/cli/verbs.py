@@ -45,9 +45,8 @@ class SeveralValuesCommand(TyperCommand):
 def add_verb(
     app: typer.Typer, function: Callable[..., None], cls: type[TyperCommand] = TyperCommand, name: str | None = None
 ) -> None:
-    """Make a function a command of the same name; its help ends where its docstring turns to programmers."""
-    text = (inspect.getdoc(function) or "").partition("\n\nParameters\n")[0]
-    app.command(name, cls=cls, help=text)(expand_groups(function))
+    """Make a function a command of the same name; its docstring is the help."""
+    app.command(name, cls=cls, help=inspect.getdoc(function))(expand_groups(function))
 
 
 def expand_groups(function: Callable[..., None]) -> Callable[..., None]:

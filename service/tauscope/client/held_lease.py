@@ -15,7 +15,6 @@ class HeldLease:
     """A lease kept by heartbeats; use it as a context. When the program hangs or dies, the arm stops by itself."""
 
     def __init__(self, lease: LeaseAnswer, beat: Callable[[], object], release: Callable[[], object]) -> None:
-        """Begin to keep a lease."""
         self.lease = lease
         self.lost: str | None = None
         self._beat, self._release = beat, release

@@ -108,7 +108,6 @@ class TorqueDrive:
     is_closed = False
 
     def __init__(self, robot: Robot, recording: Recording, motion: RecordedMotion, inertia: Array) -> None:
-        """Put the torque on the steps."""
         samples = recording.samples()
         effort = samples.effort if samples.effort_command is None else samples.effort_command
         torque = recording.joint_torque(effort, robot)

@@ -52,7 +52,6 @@ class RefinableModel:
     """A model as a function of P parameters, and its errors on segments."""
 
     def __init__(self, model: ExportModel, loops: tuple[Actuator, ...], segments: Segments) -> None:
-        """Take a model without findings, and its loops."""
         self.segments = segments
         self._model = model
         self._loops = loops

@@ -13,7 +13,6 @@ class SplitClock:
     """Joins seconds and nanoseconds, from the first row on: a large count has no room for small parts of a second."""
 
     def __init__(self) -> None:
-        """Start before the first row."""
         self._first = np.nan
 
     def join(self, seconds: Array, nanoseconds: Array) -> Array:

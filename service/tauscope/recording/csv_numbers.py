@@ -96,7 +96,6 @@ class Clock:
     """Reads a file's column t: numbers, or ISO 8601 dates, of which seconds since the first are kept."""
 
     def __init__(self) -> None:
-        """Start before the first row."""
         self._first: datetime | None = None
 
     def parse(self, field: bytes, file: str, line: int) -> float:

@@ -32,7 +32,6 @@ class JointStateEncoder:
     """Writes joint states of the same joints, message after message, into one template."""
 
     def __init__(self, names: Sequence[str], *, has_velocity: bool = True, has_effort: bool = True) -> None:
-        """Lay the template out."""
         message = bytearray(_ENCAPSULATION + bytes(_STAMP.size))
         _append_string(message, "")
         _append_length(message, len(names))

@@ -18,7 +18,6 @@ class JointStateLog:
     """Joint states of one or several container files that were recorded together."""
 
     def __init__(self, choice: Choice) -> None:
-        """Start empty."""
         self._choice = choice
         self._topics: dict[str, JointStateTopic] = {}
         self._others: list[str] = []

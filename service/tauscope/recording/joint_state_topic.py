@@ -31,7 +31,6 @@ class OtherPublishers:
     """Counts a topic's messages of others."""
 
     def __init__(self) -> None:
-        """Start without any."""
         self._foreign: dict[tuple[str, ...], int] = {}
         self._partial: dict[tuple[str, ...], int] = {}
         self._incomplete: dict[tuple[str, tuple[str, ...]], int] = {}
@@ -113,7 +112,6 @@ class JointStateTopic:
     """Collects the messages of one topic; a fault is kept until it is known whether this topic is the wanted one."""
 
     def __init__(self, topic: str, decoder: Decoder, choice: Choice) -> None:
-        """Start empty."""
         self.topic = topic
         self.messages = 0
         self.fault: RecordingError | None = None

@@ -18,7 +18,6 @@ class RowCheck:
     """
 
     def __init__(self, file: str, names: tuple[str, ...]) -> None:
-        """Prepare for the first block."""
         self._file = file
         self._names = names
         self._period = names.index("period") if "period" in names else None

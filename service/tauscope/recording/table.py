@@ -45,7 +45,6 @@ class SpooledTable:
     """
 
     def __init__(self, names: tuple[str, ...]) -> None:
-        """Open an empty spool."""
         self._names = names
         self._row_bytes = 8 * len(names)
         self._length = 0

@@ -22,7 +22,6 @@ class GuardedArm:
     """An arm that can only be commanded through its guard; nothing else calls `Backend.exchange`."""
 
     def __init__(self, backend: Backend, guard: Guard, state: ArmState) -> None:
-        """Take over an arm that has just been enabled."""
         self._backend, self._guard = backend, guard
         self.state = state
 

@@ -174,7 +174,6 @@ class RecordKeeper:
     """Writes the newest record; records that are overtaken while the disk is busy are left out."""
 
     def __init__(self, folder: Path) -> None:
-        """Start the thread."""
         self._folder = folder
         self._newest: RunRecord | None = None
         self._problem: str | None = None

@@ -179,7 +179,6 @@ class Outputs(Mapping[str, bytes]):
     """
 
     def __init__(self, make: Mapping[str, Callable[[], str | bytes]]) -> None:
-        """Take what makes each of them."""
         self._make = make
 
     def __getitem__(self, name: str) -> bytes:

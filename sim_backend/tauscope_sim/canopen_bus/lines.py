@@ -21,7 +21,6 @@ class SerialLine:
     """
 
     def __init__(self) -> None:
-        """Closed."""
         self.is_open = False
         self._pending = b""
 
@@ -94,7 +93,6 @@ class CanSocket:
     baud = 1_000_000
 
     def __init__(self, interface: str) -> None:
-        """Listen."""
         self._socket = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
         self._socket.bind((interface,))
         self._socket.setblocking(False)

@@ -54,7 +54,6 @@ class EmulatedBus:
     """Servos on one line."""
 
     def __init__(self, servos: Sequence[EmulatedServo], *, fast_sync_read: bool = True, paced: bool = True) -> None:
-        """Connect servos."""
         self.servos = {servo.servo: servo for servo in servos}
         self.schedule = FaultSchedule()
         self._fast = fast_sync_read

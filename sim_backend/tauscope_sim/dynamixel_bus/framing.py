@@ -53,7 +53,6 @@ class InstructionParser:
     """Finds instructions in what a master sends; answers of other servos are passed over."""
 
     def __init__(self) -> None:
-        """Begin with nothing."""
         self._buffer = bytearray()
 
     def feed(self, received: bytes) -> list[Instruction]:

@@ -33,7 +33,6 @@ class EmulatedServo:
     """A servo on the bus and at its joint."""
 
     def __init__(self, specification: ServoSpecification, *, seed: int = 0) -> None:
-        """Power up."""
         self.specification = specification
         self.memory = ControlMemory(specification)
         self.encoder_offset_counts = 0

@@ -33,7 +33,6 @@ class ServoLoop:
     """Goals to demands: a target that moves no faster than Profile Velocity, or plain current."""
 
     def __init__(self, specification: ServoSpecification, memory: ControlMemory) -> None:
-        """At rest."""
         self._specification = specification
         self._memory = memory
         self._target: float | None = None

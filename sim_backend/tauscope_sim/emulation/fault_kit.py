@@ -68,7 +68,6 @@ class FaultSchedule:
     """Faults in the order of their instants."""
 
     def __init__(self) -> None:
-        """No fault."""
         self._queue: list[_Scheduled] = []
         self._number = 0
 

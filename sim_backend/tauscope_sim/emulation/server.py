@@ -30,7 +30,6 @@ class Arrivals:
     """Bytes that a port has received, each piece with its instant, as long as the ``with`` block lasts."""
 
     def __init__(self, port: Port) -> None:
-        """Nothing is received yet."""
         self._port = port
         self._pieces: list[tuple[bytes, int]] = []
         self._lock = threading.Lock()
@@ -93,7 +92,6 @@ class EmulatorServer:
     """Runs an emulator until its standard input ends, against the machine's clock or one that a test moves on."""
 
     def __init__(self, order: EmulatorOrder) -> None:
-        """Open everything."""
         self._order = order
         self._port = order.open_port()
         self._tests = _listen(order.control)

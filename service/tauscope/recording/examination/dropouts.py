@@ -31,7 +31,6 @@ class ZeroRuns:
     """Collects runs of zero, block by block: of every joint, and of all at once."""
 
     def __init__(self, scales: Sequence[EffortScale]) -> None:
-        """Start before the first row."""
         self._scales = scales
         self._runs: list[list[tuple[int, int]]] = [[] for _ in range(len(scales) + 1)]
 

@@ -37,7 +37,6 @@ class EditedTable:
     """A table of which some columns are mended as they are read."""
 
     def __init__(self, table: Table, edits: Mapping[int, ColumnEdit]) -> None:
-        """Keep a table and the edits by index of their column."""
         self._table = table
         self._edits = dict(edits)
         self._spare = 2 + max(((2 * edit.hold + 2) * (edit.fill + 1) for edit in edits.values()), default=0)
