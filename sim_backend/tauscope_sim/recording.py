@@ -77,18 +77,11 @@ def simulate_recording(
     RobotFileError where the robot file lacks what the simulation needs. Raises RecordingError where the settings make
     no recording.
 
-    Parameters
-    ----------
-    rate_hz : float
-        samples per second; each period has to hold a whole number of samples [Hz]
-    noise_std : (n,) float64 or float
-        standard deviation of the torque noise [Nm or N]
-    position_noise_std : (n,) float64 or float
-        standard deviation of the position noise [rad or m]
-    encoder_step : (n,) float64 or float
-        resolution to which positions are rounded, zero for none [rad or m]
-    friction_shape : sequence of FrictionShape, optional
-        K_v and δ of each joint [s/rad or s/m]; the robot file's where None
+    `rate_hz`: samples per second; each period has to hold a whole number of samples [Hz].
+    `noise_std`: (n,) or float, standard deviation of the torque noise [Nm or N].
+    `position_noise_std`: (n,) or float, standard deviation of the position noise [rad or m].
+    `encoder_step`: (n,) or float, resolution to which positions are rounded, zero for none [rad or m].
+    `friction_shape`: K_v and δ of each joint [s/rad or s/m]; the robot file's where None.
     """
     samples_per_period = _samples_per_period(motion.period_s, rate_hz)
     if periods < 1:

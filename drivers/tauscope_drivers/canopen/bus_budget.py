@@ -43,15 +43,9 @@ def cycle_bits(nodes: int, frames: CycleFrames) -> int:
 def largest_rate_hz(nodes: int, frames: CycleFrames, bit_rate: float, serial_baud: float | None = None) -> float:
     """Most cycles a second that the bus carries, and the adapter where it is a true serial line.
 
-    Parameters
-    ----------
-    serial_baud : float or None
-        of the adapter's serial line at 10 bits a byte [bit/s]; None where it is none (a USB CDC adapter ignores it)
-
-    Returns
-    -------
-    float
-        [Hz]
+    `serial_baud`: of the adapter's serial line at 10 bits a byte [bit/s]; None where it is none (a USB CDC adapter
+        ignores it).
+    Returns float: [Hz].
     """
     bus_s = cycle_bits(nodes, frames) / (LARGEST_LOAD * bit_rate)
     return 1.0 / max(bus_s, _serial_s(nodes, frames, serial_baud))

@@ -210,13 +210,9 @@ class DynamixelArm:
 
         Raises DriverError: ``not-connected``, ``refused`` or ``fault``.
 
-        Parameters
-        ----------
-        watchdog_s : float
-            time without `exchange` after which they do; rounded down to 20 ms [s]
-        cycle_s : float or None
-            time between two goals, over which the servos go from one to the next; they leap where it is None, or too
-            short for a bus that has to carry the speeds as well [s]
+        `watchdog_s`: time without `exchange` after which they do; rounded down to 20 ms [s].
+        `cycle_s`: time between two goals, over which the servos go from one to the next; they leap where it is None, or
+            too short for a bus that has to carry the speeds as well [s].
         """
         session = self._require_session()
         self._require_possible(mode, stop_policy)

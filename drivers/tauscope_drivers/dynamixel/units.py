@@ -98,16 +98,10 @@ def servo_units(
 
     Raises ValueError where no unit of current is known for the model, and none is given.
 
-    Parameters
-    ----------
-    reduction : float
-        turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints
-    zero_count : int or None
-        count at which the joint stands at zero; None for the model's own
-    milliampere : float or None
-        one unit of Present Current, in place of the model's [mA]
-    torque_per_milliampere : float or None
-        as recorded torque constants are: joint torque for one milliampere [Nm/mA or N/mA]
+    `reduction`: turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints.
+    `zero_count`: count at which the joint stands at zero; None for the model's own.
+    `milliampere`: one unit of Present Current, in place of the model's [mA].
+    `torque_per_milliampere`: as recorded torque constants are: joint torque for one milliampere [Nm/mA or N/mA].
     """
     unit = model.current_unit
     if milliampere is None and unit is None:

@@ -38,23 +38,12 @@ class Delay:
 def shift_command(time: Array, command: Array, delay: float, rate_hz: float | None, at: Array) -> Array:
     """Command in force: late by a delay, and held from one update of the loop to the next.
 
-    Parameters
-    ----------
-    time : (N,) float64
-        of the recorded commands [s]
-    command : (N,) float64
-        [rad or m]
-    delay : float
-        [s]
-    rate_hz : float or None
-        updates a second; None: with every sample
-    at : (M,) float64
-        instants that are asked for [s]
-
-    Returns
-    -------
-    (M,) float64
-        [rad or m]
+    `time`: (N,), of the recorded commands [s].
+    `command`: (N,) [rad or m].
+    `delay`: [s].
+    `rate_hz`: updates a second; None: with every sample.
+    `at`: (M,), instants that are asked for [s].
+    Returns (M,) [rad or m].
     """
     since = at if rate_hz is None else time[0] + np.floor((at - time[0]) * rate_hz + 1e-9) / rate_hz
     known = np.isfinite(command)

@@ -33,16 +33,10 @@ class JointLaws:
     ) -> None:
         """Take a model.
 
-        Parameters
-        ----------
-        effects : tuple of FoundEffect
-            that the MJCF does not hold and whose torque follows from position, velocity and load
-        held : (n,) float64
-            dry friction that the MJCF's bristles hold [Nm or N]
-        has_offset : tuple of bool
-            joints whose constant torque the MJCF holds
-        friction_by_load : LoadFriction or None
-            of a refinement
+        `effects`: that the MJCF does not hold and whose torque follows from position, velocity and load.
+        `held`: (n,), dry friction that the MJCF's bristles hold [Nm or N].
+        `has_offset`: joints whose constant torque the MJCF holds.
+        `friction_by_load`: of a refinement.
         """
         friction: tuple[JointFriction, ...] = model.friction
         self._stiction = np.array([each.stiction for each in friction])

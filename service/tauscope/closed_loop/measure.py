@@ -59,16 +59,10 @@ def lag(time: Array, measured: Array, simulated: Array) -> Array:
 def reversal_error(rows: Array, measured: Array, simulated: Array, time: Array, velocity: Array) -> Array:
     """Rms of the position error within `REVERSAL_S` of a reversal of the real joint, (n,) [rad or m]; NaN without one.
 
-    Parameters
-    ----------
-    rows : (N,) float64
-        instants of both positions [s]
-    measured, simulated : (N, n) float64
-        q of the real and of the simulated arm [rad or m]; NaN where it was missed
-    time : (K,) float64
-        instants of the velocity [s]
-    velocity : (K, n) float64
-        of the real arm [rad/s or m/s]
+    `rows`: (N,), instants of both positions [s].
+    `measured`, `simulated`: (N, n), q of the real and of the simulated arm [rad or m]; NaN where it was missed.
+    `time`: (K,), instants of the velocity [s].
+    `velocity`: (K, n), of the real arm [rad/s or m/s].
     """
     found = np.full(measured.shape[1], np.nan)
     for joint, speed in enumerate(velocity.T):

@@ -35,16 +35,10 @@ def read_batches(
     Raises RecordingError, which names the row and column at fault. Raises RecordingMismatchError where the file has
     another number of joints.
 
-    Parameters
-    ----------
-    rows : int
-        expected number
-    open_batches : callable
-        the batches of the columns that it is told to read
-    first_row : int
-        number of the file's first row in messages
-    has_episodes : bool
-        whether a column `episode_index` splits the rows into episodes, each on a clock of its own
+    `rows`: expected number.
+    `open_batches`: the batches of the columns that it is told to read.
+    `first_row`: number of the file's first row in messages.
+    `has_episodes`: whether a column `episode_index` splits the rows into episodes, each on a clock of its own.
     """
     reading, layout = find_layout(header, reading, name)
     require_joint_count(layout.joint_count, joint_count, name)

@@ -103,15 +103,8 @@ class Clock:
 
         Raises RecordingError where the text is neither a number nor a date.
 
-        Parameters
-        ----------
-        line : int
-            its line, counted from 1
-
-        Returns
-        -------
-        float
-            [s], or in the file's own unit
+        `line`: its line, counted from 1.
+        Returns float: [s], or in the file's own unit.
         """
         text = field.strip(b' \t"')
         if not _DATE.match(text):

@@ -118,32 +118,18 @@ class Recording:
 
         Raises RecordingError, which names the argument, the row (counted from 0, as NumPy does) and the joint at fault.
 
-        Parameters
-        ----------
-        time : (N,) float64
-            strictly increasing [s]
-        position : (N, n) float64
-            q [rad or m]
-        effort : (N, n) float64
-            τ [Nm or N], or drive units
-        velocity : (N, n) float64 or None
-            qd [rad/s or m/s]
-        acceleration : (N, n) float64 or None
-            qdd [rad/s² or m/s²]
-        reference : (N, n) float64 or None
-            commanded position [rad or m]
-        effort_command : (N, n) float64 or None
-            commanded effort [Nm or N, or drive units]
-        temperature : (N, n) float64 or None
-            motor or joint temperature [°C]
-        link_position : (N, n) float64 or None
-            position behind the transmission [rad or m]
-        voltage : (N, n) float64 or None
-            supply of the joint's bridge [V]
-        gain : (N, n) float64 or None
-            gain kp in force, in the unit of the robot file's actuator
-        period : (N,) float64 or None
-            index of the repeated excitation period, NaN outside the repeated part
+        `time`: (N,), strictly increasing [s].
+        `position`: (N, n), q [rad or m].
+        `effort`: (N, n), τ [Nm or N], or drive units.
+        `velocity`: (N, n), qd [rad/s or m/s].
+        `acceleration`: (N, n), qdd [rad/s² or m/s²].
+        `reference`: (N, n), commanded position [rad or m].
+        `effort_command`: (N, n), commanded effort [Nm or N, or drive units].
+        `temperature`: (N, n), motor or joint temperature [°C].
+        `link_position`: (N, n), position behind the transmission [rad or m].
+        `voltage`: (N, n), supply of the joint's bridge [V].
+        `gain`: (N, n), gain kp in force, in the unit of the robot file's actuator.
+        `period`: (N,), index of the repeated excitation period, NaN outside the repeated part.
         """
         groups = {
             "qd": velocity,

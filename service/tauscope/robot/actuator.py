@@ -135,18 +135,12 @@ class Actuator:
     ) -> Values:
         """Torque at the joint.
 
-        Parameters
-        ----------
-        error : float or (N,) float64
-            command less motion: of position [rad or m], of a velocity loop of velocity [rad/s or m/s]
-        velocity : float or (N,) float64
-            q̇ [rad/s or m/s]
-        voltage : float or (N,) float64 or None
-            supply [V]; None: as stated
-        kp : float or (N,) float64 or None
-            gain in force; None: as stated
-        temperature : float or (N,) float64 or None
-            of the motor [°C]; None or NaN: 25
+        `error`: float or (N,), command less motion: of position [rad or m], of a velocity loop of velocity [rad/s or
+            m/s].
+        `velocity`: float or (N,), q̇ [rad/s or m/s].
+        `voltage`: float or (N,), supply [V]; None: as stated.
+        `kp`: float or (N,), gain in force; None: as stated.
+        `temperature`: float or (N,), of the motor [°C]; None or NaN: 25.
         """
         dead = self.conversion.dead_band if self.dead_band is None and self.unit == "register" else self.dead_band
         gain = self.kp if kp is None else kp

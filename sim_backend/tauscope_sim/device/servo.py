@@ -80,16 +80,10 @@ class Servo:
     def track(self, error: Array, error_rate: Array, feed_forward: Array | None, position: Array) -> Array:
         """Torque of the position loop, (n,) [Nm or N].
 
-        Parameters
-        ----------
-        error : (n,) float64
-            target less position [rad or m]
-        error_rate : (n,) float64
-            target velocity less velocity [rad/s or m/s]
-        feed_forward : (n,) float64 or None
-            torque of the host; None for none [Nm or N]
-        position : (n,) float64
-            q, for H(q) [rad or m]
+        `error`: (n,), target less position [rad or m].
+        `error_rate`: (n,), target velocity less velocity [rad/s or m/s].
+        `feed_forward`: (n,), torque of the host; None for none [Nm or N].
+        `position`: (n,), q, for H(q) [rad or m].
         """
         damping, stiffness, load = self._renew(position)
         proportional = stiffness.dot(_PROPORTIONAL * error) + self._stiffness * error

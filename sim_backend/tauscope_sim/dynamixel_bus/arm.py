@@ -56,16 +56,10 @@ class Pendulums:
     ) -> None:
         """Place them at rest.
 
-        Parameters
-        ----------
-        position : (n,) float64
-            where they stand [rad]
-        inertia : float
-            J [kg m²]
-        damping : float
-            b [Nm s/rad]
-        weight : float
-            m g l [Nm]
+        `position`: (n,), where they stand [rad].
+        `inertia`: J [kg m²].
+        `damping`: b [Nm s/rad].
+        `weight`: m g l [Nm].
         """
         self._position = np.array(position, dtype=np.float64)
         self._velocity = np.zeros_like(self._position)

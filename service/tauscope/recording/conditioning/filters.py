@@ -31,19 +31,10 @@ def smooth(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
 
     |H(f)| = 1 / (1 + (f/f_c)⁸).
 
-    Parameters
-    ----------
-    values : (N, n) float64
-        signals, a column each
-    rate_hz : float
-        sampling rate [Hz]
-    cutoff_hz : float
-        f_c, where half the amplitude is left [Hz]; at or above 0.45 of the rate nothing is filtered
-
-    Returns
-    -------
-    (N, n) float64
-        the smoothed signals; the first and last `smoothing_margin` samples still feel the edge
+    `values`: (N, n), signals, a column each.
+    `rate_hz`: sampling rate [Hz].
+    `cutoff_hz`: f_c, where half the amplitude is left [Hz]; at or above 0.45 of the rate nothing is filtered.
+    Returns (N, n), the smoothed signals; the first and last `smoothing_margin` samples still feel the edge.
     """
     if cutoff_hz >= SMOOTHED_FRACTION * rate_hz:
         return values

@@ -131,17 +131,9 @@ def with_turns_removed(periods: Periods, joint_types: Sequence[JointType]) -> Pe
 def repeats(periods: Periods, cutoff_hz: float, noise_density: Array) -> bool:
     """Whether the motion is the same in every period.
 
-    Parameters
-    ----------
-    cutoff_hz : float
-        only what lies below matters [Hz]
-    noise_density : (n,) float64
-        one-sided spectral density of the positions' noise [rad²/Hz or m²/Hz]
-
-    Returns
-    -------
-    bool
-        False where tracking differs so much from period to period that an average would not be a motion
+    `cutoff_hz`: only what lies below matters [Hz].
+    `noise_density`: (n,), one-sided spectral density of the positions' noise [rad²/Hz or m²/Hz].
+    Returns bool: False where tracking differs so much from period to period that an average would not be a motion.
     """
     samples = periods.position.shape[1]
     frequency = np.fft.rfftfreq(samples, 1.0 / periods.rate_hz)[:, None]
@@ -162,21 +154,11 @@ def fourier_derivatives(
 
     q̇ = Σ i ω_l c_l e^{i ω_l t},  q̈ = −Σ ω_l² c_l e^{i ω_l t}.
 
-    Parameters
-    ----------
-    values : (N, n) float64
-        exactly one period of q [rad or m], or of a derivative of it
-    rate_hz : float
-        sampling rate [Hz]
-    cutoff_hz : float
-        highest harmonic kept [Hz]
-    advance : (n,) float64 or None
-        what a joint that turns on and on gains in one period: the series is that of q less this ramp
-
-    Returns
-    -------
-    tuple of (N, n) float64
-        q, q̇, q̈, or those that `orders` names
+    `values`: (N, n), exactly one period of q [rad or m], or of a derivative of it.
+    `rate_hz`: sampling rate [Hz].
+    `cutoff_hz`: highest harmonic kept [Hz].
+    `advance`: (n,), what a joint that turns on and on gains in one period: the series is that of q less this ramp.
+    Returns tuple of (N, n), q, q̇, q̈, or those that `orders` names.
     """
     count = len(values)
     ramp = np.zeros(values.shape[1]) if advance is None else advance

@@ -50,18 +50,11 @@ def scan_position(
 ) -> Iterator[PositionDefect]:
     """Defects of a block of one joint's known positions.
 
-    Parameters
-    ----------
-    rows : (N,) int64
-        row of each value within the recording
-    time : (N,) float64
-        stamps [s]
-    position : (N,) float64
-        q [rad or m], finite
-    interval : float
-        longest usual time from row to row [s]
-    core : (int, int)
-        rows that this block answers for; the others are neighbours
+    `rows`: (N,) int64, row of each value within the recording.
+    `time`: (N,), stamps [s].
+    `position`: (N,), q [rad or m], finite.
+    `interval`: longest usual time from row to row [s].
+    `core`: (int, int), rows that this block answers for; the others are neighbours.
     """
     if len(position) < 8:
         return

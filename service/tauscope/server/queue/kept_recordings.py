@@ -75,11 +75,9 @@ def read_kept_samples(path: Path, most: int) -> bytes:
     or effort is least or greatest. Raises RecordingError if it cannot be read; the message calls the file by its name
     alone.
 
-    Returns
-    -------
-    bytes
-        length of the header (4 bytes, little-endian), the header (JSON, filled with blanks to a multiple of four), then
-        each column that the header names as 32-bit floats, little-endian; time counts from the first sample [s]
+    Returns bytes: length of the header (4 bytes, little-endian), the header (JSON, filled with blanks to a multiple of
+        four), then each column that the header names as 32-bit floats, little-endian; time counts from the first sample
+        [s].
     """
     try:
         recording = read_recording(path)

@@ -239,16 +239,10 @@ def add_stopping(
 ) -> None:
     """Give a resource that moves an arm the routes ``POST /{identifier}/stop`` and ``DELETE /{identifier}``.
 
-    Parameters
-    ----------
-    stop : callable
-        the state in which it was stopped; None where it does not go on
-    read_state : callable
-        the state in its folder; None where that is damaged
-    remove : callable
-        False where it goes on
-    words : (str, str)
-        what is said of either route
+    `stop`: the state in which it was stopped; None where it does not go on.
+    `read_state`: the state in its folder; None where that is damaged.
+    `remove`: False where it goes on.
+    `words`: (str, str), what is said of either route.
     """
 
     @router.post(
