@@ -1,7 +1,7 @@
 """Diagnose: what an arm's model leaves out."""
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import Literal
 
 from pydantic import Field
@@ -21,12 +21,11 @@ from tauscope.diagnosis.extended_model import model_document
 from tauscope.diagnosis.next_experiment import PlannedExperiment, planned_experiment
 from tauscope.errors import ExcitationError, IdentificationError
 from tauscope.export.formats import CODE_FILES, EXPORT_FILES, ExportFormat, make_export
-from tauscope.export.model import Origin, of_diagnosis
+from tauscope.export.model import of_diagnosis
 from tauscope.export.model_file import identified_document, model_file, read_extended_model
 from tauscope.export.simulation_files import improved_robot, scenario_text
 from tauscope.identification import Options
 from tauscope.recording import Recording
-from tauscope.report.provenance import Provenance
 from tauscope.robot import read_robot
 from tauscope.tasks.identify import CutoffFrequency
 from tauscope.tasks.task import (
@@ -35,11 +34,10 @@ from tauscope.tasks.task import (
     Progress,
     ReadingOptions,
     TaskRequest,
+    TaskResult,
     command_words,
     json_text,
-    model_origin,
     read_recordings,
-    record_provenance,
 )
 from tauscope.trajectory import trajectory_json
 from tauscope.trajectory.csv_format import trajectory_csv
@@ -94,15 +92,12 @@ class Request(TaskRequest):
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class Result(TaskResult):
     """What came of it.
 
     `refusal`: why the next motion cannot be planned within the robot's limits.
     """
 
-    request: Request
-    files: Files
-    recordings: tuple[Recording, ...]
     held_out: tuple[Recording, ...]
     diagnosis: Diagnosis
     document: DiagnosisDocument
@@ -127,27 +122,18 @@ class Result:
             made["trajectory.csv"] = lambda: trajectory_csv(trajectory, DEFAULT_RATE_HZ)
         return Outputs(made)
 
-    @cached_property
-    def provenance(self) -> Provenance:
-        """What the result was made from, and when."""
-        return record_provenance(self.files, self.request, self.diagnosis.robot)
-
     def _improved_robot(self) -> str:
         source = self.files.find("robot", self.request.robot)
         target = self.files.target("improved-robot.yaml")
         return improved_robot(self.diagnosis, source, source if target is None else target)
 
     def _export(self, export_format: ExportFormat) -> bytes:
-        return make_export(export_format, of_diagnosis(self.diagnosis, self._origin))
+        return make_export(export_format, of_diagnosis(self.diagnosis, self.origin))
 
     def _model(self) -> str:
         found = self.diagnosis
         plain = identified_document(found.identification) if found.findings else None
-        return json_text(model_file(model_document(found), found.robot, self._origin, plain))
-
-    @property
-    def _origin(self) -> Origin:
-        return model_origin(self.diagnosis.robot, self.recordings, self.provenance)
+        return json_text(model_file(model_document(found), found.robot, self.origin, plain))
 
     def _report(self) -> str:
         from tauscope.report.diagnosis_report import diagnosis_report
@@ -196,4 +182,4 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     target = files.target("trajectory.json") or files.target("trajectory.csv")
     name = None if planned is None or target is None else str(target)
     told = document(found, planned, name, headroom)
-    return Result(request, files, recordings, held_out, found, told, planned, refusal)
+    return Result(request, files, found.robot, recordings, held_out, found, told, planned, refusal)

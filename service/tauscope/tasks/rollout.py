@@ -1,14 +1,12 @@
 """Rollout: how far the simulated arm strays from the real one under the same commands."""
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 
 from pydantic import Field
 
 from tauscope.closed_loop import Rollout, RolloutDocument, roll_out
 from tauscope.export.model_file import read_export_models
-from tauscope.recording import Recording
-from tauscope.report.provenance import Provenance
 from tauscope.robot import read_robot
 from tauscope.tasks.task import (
     Files,
@@ -16,10 +14,10 @@ from tauscope.tasks.task import (
     Progress,
     ReadingOptions,
     TaskRequest,
+    TaskResult,
     command_words,
     json_text,
     read_recordings,
-    record_provenance,
 )
 
 
@@ -42,12 +40,9 @@ class Request(TaskRequest):
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class Result(TaskResult):
     """What came of it."""
 
-    request: Request
-    files: Files
-    recordings: tuple[Recording, ...]
     rollout: Rollout
     document: RolloutDocument
 
@@ -55,11 +50,6 @@ class Result:
     def outputs(self) -> Outputs:
         """``result.json`` and ``report.html``."""
         return Outputs({"result.json": partial(json_text, self.document), "report.html": self._report})
-
-    @cached_property
-    def provenance(self) -> Provenance:
-        """What the result was made from, and when."""
-        return record_provenance(self.files, self.request, self.rollout.robot)
 
     def _report(self) -> str:
         from tauscope.closed_loop.page import rollout_page
@@ -75,4 +65,4 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)
     training = read_recordings(files, "refine", request.refine, robot, request.options)
     found = roll_out(robot, recordings, exports, progress, training)
-    return Result(request, files, recordings, found, found.document)
+    return Result(request, files, found.robot, recordings, found, found.document)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -236,17 +237,32 @@ def record_provenance(files: Files, request: TaskRequest, robot: Robot) -> Prove
     return Provenance(request.command, tuple(hashed), versions(), datetime.now(UTC))
 
 
-def model_origin(robot: Robot, recordings: Sequence[Recording], provenance: Provenance) -> Origin:
-    """Where a model comes from, for its exports; its effort is current where any recording holds current."""
-    holds_current = any(recording.effort_kind is EffortKind.CURRENT for recording in recordings)
-    sources = (RecordingSource(entry.path, entry.sha256) for entry in provenance.inputs if entry.role == "recording")
-    return Origin(
-        sources=tuple(sources),
-        effort_kind=EffortKind.CURRENT if holds_current else EffortKind.TORQUE,
-        created=provenance.created,
-        urdf=None if robot.urdf is None else robot.urdf.read_bytes(),
-        is_mjcf=robot.mjcf is not None,
-    )
+@dataclass(frozen=True, eq=False)
+class TaskResult:
+    """What came of a task that reads recordings."""
+
+    request: Any
+    files: Files
+    robot: Robot
+    recordings: tuple[Recording, ...]
+
+    @cached_property
+    def provenance(self) -> Provenance:
+        """What the result was made from, and when."""
+        return record_provenance(self.files, self.request, self.robot)
+
+    @property
+    def origin(self) -> Origin:
+        """Where a model comes from, for its exports; its effort is current where any recording holds current."""
+        holds_current = any(recording.effort_kind is EffortKind.CURRENT for recording in self.recordings)
+        entries, robot = self.provenance.inputs, self.robot
+        return Origin(
+            sources=tuple(RecordingSource(entry.path, entry.sha256) for entry in entries if entry.role == "recording"),
+            effort_kind=EffortKind.CURRENT if holds_current else EffortKind.TORQUE,
+            created=self.provenance.created,
+            urdf=None if robot.urdf is None else robot.urdf.read_bytes(),
+            is_mjcf=robot.mjcf is not None,
+        )
 
 
 def command_words(verb: str, robot: str, **options: Any) -> tuple[str, ...]:
