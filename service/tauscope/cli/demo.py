@@ -14,8 +14,7 @@ from rich.console import Console
 from ruamel.yaml import YAML
 
 from tauscope.cli.demo_campaign import run_campaign
-from tauscope.cli.demo_folder import prepare_folder
-from tauscope.cli.demo_page import DATA, LEFT_FOR_S, PORT, PageShown, leave_page, show_page
+from tauscope.cli.demo_page import DATA, LEFT_FOR_S, PORT, PageShown, leave_page, prepare_folder, show_page
 from tauscope.cli.output_files import write_file
 from tauscope.cli.result_summary import show_identification
 from tauscope.cli.run_session import keep_recording, why_unfinished

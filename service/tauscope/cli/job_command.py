@@ -40,4 +40,4 @@ def list_(data: DataFolder = None, database: DatabaseUrl = None) -> None:
 
 
 add_verb(job, run)
-job.command("list", help="Show all schedules, and what came of each the last time.")(list_)
+add_verb(job, list_, name="list")

@@ -29,11 +29,10 @@ from tauscope.cli.excite_command import excite
 from tauscope.cli.export_command import export
 from tauscope.cli.fleet_command import fleet
 from tauscope.cli.identify_command import identify
+from tauscope.cli.inputs_command import recording, robot
 from tauscope.cli.job_command import job
 from tauscope.cli.model_command import model
 from tauscope.cli.prove_command import prove
-from tauscope.cli.recording_command import recording
-from tauscope.cli.robot_command import robot
 from tauscope.cli.rollout_command import rollout
 from tauscope.cli.run_command import run
 from tauscope.cli.serve_command import serve

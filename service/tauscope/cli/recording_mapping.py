@@ -13,8 +13,8 @@ from tauscope.recording.columns import map_columns
 from tauscope.recording.layout.guess import guess_parts, layout_text
 from tauscope.recording.reading import read_header
 from tauscope.recording.units import Reading
-from tauscope.recording.words import listed
 from tauscope.robot import RecordingLayout, layout_from_dict, read_robot
+from tauscope.robot.messages import listed
 from tauscope.robot.recording_layout import Source
 from tauscope.robot.yaml_text import read_yaml
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 
 from tauscope.export.actuators import ActuatorChoice, joint_gains
-from tauscope.export.compensation.source_table import comment_text, identifier
+from tauscope.export.compensation.source_code import comment_text, identifier
 from tauscope.export.joint_model import dry_friction_and_damping
 from tauscope.export.mjcf_findings import effects_in
 from tauscope.export.model import ExportModel

@@ -6,7 +6,7 @@ import numpy as np
 
 from tauscope.errors import ExportError
 from tauscope.export.actuators import ActuatorChoice, actuator_elements
-from tauscope.export.compensation.source_table import comment_text
+from tauscope.export.compensation.source_code import comment_text
 from tauscope.export.joint_model import (
     JointModel,
     centred,

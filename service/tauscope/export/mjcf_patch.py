@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tauscope.errors import ExportError
-from tauscope.export.compensation.source_table import comment_text
+from tauscope.export.compensation.source_code import comment_text
 from tauscope.export.joint_model import (
     CentredInertia,
     JointModel,

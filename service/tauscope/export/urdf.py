@@ -8,7 +8,7 @@ import numpy as np
 
 from tauscope.errors import ExportError
 from tauscope.export.compensation.model import JointFriction
-from tauscope.export.compensation.source_table import comment_text
+from tauscope.export.compensation.source_code import comment_text
 from tauscope.export.joint_model import (
     CentredInertia,
     JointModel,

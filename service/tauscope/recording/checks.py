@@ -12,8 +12,7 @@ from tauscope.recording.measures import Gaps, JointMeasures, StepMeasures, measu
 from tauscope.recording.reading import read_recording
 from tauscope.recording.recording import EffortKind, Recording
 from tauscope.recording.units import SI, Reading
-from tauscope.recording.words import listed
-from tauscope.robot.messages import Finding, Severity
+from tauscope.robot.messages import Finding, Severity, listed
 from tauscope.robot.robot import Robot
 
 _MEANINGFUL_STEP = 1e-4

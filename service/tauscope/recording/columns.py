@@ -12,8 +12,8 @@ from tauscope.recording.layout.rename import NANOSECONDS, rename_columns
 from tauscope.recording.layout.roles import role_of
 from tauscope.recording.samples import EffortKind
 from tauscope.recording.units import Reading
-from tauscope.recording.words import listed, printable
 from tauscope.result_warning import ResultWarning
+from tauscope.robot.messages import listed, printable
 from tauscope.robot.recording_layout import RecordingLayout
 
 OPTIONAL_GROUPS = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt", "kp")

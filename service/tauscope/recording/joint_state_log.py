@@ -6,7 +6,7 @@ from tauscope.errors import RecordingError
 from tauscope.recording.joint_state_decoders import find_decoder
 from tauscope.recording.joint_state_topic import Choice, JointStateTopic
 from tauscope.recording.recording import Recording
-from tauscope.recording.words import listed
+from tauscope.robot.messages import listed
 
 _PREFERRED_TOPICS = ("/joint_states", "joint_states")
 

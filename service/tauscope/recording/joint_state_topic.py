@@ -21,8 +21,8 @@ from tauscope.recording.joint_state_decoders import Decoder
 from tauscope.recording.recording import EffortKind, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
 from tauscope.recording.units import SI, Reading
-from tauscope.recording.words import listed, reason
 from tauscope.result_warning import ResultWarning
+from tauscope.robot.messages import listed, reason
 
 _REMEDY = "record with one publisher on the topic, or choose another topic with --topic"
 

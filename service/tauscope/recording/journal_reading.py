@@ -15,7 +15,7 @@ from tauscope.recording.journal import CYCLE_TOPIC, EVENT_TOPIC, JOINT_STATE_TOP
 from tauscope.recording.journal_rows import JournalHeader, Phase, journal_row_type
 from tauscope.recording.mcap_format import scan_mcap
 from tauscope.recording.recording import Array, EffortKind, Recording
-from tauscope.recording.words import reason
+from tauscope.robot.messages import reason
 
 LONGEST_HOLD = 1.5
 """Cycles between two samples of which none was missed between them."""

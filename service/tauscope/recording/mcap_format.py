@@ -33,7 +33,7 @@ from tauscope.recording.mcap_index import (
 )
 from tauscope.recording.recording import Recording
 from tauscope.recording.row_check import MINIMUM_ROWS
-from tauscope.recording.words import reason
+from tauscope.robot.messages import reason
 
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 

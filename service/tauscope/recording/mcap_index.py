@@ -17,7 +17,7 @@ from mcap.stream_reader import get_chunk_data_stream
 
 from tauscope.recording.inflation import HELD_BYTES, LARGEST_RATIO, require_plausible_inflation
 from tauscope.recording.joint_state_log import MessageHandler
-from tauscope.recording.words import reason
+from tauscope.robot.messages import reason
 
 RECORD = struct.Struct("<BQ")
 """Opcode and length of a record."""

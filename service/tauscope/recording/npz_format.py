@@ -15,7 +15,7 @@ from tauscope.recording.columns import ColumnLayout
 from tauscope.recording.inflation import HELD_BYTES, require_plausible_inflation
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.units import SI, Reading
-from tauscope.recording.words import listed, reason
+from tauscope.robot.messages import listed, reason
 
 ZIP_MAGIC = b"PK\x03\x04"
 

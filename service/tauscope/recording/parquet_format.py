@@ -18,7 +18,7 @@ from tauscope.recording.inflation import require_plausible_inflation
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
 from tauscope.recording.units import SI, Reading
-from tauscope.recording.words import printable, reason
+from tauscope.robot.messages import printable, reason
 
 _LARGEST_INFO_BYTES = 2**22
 _MOST_ELEMENTS = 1000

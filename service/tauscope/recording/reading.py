@@ -16,7 +16,7 @@ from tauscope.recording.recording import Recording
 from tauscope.recording.ros1_bag import ROS1_MAGIC, read_ros1_bag
 from tauscope.recording.rosbag2_format import SQLITE_MAGIC, read_database, read_rosbag2
 from tauscope.recording.units import SI, Reading
-from tauscope.recording.words import printable
+from tauscope.robot.messages import printable
 
 _LONGEST_PATH = 4096
 _MAGIC_BYTES = 16

@@ -14,7 +14,7 @@ from tauscope.recording.inflation import HELD_BYTES, LARGEST_RATIO, require_plau
 from tauscope.recording.joint_state_log import JointStateLog
 from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.recording import Recording
-from tauscope.recording.words import reason
+from tauscope.robot.messages import reason
 
 ROS1_MAGIC = b"#ROSBAG V2.0"
 

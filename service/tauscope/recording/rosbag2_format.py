@@ -15,7 +15,7 @@ from tauscope.recording.joint_state_log import JointStateLog
 from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.mcap_format import add_mcap
 from tauscope.recording.recording import Recording
-from tauscope.recording.words import printable, reason
+from tauscope.robot.messages import printable, reason
 
 SQLITE_MAGIC = b"SQLite format 3\0"
 METADATA = "metadata.yaml"

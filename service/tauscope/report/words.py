@@ -4,8 +4,8 @@ from collections.abc import Iterable, Iterator
 
 from tauscope.identification import IdentificationDocument
 from tauscope.number_text import percent, significant
-from tauscope.recording.words import listed
 from tauscope.robot import JointType
+from tauscope.robot.messages import listed
 
 
 def torque_unit(joint_type: JointType) -> str:

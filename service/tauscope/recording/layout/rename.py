@@ -10,7 +10,7 @@ from tauscope.recording.layout.families import BY_NAME, PLACEHOLDERS, fill_templ
 from tauscope.recording.layout.guess import guess_layout, guess_parts, layout_text
 from tauscope.recording.layout.presets import PRESET_OF
 from tauscope.recording.units import Reading
-from tauscope.recording.words import listed, printable
+from tauscope.robot.messages import listed, printable
 from tauscope.robot.recording_layout import RecordingLayout, Source
 
 _TARGET = re.compile(r"([a-z]+)([0-9]*)")

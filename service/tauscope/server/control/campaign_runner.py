@@ -31,7 +31,7 @@ from tauscope.server.queue.analyses import (
     IdentificationWorkspace,
 )
 from tauscope.server.queue.excitation import ExcitationOrder, ExcitationWorkspace
-from tauscope.server.queue.job_folder import Workspace
+from tauscope.server.queue.job_folder import StoppedError, Workspace
 from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, JobKind, JobQueue, QueueFullError
 from tauscope.server.queue.record import JobProblem, JobState
 from tauscope.server.queue.task_job import (
@@ -41,7 +41,6 @@ from tauscope.server.queue.task_job import (
     staged_workspace,
     submit_job,
 )
-from tauscope.server.queue.work import StoppedError
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.tasks.campaign import backend_of_run
 from tauscope.tasks.design_excitation import ExcitationDesignOptions

@@ -12,10 +12,18 @@ from pydantic import Field
 from tauscope.errors import ExportError, NotFoundError, RecordingError, TauscopeError
 from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.files import write_atomically
-from tauscope.server.queue.job_folder import Workspace, read_bytes, read_document, read_stored, write_stored
+from tauscope.server.queue.job_folder import (
+    Workspace,
+    begin_step,
+    do_work,
+    read_bytes,
+    read_document,
+    read_stored,
+    require_wanted,
+    write_stored,
+)
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.record import JobProblem, without_folders
-from tauscope.server.queue.work import begin_step, do_work, require_wanted
 from tauscope.server.store.files import hash_file
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore

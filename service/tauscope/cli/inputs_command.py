@@ -1,12 +1,30 @@
-"""``tauscope recording``: its arguments."""
+"""``tauscope robot`` and ``tauscope recording``: their arguments."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tauscope.cli.arguments import LayoutArguments, ReadingArguments, RecordingFile
+from tauscope.cli.arguments import LayoutArguments, ReadingArguments, RecordingFile, RobotFile
 from tauscope.cli.verbs import add_verb
+
+robot = typer.Typer(help="Look at robot files.", no_args_is_help=True, rich_markup_mode=None)
+
+
+@robot.callback()
+def _robot() -> None:
+    """Make `check` a verb of its own, as a second one will be."""
+
+
+def check_robot(file: RobotFile) -> None:
+    """Show what a robot file says, and everything doubtful in it."""
+    from tauscope.cli.inputs_summary import show_robot
+
+    show_robot(file)
+
+
+add_verb(robot, check_robot, name="check")
+
 
 RobotOption = Annotated[
     Path | None,
@@ -29,7 +47,7 @@ def check(
 ) -> None:
     """Show what a recording holds, and what to look at before trusting it."""
     options = reading.options()
-    from tauscope.cli.recording_summary import show_recording
+    from tauscope.cli.inputs_summary import show_recording
 
     show_recording(file, joints, robot, options.reading)
 
@@ -47,7 +65,7 @@ def convert(
 ) -> None:
     """Write a recording in another format, in SI; the source stays as it is."""
     options = reading.options()
-    from tauscope.cli.recording_summary import convert_file
+    from tauscope.cli.inputs_summary import convert_file
 
     convert_file(source, target, robot, options.reading, recover=recover, overwrite=overwrite)
 

@@ -1,15 +1,16 @@
-"""``tauscope recording check|convert``: what is in a recording, and what became of it."""
+"""``tauscope robot check`` and ``tauscope recording check|convert``: what inputs hold."""
 
 from pathlib import Path
 
 import typer
 
+from tauscope.cli.device_run import check_drives, require_sound, show_finding
 from tauscope.cli.terminal import output, plain, shown_progress, table
-from tauscope.number_text import ABSENT, counted, significant
+from tauscope.number_text import ABSENT, counted, given, significant
 from tauscope.recording import EffortKind, Reading, RecordingReport, check_recording, convert_recording
 from tauscope.recording.convert import FORMATS
 from tauscope.report.table import Table
-from tauscope.robot import read_robot
+from tauscope.robot import JointSummary, RobotReport, check_robot, read_robot
 
 
 def show_recording(path: Path, joint_count: int | None, robot_file: Path | None, reading: Reading) -> None:
@@ -91,3 +92,57 @@ def _joints(report: RecordingReport) -> Table:
         ranges = (" … ".join(significant(value) for value in pair) for pair in (joint.position, joint.effort))
         rows.append([str(number), *ranges, significant(joint.position_step, 3)])
     return Table(("joint", "position [rad, m]", "effort", "position step"), rows)
+
+
+def show_robot(path: Path) -> None:
+    """Show what a robot file says, and everything doubtful in it.
+
+    Raises RobotFileError if the file is not valid. Raises AcquisitionError if a drive block or the EDS or DCF file that
+    it names is not usable.
+    """
+    report = check_robot(path)
+    console = output()
+    gravity = ", ".join(given(value) for value in report.gravity)
+    console.print(
+        plain(f"Robot {report.name}: {counted(len(report.joints), 'joint')}, gravity [{gravity}] m/s²{_mass(report)}")
+    )
+    columns = (
+        "joint",
+        "name",
+        "type",
+        "position",
+        "velocity",
+        "acceleration",
+        "torque",
+        "gear",
+        "per unit",
+        "mass [kg]",
+    )
+    console.print(table("Joints", Table(columns, [_row(joint) for joint in report.joints], words=3)))
+    for finding in report.findings:
+        console.print(plain(f"{finding.severity}: {finding.where}: {finding.text}"), soft_wrap=True)
+    findings = check_drives(path)
+    for finding in findings:
+        show_finding(console, finding)
+    require_sound(findings)
+    console.print(plain(f"{path}: valid"), soft_wrap=True)
+
+
+def _mass(report: RobotReport) -> str:
+    """What the model weighs, where there is one."""
+    return "" if report.total_mass is None else f", model of {given(report.total_mass)} kg"
+
+
+def _row(joint: JointSummary) -> list[str]:
+    """One joint."""
+    limits = joint.limits
+    reach = ABSENT if limits.position is None else " … ".join(given(value) for value in limits.position)
+    return [
+        str(joint.number),
+        joint.name,
+        joint.type.value,
+        reach,
+        *(given(value) for value in (limits.velocity, limits.acceleration, limits.torque, joint.gear_ratio)),
+        given(joint.sign * joint.torque_constant),
+        given(joint.mass),
+    ]
