@@ -41,10 +41,7 @@ _LEAST_FIRMWARE = 45
 def examine(joints: Sequence[DriveJoint], *, slack_s: float = 0.002) -> list[Finding]:
     """Port, adapter, and every servo that the robot file names.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: a ``drive`` block is not valid
+    Raises DriverError: ``refused``: a ``drive`` block is not valid.
     """
     configuration = read_configuration(joints)
     port = SerialPort(configuration.port, configuration.baud, slack_s)
@@ -263,10 +260,7 @@ USUAL_BAUDS = (57_600, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 115_200, 4_50
 def scan_bus(path: str, bauds: Sequence[int] = USUAL_BAUDS, *, slack_s: float = 0.002) -> Iterator[FoundDevice]:
     """Every servo that answers a ping to all, one baud rate after the other; about a second each.
 
-    Raises
-    ------
-    DriverError
-        ``cannot-connect``: the port is missing, not permitted or taken
+    Raises DriverError ``cannot-connect`` where the port is missing, not permitted or taken.
     """
     for baud in bauds:
         port = SerialPort(path, baud, slack_s)

@@ -39,12 +39,7 @@ class GoalPace:
     ) -> None:
         """Begin with servos that hold their goals.
 
-        Parameters
-        ----------
-        goals : sequence of int
-            Goal Position of each [counts]
-        caps : sequence of int
-            most Profile Velocity of each, 0 for none [units]
+        `goals`: Goal Position of each [counts]; `caps`: most Profile Velocity of each, 0 for none [units].
         """
         self._counts_per_second = [servo.model.velocity_unit * servo.model.counts_per_radian for servo in servos]
         self._goals = list(goals)
@@ -56,13 +51,7 @@ class GoalPace:
         self._grid = CycleGrid(cycle_s)
 
     def speeds(self, goals: Sequence[int], now_ns: int) -> list[int]:
-        """Profile Velocity of each servo for its next goal [units].
-
-        Parameters
-        ----------
-        goals : sequence of int
-            Goal Position of each [counts]
-        """
+        """Profile Velocity of each servo for its next goal [units]. `goals`: Goal Position of each [counts]."""
         elapsed_s, self._now_ns = (now_ns - self._now_ns) * 1e-9, now_ns
         left_s = self._time_left_s(now_ns)
         for joint, unit in enumerate(self._counts_per_second):

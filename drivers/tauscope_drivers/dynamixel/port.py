@@ -35,7 +35,6 @@ class SerialPort(PortHandler):
     """An exclusive serial port; also usable with dynamixel-sdk's own packet handler."""
 
     def __init__(self, path: str, baud: int, slack_s: float = 0.002) -> None:
-        """Nothing is opened yet."""
         super().__init__(path)
         self.baudrate = baud
         self.latency_s = LEAST_LATENCY_S
@@ -49,10 +48,7 @@ class SerialPort(PortHandler):
     def open(self) -> None:
         """Open the port and lock it against everybody else.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: it is not there, not permitted, or taken; names the holder
+        Raises DriverError ``cannot-connect`` where it is not there, not permitted, or taken; names the holder.
         """
         try:
             self.openPort()
@@ -71,25 +67,25 @@ class SerialPort(PortHandler):
 
     def send(self, frame: bytes) -> None:
         """Discard unread input, so that no late answer is taken for the next one, and send a frame."""
-        serial_port = self._opened()
+        serial_port = self._require_open()
         try:
             serial_port.reset_input_buffer()
             serial_port.write(frame)
         except (OSError, serial.SerialException, termios.error) as error:
-            raise self._lost(error) from error
+            raise self._report_loss(error) from error
 
     def receive(self, deadline_ns: int) -> bytes:
         """What comes first, or nothing by the deadline."""
-        serial_port = self._opened()
+        serial_port = self._require_open()
         wait_s = (deadline_ns - time.monotonic_ns()) * 1e-9
         try:
             if not select.select([serial_port.fileno()], [], [], max(0.0, wait_s))[0]:
                 return b""
             received = os.read(serial_port.fileno(), 4096)
         except (OSError, serial.SerialException, ValueError) as error:
-            raise self._lost(error) from error
+            raise self._report_loss(error) from error
         if not received:
-            raise self._lost(OSError("the device is gone"))
+            raise self._report_loss(OSError("the device is gone"))
         return received
 
     def drain(self) -> None:
@@ -127,8 +123,8 @@ class SerialPort(PortHandler):
     def readPort(self, length: int) -> bytes:  # noqa: N802
         """Up to so many bytes; waits on the descriptor and not in a loop."""
         remaining_s = max(0.0, self.packet_timeout - self.getTimeSinceStart()) * 1e-3
-        select.select([self._opened().fileno()], [], [], remaining_s)
-        return self._opened().read(length)
+        select.select([self._require_open().fileno()], [], [], remaining_s)
+        return self._require_open().read(length)
 
     def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802
         """Time-out of an answer from the true latency, not from 16 ms."""
@@ -140,10 +136,10 @@ class SerialPort(PortHandler):
         return time.monotonic_ns() * 1e-6
 
     def _is_pseudo_terminal(self) -> bool:
-        status = os.fstat(self._opened().fileno())
+        status = os.fstat(self._require_open().fileno())
         return stat.S_ISCHR(status.st_mode) and os.major(status.st_rdev) in _PSEUDO_TERMINALS
 
-    def _opened(self) -> serial.Serial:
+    def _require_open(self) -> serial.Serial:
         if self.ser is None:
             raise DriverError(DriverErrorKind.NOT_CONNECTED, f"port {self.path} is not open; connect first")
         return self.ser
@@ -165,7 +161,7 @@ class SerialPort(PortHandler):
             reason, remedy = f"cannot be opened ({' '.join(str(error).split())})", "check the device and its baud rate"
         return DriverError(DriverErrorKind.CANNOT_CONNECT, f"port {self.path} {reason}; {remedy}")
 
-    def _lost(self, error: Exception) -> DriverError:
+    def _report_loss(self, error: Exception) -> DriverError:
         reason = " ".join(str(error).split())
         return DriverError(
             DriverErrorKind.LOST, f"port {self.path} is gone ({reason}); check the adapter, its cable and its power"

@@ -25,10 +25,8 @@ class Phase(IntEnum):
 class JournalHeader:
     """What all rows of a journal have in common.
 
-    rate_hz : float
-        cycles a second that were asked for [Hz]
-    epoch_offset_ns : int
-        to be added to a row's time to make it nanoseconds since 1970 [ns]
+    `rate_hz`: cycles a second that were asked for [Hz].
+    `epoch_offset_ns`: to be added to a row's time to make it nanoseconds since 1970 [ns].
     """
 
     robot: str
@@ -51,13 +49,7 @@ class JournalHeader:
 
     @staticmethod
     def from_dict(data: Any) -> "JournalHeader":
-        """The header of plain data.
-
-        Raises
-        ------
-        RecordingError
-            it is no such header
-        """
+        """The header of plain data. Raises RecordingError where it is no such header."""
         fields = {key: value for key, value in data.items() if key != "form"} if isinstance(data, dict) else {}
         try:
             header = TypeAdapter(JournalHeader).validate_python(fields)

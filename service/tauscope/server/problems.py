@@ -104,7 +104,6 @@ class ProblemError(HTTPException):
         errors: Sequence[FieldError] | None = None,
         headers: Mapping[str, str] | None = None,
     ) -> None:
-        """Make the exception."""
         super().__init__(KINDS[code].status, detail, headers)
         self.code = code
         self.errors = None if errors is None else list(errors)

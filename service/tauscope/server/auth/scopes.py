@@ -25,13 +25,7 @@ class Scope(StrEnum):
 
 
 def parse_scope(text: str) -> Scope:
-    """The scope of a name.
-
-    Raises
-    ------
-    TauscopeError
-        if there is none of that name
-    """
+    """The scope of a name. Raises TauscopeError if there is none of that name."""
     try:
         return Scope(text)
     except ValueError:

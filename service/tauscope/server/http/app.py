@@ -23,10 +23,9 @@ from tauscope.server.http.history import router as history
 from tauscope.server.http.identifications import IdentificationRequest
 from tauscope.server.http.identifications import router as identifications
 from tauscope.server.http.items import router as items
-from tauscope.server.http.leases.models import LeaseRequest
-from tauscope.server.http.leases.router import router as leases
-from tauscope.server.http.leases.router import stop_router
-from tauscope.server.http.methods import collect_methods
+from tauscope.server.http.leases import LeaseRequest, stop_router
+from tauscope.server.http.leases import router as leases
+from tauscope.server.http.methods import collect_methods, require_known_query
 from tauscope.server.http.openapi import install_openapi
 from tauscope.server.http.problem_handlers import install_problem_handlers
 from tauscope.server.http.protection import BodyLimit, ConcurrencyLimiter, OriginCheck, RequestLog, ResponseProtection
@@ -44,7 +43,6 @@ from tauscope.server.http.schedules import ScheduleRequest
 from tauscope.server.http.schedules import router as schedules
 from tauscope.server.http.services import open_services
 from tauscope.server.http.settings import Settings
-from tauscope.server.http.strict_query import require_known_query
 from tauscope.server.http.tasks.events import EVENT_MODELS
 from tauscope.server.page.router import router as page
 from tauscope.server.problems import Problem

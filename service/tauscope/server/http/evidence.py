@@ -7,13 +7,7 @@ from tauscope.server.problems import ProblemError
 
 
 def require_no_model(services: Services, identifier: str) -> None:
-    """Refuse to remove an identification that is an active model or a reference.
-
-    Raises
-    ------
-    ProblemError
-        if it is one
-    """
+    """Refuse to remove an identification that is an active model or a reference. Raises ProblemError if it is one."""
     _judge_new(services)
     _require_free(services, identifier, {identifier})
 
@@ -21,10 +15,7 @@ def require_no_model(services: Services, identifier: str) -> None:
 def require_no_evidence(services: Services, recording: str) -> None:
     """Refuse to remove a recording that an active model or a reference was made from or judged by.
 
-    Raises
-    ------
-    ProblemError
-        if one was
+    Raises ProblemError if one was.
     """
     _judge_new(services)
     _require_free(services, recording, services.index.index.list_users(recording))

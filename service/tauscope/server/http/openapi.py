@@ -24,13 +24,7 @@ Examples = Mapping[str, tuple[str, Any]]
 
 
 def json_body(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
-    """A JSON body of an operation.
-
-    Parameters
-    ----------
-    examples : mapping of str to (str, plain data)
-        summary and value by name
-    """
+    """A JSON body of an operation. `examples`: mapping of str to (str, plain data), summary and value by name."""
     shown = {name: {"summary": summary, "value": value} for name, (summary, value) in examples.items()}
     return {"application/json": {"schema": model_reference(model), "examples": shown}}
 

@@ -38,15 +38,9 @@ class Answers(Protocol):
     def begin(self, name: str) -> bool:
         """Claim a request before anything is done.
 
-        Returns
-        -------
-        bool
-            False where the request was begun before
+        Raises OSError if that has to be written down and cannot be.
 
-        Raises
-        ------
-        OSError
-            if that has to be written down and cannot be
+        Returns bool: False where the request was begun before.
         """
         ...
 
@@ -124,13 +118,7 @@ class MemoryAnswers(Answers):
     """Answers none of which is ever written to a disk."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """Begin without any.
-
-        Parameters
-        ----------
-        clock : callable
-            by which they age [s]
-        """
+        """Begin without any. `clock`: by which they age [s]."""
         self._clock = clock
         self._lock = threading.Lock()
         self._kept: dict[str, tuple[float, KeptAnswer | None]] = {}

@@ -81,7 +81,7 @@ class IdempotentRequests:
             text = "the request could not be written down, so that it was not begun; make room on the disk"
             return await problem_answer(make_problem("storage-full", text, scope["path"]))(scope, receive, send)
         if not is_new:
-            return await (await _repeated(scope, receive, store, name, is_underway))(scope, receive, send)
+            return await (await _repeat(scope, receive, store, name, is_underway))(scope, receive, send)
         self._underway.add(name)
         try:
             await self._answer_first(scope, receive, send, name)
@@ -93,7 +93,7 @@ class IdempotentRequests:
         store = _answers_of(scope)
         fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
         answer = _Captured()
-        await self.app(scope, _counted(receive, fingerprint), answer.take)
+        await self.app(scope, _count_body(receive, fingerprint), answer.take)
         kept = None
         # What was refused has done nothing, and may be corrected and sent again.
         if not 400 <= answer.status < 500:
@@ -139,7 +139,7 @@ class _Captured:
         return tuple((name.decode("latin-1"), value.decode("latin-1")) for name, value in self._headers)
 
 
-def _counted(receive: Receive, fingerprint: Fingerprint) -> Receive:
+def _count_body(receive: Receive, fingerprint: Fingerprint) -> Receive:
     """The body on its way to the application."""
 
     async def received() -> Message:
@@ -150,7 +150,7 @@ def _counted(receive: Receive, fingerprint: Fingerprint) -> Receive:
     return received
 
 
-async def _repeated(scope: AsgiScope, receive: Receive, store: Answers, name: str, is_underway: bool) -> Response:
+async def _repeat(scope: AsgiScope, receive: Receive, store: Answers, name: str, is_underway: bool) -> Response:
     """The answer to a request that came before."""
     fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
     more = True

@@ -36,14 +36,12 @@ from tauscope.server.http.reading import WIDTH, ReadingQueue
 from tauscope.server.http.repeated_answers import Answers, MemoryAnswers, StoredAnswers
 from tauscope.server.http.settings import Settings
 from tauscope.server.http.tasks.event_feeds import EventFeeds
+from tauscope.server.queue.analyses import run_diagnosis, run_identification, run_rollout
 from tauscope.server.queue.cluster_executor import ClusterExecutor
-from tauscope.server.queue.diagnosis import run_diagnosis
 from tauscope.server.queue.excitation import run_excitation
 from tauscope.server.queue.executors import open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
-from tauscope.server.queue.identification import run_identification
 from tauscope.server.queue.queue import JobKind, JobQueue
-from tauscope.server.queue.rollout import run_rollout
 from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.server.schedules.repeater import Repeater
 from tauscope.server.schedules.repository import ScheduleRepository
@@ -117,10 +115,7 @@ def open_services(
 ) -> Iterator[Services]:
     """Take the data folder, and end all work on leaving: first what moves, then the rest.
 
-    Raises
-    ------
-    TauscopeError
-        if another service works with the data folder, or its database cannot be used
+    Raises TauscopeError if another service works with the data folder, or its database cannot be used.
     """
     settings.data_folder.mkdir(0o700, parents=True, exist_ok=True)
     access = _open_access(settings)
@@ -346,10 +341,8 @@ def _open_access(settings: Settings) -> Access:
 def require_data_folder(settings: Settings) -> None:
     """Make the data folder, and refuse one that cannot be worked with.
 
-    Raises
-    ------
-    TauscopeError
-        if it cannot be made or written to, another service works with it, or it has no key where one is needed
+    Raises TauscopeError if it cannot be made or written to, another service works with it, or it has no key where one
+    is needed.
     """
     folder = settings.data_folder
     try:
