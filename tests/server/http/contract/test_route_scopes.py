@@ -67,6 +67,7 @@ UNDOCUMENTED: set[str] = {
     "GET /docs/errors/{code}",
     "GET /docs/how-to/{name}",
     "GET /docs/pages.css",
+    "GET /docs/schemas/{name}",
     "GET /example/{name}",
     "GET /openapi.json",
     "GET /page/{name}",
