@@ -1,5 +1,6 @@
 """A multipart form, streamed: files go to the disk and are hashed as they arrive; none is held in memory."""
 
+import asyncio
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from starlette.concurrency import run_in_threadpool
 from tauscope.errors import LimitExceededError
 from tauscope.robot.messages import one_line, shown
 from tauscope.server.auth.gate import require_upload_quota
+from tauscope.server.http.processor_wait import ProcessorWait
 from tauscope.server.problems import ProblemError
 from tauscope.server.store.files import FILE_NAME_RULE, IncomingFile, KeptFile, is_file_name
 
@@ -70,11 +72,13 @@ async def receive_form(request: Request, rules: Mapping[str, PartRule]) -> Recei
     with _form_errors():
         _, options = parse_options_header(request.headers.get("content-type"))
         parser = MultipartParser(options.get(b"boundary") or b"", receiver.callbacks())
+    wait = ProcessorWait()
     try:
         async for piece in request.stream():
             if piece:
                 charge(len(piece))
                 await run_in_threadpool(_feed, parser, piece)
+                await asyncio.sleep(wait.take_pause())
         with _form_errors():
             parser.finalize()
         if not receiver.has_ended:

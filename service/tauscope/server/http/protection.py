@@ -15,6 +15,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from tauscope.errors import LimitExceededError
 from tauscope.server.auth.gate import find_caller
 from tauscope.server.http.metrics import Metrics
+from tauscope.server.http.processor_wait import ProcessorWait
 from tauscope.server.problems import make_problem, problem_answer
 
 _request_log = logging.getLogger("tauscope.requests")
@@ -246,7 +247,8 @@ _PROBES = ("/healthz", "/readyz")
 class ConcurrencyLimiter:
     """Admits a few reading requests at a time, first come first served; all other requests pass at once.
 
-    A slot is free again when the answer begins: a stream of events keeps no other request waiting.
+    A slot is free again when the answer begins: a stream of events keeps no other request waiting. Where processors are
+    scarce, it stays empty for a while.
     """
 
     def __init__(
@@ -290,11 +292,12 @@ class _Slot:
 
     def __init__(self, slots: asyncio.Semaphore, longest_s: float) -> None:
         self._slots, self._has_ended = slots, False
-        self._timer = asyncio.get_running_loop().call_later(longest_s, self.end)
+        self._wait, self._loop = ProcessorWait(), asyncio.get_running_loop()
+        self._timer = self._loop.call_later(longest_s, self.end)
 
     def end(self) -> None:
-        """Let the next one in."""
+        """Let the next one in, at once unless processors are scarce."""
         if not self._has_ended:
             self._has_ended = True
             self._timer.cancel()
-            self._slots.release()
+            self._loop.call_later(self._wait.take_pause(), self._slots.release)
