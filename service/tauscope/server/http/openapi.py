@@ -36,14 +36,12 @@ def json_body(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
     return {"application/json": {"schema": model_reference(model), "examples": shown}}
 
 
-def form_body(
-    parts: Mapping[str, Any], required: Sequence[str], encoding: Mapping[str, Any] | None = None
-) -> dict[str, Any]:
-    """A multipart body of an operation."""
+def form_body(parts: Mapping[str, Any], required: Sequence[str]) -> dict[str, Any]:
+    """A multipart body of an operation; an object in it is JSON."""
     schema = {"type": "object", "properties": dict(parts), "additionalProperties": False}
     if required:
         schema["required"] = list(required)
-    return {"multipart/form-data": {"schema": schema, **({"encoding": dict(encoding)} if encoding else {})}}
+    return {"multipart/form-data": {"schema": schema}}
 
 
 _BYTES = "application/octet-stream"

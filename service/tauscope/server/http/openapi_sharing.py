@@ -73,7 +73,7 @@ def _refer_to_formats(document: dict[str, Any], formats: Sequence[type[BaseModel
                 address = addresses.get(content.get("schema", {}).get("$ref"))
                 if address is not None:
                     file = {"type": "object", "additionalProperties": True}
-                    content["schema"] = {**file, "externalDocs": {"url": address, "description": "JSON Schema"}}
+                    content["schema"] = {**file, "externalDocs": {"url": address}}
 
 
 def _drop_unused(document: dict[str, Any]) -> None:

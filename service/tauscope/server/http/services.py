@@ -53,6 +53,7 @@ from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
+from tauscope.server.store.robots import RobotStore
 
 _log = logging.getLogger("tauscope.jobs")
 
@@ -63,6 +64,7 @@ class Services:
 
     settings: Settings
     recordings: RecordingStore
+    robots: RobotStore
     identifications: JobKind
     diagnoses: JobKind
     rollouts: JobKind
@@ -222,6 +224,7 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
     return Services(
         settings=settings,
         recordings=recordings,
+        robots=RobotStore(settings.data_folder / "robots"),
         identifications=identifications,
         diagnoses=diagnoses,
         rollouts=rollouts,

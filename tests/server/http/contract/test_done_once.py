@@ -27,6 +27,7 @@ NOT_NEEDED: dict[str, str] = {
     f"{V1}/runs/{{identifier}}/stop": STOPS_AGAIN,
     f"{V1}/campaigns/{{identifier}}/stop": STOPS_AGAIN,
     f"{V1}/robots/check": "keeps nothing",
+    f"{V1}/robots": "the same content is kept once",
     f"{V1}/mappings/check": "keeps nothing",
     f"{V1}/events/{{number}}/acknowledge": "an event that is closed stays as it was closed",
     f"{V1}/models/{{identifier}}/activate": SET_AGAIN,

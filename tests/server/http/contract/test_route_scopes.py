@@ -30,6 +30,8 @@ CHANGING: dict[str, Scope] = {
     f"POST {V1}/campaigns/{{identifier}}/stop": READ,
     f"POST {V1}/robots/check": ANALYSE,
     f"POST {V1}/recordings": ANALYSE,
+    f"POST {V1}/robots": ANALYSE,
+    f"DELETE {V1}/robots/versions/{{version}}": ADMIN,
     f"POST {V1}/mappings/check": ANALYSE,
     f"POST {V1}/identifications": ANALYSE,
     f"POST {V1}/diagnoses": ANALYSE,

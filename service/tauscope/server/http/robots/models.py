@@ -1,11 +1,14 @@
 """Requests and answers about robots."""
 
+from dataclasses import asdict
+from datetime import datetime
 from typing import Any
 
 from pydantic import Field
 
 from tauscope.robot import JointType, RobotReport, Severity
 from tauscope.server.models import AnswerModel
+from tauscope.server.store.robots import RobotVersion
 from tauscope.strict_model import StrictModel
 
 EXAMPLE_ROBOT: dict[str, Any] = {
@@ -30,6 +33,21 @@ class RobotCheckRequest(StrictModel):
     """A robot to be checked."""
 
     robot: dict[str, Any] = Field(description="content of a robot file")
+
+
+class RobotVersionAnswer(AnswerModel):
+    """A robot that is kept."""
+
+    version: str = Field(description="of its content; a request's robot may be {version: …}")
+    name: str = Field(description="as in its file")
+    robot_file: str = Field(description="which of its files is the robot file")
+    created: datetime = Field(description="when it was kept, UTC")
+    link: str = Field(description="path of its resource")
+
+    @classmethod
+    def of(cls, robot: RobotVersion) -> "RobotVersionAnswer":
+        """The answer that holds a version."""
+        return cls(**asdict(robot), link=f"/api/v1/robots/versions/{robot.version}")
 
 
 class LimitsAnswer(AnswerModel):
