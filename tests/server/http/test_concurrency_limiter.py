@@ -6,6 +6,8 @@ from collections.abc import Awaitable, Callable
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
+from tauscope.server.http import processor_wait as processor_wait_module
+from tauscope.server.http.processor_wait import LONGEST_PAUSE_S
 from tauscope.server.http.protection import ConcurrencyLimiter
 
 NEVER_S = 3600.0
@@ -38,6 +40,14 @@ async def receive() -> Message:
 
 async def send(message: Message) -> None:
     """Nobody looks at the answers."""
+
+
+@pytest.fixture(autouse=True)
+def processor_wait(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """How long the event loop has waited for a processor [s]: the last number."""
+    waits = [0.0]
+    monkeypatch.setattr(processor_wait_module, "read_processor_wait", lambda: waits[-1])
+    return waits
 
 
 async def settle() -> None:
@@ -162,3 +172,25 @@ def test_readers_that_wait_when_the_service_ends_are_let_go() -> None:
     asyncio.run(run())
     assert work.entered == ["/slow/0"]
     assert (statuses.count(200), statuses.count(503)) == (1, 199)
+
+
+def test_readers_pause_where_processors_are_scarce_and_nothing_else_does(processor_wait: list[float]) -> None:
+    async def scene(work: Work, ask: Callable[[str, str], asyncio.Task[None]]) -> None:
+        work.may_end.set()
+        first = ask("GET", "/slow/1")
+        await settle()
+        processor_wait.append(10.0)
+        work.may_begin.set()
+        await first
+        began = asyncio.get_running_loop().time()
+        await ask("POST", "/api/v1/stop")
+        await ask("GET", "/healthz")
+        assert asyncio.get_running_loop().time() - began < 0.5 * LONGEST_PAUSE_S
+        given_up = ask("GET", "/slow/2")
+        await settle()
+        given_up.cancel()
+        await ask("GET", "/slow/3")
+        assert asyncio.get_running_loop().time() - began >= 0.9 * LONGEST_PAUSE_S
+        await asyncio.gather(ask("GET", "/slow/4"), ask("GET", "/slow/5"))  # no slot was lost
+
+    play(scene)

@@ -248,7 +248,7 @@ class ConcurrencyLimiter:
     """Admits a few reading requests at a time, first come first served; all other requests pass at once.
 
     A slot is free again when the answer begins: a stream of events keeps no other request waiting. Where processors are
-    scarce, it stays empty for a while.
+    scarce, the next one begins after a pause.
     """
 
     def __init__(
@@ -263,6 +263,7 @@ class ConcurrencyLimiter:
         self._is_closing = is_closing
         self._slots, self._probes = asyncio.Semaphore(readers), asyncio.Semaphore(1)
         self._slot_timeout_s = slot_timeout_s
+        self._resumes_s = 0.0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request when a slot is free."""
@@ -270,21 +271,35 @@ class ConcurrencyLimiter:
             return await self.app(scope, receive, send)
         slots = self._probes if scope["path"] in _PROBES else self._slots
         await slots.acquire()
+        if slots is self._slots:
+            await self._pause()
         if slots is self._slots and self._is_closing():  # hundreds that wait would hold up the end
             slots.release()
             text = "the service is ending; ask again when it has started"
             problem = make_problem("not-ready", text, scope["path"])
             return await problem_answer(problem, {"Retry-After": "5"})(scope, receive, send)
-        slot = _Slot(slots, self._slot_timeout_s)
+        slot, wait = _Slot(slots, self._slot_timeout_s), ProcessorWait()
+
+        def end_slot() -> None:
+            if slot.end():
+                self._resumes_s = max(self._resumes_s, time.monotonic() + wait.take_pause())
 
         async def send_and_free_slot(message: Message) -> None:
-            slot.end()
+            end_slot()
             await send(message)
 
         try:
             await self.app(scope, receive, send_and_free_slot)
         finally:
-            slot.end()
+            end_slot()
+
+    async def _pause(self) -> None:
+        """Wait until reading may go on; a client that goes meanwhile leaves its slot."""
+        try:
+            await asyncio.sleep(max(0.0, self._resumes_s - time.monotonic()))
+        except BaseException:
+            self._slots.release()
+            raise
 
 
 class _Slot:
@@ -292,12 +307,13 @@ class _Slot:
 
     def __init__(self, slots: asyncio.Semaphore, longest_s: float) -> None:
         self._slots, self._has_ended = slots, False
-        self._wait, self._loop = ProcessorWait(), asyncio.get_running_loop()
-        self._timer = self._loop.call_later(longest_s, self.end)
+        self._timer = asyncio.get_running_loop().call_later(longest_s, self.end)
 
-    def end(self) -> None:
-        """Let the next one in, at once unless processors are scarce."""
-        if not self._has_ended:
-            self._has_ended = True
-            self._timer.cancel()
-            self._loop.call_later(self._wait.take_pause(), self._slots.release)
+    def end(self) -> bool:
+        """Let the next one in; whether that is new."""
+        if self._has_ended:
+            return False
+        self._has_ended = True
+        self._timer.cancel()
+        self._slots.release()
+        return True

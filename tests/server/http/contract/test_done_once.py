@@ -26,6 +26,7 @@ NOT_NEEDED: dict[str, str] = {
     f"{V1}/stop": STOPS_AGAIN,
     f"{V1}/runs/{{identifier}}/stop": STOPS_AGAIN,
     f"{V1}/campaigns/{{identifier}}/stop": STOPS_AGAIN,
+    f"{V1}/leases": "exclusive, and ends by itself",
     f"{V1}/robots/check": "keeps nothing",
     f"{V1}/robots": "the same content is kept once",
     f"{V1}/mappings/check": "keeps nothing",
@@ -44,7 +45,6 @@ REQUESTS: dict[str, dict[str, Any]] = {
     f"{V1}/identifications": {"json": {"robot": ROBOT, **SNAPSHOT_JOB}},
     f"{V1}/diagnoses": {"json": {"robot": ROBOT, **SNAPSHOT_JOB}},
     f"{V1}/rollouts": {"json": {"robot": ROBOT, "recordings": ["monday.csv"]}},
-    f"{V1}/leases": {"json": {"robot": "two-joint-arm"}},
     RECORDINGS: {"files": {"file": ("new.csv", b"t,q1,tau1\n")}},
     f"{V1}/schedules/{{name}}/run": {"json": {"reason": "a test"}},
 }

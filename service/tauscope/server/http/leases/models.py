@@ -43,7 +43,7 @@ class LeaseAnswer(AnswerModel):
     """A lease that holds."""
 
     id: str = Field(description="identifier", examples=["lease-7"])
-    number: int = Field(description="fencing number: above that of every earlier lease, also before a restart")
+    number: int = Field(description="above that of every earlier lease since the service started")
     token: str | None = Field(
         default=None, description="what to send as header Lease-Token; told to whoever takes the lease, once"
     )

@@ -68,7 +68,7 @@ _NO_BODY = {"requestBody": {"required": False, "content": {}}}
     status_code=201,
     summary="Take the lease of an arm",
     response_model=LeaseAnswer,
-    responses=problem_responses("bad-request", "limit-exceeded", "media-type", "leased", "busy", "storage-full"),
+    responses=problem_responses("bad-request", "limit-exceeded", "media-type", "leased", "busy"),
     openapi_extra={"requestBody": {"required": True, "content": json_body(LeaseRequest, EXAMPLES)}},
 )
 async def take_lease(request: Request, response: Response, services: ServicesDep) -> LeaseAnswer:
