@@ -161,7 +161,7 @@ def problem_responses(*codes: str) -> dict[int | str, dict[str, Any]]:
     responses: dict[int | str, dict[str, Any]] = {}
     for code in codes:
         kind = KINDS[code]
-        example = make_problem(code, f"{kind.title}.", "/api/v1/…").model_dump(exclude_none=True)
+        example = make_problem(code, "…", "/api/v1/…").model_dump(exclude_none=True)
         answer = responses.setdefault(
             int(kind.status),
             {

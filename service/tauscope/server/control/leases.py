@@ -1,7 +1,7 @@
-"""Who controls which arm: exclusive leases that expire unless renewed, numbered for fencing, and permits to move.
+"""Who controls which arm: exclusive leases that expire unless renewed, and permits to move.
 
-A lease holds while the clock is before its end; no thread has to be alive for it to expire. Its number is higher than
-that of every lease before it, also after a restart, so that a former holder is never taken for the present one.
+A lease holds while the clock is before its end; no thread has to be alive for it to expire. Its secret is drawn anew:
+a former holder is never taken for the present one.
 """
 
 import hmac
@@ -10,13 +10,12 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from itertools import count
 from typing import Protocol
 
 from typing_extensions import override
 
 from tauscope.errors import AcquisitionError
-from tauscope.files import write_atomically
 from tauscope.robot.messages import one_line
 from tauscope.server.control.device_claims import DeviceClaims
 
@@ -106,19 +105,6 @@ class Lease:
         return f"{self.number}-{self.secret}"
 
 
-def next_number(counter: Path) -> int:
-    """A number above all before, kept before it is used."""
-    try:
-        last = int(counter.read_text(encoding="ascii"))
-    except FileNotFoundError:
-        last = 0
-    except (OSError, ValueError):
-        # The seconds of our era are more than any number that was counted one by one.
-        last = int(time.time())
-    write_atomically(counter, str(last + 1).encode())
-    return last + 1
-
-
 class LeasePermit:
     """Leave by a lease that was shown."""
 
@@ -168,12 +154,11 @@ class Leases:
     def __init__(
         self,
         claims: DeviceClaims,
-        counter: Path,
         *,
         clock: Callable[[], float] = time.monotonic,
         on_end: LeaseEnd | None = None,
     ) -> None:
-        self._claims, self._counter, self._clock = claims, counter, clock
+        self._claims, self._numbers, self._clock = claims, count(1), clock
         self._on_end = on_end or (lambda _lease, _why: None)
         self._lock = threading.Lock()
         self._active: Mapping[str, Lease] = {}
@@ -200,7 +185,7 @@ class Leases:
                 if not take:
                     raise self._refuse_leased(present)
                 self._finish(present, f"{holder} took the arm")
-            number = next_number(self._counter)
+            number = next(self._numbers)
             lease = Lease(
                 id=f"lease-{number}",
                 number=number,

@@ -210,7 +210,7 @@ async def submit_campaign(request: Request, services: Services) -> str:
     """
     async with stage_request(services.campaigns.items, CampaignWorkspace) as workspace:
         received = await receive_request(request, CampaignRequest, services.settings, workspace.robot)
-        robot_file = await run_in_threadpool(keep_robot, received, workspace.robot)
+        robot_file = await run_in_threadpool(keep_robot, received, workspace.robot, services.robots)
         robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
         backend = chosen_backend(services.settings, received.document.backend, robot)
         permit = permit_of(request, services, backend.device(robot.name))

@@ -54,7 +54,7 @@ class LeaseAnswer(AnswerModel):
     """A lease that holds."""
 
     id: str = Field(description="identifier", examples=["lease-7"])
-    number: int = Field(description="fencing number: above that of every earlier lease, also before a restart")
+    number: int = Field(description="above that of every earlier lease since the service started")
     token: str | None = Field(
         default=None, description="what to send as header Lease-Token; told to whoever takes the lease, once"
     )
@@ -117,7 +117,7 @@ _NO_BODY = {"requestBody": {"required": False, "content": {}}}
     status_code=201,
     summary="Take the lease of an arm",
     response_model=LeaseAnswer,
-    responses=problem_responses("bad-request", "limit-exceeded", "media-type", "leased", "busy", "storage-full"),
+    responses=problem_responses("bad-request", "limit-exceeded", "media-type", "leased", "busy"),
     openapi_extra={"requestBody": {"required": True, "content": json_body(LeaseRequest, EXAMPLES)}},
 )
 async def take_lease(request: Request, response: Response, services: ServicesDep) -> LeaseAnswer:

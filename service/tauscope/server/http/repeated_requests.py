@@ -13,7 +13,7 @@ from starlette.types import ASGIApp, Message, Receive, Send
 from starlette.types import Scope as AsgiScope
 
 from tauscope.server.auth.gate import find_caller
-from tauscope.server.http.repeated_answers import Answers, KeptAnswer, request_name
+from tauscope.server.http.repeated_answers import KeptAnswer, StoredAnswers, request_name
 from tauscope.server.http.services import Services
 from tauscope.server.problems import make_problem, problem_answer
 
@@ -50,9 +50,8 @@ HEADER = "Idempotency-Key"
 LONGEST_KEY = 200
 """Most characters of the header's value."""
 
-_LEASES = "/api/v1/leases"
 _REPEATABLE = re.compile(
-    r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|rollouts|recordings|leases|schedules/[^/]+/run)"
+    r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|rollouts|recordings|schedules/[^/]+/run)"
 )
 _KEY = re.compile(rf"[\x21-\x7e]{{1,{LONGEST_KEY}}}")
 
@@ -111,10 +110,9 @@ def is_repeatable(path: str) -> bool:
     return _REPEATABLE.fullmatch(path) is not None
 
 
-def _answers_of(scope: AsgiScope) -> Answers:
-    """Where the answers to a request are kept: a lease's secret never on the disk, it ends with the service anyway."""
-    services = cast(Services, scope["app"].state.services)
-    return services.lease_answers if scope["path"] == _LEASES else services.answers
+def _answers_of(scope: AsgiScope) -> StoredAnswers:
+    """Where answers are kept."""
+    return cast(Services, scope["app"].state.services).answers
 
 
 class _Captured:
@@ -150,7 +148,7 @@ def _count_body(receive: Receive, fingerprint: Fingerprint) -> Receive:
     return received
 
 
-async def _repeat(scope: AsgiScope, receive: Receive, store: Answers, name: str, is_underway: bool) -> Response:
+async def _repeat(scope: AsgiScope, receive: Receive, store: StoredAnswers, name: str, is_underway: bool) -> Response:
     """The answer to a request that came before."""
     fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
     more = True

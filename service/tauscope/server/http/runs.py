@@ -298,7 +298,7 @@ def _put_robot(received: Received[RunRequest], services: Services, workspace: Ru
     """Put the robot into its place; returns its file's name."""
     document, has_robot = received.document, received.form.file("robot") or received.document.robot
     if document.excitation is None or has_robot:
-        return keep_robot(received, workspace.robot)
+        return keep_robot(received, workspace.robot, services.robots)
     excitation = EXCITATIONS.finished(services, document.excitation)
     order = excitation.read_order()
     shutil.copytree(excitation.robot, workspace.robot, dirs_exist_ok=True)

@@ -33,7 +33,7 @@ from tauscope.server.http.heartbeat import Heartbeat
 from tauscope.server.http.metrics import Metrics, TimedExecutor
 from tauscope.server.http.readiness import Clock, Readiness, ReadyMetrics, check_database, check_disk
 from tauscope.server.http.reading import WIDTH, ReadingQueue
-from tauscope.server.http.repeated_answers import Answers, MemoryAnswers, StoredAnswers
+from tauscope.server.http.repeated_answers import StoredAnswers
 from tauscope.server.http.settings import Settings
 from tauscope.server.http.tasks.event_feeds import EventFeeds
 from tauscope.server.queue.analyses import run_diagnosis, run_identification, run_rollout
@@ -51,6 +51,7 @@ from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
+from tauscope.server.store.robots import RobotStore
 
 _log = logging.getLogger("tauscope.jobs")
 
@@ -61,6 +62,7 @@ class Services:
 
     settings: Settings
     recordings: RecordingStore
+    robots: RobotStore
     identifications: JobKind
     diagnoses: JobKind
     rollouts: JobKind
@@ -72,8 +74,7 @@ class Services:
     access: Access
     leases: Leases
     audit: AuditTrail
-    answers: Answers
-    lease_answers: Answers
+    answers: StoredAnswers
     metrics: Metrics
     readiness: Readiness
     heartbeat: Heartbeat
@@ -205,7 +206,7 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
         jobs = new_queue(slots=settings.workers)
     audit = AuditTrail(AuditLog(settings.data_folder))
     claims, closing = DeviceClaims(settings.max_arms), threading.Event()
-    leases = Leases(claims, settings.data_folder / "lease-number", on_end=partial(_note_end, audit))
+    leases = Leases(claims, on_end=partial(_note_end, audit))
     start = start or partial(start_control, sim_socket=settings.sim_socket)
     runs = RunManager(items["run"], recordings, start, claims, heartbeat.is_alive, metrics.run_ended)
     dependencies = CampaignDependencies(jobs, excitations, identifications, diagnoses, runs, recordings)
@@ -217,6 +218,7 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
     return Services(
         settings=settings,
         recordings=recordings,
+        robots=RobotStore(settings.data_folder / "robots"),
         identifications=identifications,
         diagnoses=diagnoses,
         rollouts=rollouts,
@@ -229,7 +231,6 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
         leases=leases,
         audit=audit,
         answers=StoredAnswers(settings.data_folder / "idempotency"),
-        lease_answers=MemoryAnswers(),
         metrics=metrics,
         readiness=Readiness(_collect_checks(ground, jobs, readers, audit, closing)),
         closing=closing,

@@ -138,7 +138,7 @@ class QueuedTask:
             for part, (folder, limit) in self.further_parts.items():
                 rules[part] = PartRule(limit, workspace.uploads(folder), default_name=f"{part}.json")
             received = await receive_request(request, self.models[0], settings, workspace.robot, rules)
-            robot_file = await run_in_threadpool(keep_robot, received, workspace.robot)
+            robot_file = await run_in_threadpool(keep_robot, received, workspace.robot, services.robots)
             robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
             wanted = {"robot_file": robot_file, "robot_name": robot.name}
             caller = find_caller(request.scope).name

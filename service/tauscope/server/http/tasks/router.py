@@ -196,14 +196,12 @@ def make_router(resource: Resource) -> APIRouter:
         responses=problem_responses("not-found", "damaged", "robot-file", *READING),
     )
     async def get_robot(request: Request, identifier: Identifier, services: ServicesDep) -> JobRobotAnswer:
-        """Its joints, limits and frames, and the very files that were sent: they can be handed in again."""
+        """Its joints, limits and frames, and the files that were sent."""
         workspace = await run_in_threadpool(resource.find, services, identifier)
         folder, order = workspace.robot, await run_in_threadpool(workspace.read_order)
         if order is None:
             raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it has no robot any more")
-        report = await services.reading.call(request, check_received_robot, folder, order.robot_file)
-        files = await run_in_threadpool(_read_files, folder)
-        return JobRobotAnswer(report=RobotReportAnswer.of(report), robot_file=order.robot_file, files=files)
+        return await describe_robot(request, services, folder, order.robot_file)
 
     add_events_route(router, noun, resource.followed)
     return router
@@ -338,6 +336,13 @@ def add_export_route(
         file = formats[ExportFormat(format_)]
         disposition = {"Content-Disposition": f'attachment; filename="{file.name}"'}
         return Response(workspace.read_export(file.name), headers=disposition, media_type=file.media_type)
+
+
+async def describe_robot(request: Request, services: Services, folder: FilePath, robot_file: str) -> JobRobotAnswer:
+    """A robot at a glance, and its files."""
+    report = await services.reading.call(request, check_received_robot, folder, robot_file)
+    files = await run_in_threadpool(_read_files, folder)
+    return JobRobotAnswer(report=RobotReportAnswer.of(report), robot_file=robot_file, files=files)
 
 
 def _lease_header(_lease: LeaseToken = None) -> None:

@@ -1,5 +1,6 @@
 """A request that hands a job in: JSON, or a form with the JSON as part `request` and files beside it."""
 
+import shutil
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -29,6 +30,7 @@ from tauscope.server.problems import ProblemError
 from tauscope.server.queue.task_job import SAVED_MODEL, Staged, TaskWorkspace
 from tauscope.server.store.files import FILE_NAME_PATTERN, FILE_NAME_RULE, KeptFile, is_file_name
 from tauscope.server.store.items import ItemStore
+from tauscope.server.store.robots import RobotStore
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.task import ROLES
 
@@ -67,7 +69,9 @@ class RobotRequest(StrictModel):
     """What a request says about a robot."""
 
     robot: dict[str, Any] | None = Field(
-        default=None, description="content of a robot file; in a form, the part `robot` may hold the file instead"
+        default=None,
+        description="content of a robot file, or {version: …} of a kept robot; in a form, the part `robot` may hold"
+        " the file instead",
     )
 
 
@@ -147,10 +151,11 @@ async def receive_request(
     return Received(parse_document(form.texts.get("request", b"{}"), kind, within="part request"), form)
 
 
-def keep_robot(received: Received[Any], folder: Path) -> str:
-    """Name of the robot file in the job's folder, written there if it came as JSON.
+def keep_robot(received: Received[Any], folder: Path, robots: RobotStore) -> str:
+    """Name of the robot file in the job's folder, written there if it came as JSON or is a kept one.
 
     Raises ProblemError if there is no robot, or two. Raises RobotFileError if its content is not plain data.
+    Raises NotFoundError if it names a version that is not kept.
     """
     file, inline = received.form.file("robot"), received.document.robot
     if file is not None and inline is not None:
@@ -159,6 +164,10 @@ def keep_robot(received: Received[Any], folder: Path) -> str:
         return file.name
     if inline is None:
         raise ProblemError("invalid-request", "no robot was sent; send part robot, or the field robot in the JSON")
+    if inline.keys() == {"version"}:
+        robot = robots.find(str(inline["version"]))
+        shutil.copytree(robots.files(robot.version), folder, dirs_exist_ok=True)
+        return robot.robot_file
     return keep_inline_robot(folder, inline)
 
 
@@ -175,5 +184,5 @@ def request_body(
         "urdf": binary_part("the URDF that the robot file names, by its bare name"),
         **(further_parts or {}),
     }
-    form = form_body(parts, required=[], encoding={"request": {"contentType": JSON}})
+    form = form_body(parts, required=[])
     return {"requestBody": {"required": True, "content": {**json_body(kind, examples), **form}}}
