@@ -40,7 +40,7 @@ class DynamixelDriver(BusDriver):
 
     def list_adapters(self) -> list[Finding]:
         """Serial ports of this machine."""
-        from tauscope_drivers.dynamixel.doctor import serial_adapters
+        from tauscope_drivers.serial_adapters import serial_adapters
 
         return serial_adapters()
 

@@ -86,7 +86,7 @@ def _adapters(backend: str | None) -> list[Finding]:
     for bus in buses:
         adapters = bus.list_adapters()
         found += adapters or [Finding(Severity.WARNING, bus.name, "no adapter is there", "plug one in")]
-    return found
+    return list(dict.fromkeys(found))  # several buses may hang on one kind of adapter
 
 
 def _drives(path: Path, backend: str | None) -> Sequence[Finding]:

@@ -1,0 +1,213 @@
+"""Instructions and their answers on one bus of servos."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from tauscope_drivers.answer_time import AnswerTime
+from tauscope_drivers.clock import Clock, MonotonicClock
+from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.feetech import packets
+from tauscope_drivers.feetech.packets import ANSWER_BYTES, FrameParser, Status
+from tauscope_drivers.feetech.registers import FIRST_IN_RAM, REGISTERS, SPARE_BYTES, Block
+from tauscope_drivers.serial_port import BITS_PER_BYTE, SerialPort
+
+FACTORY_RETURN_DELAY_S = 500e-6
+"""Return Delay Time of 250 [s]."""
+
+ATTEMPTS = 3
+"""How often a single servo is asked outside the control loop."""
+
+PATIENCE_S = 0.02
+"""How much longer a single servo is waited for there [s]."""
+
+_PING_SLOT_S = 0.003
+"""Time that a ping to all leaves each ID [s]."""
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Answers to one question to many servos.
+
+    asked_ns : int
+        instant at which the question had left [ns, by the bus' clock]
+    late_ns : int
+        how much later than usual the last answer came [ns]
+    beyond_ns : int
+        how much longer than bus and adapter should take for it [ns]
+    """
+
+    asked_ns: int
+    late_ns: int
+    statuses: dict[int, Status]
+    beyond_ns: int = 0
+
+
+class FeetechBus:
+    """Speaks to the servos of one port; one thread's own.
+
+    Nothing in an answer says to which question it belongs. After each question that was not answered in time, all
+    further ones ask for another number of bytes, so that an answer that comes late has the wrong length.
+    """
+
+    def __init__(self, port: SerialPort, clock: Clock | None = None) -> None:
+        """Use a port, open or not yet."""
+        self.port = port
+        self.return_delay_s = FACTORY_RETURN_DELAY_S
+        self._clock = MonotonicClock() if clock is None else clock
+        self._spare = 0
+        self._owes = False
+        self._answer_times: dict[int, AnswerTime] = {}
+
+    def ping(self, servo: int) -> bool:
+        """Whether a servo answers."""
+        return any(self._ask(servo, packets.encode_ping(servo), 0, PATIENCE_S) for _ in range(ATTEMPTS))
+
+    def ping_all(self) -> list[int]:
+        """IDs of the servos that answer a ping to all."""
+        slots = packets.HIGHEST_ID + 1
+        self.port.send(packets.encode_ping())
+        deadline = self.port.reply_deadline_ns(ANSWER_BYTES * slots, slots * _PING_SLOT_S)
+        parser, found = FrameParser(), set[int]()
+        while received := self.port.receive(deadline):
+            statuses = map(packets.decode_status, parser.feed(received))
+            found |= {status.servo for status in statuses if status is not None and not status.data}
+        return sorted(found)
+
+    def read(self, servo: int, block: Block) -> tuple[int, dict[str, int]]:
+        """Alarms and registers of one servo, asked again while it does not answer.
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: it does not answer
+        """
+        for _ in range(ATTEMPTS):
+            request = packets.encode_read(servo, block.address, block.length)
+            answer = self._ask(servo, request, block.length, PATIENCE_S)
+            if answer is not None:
+                return answer.alarms, block.decode(answer.data)
+        raise DriverError(
+            DriverErrorKind.CANNOT_CONNECT,
+            f"servo {servo} does not answer; check its power, cable, ID and baud rate",
+        )
+
+    def read_once(self, servo: int, block: Block) -> Status | None:
+        """A block and its spare bytes, asked for once; None where no whole answer came in time."""
+        length = block.length + self._spare
+        answer = self._ask(servo, packets.encode_read(servo, block.address, length), length)
+        if answer is None:
+            self._miss()
+        return answer
+
+    def write(self, servo: int, values: Mapping[str, int]) -> None:
+        """Write neighbouring registers of one servo's RAM and read them back.
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: it does not answer; ``refused``: it holds something else
+        """
+        address, data = encode_registers(values)
+        for _ in range(ATTEMPTS):
+            # A servo whose Response Status Level is 0 does not answer: the registers that it holds now count.
+            self._ask(servo, packets.encode_write(servo, address, data), 0, self.return_delay_s)
+            found = self.read(servo, Block(address, len(data)))[1]
+            if all(found[name] == value for name, value in values.items()):
+                return
+        name, value = next((name, value) for name, value in values.items() if found[name] != value)
+        raise DriverError(
+            DriverErrorKind.REFUSED,
+            f"servo {servo}: {name} was written as {value} and reads {found[name]}; check it with Feetech's FD",
+        )
+
+    def sync_write(self, values: Mapping[int, Mapping[str, int]]) -> None:
+        """Write the same registers of many servos' RAM; no servo answers."""
+        encoded = {servo: encode_registers(own) for servo, own in values.items()}
+        if encoded:
+            (address,) = {start for start, _ in encoded.values()}
+            self.port.send(packets.encode_sync_write({servo: data for servo, (_, data) in encoded.items()}, address))
+
+    def sync_read(self, servos: Sequence[int], block: Block, patience_s: float = 0.0) -> Answers:
+        """Read a block and its spare bytes of many servos."""
+        if self._owes:
+            self._owes = False
+            self.port.drain()
+        length = block.length + self._spare
+        request = packets.encode_sync_read(servos, block.address, length)
+        # Taken before: who is woken by the bytes may run before this process does again.
+        asked_ns = self._clock.now_ns() + round(self._wire_s(len(request)) * 1e9)
+        self.port.send(request)
+        answer_bytes = len(servos) * (ANSWER_BYTES + length)
+        waits_s = len(servos) * self.return_delay_s
+        deadline = self.port.reply_deadline_ns(len(request) + answer_bytes, waits_s + patience_s)
+        found, answered_ns = self._receive_each(servos, length, max(len(request), ANSWER_BYTES + length), deadline)
+        if len(found) < len(servos):
+            self._miss()
+        if not found:
+            return Answers(asked_ns, 0, found)
+        usual_s = self._wire_s(answer_bytes) + waits_s + self.port.latency_s
+        taken_ns = answered_ns - asked_ns - round(usual_s * 1e9)
+        late_ns = self._answer_times.setdefault(len(servos), AnswerTime()).late_ns(taken_ns)
+        return Answers(asked_ns, late_ns, found, max(0, taken_ns))
+
+    def _receive_each(
+        self, servos: Sequence[int], length: int, longest: int, deadline: int
+    ) -> tuple[dict[int, Status], int]:
+        """One answer of each servo, and when the last came; none of a servo that gave two that differ."""
+        parser, found = FrameParser(longest), dict[int, Status]()
+        contradicted: set[int] = set()
+        answered_ns = 0
+        while len(found) + len(contradicted) < len(servos) and (received := self.port.receive(deadline)):
+            for frame in parser.feed(received):
+                status = packets.decode_status(frame)
+                if status is None or status.servo not in servos or len(status.data) != length:
+                    continue
+                answered_ns = self._clock.now_ns()
+                if found.setdefault(status.servo, status) != status:
+                    contradicted.add(status.servo)
+        return {servo: status for servo, status in found.items() if servo not in contradicted}, answered_ns
+
+    def _ask(self, servo: int, request: bytes, length: int, patience_s: float = 0.0) -> Status | None:
+        """Send an instruction to one servo and wait for its answer; an echo of the instruction is none."""
+        if self._owes:
+            self._owes = False
+            self.port.drain()
+        self.port.send(request)
+        delay_s = self.return_delay_s + patience_s
+        deadline = self.port.reply_deadline_ns(len(request) + ANSWER_BYTES + length, delay_s)
+        parser = FrameParser(max(len(request), ANSWER_BYTES + length))
+        may_echo = True
+        while received := self.port.receive(deadline):
+            for frame in parser.feed(received):
+                if may_echo and frame == request:
+                    may_echo = False
+                    continue
+                status = packets.decode_status(frame)
+                if status is not None and status.servo == servo and len(status.data) == length:
+                    return status
+        self._owes = True
+        return None
+
+    def _miss(self) -> None:
+        """An answer that is missing may come yet."""
+        self._owes = True
+        self._spare = (self._spare + 1) % (SPARE_BYTES + 1)
+
+    def _wire_s(self, count: int) -> float:
+        """Time of so many bytes on the wire [s]."""
+        return count * BITS_PER_BYTE / self.port.baudrate
+
+
+def encode_registers(values: Mapping[str, int]) -> tuple[int, bytes]:
+    """Address and bytes of neighbouring registers in RAM.
+
+    Raises
+    ------
+    ValueError
+        they are no neighbours, or lie in EEPROM
+    """
+    registers = [REGISTERS[name] for name in values]
+    ends = [register.end for register in registers[:-1]]
+    if registers[0].address < FIRST_IN_RAM or ends != [register.address for register in registers[1:]]:
+        raise ValueError(f"{', '.join(values)} cannot be written at once, or not at all")
+    return registers[0].address, b"".join(REGISTERS[name].encode(value) for name, value in values.items())
