@@ -127,5 +127,5 @@ class FeetechBus:
         return deliveries
 
     def _wire_s(self, length: int) -> float:
-        baud = min(servo.specification.baud for servo in self.servos.values())
+        baud = min((servo.specification.baud for servo in self.servos.values()), default=1_000_000)
         return length * 10 / baud if self._paced else 0.0

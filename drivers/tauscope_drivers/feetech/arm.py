@@ -170,16 +170,14 @@ class FeetechArm:
                     task.bound(servo.counts(place))
                     for task, servo, place in zip(self._tasks, session.servos, setpoint.position.tolist(), strict=True)
                 ]
+                goals = enumerate(zip(session.servos, self._last_goals, strict=True))
                 session.bus.sync_write(
-                    {
-                        servo.servo: {"Goal Position": goal}
-                        for servo, goal, holds in zip(
-                            session.servos, self._last_goals, session.health.has_torque, strict=True
-                        )
-                        if holds  # a goal may switch torque on
-                    }
+                    {servo.servo: {"Goal Position": goal} for joint, (servo, goal) in goals if session.follows(joint)}
                 )
             answers = session.bus.sync_read(session.identifiers, FEEDBACK)
+            session.unsure |= {
+                joint for joint, servo in enumerate(session.identifiers) if servo not in answers.statuses
+            }
             session.watch_next()
         self._last_exchange_ns = self._clock.now_ns()
         return arm_state(session, answers)

@@ -1,6 +1,7 @@
 """Instructions and their answers on one bus of servos."""
 
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from tauscope_drivers.answer_time import AnswerTime
@@ -19,6 +20,9 @@ ATTEMPTS = 3
 
 PATIENCE_S = 0.02
 """How much longer a single servo is waited for there [s]."""
+
+_LATEST_ANSWER_NS = 500_000_000
+"""Answers have come 133 ms late where a machine stood still; a control loop gives an arm up long before this."""
 
 _PING_SLOT_S = 0.003
 """Time that a ping to all leaves each ID [s]."""
@@ -45,8 +49,9 @@ class Answers:
 class FeetechBus:
     """Speaks to the servos of one port; one thread's own.
 
-    Nothing in an answer says to which question it belongs. After each question that was not answered in time, all
-    further ones ask for another number of bytes, so that an answer that comes late has the wrong length.
+    Nothing in an answer says to which question it belongs. After a question that was not answered in time, the next
+    ones ask for another number of bytes: an answer that comes late has the wrong length. A servo that may still owe an
+    answer of the same length is not believed.
     """
 
     def __init__(self, port: SerialPort, clock: Clock | None = None) -> None:
@@ -54,7 +59,7 @@ class FeetechBus:
         self.port = port
         self.return_delay_s = FACTORY_RETURN_DELAY_S
         self._clock = MonotonicClock() if clock is None else clock
-        self._spare = 0
+        self._missed_ns: dict[tuple[int, int], int] = {}
         self._owes = False
         self._answer_times: dict[int, AnswerTime] = {}
 
@@ -92,12 +97,13 @@ class FeetechBus:
         )
 
     def read_once(self, servo: int, block: Block) -> Status | None:
-        """A block and its spare bytes, asked for once; None where no whole answer came in time."""
-        length = block.length + self._spare
+        """A block and some spare bytes, asked for once; None where no answer came that can be believed."""
+        length = self._choose_length([servo], block)
+        owed = self._owed([servo], length)
         answer = self._ask(servo, packets.encode_read(servo, block.address, length), length)
         if answer is None:
-            self._miss()
-        return answer
+            self._miss([servo], length)
+        return None if owed else answer
 
     def write(self, servo: int, values: Mapping[str, int]) -> None:
         """Write neighbouring registers of one servo's RAM and read them back.
@@ -128,11 +134,10 @@ class FeetechBus:
             self.port.send(packets.encode_sync_write({servo: data for servo, (_, data) in encoded.items()}, address))
 
     def sync_read(self, servos: Sequence[int], block: Block, patience_s: float = 0.0) -> Answers:
-        """Read a block and its spare bytes of many servos."""
-        if self._owes:
-            self._owes = False
-            self.port.drain()
-        length = block.length + self._spare
+        """Read a block and some spare bytes of many servos."""
+        self._drain()
+        length = self._choose_length(servos, block)
+        owed = self._owed(servos, length)
         request = packets.encode_sync_read(servos, block.address, length)
         # Taken before: who is woken by the bytes may run before this process does again.
         asked_ns = self._clock.now_ns() + round(self._wire_s(len(request)) * 1e9)
@@ -141,8 +146,8 @@ class FeetechBus:
         waits_s = len(servos) * self.return_delay_s
         deadline = self.port.reply_deadline_ns(len(request) + answer_bytes, waits_s + patience_s)
         found, answered_ns = self._receive_each(servos, length, max(len(request), ANSWER_BYTES + length), deadline)
-        if len(found) < len(servos):
-            self._miss()
+        self._miss(set(servos) - found.keys(), length)
+        found = {servo: status for servo, status in found.items() if status is not None and servo not in owed}
         if not found:
             return Answers(asked_ns, 0, found)
         usual_s = self._wire_s(answer_bytes) + waits_s + self.port.latency_s
@@ -152,26 +157,23 @@ class FeetechBus:
 
     def _receive_each(
         self, servos: Sequence[int], length: int, longest: int, deadline: int
-    ) -> tuple[dict[int, Status], int]:
-        """One answer of each servo, and when the last came; none of a servo that gave two that differ."""
-        parser, found = FrameParser(longest), dict[int, Status]()
-        contradicted: set[int] = set()
+    ) -> tuple[dict[int, Status | None], int]:
+        """One answer of each servo, None where two differ, and when the last came."""
+        parser, found = FrameParser(longest), dict[int, Status | None]()
         answered_ns = 0
-        while len(found) + len(contradicted) < len(servos) and (received := self.port.receive(deadline)):
+        while len(found) < len(servos) and (received := self.port.receive(deadline)):
             for frame in parser.feed(received):
                 status = packets.decode_status(frame)
                 if status is None or status.servo not in servos or len(status.data) != length:
                     continue
                 answered_ns = self._clock.now_ns()
                 if found.setdefault(status.servo, status) != status:
-                    contradicted.add(status.servo)
-        return {servo: status for servo, status in found.items() if servo not in contradicted}, answered_ns
+                    found[status.servo] = None
+        return found, answered_ns
 
     def _ask(self, servo: int, request: bytes, length: int, patience_s: float = 0.0) -> Status | None:
         """Send an instruction to one servo and wait for its answer; an echo of the instruction is none."""
-        if self._owes:
-            self._owes = False
-            self.port.drain()
+        self._drain()
         self.port.send(request)
         delay_s = self.return_delay_s + patience_s
         deadline = self.port.reply_deadline_ns(len(request) + ANSWER_BYTES + length, delay_s)
@@ -188,10 +190,26 @@ class FeetechBus:
         self._owes = True
         return None
 
-    def _miss(self) -> None:
-        """An answer that is missing may come yet."""
-        self._owes = True
-        self._spare = (self._spare + 1) % (SPARE_BYTES + 1)
+    def _drain(self) -> None:
+        """Let what comes late pass, where something may."""
+        if self._owes:
+            self._owes = False
+            self.port.drain()
+
+    def _choose_length(self, servos: Sequence[int], block: Block) -> int:
+        """The length of which an answer was missed longest ago; the block's own where none was."""
+        lengths = range(block.length, block.length + SPARE_BYTES + 1)
+        return min(lengths, key=lambda length: max(self._missed_ns.get((servo, length), 0) for servo in servos))
+
+    def _owed(self, servos: Sequence[int], length: int) -> set[int]:
+        """Servos whose answer of this length to an earlier question may still be under way."""
+        since_ns = time.monotonic_ns() - _LATEST_ANSWER_NS
+        return {servo for servo in servos if self._missed_ns.get((servo, length), 0) > since_ns}
+
+    def _miss(self, servos: Collection[int], length: int) -> None:
+        """Note who has not answered: that answer may come yet."""
+        self._owes |= bool(servos)
+        self._missed_ns |= dict.fromkeys(((servo, length) for servo in servos), time.monotonic_ns())
 
     def _wire_s(self, count: int) -> float:
         """Time of so many bytes on the wire [s]."""

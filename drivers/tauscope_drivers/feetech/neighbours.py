@@ -39,13 +39,13 @@ def describe_device(servo: int, identity: Mapping[str, int]) -> str:
         the registers of `IDENTITY`
     """
     if (model := _robotis_model(servo, identity)) is not None:
-        return f"a {model} (Dynamixel protocol 1.0, not supported)"
+        return f"Dynamixel {model} (protocol 1.0, not supported)"
     number = _model_number(identity)
     if number == MODEL_NUMBER:
         return "STS3215"
     if number in NEIGHBOURS:
-        return f"a Feetech {NEIGHBOURS[number]} (not supported)"
-    return f"a device with model number {number} (not supported)"
+        return f"Feetech {NEIGHBOURS[number]} (not supported)"
+    return f"model number {number} (not supported)"
 
 
 def _model_number(identity: Mapping[str, int]) -> int:

@@ -42,6 +42,10 @@ class Health:
         """State the torque and limits that a servo shall have from now on; one that has others is at fault."""
         self._expected[joint] = values
 
+    def is_as_expected(self, joint: int) -> bool:
+        """Whether a servo has its torque and limits, as far as it was asked."""
+        return bool(self.has_torque[joint] and not self._lost[joint])
+
     def forget(self) -> None:
         """The operator knows."""
         self.alarms = [0] * len(self.alarms)
@@ -65,13 +69,16 @@ class Session:
 
     settings : list of dict
         EEPROM of each servo
+    unsure : set of int
+        joints whose servo has missed an answer since its torque and limits were read: it may have restarted
     """
 
     bus: FeetechBus
     servos: tuple[JointServo, ...]
     settings: list[dict[str, int]]
     health: Health
-    turn: int = field(default=0)
+    unsure: set[int] = field(default_factory=set)
+    turn: int = 0
 
     @property
     def identifiers(self) -> list[int]:
@@ -90,6 +97,7 @@ class Session:
             alarms, values = self.bus.read(self.servos[joint].servo, TARGETS)
         self.health.take_alarms(joint, alarms)
         self.health.take_targets(joint, values)
+        self.unsure.discard(joint)
         return values
 
     def read_feedback(self, joint: int) -> dict[str, int]:
@@ -117,12 +125,26 @@ class Session:
             self.bus.write(self.servos[joint].servo, values)
 
     def watch_next(self) -> None:
-        """Read torque and limits of the next servo in turn, once."""
-        joint, self.turn = self.turn, (self.turn + 1) % len(self.servos)
+        """Read torque and limits of a servo once: of one that has missed an answer, else of the next in turn."""
+        count = len(self.servos)
+        turns = [(self.turn + step) % count for step in range(count)]
+        joint = next((one for one in turns if one in self.unsure), self.turn)
+        self.turn = (joint + 1) % count
         answer = self.bus.read_once(self.servos[joint].servo, TARGETS)
         if answer is not None:
             self.health.take_alarms(joint, answer.alarms)
             self.health.take_targets(joint, TARGETS.decode(answer.data))
+            self.unsure.discard(joint)
+
+    def follows(self, joint: int) -> bool:
+        """Whether a servo may be sent a goal, which might switch torque on.
+
+        Parameters
+        ----------
+        joint : int
+            index of the joint, from 0
+        """
+        return self.health.is_as_expected(joint) and joint not in self.unsure
 
 
 @contextmanager
