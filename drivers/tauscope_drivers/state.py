@@ -28,6 +28,8 @@ class ArmState:
         of the motor, NaN where it is not reported [°C]
     enabled : (n,) bool
         whether the joint's drive holds or drives the joint
+    voltage : (n,) float64 or None
+        supply of the drive's bridge; None where the drives report none [V]
     late_ns : int
         how much later than the bus takes the answers came: the instant of the reading is not known any better [ns]
     """
@@ -40,6 +42,7 @@ class ArmState:
     enabled: NDArray[np.bool_]
     faults: tuple[Fault, ...] = ()
     late_ns: int = 0
+    voltage: Array | None = None
 
     @property
     def fresh(self) -> NDArray[np.bool_]:

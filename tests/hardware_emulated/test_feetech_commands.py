@@ -123,6 +123,8 @@ def test_run_moves_the_servos_and_an_arm_that_holds_is_let_go(
     samples = recording.samples()
     assert samples.reference is not None
     assert np.nanmax(np.abs(samples.reference - samples.position)) < 0.2
+    assert samples.voltage is not None
+    assert np.nanmin(samples.voltage) == np.nanmax(samples.voltage) == pytest.approx(7.4)
     assert all(emulator.state["enabled"]), "it holds"
     assert "The arm is under power where it stopped" in printed
     assert "no watchdog" in printed

@@ -6,7 +6,7 @@ import numpy as np
 
 from tauscope_drivers.errors import Fault
 from tauscope_drivers.feetech.bus import ATTEMPTS, PATIENCE_S, Answers
-from tauscope_drivers.feetech.registers import FEEDBACK
+from tauscope_drivers.feetech.registers import FEEDBACK, VOLT
 from tauscope_drivers.feetech.session import Session
 from tauscope_drivers.state import ArmState
 
@@ -23,7 +23,7 @@ def observe(session: Session, *failures: Fault) -> ArmState:
 
 def arm_state(session: Session, answers: Answers) -> ArmState:
     """State of a cycle; NaN for who did not answer in it."""
-    position, velocity, load, temperature = np.full((4, len(session.servos)), np.nan)
+    position, velocity, load, temperature, voltage = np.full((5, len(session.servos)), np.nan)
     for joint, servo in enumerate(session.servos):
         if (status := answers.statuses.get(servo.servo)) is None:
             continue
@@ -31,7 +31,7 @@ def arm_state(session: Session, answers: Answers) -> ArmState:
         position[joint] = servo.position(values["Present Position"])
         velocity[joint] = servo.velocity(values["Present Speed"])
         load[joint] = servo.load(values["Present Load"])
-        temperature[joint] = values["Present Temperature"]
+        temperature[joint], voltage[joint] = values["Present Temperature"], values["Present Voltage"] * VOLT
         session.health.take_alarms(joint, status.alarms)
     return ArmState(
         time_ns=answers.asked_ns,
@@ -42,6 +42,7 @@ def arm_state(session: Session, answers: Answers) -> ArmState:
         enabled=session.health.has_torque.copy(),
         faults=session.health.faults,
         late_ns=answers.late_ns,
+        voltage=voltage,
     )
 
 
