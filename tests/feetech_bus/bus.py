@@ -122,7 +122,7 @@ class FeetechBus:
         for servo, data in parts:
             body = bytes([servo.servo, len(data) + 2, servo.hardware_error]) + data
             frame = b"\xff\xff" + body + bytes([0xFF - sum(body) % 256])
-            after_s += servo.return_delay_s + self._wire_s(len(frame))
+            after_s += self._wire_s(len(frame)) + (servo.return_delay_s if self._paced else 0.0)
             deliveries += self._answer_faults[servo.servo].apply(frame, after_s)
         return deliveries
 

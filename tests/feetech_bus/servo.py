@@ -28,7 +28,7 @@ class FeetechServo:
         self.encoder_offset_counts = 0
         self._target: float | None = None
         self._is_on_the_way = False
-        self._seen = [(0.0, 0.0, 0.0)]
+        self._seen: list[tuple[float, float, float]] = []
 
     @property
     def servo(self) -> int:
@@ -100,7 +100,8 @@ class FeetechServo:
 
     def take_motion(self, position: float, velocity: float, torque: float) -> None:
         """See the joint, and the torque that the servo exerts on it."""
-        self._seen = [*self._seen[-1:], (position, velocity, torque)]
+        now = (position, velocity, torque)
+        self._seen = [*(self._seen[-1:] or [now]), now]
 
     def sense(self, now_s: float, part: float = 1.0) -> None:
         """Show the present measurement: position, speed and load of one instant."""

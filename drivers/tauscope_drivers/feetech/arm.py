@@ -11,11 +11,12 @@ from tauscope_drivers.feetech.budget import adapter_latency_s, cycle_parts, larg
 from tauscope_drivers.feetech.bus import FeetechBus
 from tauscope_drivers.feetech.commissioning import ServoTask
 from tauscope_drivers.feetech.configuration import read_configuration
-from tauscope_drivers.feetech.enabling import enable_servos, plan_tasks, stop_servos
+from tauscope_drivers.feetech.enabling import enable_servos, goal_writes, plan_tasks, stop_servos
 from tauscope_drivers.feetech.faults import lost_bus_fault, silent_servo_fault
 from tauscope_drivers.feetech.observation import arm_state, blind_state, observe
 from tauscope_drivers.feetech.registers import FEEDBACK, VOLT
 from tauscope_drivers.feetech.session import SHORTEST_RETURN_DELAY_S, Session, open_session
+from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.limits import require_finite
 from tauscope_drivers.serial_port import SerialPort
 from tauscope_drivers.state import ArmState, Setpoint
@@ -51,6 +52,7 @@ class FeetechArm:
         self._watchdog_s = 0.0
         self._last_exchange_ns = 0
         self._last_goals: list[int] | None = None
+        self._pace: GoalPace | None = None
         self._lost: tuple[Fault, ...] = ()
         self._remarks: tuple[str, ...] = ()
 
@@ -130,7 +132,7 @@ class FeetechArm:
         watchdog_s : float
             longest silence of the host [s]
         cycle_s : float or None
-            not used: the servos go to each goal at the speed limit [s]
+            time between two goals, over which the servos go from one to the next; they leap where it is None [s]
 
         Raises
         ------
@@ -145,7 +147,11 @@ class FeetechArm:
             if faults := session.health.faults:
                 raise DriverError(DriverErrorKind.FAULT, f"{faults[0]}", faults)
             tasks = plan_tasks(session, limits)
-            enable_servos(session, tasks)
+            held = enable_servos(session, tasks)
+        caps = [task.speed for task in tasks]
+        self._pace = None
+        if cycle_s is not None:
+            self._pace = GoalPace(session.servos, held, caps, cycle_s, self._clock.now_ns())
         self._tasks, self._policy, self._watchdog_s = tasks, stop_policy, watchdog_s
         self._last_goals = None
         self._last_exchange_ns = self._clock.now_ns()
@@ -170,9 +176,9 @@ class FeetechArm:
                     task.bound(servo.counts(place))
                     for task, servo, place in zip(self._tasks, session.servos, setpoint.position.tolist(), strict=True)
                 ]
-                goals = enumerate(zip(session.servos, self._last_goals, strict=True))
+                writes = goal_writes(self._last_goals, self._tasks, self._pace, self._clock.now_ns())
                 session.bus.sync_write(
-                    {servo.servo: {"Goal Position": goal} for joint, (servo, goal) in goals if session.follows(joint)}
+                    {servo: writes[joint] for joint, servo in enumerate(session.identifiers) if session.follows(joint)}
                 )
             answers = session.bus.sync_read(session.identifiers, FEEDBACK)
             session.unsure |= {

@@ -14,8 +14,8 @@ LARGEST_LOAD = 0.85
 """Share of a cycle that the bus may take; the rest is for the servos' own turnaround and for the host."""
 
 _ASK_BYTES = 8
-_GOAL_BYTES = 3
-"""ID and position."""
+_GOAL_BYTES = 7
+"""ID, position, time and speed."""
 
 
 def cycle_parts(servos: int, baud: float, return_delay_s: float, latency_s: float) -> dict[str, float]:

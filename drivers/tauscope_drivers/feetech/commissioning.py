@@ -45,11 +45,6 @@ class ServoTask:
     speed: int
     torque: int
 
-    @property
-    def limits(self) -> dict[str, int]:
-        """Registers of speed and torque."""
-        return {"Goal Speed": self.speed, "Torque Limit": self.torque}
-
     def bound(self, goal: int) -> int:
         """A goal within the range."""
         return min(max(goal, self.low), self.high)

@@ -9,9 +9,10 @@ from tauscope_drivers.feetech import packets
 from tauscope_drivers.feetech.bus import encode_registers
 from tauscope_drivers.feetech.commissioning import Reading, ServoTask, plan_task
 from tauscope_drivers.feetech.configuration import read_configuration
-from tauscope_drivers.feetech.enabling import taking_writes
+from tauscope_drivers.feetech.enabling import goal_writes, taking_writes
 from tauscope_drivers.feetech.registers import COUNTS_PER_TURN, FEEDBACK, IDENTITY, PERMILLE, SETTINGS, TARGETS, Block
 from tauscope_drivers.feetech.servo import JointServo
+from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.inspection import FrameRequest, PlannedFrame
 from tauscope_drivers.limits import require_sensible
 
@@ -42,9 +43,14 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
     tasks = [plan_task(servo, _DELIVERED, request.limits, joint) for joint, servo in enumerate(servos)]
     yield from _connection(servos)
     yield from _enabling(servos, tasks, request)
+    held = [servo.counts(float(place)) for servo, place in zip(servos, request.targets[0], strict=True)]
+    pace, cycle_s = None, request.cycle_s
+    if cycle_s is not None:
+        pace = GoalPace(servos, held, [task.speed for task in tasks], cycle_s, 0)
     for cycle, targets in enumerate(request.targets):
         goals = [task.bound(servo.counts(place)) for task, servo, place in zip(tasks, servos, targets, strict=True)]
-        yield from _cycle(servos, goals, servos[cycle % len(servos)])
+        writes = goal_writes(goals, tasks, pace, round(cycle * (cycle_s or 0.0) * 1e9))
+        yield from _cycle(servos, writes, servos[cycle % len(servos)])
     for servo in servos:
         yield _read(servo, "stop", TARGETS, f"holds its last goal ({StopPolicy.HOLD}): torque and limits?")
 
@@ -66,15 +72,18 @@ def _enabling(
             yield _write(servo, write)
 
 
-def _cycle(servos: Sequence[JointServo], goals: Sequence[int], turn: JointServo) -> Iterator[PlannedFrame]:
+def _cycle(
+    servos: Sequence[JointServo], writes: Sequence[Mapping[str, int]], turn: JointServo
+) -> Iterator[PlannedFrame]:
     """Goals out, states in, and torque and limits of one servo in turn."""
-    encoded = {
-        servo.servo: encode_registers({"Goal Position": goal}) for servo, goal in zip(servos, goals, strict=True)
-    }
+    encoded = {servo.servo: encode_registers(values) for servo, values in zip(servos, writes, strict=True)}
     address = next(iter(encoded.values()))[0]
-    told = ", ".join(f"{servo.servo} := {goal}" for servo, goal in zip(servos, goals, strict=True))
-    values = {servo: data for servo, (_, data) in encoded.items()}
-    yield _frame("cycle", f"Goal Position: servo {told}", packets.encode_sync_write(values, address))
+    told = ", ".join(
+        f"{servo.servo} := {values['Goal Position']} at {values['Goal Speed']}"
+        for servo, values in zip(servos, writes, strict=True)
+    )
+    data = {servo: data for servo, (_, data) in encoded.items()}
+    yield _frame("cycle", f"Goal Position and Goal Speed: servo {told}", packets.encode_sync_write(data, address))
     identifiers = [servo.servo for servo in servos]
     asked = ", ".join(map(str, identifiers))
     frame = packets.encode_sync_read(identifiers, FEEDBACK.address, FEEDBACK.length)

@@ -10,6 +10,7 @@ from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.feetech.commissioning import Reading, ServoTask, find_flaws, plan_task, read_servo
 from tauscope_drivers.feetech.registers import COUNTS_PER_RADIAN
 from tauscope_drivers.feetech.session import Session
+from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.limits import require_sensible
 
 NEAR_GOAL_RAD = 0.1
@@ -46,11 +47,16 @@ def _plan(session: Session, joint: int, reading: Reading, limits: DriveLimits) -
     return plan_task(servo, reading, limits, joint)
 
 
-def enable_servos(session: Session, tasks: Sequence[ServoTask]) -> None:
+def enable_servos(session: Session, tasks: Sequence[ServoTask]) -> list[int]:
     """Give each servo its limits and its place for a goal, then torque, one servo after the other.
 
     An arm may fall meanwhile: each servo is asked for its place at the last moment, and catches its joint there. Where
     one fails, those that had no torque before are let go again.
+
+    Returns
+    -------
+    list of int
+        Goal Position of each servo [counts]
 
     Raises
     ------
@@ -59,16 +65,18 @@ def enable_servos(session: Session, tasks: Sequence[ServoTask]) -> None:
     """
     held_before = session.health.has_torque.copy()
     reached: list[int] = []
+    goals: list[int] = []
     try:
         for joint, task in enumerate(tasks):
             reached.append(joint)
-            _take(session, joint, task)
+            goals.append(_take(session, joint, task))
     except DriverError:
         for joint in reached:
             session.health.expect(joint, {})
             if not held_before[joint]:
                 _let_go_blindly(session, joint)
         raise
+    return goals
 
 
 def taking_writes(task: ServoTask, present: int, goal: int | None) -> list[dict[str, int]]:
@@ -83,18 +91,38 @@ def taking_writes(task: ServoTask, present: int, goal: int | None) -> list[dict[
     """
     keeps = goal is not None and abs(goal - present) < NEAR_GOAL_RAD * COUNTS_PER_RADIAN
     target = {"Acceleration": FREE_ACCELERATION, "Goal Position": goal if keeps and goal is not None else present}
-    writes = [target | {"Goal Time": 0} | task.limits]
+    writes = [target | {"Goal Time": 0, "Goal Speed": task.speed, "Torque Limit": task.torque}]
     return writes if goal is not None else [*writes, {"Torque Enable": 1}]
 
 
-def _take(session: Session, joint: int, task: ServoTask) -> None:
-    """Take a servo under power where it is now."""
+def _take(session: Session, joint: int, task: ServoTask) -> int:
+    """Take a servo under power where it is now; its goal [counts]."""
     goal = session.read_targets(joint)["Goal Position"] if session.health.has_torque[joint] else None
     present = session.read_feedback(joint)["Present Position"]
-    for write in taking_writes(task, present, goal):
+    writes = taking_writes(task, present, goal)
+    for write in writes:
         session.write(joint, write)
     session.health.has_torque[joint] = True
-    session.health.expect(joint, {"Torque Enable": 1} | task.limits)
+    session.health.expect(joint, {"Torque Enable": 1, "Torque Limit": task.torque})
+    return writes[0]["Goal Position"]
+
+
+def goal_writes(
+    goals: Sequence[int], tasks: Sequence[ServoTask], pace: GoalPace | None, now_ns: int
+) -> list[dict[str, int]]:
+    """Registers of a cycle, one servo each: its goal, and the speed that takes until the next.
+
+    Parameters
+    ----------
+    goals : sequence of int
+        one a joint [counts]
+    pace : GoalPace or None
+        None: servos leap at the speed limit
+    """
+    speeds = [task.speed for task in tasks] if pace is None else pace.speeds(goals, now_ns)
+    return [
+        {"Goal Position": goal, "Goal Time": 0, "Goal Speed": speed} for goal, speed in zip(goals, speeds, strict=True)
+    ]
 
 
 def stop_servos(session: Session, policy: StopPolicy, last_goals: Sequence[int] | None) -> None:

@@ -22,13 +22,13 @@ class JointServo:
 
     number : int
         of the joint, from 1
-    speed_unit : int
+    counts_per_speed_unit : int
         one unit of Present Speed and Goal Speed [counts/s]
     """
 
     number: int
     configuration: ServoConfiguration
-    speed_unit: int = 1
+    counts_per_speed_unit: int = 1
 
     @property
     def servo(self) -> int:
@@ -75,7 +75,7 @@ class JointServo:
 
     def velocity(self, units: int) -> float:
         """Joint velocity [rad/s or m/s]."""
-        return units * self.speed_unit / self._counts_per_unit
+        return units * self.counts_per_speed_unit / self._counts_per_unit
 
     def goal_speed(self, velocity: float) -> int:
         """Goal Speed for a largest joint speed; one at least, for 0 may mean no limit.
@@ -85,7 +85,7 @@ class JointServo:
         velocity : float
             positive, may be infinite [rad/s or m/s]
         """
-        most = velocity * abs(self._counts_per_unit) / self.speed_unit
+        most = velocity * abs(self._counts_per_unit) / self.counts_per_speed_unit
         return int(min(LARGEST_SPEED, max(1.0, most)))
 
     def load(self, units: int) -> float:

@@ -213,4 +213,4 @@ def reach(bus: FeetechBus, number: int, configuration: ServoConfiguration) -> tu
             device = describe_device(servo.servo, identity)
             raise DriverError(DriverErrorKind.CANNOT_CONNECT, f"is {device}; this driver knows the STS3215 alone")
         settings = bus.read(servo.servo, SETTINGS)[1]
-    return replace(servo, speed_unit=speed_unit(settings["Phase"])), settings
+    return replace(servo, counts_per_speed_unit=speed_unit(settings["Phase"])), settings
