@@ -92,6 +92,7 @@ def test_scan_of_an_empty_bus_fails(tauscope: Tauscope, emulator: EmulatorProces
     status, _, err = tauscope("bus", "scan", "feetech", emulator.order.port, "--bit-rate", "57600")
     assert status == 1
     assert "nobody answers" in err
+    assert "protocol 2.0" in err
 
 
 @pytest.mark.parametrize("options", [(), ("--backend", "feetech")])

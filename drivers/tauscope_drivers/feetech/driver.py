@@ -18,6 +18,7 @@ class FeetechDriver(BusDriver):
     options = (Option("port", "serial device, in place of the robot file's"), PATIENCE)
     block_example = "{servo_id: 1}"
     port_help = "serial device"
+    neighbours = "Dynamixel servos of protocol 2.0 answer to tauscope bus scan dynamixel"
     bus_options = ("port",)
 
     def is_meant(self, block: Mapping[str, Any]) -> bool:
