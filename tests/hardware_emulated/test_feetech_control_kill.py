@@ -33,7 +33,14 @@ pytestmark = pytest.mark.realtime
 WATCHDOG_S = 0.4
 RATE_HZ = 100.0
 REST_S = 0.8
-COUNT = 2.0 * np.pi / 4096
+FASTEST = 2.0
+"""Speed limit of the joints [rad/s]."""
+
+LAG_S = 3.0 / RATE_HZ + 2.0 / (2.0 * np.pi * 8.0)
+"""Between goal and joint: the pace's two cycles, the one under way, and the loop's two time constants [s]."""
+
+DROOP = 0.006
+"""Of the loop under a pendulum's weight, with a count of the encoder [rad]."""
 
 
 @dataclass
@@ -92,8 +99,17 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         yield Site(emulator, robot, order, folder)
 
 
-def hit(site: Site, how: signal.Signals, rng: np.random.Generator) -> str:
-    """Kill once, in the state that is returned, and check that the arm rests where it was going, held."""
+def goals(site: Site) -> np.ndarray:
+    """Where the servos go [rad]."""
+    counts = [site.emulator.get(servo, "goal_position") for servo in (1, 2, 3)]
+    return (np.array(counts) - 2048) * 2.0 * np.pi / 4096
+
+
+def hit(site: Site, how: signal.Signals, rng: np.random.Generator) -> str | None:
+    """Kill once, in the state that is returned, and check that the arm rests where it was going, held.
+
+    None where the run has ended before, as on a machine that is too slow for it.
+    """
     emulator = site.emulator
     emulator.reset()
     site.runs += 1
@@ -109,16 +125,18 @@ def hit(site: Site, how: signal.Signals, rng: np.random.Generator) -> str:
         site.wait_until(lambda _: wanted in states or run.has_ended, 60.0)
         site.let_pass(rng.uniform(0.0, 0.6))
         state = states[-1]
+        if run.has_ended:
+            return None
         os.kill(run.pid, how)
-        killed = emulator.state
+        killed, wanted_place = emulator.state, goals(site)
         site.let_pass(REST_S)
         place = np.array(emulator.state["position"])
         resting = site.let_pass(0.2)
         assert np.abs(np.array(resting["position"]) - place).max() < 1e-3
-        # a goal or two are under way, and the loop lags behind by two of its time constants
-        lag_s = 2.0 / RATE_HZ + 2.0 / (2.0 * np.pi * 8.0)
-        speed = np.maximum(np.abs(killed["velocity"]), 0.2)
-        assert np.all(np.abs(place - killed["position"]) < 1.5 * speed * lag_s + 2.0 * COUNT)
+        if state == "running":
+            assert np.array_equal(goals(site), wanted_place)
+            assert np.abs(place - wanted_place).max() < DROOP, "the last goal is where it rests"
+            assert np.abs(wanted_place - killed["position"]).max() < FASTEST * LAG_S + DROOP
         assert state != "running" or all(resting["enabled"]), "no joint was dropped"
     finally:
         with suppress(ProcessLookupError):
@@ -130,7 +148,7 @@ def hit(site: Site, how: signal.Signals, rng: np.random.Generator) -> str:
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
 def test_killed_or_frozen_control_process(site: Site, how: signal.Signals) -> None:
-    hit(site, how, np.random.default_rng([1, how]))
+    assert hit(site, how, np.random.default_rng([1, how])) is not None
 
 
 @pytest.mark.slow

@@ -51,7 +51,6 @@ class FeetechArm:
         self._policy = StopPolicy.HOLD
         self._watchdog_s = 0.0
         self._last_exchange_ns = 0
-        self._last_goals: list[int] | None = None
         self._pace: GoalPace | None = None
         self._lost: tuple[Fault, ...] = ()
         self._remarks: tuple[str, ...] = ()
@@ -153,7 +152,6 @@ class FeetechArm:
         if cycle_s is not None:
             self._pace = GoalPace(session.servos, held, caps, cycle_s, self._clock.now_ns())
         self._tasks, self._policy, self._watchdog_s = tasks, stop_policy, watchdog_s
-        self._last_goals = None
         self._last_exchange_ns = self._clock.now_ns()
         return self._observe(session)
 
@@ -172,11 +170,11 @@ class FeetechArm:
         self._notice_silence(session)
         with self._watching_the_port():
             if not session.health.starved:
-                self._last_goals = [
+                goals = [
                     task.bound(servo.counts(place))
                     for task, servo, place in zip(self._tasks, session.servos, setpoint.position.tolist(), strict=True)
                 ]
-                writes = goal_writes(self._last_goals, self._tasks, self._pace, self._clock.now_ns())
+                writes = goal_writes(goals, self._tasks, self._pace, self._clock.now_ns())
                 session.bus.sync_write(
                     {servo: writes[joint] for joint, servo in enumerate(session.identifiers) if session.follows(joint)}
                 )
@@ -199,7 +197,7 @@ class FeetechArm:
         self._tasks = None
         try:
             with self._watching_the_port():
-                stop_servos(session, policy, self._last_goals)
+                stop_servos(session, policy)
                 return self._observe(session)
         except DriverError as error:
             if self._session is None:

@@ -89,9 +89,9 @@ def taking_writes(task: ServoTask, present: int, goal: int | None) -> list[dict[
     goal : int or None
         Goal Position of a servo that holds its joint already [counts]
     """
-    keeps = goal is not None and abs(goal - present) < NEAR_GOAL_RAD * COUNTS_PER_RADIAN
-    target = {"Acceleration": FREE_ACCELERATION, "Goal Position": goal if keeps and goal is not None else present}
-    writes = [target | {"Goal Time": 0, "Goal Speed": task.speed, "Torque Limit": task.torque}]
+    place = goal if goal is not None and _is_near(goal, present) else present
+    target = {"Acceleration": FREE_ACCELERATION, "Goal Position": place, "Goal Time": 0}
+    writes = [target | {"Goal Speed": task.speed, "Torque Limit": task.torque}]
     return writes if goal is not None else [*writes, {"Torque Enable": 1}]
 
 
@@ -125,7 +125,7 @@ def goal_writes(
     ]
 
 
-def stop_servos(session: Session, policy: StopPolicy, last_goals: Sequence[int] | None) -> None:
+def stop_servos(session: Session, policy: StopPolicy) -> None:
     """Stop every servo. These servos cannot damp: for `StopPolicy.DAMP` they hold, which gives way less.
 
     A servo that is near its goal keeps it, another's goal becomes its place. One that does not answer may hold a goal
@@ -142,16 +142,22 @@ def stop_servos(session: Session, policy: StopPolicy, last_goals: Sequence[int] 
         session.bus.sync_write(dict.fromkeys(session.identifiers, _LET_GO))
         _each(session, _let_go)
         return
-    _each(session, lambda own, joint: _hold(own, joint, None if last_goals is None else last_goals[joint]))
+    _each(session, _hold)
 
 
-def _hold(session: Session, joint: int, last_goal: int | None) -> None:
+def _hold(session: Session, joint: int) -> None:
     """Hold a joint that is held, where it is."""
-    if not session.read_targets(joint)["Torque Enable"]:
+    targets = session.read_targets(joint)
+    if not targets["Torque Enable"]:
         return
     present = session.read_feedback(joint)["Present Position"]
-    if last_goal is None or abs(last_goal - present) >= NEAR_GOAL_RAD * COUNTS_PER_RADIAN:
+    if not _is_near(targets["Goal Position"], present):
         session.write(joint, {"Goal Position": present})
+
+
+def _is_near(goal: int, present: int) -> bool:
+    """Whether a servo may keep its goal."""
+    return abs(goal - present) < NEAR_GOAL_RAD * COUNTS_PER_RADIAN
 
 
 def _let_go(session: Session, joint: int) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
-from tauscope_drivers.feetech.bus import FeetechBus
+from tauscope_drivers.feetech.bus import PATIENCE_S, FeetechBus
 from tauscope_drivers.feetech.configuration import ServoConfiguration
 from tauscope_drivers.feetech.faults import alarm_faults, restarted_fault, watchdog_fault
 from tauscope_drivers.feetech.neighbours import describe_device, is_supported
@@ -16,6 +16,9 @@ from tauscope_drivers.feetech.servo import JointServo
 
 SHORTEST_RETURN_DELAY_S = 2e-6
 """Of a servo whose Return Delay Time is 0 [s]."""
+
+_PROBES = 3
+"""Answers by which the latency of an adapter is learnt."""
 
 
 class Health:
@@ -42,9 +45,9 @@ class Health:
         """State the torque and limits that a servo shall have from now on; one that has others is at fault."""
         self._expected[joint] = values
 
-    def is_as_expected(self, joint: int) -> bool:
-        """Whether a servo has its torque and limits, as far as it was asked."""
-        return bool(self.has_torque[joint] and not self._lost[joint])
+    def is_sound(self, joint: int) -> bool:
+        """Whether a servo has no alarm, and its torque and limits, as far as it was asked."""
+        return bool(self.has_torque[joint] and not self._lost[joint] and not self.alarms[joint])
 
     def forget(self) -> None:
         """The operator knows."""
@@ -144,7 +147,7 @@ class Session:
         joint : int
             index of the joint, from 0
         """
-        return self.health.is_as_expected(joint) and joint not in self.unsure
+        return self.health.is_sound(joint) and joint not in self.unsure
 
 
 @contextmanager
@@ -175,9 +178,9 @@ def open_session(bus: FeetechBus, configurations: Sequence[ServoConfiguration]) 
     """
     found = [reach(bus, number, servo) for number, servo in enumerate(configurations, 1)]
     session = make_session(bus, found)
-    answers = bus.sync_read(session.identifiers, FEEDBACK, 0.02)
+    answers = [bus.sync_read(session.identifiers, FEEDBACK, PATIENCE_S) for _ in range(_PROBES)]
     # an adapter that is slow by a constant is no slower than that in any answer
-    bus.port.latency_s += answers.beyond_ns * 1e-9
+    bus.port.latency_s += min((one.beyond_ns for one in answers if one.statuses), default=0) * 1e-9
     return session
 
 
