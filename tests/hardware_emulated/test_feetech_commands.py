@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -149,3 +150,10 @@ def test_run_beyond_the_bus_is_refused(tauscope: Tauscope, folder: Path, emulato
     assert status == 1
     assert "bus allows" in err
     assert not any(emulator.state["enabled"])
+
+
+def test_adapters_of_several_buses_are_listed_once(tauscope: Tauscope, monkeypatch: pytest.MonkeyPatch) -> None:
+    adapter = SimpleNamespace(device="/dev/ttyNONE", description="USB serial")
+    monkeypatch.setattr("tauscope_drivers.serial_adapters.comports", lambda: [adapter])
+    _, out, _ = tauscope("doctor")
+    assert sum("/dev/ttyNONE" in line for line in out.splitlines()) == 1

@@ -17,6 +17,8 @@ from tauscope_drivers.feetech.registers import (
     FULL_ANGLE,
     MODE_NAMES,
     POSITION_MODE,
+    PROTECTIONS,
+    PROTECTIVE,
     RETURN_DELAY_UNIT_S,
     VOLT,
 )
@@ -189,6 +191,9 @@ def find_doubts(servo: JointServo, reading: Reading, limits: DriveLimits, target
         find(f"Return Delay Time {delay_us:.0f} µs lowers the rate", f"set it to 0 {_TOOL}")
     if not settings["Response Status Level"]:
         find("Response Status Level 0: it answers reads alone", f"none needed; 1 enables sooner, set {_TOOL}")
+    if (unloading := settings["Unloading Condition"]) & PROTECTIONS != PROTECTIONS:
+        detail = f"Unloading Condition {unloading}: it does not protect itself from both heat and overload"
+        find(detail, f"set it to {PROTECTIVE}, as delivered, {_TOOL}")
     if not targets["Lock"]:
         find("Lock is 0: whatever a program writes to EEPROM stays", "set Lock to 1 once it is set up")
     if targets["Torque Enable"]:

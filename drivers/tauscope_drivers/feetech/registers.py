@@ -39,6 +39,12 @@ FINE_SPEED = 0x04
 FULL_ANGLE = 0x10
 """Bit of Phase: Present Position counts whole turns."""
 
+PROTECTIONS = 0x24
+"""Bits of Unloading Condition: the servo lets go when it is too hot, or overloaded for too long."""
+
+PROTECTIVE = 44
+"""Unloading Condition as delivered: heat, current, overload."""
+
 _COARSE_SPEED = 50
 
 

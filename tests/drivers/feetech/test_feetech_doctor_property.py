@@ -31,6 +31,7 @@ SETTINGS = {
     "status": (0x01, 0x20),
     "voltage": (30, 60, 120),
     "lock": (0, 1),
+    "unloading": (0, 44),
 }
 DEFECTS_MOST = 2
 CYCLE_S = 0.01
@@ -147,6 +148,7 @@ def test_doctor_names_what_keeps_a_run_from_starting(registers: dict[str, int], 
         ({}, "Return Delay Time 500 µs lowers the rate"),
         ({"status_level": 0}, "answers reads alone"),
         ({"lock": 0}, "Lock is 0"),
+        ({"unloading": 4}, "Unloading Condition 4: it does not protect itself"),
         ({"torque_enable": 1}, "is under torque"),
         ({}, "no torque constant"),
     ],
