@@ -3,7 +3,8 @@
 The order of calls is fixed: ``connect``, ``enable``, any number of ``exchange``, ``stop``, ``disconnect``. ``stop`` and
 ``disconnect`` are legal at any time and any number of times. Between ``enable`` and ``stop`` the device's own watchdog
 is armed: where no ``exchange`` reaches the device within its time, the device stops by itself and reports the fault
-``watchdog`` until it is acknowledged.
+``watchdog`` until it is acknowledged. Drives without a watchdog may be driven in position mode alone, where they hold
+their last target; their backend reports the fault as soon as it is called again.
 """
 
 from collections.abc import Mapping

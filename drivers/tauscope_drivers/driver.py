@@ -83,6 +83,8 @@ class BusDriver(Driver):
     """The least ``drive`` block, as a message shows it."""
     port_help: str
     """What ``bus scan`` takes as port."""
+    neighbours: str = ""
+    """Devices that hang on such a bus and do not answer this driver, in a sentence for who finds nobody."""
     bus_options: tuple[str, ...] = ()
     """Names of the options that replace a key of the first joint's ``drive`` block."""
 

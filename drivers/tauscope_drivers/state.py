@@ -23,6 +23,7 @@ class ArmState:
         reports instead.
     `temperature`: (n,), of the motor, NaN where it is not reported [°C].
     `enabled`: (n,), whether the joint's drive holds or drives the joint.
+    `voltage`: (n,) or None, supply of the drive's bridge; None where the drives report none [V].
     `late_ns`: how much later than the bus takes the answers came: the instant of the reading is not known any better
         [ns].
     """
@@ -35,6 +36,7 @@ class ArmState:
     enabled: NDArray[np.bool_]
     faults: tuple[Fault, ...] = ()
     late_ns: int = 0
+    voltage: Array | None = None
 
     @property
     def fresh(self) -> NDArray[np.bool_]:

@@ -26,13 +26,13 @@ from tauscope_drivers.dynamixel.enabling import Bounds, enable_servos, goals_of
 from tauscope_drivers.dynamixel.faults import lost_bus_fault, silent_servo_fault
 from tauscope_drivers.dynamixel.group import GroupReading
 from tauscope_drivers.dynamixel.models import WATCHDOG_MOST, WATCHDOG_STEP_S
-from tauscope_drivers.dynamixel.pacing import GoalPace
-from tauscope_drivers.dynamixel.port import SerialPort
 from tauscope_drivers.dynamixel.preparation import commissioning_writes
 from tauscope_drivers.dynamixel.session import Session, open_session
 from tauscope_drivers.dynamixel.stopping import clear_errors, clear_watchdogs, stop_servos
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
+from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.limits import RunawayWatch, require_finite
+from tauscope_drivers.serial_port import SerialPort
 from tauscope_drivers.state import ArmState, Setpoint
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ from tauscope_drivers.clock import AnswerTime, Clock, MonotonicClock
 from tauscope_drivers.dynamixel import packets
 from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
 from tauscope_drivers.dynamixel.packets import FrameParser, Status
-from tauscope_drivers.dynamixel.port import BITS_PER_BYTE, SerialPort
 from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.serial_port import BITS_PER_BYTE, SerialPort
 
 
 class Turns:

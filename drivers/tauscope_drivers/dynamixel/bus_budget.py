@@ -9,9 +9,9 @@ import os
 from dataclasses import dataclass, replace
 
 from tauscope_drivers.dynamixel.configuration import BusConfiguration
-from tauscope_drivers.dynamixel.port import BITS_PER_BYTE, LEAST_LATENCY_S, read_latency_timer_ms
 from tauscope_drivers.dynamixel.session import SHORTEST_RETURN_DELAY_S, Session
 from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.serial_port import BITS_PER_BYTE, LEAST_LATENCY_S, read_latency_timer_ms
 
 LARGEST_LOAD = 0.85
 """Share of a cycle that the bus may take; the rest is for the servos' own turnaround and for the host."""

@@ -13,7 +13,6 @@ from tauscope_drivers.dynamixel.configuration import read_configuration
 from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
 from tauscope_drivers.dynamixel.enabling import Bounds, goals_of
 from tauscope_drivers.dynamixel.group import health_turns, paced_goals, servo_families
-from tauscope_drivers.dynamixel.pacing import GoalPace
 from tauscope_drivers.dynamixel.preparation import (
     SETTINGS,
     ServoTask,
@@ -24,6 +23,7 @@ from tauscope_drivers.dynamixel.preparation import (
     watchdog_steps,
 )
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
+from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.inspection import FrameRequest, PlannedFrame
 from tauscope_drivers.limits import require_sensible
 from tauscope_drivers.state import Setpoint

@@ -24,6 +24,11 @@ class JointServo:
     current_limit_ma: float | None = None
 
     @property
+    def counts_per_speed_unit(self) -> float:
+        """One unit of Profile Velocity [counts/s]."""
+        return self.model.velocity_unit * self.model.counts_per_radian
+
+    @property
     def label(self) -> str:
         """What messages call it."""
         return f"joint {self.joint} (servo {self.servo}, {self.model.label})"

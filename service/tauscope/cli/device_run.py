@@ -85,7 +85,7 @@ def _adapters(backend: str | None) -> list[Finding]:
     for bus in buses:
         adapters = bus.list_adapters()
         found += adapters or [Finding(Severity.WARNING, bus.name, "no adapter is there", "plug one in")]
-    return found
+    return list(dict.fromkeys(found))  # several buses may hang on one kind of adapter
 
 
 def _drives(path: Path, backend: str | None) -> Sequence[Finding]:
@@ -134,13 +134,15 @@ def show_devices(backend: str, port: str, bit_rates: Sequence[int] | None) -> No
     `bit_rates`: to try [bit/s]; the usual ones where None.
     """
     found: list[FoundDevice] = []
+    bus = find_bus(backend)
     with shown_progress() as told, translate_driver_errors():
         told(f"scan {port}")
-        for device in find_bus(backend).scan(port, bit_rates or None):
+        for device in bus.scan(port, bit_rates or None):
             found.append(device)
             told(f"scan {port}: {len(found)} found")
     if not found:
-        raise AcquisitionError(f"{port}: nobody answers; check power, cable, termination and bit rate")
+        others = f" ({bus.neighbours})" if bus.neighbours else ""
+        raise AcquisitionError(f"{port}: nobody answers{others}; check power, cable, termination and bit rate")
     rows = [(str(one.address), one.model, one.firmware, str(one.bit_rate)) for one in found]
     output().print(table("Devices", Table(("address", "model", "firmware", "bit/s"), rows, words=2)))
 

@@ -39,6 +39,7 @@ _CYCLE_SCHEMA = {
         "period": {"type": ["number", "null"]},
         "lateness_ns": {"type": "integer"},
         "temperature": {"type": "array", "items": {"type": ["number", "null"]}},
+        "voltage": {"type": "array", "items": {"type": ["number", "null"]}},
     },
 }
 _EVENT_SCHEMA = {"title": EVENT_TYPE, "type": "object", "properties": {"event": {"type": "string"}}}
@@ -84,6 +85,7 @@ class JournalWriter:
                 "period": float(row["period"]),
                 "lateness_ns": int(row["lateness_ns"]),
                 "temperature": row["temperature"].tolist(),
+                "voltage": row["voltage"].tolist(),
             }
             self._add(JOINT_STATE_TOPIC, stamp, measured)
             self._add(REFERENCE_TOPIC, stamp, asked)

@@ -61,9 +61,9 @@ def read_journal(path: Path) -> Journal:
 def journal_recording(journal: Journal, name: str) -> Recording:
     """The recording of a journal's motion, without the ramp; time runs from the motion's first sample.
 
-    Columns t, q, tau (i where the drives report no torque), qd and temp where they report them, qref, taucmd where
-    effort was commanded, and period where the motion is repeated. Where the host commanded effort, tau (i) is the mean
-    of what acted before and after the sample; the journal keeps what was reported. Raises RecordingError: next to
+    Columns t, q, tau (i where the drives report no torque), qd, temp and volt where they report them, qref, taucmd
+    where effort was commanded, and period where the motion is repeated. Where the host commanded effort, tau (i) is the
+    mean of what acted before and after the sample; the journal keeps what was reported. Raises RecordingError: next to
     nothing of the motion is there.
     """
     rows, header = journal.motion, journal.header
@@ -82,6 +82,7 @@ def journal_recording(journal: Journal, name: str) -> Recording:
         reference=_find_reported(rows["reference"]),
         effort_command=_find_reported(rows["command"]),
         temperature=_find_reported(rows["temperature"]),
+        voltage=_find_reported(rows["voltage"]),
         period=_find_reported(rows["period"]),
     )
 
@@ -127,6 +128,8 @@ class _Collector:
         rows["phase"] = [Phase[cycle["phase"].upper()] for cycle in cycles]
         rows["period"] = np.array([cycle["period"] for cycle in cycles], dtype=np.float64)
         rows["temperature"] = np.array([cycle["temperature"] for cycle in cycles], dtype=np.float64)
+        unknown = [None] * header.joint_count  # journals of before there was a voltage
+        rows["voltage"] = np.array([cycle.get("voltage", unknown) for cycle in cycles], dtype=np.float64)
         return rows
 
 

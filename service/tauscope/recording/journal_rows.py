@@ -69,9 +69,9 @@ def journal_row_type(joint_count: int) -> np.dtype[np.void]:
 
     ``time_ns`` instant of the reading by the backend's clock, ``lateness_ns`` of the cycle behind its deadline,
     ``phase`` as in `Phase`, ``period`` index of the excitation period or NaN; one number a joint: measured
-    ``position``, ``velocity``, ``effort``, ``temperature``; ``reference``, ``reference_velocity`` and ``command``
-    (effort, NaN where none was commanded).
+    ``position``, ``velocity``, ``effort``, ``temperature``, ``voltage``; ``reference``, ``reference_velocity`` and
+    ``command`` (effort, NaN where none was commanded).
     """
     scalars = [("time_ns", "<i8"), ("lateness_ns", "<i8"), ("phase", "<i8"), ("period", "<f8")]
-    groups = ("position", "velocity", "effort", "temperature", "reference", "reference_velocity", "command")
+    groups = ("position", "velocity", "effort", "temperature", "voltage", "reference", "reference_velocity", "command")
     return np.dtype([*scalars, *((group, "<f8", (joint_count,)) for group in groups)])

@@ -122,6 +122,7 @@ class Cycles:
         row["phase"][0], row["period"][0] = plan.phase[cycle], plan.period[cycle]
         row["position"][0], row["velocity"][0] = state.position, state.velocity
         row["effort"][0], row["temperature"][0] = state.effort, state.temperature
+        row["voltage"][0] = np.nan if state.voltage is None else state.voltage
         row["reference"][0], row["reference_velocity"][0] = plan.position[cycle], plan.velocity[cycle]
         row["command"][0] = torque if self.control is not None else np.nan
         self.recorder.put(self._row)

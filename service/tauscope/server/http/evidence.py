@@ -28,10 +28,7 @@ def require_no_evidence(services: Services, recording: str) -> None:
 def require_no_identification(services: Services, version: str) -> None:
     """Refuse to remove a robot with which an active model or a reference was identified.
 
-    Raises
-    ------
-    ProblemError
-        if one was
+    Raises ProblemError if one was.
     """
     _judge_new(services)
     users = set()

@@ -41,10 +41,7 @@ SCHEMAS = "#/components/schemas/"
 def share_parts(document: dict[str, Any], formats: Sequence[type[BaseModel]]) -> None:
     """Refer to parts that repeat, and leave out keywords that say nothing more.
 
-    Parameters
-    ----------
-    formats : sequence of model
-        formats of files: their schemas have addresses of their own
+    `formats`: formats of files: their schemas have addresses of their own.
     """
     _refer_to_formats(document, formats)
     _drop_unused(document)

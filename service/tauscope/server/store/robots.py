@@ -48,13 +48,7 @@ class RobotStore:
         return staged
 
     def keep(self, staged: Path, robot_file: str, name: str) -> tuple[RobotVersion, bool]:
-        """Keep staged files.
-
-        Returns
-        -------
-        (RobotVersion, bool)
-            whether it is new; else the same content was kept before
-        """
+        """Keep staged files. Returns (RobotVersion,), whether it is new; else the same content was kept before."""
         robot = RobotVersion(hash_robot(staged, robot_file), name, robot_file, self._clock())
         record = {"form": "tauscope.robot/1", "name": name, "robot_file": robot_file}
         write_atomically(staged.parent / _RECORD, json.dumps({**record, "created": robot.created.isoformat()}).encode())
@@ -81,13 +75,7 @@ class RobotStore:
         return sorted(found, key=lambda each: (each.created, each.version), reverse=True)
 
     def find(self, version: str) -> RobotVersion:
-        """A version.
-
-        Raises
-        ------
-        NotFoundError
-            if it is not kept, or its record is damaged
-        """
+        """A version. Raises NotFoundError if it is not kept, or its record is damaged."""
         try:
             record = json.loads((self.files(version).parent / _RECORD).read_bytes())
             created = datetime.fromisoformat(record["created"])
@@ -96,26 +84,14 @@ class RobotStore:
             raise _unknown(version) from None
 
     def files(self, version: str) -> Path:
-        """The folder of a version's files.
-
-        Raises
-        ------
-        NotFoundError
-            if it is not kept
-        """
+        """The folder of a version's files. Raises NotFoundError if it is not kept."""
         folder = self._root / version / _FILES
         if re.fullmatch(VERSION_PATTERN, version) is None or not folder.is_dir():
             raise _unknown(version)
         return folder
 
     def remove(self, version: str) -> None:
-        """Remove a version.
-
-        Raises
-        ------
-        NotFoundError
-            if it is not kept
-        """
+        """Remove a version. Raises NotFoundError if it is not kept."""
         going = Path(tempfile.mkdtemp(prefix=_STAGED, dir=self._root)) / version
         self.files(version).parent.rename(going)
         sync_folder(self._root)

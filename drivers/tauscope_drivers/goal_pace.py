@@ -11,9 +11,9 @@ the mean, by v σ²/(4T) at speed v for lateness of variance σ² and a cycle T,
 
 import math
 from collections.abc import Sequence
+from typing import Protocol
 
 from tauscope_drivers.clock import CycleGrid
-from tauscope_drivers.dynamixel.servo import JointServo
 
 _AHEAD_CYCLES = 2.0
 """A goal is to be reached when that of the next cycle but one comes: while the host is less than a cycle late, no servo
@@ -26,12 +26,21 @@ _LEAST_PART = 0.01
 """Part of the largest speed with which even the shortest way is gone."""
 
 
+class PacedServo(Protocol):
+    """A servo whose target follows its goal at a speed that it is told."""
+
+    @property
+    def counts_per_speed_unit(self) -> float:
+        """One unit of that speed [counts/s]."""
+        ...
+
+
 class GoalPace:
-    """Profile Velocity for each goal; keeps account of where the servos' own targets are."""
+    """Speed for each goal; keeps account of where the servos' own targets are."""
 
     def __init__(
         self,
-        servos: Sequence[JointServo],
+        servos: Sequence[PacedServo],
         goals: Sequence[int],
         caps: Sequence[int],
         cycle_s: float,
@@ -39,9 +48,9 @@ class GoalPace:
     ) -> None:
         """Begin with servos that hold their goals.
 
-        `goals`: Goal Position of each [counts]; `caps`: most Profile Velocity of each, 0 for none [units].
+        `goals`: of each servo [counts]; `caps`: largest speed of each, 0 for none [units].
         """
-        self._counts_per_second = [servo.model.velocity_unit * servo.model.counts_per_radian for servo in servos]
+        self._counts_per_second = [servo.counts_per_speed_unit for servo in servos]
         self._goals = list(goals)
         self._targets = [float(goal) for goal in goals]
         self._caps = [math.inf if cap == 0 else cap for cap in caps]
@@ -51,7 +60,7 @@ class GoalPace:
         self._grid = CycleGrid(cycle_s)
 
     def speeds(self, goals: Sequence[int], now_ns: int) -> list[int]:
-        """Profile Velocity of each servo for its next goal [units]. `goals`: Goal Position of each [counts]."""
+        """Speed of each servo towards its next goal [units]. `goals`: of each servo [counts]."""
         elapsed_s, self._now_ns = (now_ns - self._now_ns) * 1e-9, now_ns
         left_s = self._time_left_s(now_ns)
         for joint, unit in enumerate(self._counts_per_second):

@@ -1,8 +1,4 @@
-"""A serial port that one process owns: the library's port, with what it lacks.
-
-The library's own waits by polling at full load, times out by the wall clock and with 16 ms of latency, knows no
-4.5 Mbaud, and lets two programs open the same port.
-"""
+"""A serial port that one process owns, and what a bus of servos needs of it."""
 
 import contextlib
 import fcntl
@@ -14,7 +10,6 @@ import time
 from pathlib import Path
 
 import serial
-from dynamixel_sdk import PortHandler
 
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.port_holder import find_holder
@@ -31,27 +26,28 @@ _QUIET_NS = 500_000
 _PSEUDO_TERMINALS = range(136, 144)
 
 
-class SerialPort(PortHandler):
-    """An exclusive serial port; also usable with dynamixel-sdk's own packet handler."""
+class SerialPort:
+    """An exclusive serial port.
+
+    `latency_s`: latency timer of the adapter, one USB frame at least [s].
+    """
 
     def __init__(self, path: str, baud: int, slack_s: float = 0.002) -> None:
-        super().__init__(path)
+        """Nothing is opened yet."""
+        self.path = path
         self.baudrate = baud
         self.latency_s = LEAST_LATENCY_S
+        self.ser: serial.Serial | None = None
         self._slack_s = slack_s
-
-    @property
-    def path(self) -> str:
-        """Of the device."""
-        return self.port_name
 
     def open(self) -> None:
         """Open the port and lock it against everybody else.
 
         Raises DriverError ``cannot-connect`` where it is not there, not permitted, or taken; names the holder.
         """
+        self.close()
         try:
-            self.openPort()
+            self._claim(self.baudrate)
         except (OSError, serial.SerialException, ValueError) as error:
             raise self._refusal(error) from error
         latency_ms = read_latency_timer_ms(self.path)
@@ -61,8 +57,7 @@ class SerialPort(PortHandler):
         """Let go of the port; legal at any time."""
         if self.ser is not None:
             with contextlib.suppress(OSError, serial.SerialException):
-                self.closePort()
-        self.is_open = False
+                self.ser.close()
         self.ser = None
 
     def send(self, frame: bytes) -> None:
@@ -99,41 +94,15 @@ class SerialPort(PortHandler):
         wire_s = byte_count * BITS_PER_BYTE / self.baudrate
         return time.monotonic_ns() + round((wire_s + delay_s + 2.0 * self.latency_s + self._slack_s) * 1e9)
 
-    # What dynamixel-sdk calls, in its own spelling:
-
-    def getCFlagBaud(self, baudrate: int) -> int:  # noqa: N802
-        """Any rate that the system can set, not the library's list, which ends at 4 Mbaud."""
-        return baudrate
-
-    def setupPort(self, cflag_baud: int) -> bool:  # noqa: N802
+    def _claim(self, baud: int) -> None:
         """Open the device, lock it, and ask its driver for low latency."""
-        if self.is_open:
-            self.closePort()
-        self.ser = serial.Serial(self.port_name, cflag_baud, timeout=0, exclusive=True)
-        self.is_open = True
+        self.ser = serial.Serial(self.path, baud, timeout=0, exclusive=True)
         if not self._is_pseudo_terminal():
             # The flag of a pseudo terminal would outlive a killed owner, for its emulator keeps it open.
             fcntl.ioctl(self.ser.fileno(), termios.TIOCEXCL)
             with contextlib.suppress(OSError, ValueError, serial.SerialException):
                 self.ser.set_low_latency_mode(True)
         self.ser.reset_input_buffer()
-        self.tx_time_per_byte = 1e3 * BITS_PER_BYTE / cflag_baud
-        return True
-
-    def readPort(self, length: int) -> bytes:  # noqa: N802
-        """Up to so many bytes; waits on the descriptor and not in a loop."""
-        remaining_s = max(0.0, self.packet_timeout - self.getTimeSinceStart()) * 1e-3
-        select.select([self._require_open().fileno()], [], [], remaining_s)
-        return self._require_open().read(length)
-
-    def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802
-        """Time-out of an answer from the true latency, not from 16 ms."""
-        self.packet_start_time = self.getCurrentTime()
-        self.packet_timeout = self.tx_time_per_byte * packet_length + 1e3 * (2.0 * self.latency_s + self._slack_s)
-
-    def getCurrentTime(self) -> float:  # noqa: N802
-        """Monotonic time [ms]."""
-        return time.monotonic_ns() * 1e-6
 
     def _is_pseudo_terminal(self) -> bool:
         status = os.fstat(self._require_open().fileno())
