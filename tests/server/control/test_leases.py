@@ -1,4 +1,4 @@
-"""Leases on a clock that the test turns: one holder, fencing, expiry, arming, and what that means for motion."""
+"""Leases on a clock that the test turns: one holder, stale tokens, expiry, arming, and what that means for motion."""
 
 import threading
 
