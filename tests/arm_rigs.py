@@ -64,7 +64,7 @@ class Rig(Protocol):
     is none. `swing` is how far position loops that the backend does not tune carry a joint past a place, or leave it
     short of it [rad]. `answers_within` is the number of cycles in which every drive answers at least once: 1, unless
     frames are lost on purpose. `is_real_time` says whether its clock is the machine's, `tells_temperature` whether its
-    drives measure theirs.
+    drives measure theirs, `has_watchdog` whether they notice by themselves that their host is silent.
     """
 
     robot: Robot
@@ -74,6 +74,7 @@ class Rig(Protocol):
     answers_within: int
     is_real_time: bool
     tells_temperature: bool
+    has_watchdog: bool
 
     @property
     def backend(self) -> Backend:
@@ -126,6 +127,7 @@ class ExactRig:
     swing = 0.0
     answers_within = 1
     tells_temperature = True
+    has_watchdog = True
 
     def torque(self, effort: Array) -> Array:
         return effort
@@ -236,7 +238,8 @@ def enable(
     watchdog_s: float = 0.5,
     **limits: ArrayLike,
 ) -> ArmState:
-    """Connect and take the arm under power."""
+    """Connect and take the arm under power; skips the test where the drives cannot do the mode."""
+    require_mode(rig, mode)
     rig.backend.connect()
     bounds = wide_limits(rig.robot, **limits)
     return rig.backend.enable(mode, bounds, allowed(rig, mode, policy), watchdog_s, 1.0 / RATE_HZ)
@@ -246,6 +249,12 @@ def allowed(rig: Rig, mode: ControlMode, policy: StopPolicy) -> StopPolicy:
     """A stop policy, or one that the drives can carry out by themselves where they cannot do that in this mode."""
     able = rig.backend.capabilities.policies_in(mode)
     return policy if policy in able else min(able)
+
+
+def require_mode(rig: Rig, mode: ControlMode) -> None:
+    """Skip the test where the drives cannot do a mode."""
+    if mode not in rig.backend.capabilities.modes:
+        pytest.skip(f"the drives have no mode {mode}")
 
 
 def require_policy(rig: Rig, policy: StopPolicy, mode: ControlMode = ControlMode.POSITION) -> None:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tauscope.errors import RecordingError
 from tauscope_sim.device.activity import Activity
-from tauscope_sim.device.trace import FIXED_COLUMNS
+from tauscope_sim.device.server import FIXED_COLUMNS
 
 Array = NDArray[np.float64]
 

@@ -1,6 +1,7 @@
 """Starts an emulator in a process of its own and talks to it."""
 
 import json
+import os
 import socket
 import subprocess
 import sys
@@ -32,7 +33,7 @@ class EmulatorProcess(Generic[_Order]):
     def __enter__(self) -> Self:
         command = [sys.executable, "-m", self.order.module, self.order.to_json()]
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=process_environment(), start_new_session=True
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=_environment(), start_new_session=True
         )
         assert self._process.stdout is not None
         if self._process.stdout.readline().strip() != b"ready":
@@ -120,3 +121,10 @@ class EmulatorProcess(Generic[_Order]):
             # in one piece: the last line may be only half written
             *whole, _ = file.read().split("\n")
         return [json.loads(line) for line in whole]
+
+
+def _environment() -> dict[str, str]:
+    """That of a process of this tree, with the emulators that are tests' own."""
+    environment = process_environment()
+    tests = str(Path(__file__).resolve().parent)
+    return environment | {"PYTHONPATH": os.pathsep.join([environment["PYTHONPATH"], tests])}

@@ -3,7 +3,8 @@
 The order of calls is fixed: ``connect``, ``enable``, any number of ``exchange``, ``stop``, ``disconnect``. ``stop`` and
 ``disconnect`` are legal at any time and any number of times. Between ``enable`` and ``stop`` the device's own watchdog
 is armed: where no ``exchange`` reaches the device within its time, the device stops by itself and reports the fault
-``watchdog`` until it is acknowledged.
+``watchdog`` until it is acknowledged. Drives without a watchdog may be driven in position mode alone, where they hold
+their last target; their backend reports the fault as soon as it is called again.
 """
 
 from collections.abc import Mapping
@@ -44,12 +45,9 @@ class StopPolicy(StrEnum):
 class DriveLimits:
     """What the drives themselves enforce, set before torque is switched on; infinite where there is no limit.
 
-    position_low, position_high : (n,) float64
-        range of the joint [rad or m]
-    velocity : (n,) float64
-        largest speed [rad/s or m/s]
-    torque : (n,) float64
-        largest torque [Nm or N]
+    `position_low`, `position_high`: (n,), range of the joint [rad or m].
+    `velocity`: (n,), largest speed [rad/s or m/s].
+    `torque`: (n,), largest torque [Nm or N].
     """
 
     position_low: Array
@@ -62,12 +60,10 @@ class DriveLimits:
 class Capabilities:
     """What a backend can do, known without motion.
 
-    watchdog_range_s : tuple of two float
-        shortest and longest time of the device's watchdog [s]
-    policies_by_mode : mapping of ControlMode to frozenset of StopPolicy, or None
-        ways to stop that the device carries out itself in each mode, where they differ; None where every mode has all
-    remarks : tuple of str
-        what the drives do not have, and what is done in place of it; known once the arm is connected
+    `watchdog_range_s`: shortest and longest time of the device's watchdog [s].
+    `policies_by_mode`: ways to stop that the device carries out itself in each mode, where they differ; None where
+        every mode has all.
+    `remarks`: what the drives do not have, and what is done in place of it; known once the arm is connected.
     """
 
     joint_count: int
@@ -103,20 +99,14 @@ class Backend(Protocol):
     def connect(self) -> ArmState:
         """Reach every drive and read it; moves nothing and switches no torque on.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: a device is missing, taken or of the wrong kind
+        Raises DriverError ``cannot-connect`` where a device is missing, taken or of the wrong kind.
         """
         ...
 
     def acknowledge_faults(self) -> ArmState:
         """Clear the faults that the drives have latched, on the operator's word; moves nothing.
 
-        Raises
-        ------
-        DriverError
-            ``not-connected``, or ``fault`` where a fault stays
+        Raises DriverError: ``not-connected``, or ``fault`` where a fault stays.
         """
         ...
 
@@ -130,17 +120,11 @@ class Backend(Protocol):
     ) -> ArmState:
         """Take the arm under power where it stands: targets := present, limits and watchdog read back, then torque.
 
-        Parameters
-        ----------
-        cycle_s : float or None
-            time between two calls of `exchange`, for drives that interpolate between targets; None where it is not
-            known [s]
+        Raises DriverError: ``not-connected``, ``refused`` (a mode, policy or time that the backend cannot do), or
+        ``fault`` (latched and not acknowledged).
 
-        Raises
-        ------
-        DriverError
-            ``not-connected``, ``refused`` (a mode, policy or time that the backend cannot do), or ``fault`` (latched
-            and not acknowledged)
+        `cycle_s`: time between two calls of `exchange`, for drives that interpolate between targets; None where it is
+        not known [s].
         """
         ...
 
@@ -148,11 +132,8 @@ class Backend(Protocol):
         """One cycle: write the setpoints, read the arm. Feeds the watchdog; never waits longer than the bus takes.
 
         A drive that does not answer leaves NaN in the state; a fault that it reports stands in `ArmState.faults`.
-
-        Raises
-        ------
-        DriverError
-            ``not-enabled``, ``refused`` (a target that is not finite: nothing is sent), or ``lost`` (the bus is gone)
+        Raises DriverError: ``not-enabled``, ``refused`` (a target that is not finite: nothing is sent), or ``lost``
+        (the bus is gone).
         """
         ...
 

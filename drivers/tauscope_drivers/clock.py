@@ -1,7 +1,32 @@
-"""The clock that a control loop runs by, and the grid of instants on which its cycles are due."""
+"""The clock of drivers, and how long they wait for an answer."""
 
 import time
+from collections import deque
+from statistics import median
 from typing import Protocol
+
+REMEMBERED = 31
+"""Answers by which it is known how long they usually take: adapters differ."""
+
+
+class AnswerTime:
+    """Compares how long each answer took with the median of the last ones."""
+
+    def __init__(self) -> None:
+        self._taken_ns: deque[int] = deque(maxlen=REMEMBERED)
+
+    @property
+    def usual_ns(self) -> int:
+        """Median of the last answers' times; 0 where there was none [ns]."""
+        return round(median(self._taken_ns)) if self._taken_ns else 0
+
+    def late_ns(self, taken_ns: int) -> int:
+        """How much later than usual an answer came [ns].
+
+        `taken_ns`: from the question to the last byte or frame of the answer [ns].
+        """
+        self._taken_ns.append(taken_ns)
+        return max(0, taken_ns - self.usual_ns)
 
 
 class Clock(Protocol):
@@ -12,13 +37,7 @@ class Clock(Protocol):
         ...
 
     def wait_until_ns(self, deadline_ns: int) -> int:
-        """Return at a deadline, or at once where it has passed.
-
-        Returns
-        -------
-        int
-            the instant of the return [ns]
-        """
+        """Return at a deadline, or at once where it has passed. Returns int: the instant of the return [ns]."""
         ...
 
 
@@ -48,7 +67,6 @@ class CycleGrid:
     """Even instants, one a cycle, laid through the calls that were the earliest."""
 
     def __init__(self, cycle_s: float) -> None:
-        """The first call is in time."""
         self._period_ns = cycle_s * 1e9
         self._due_ns: int | None = None
 

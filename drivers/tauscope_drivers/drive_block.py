@@ -14,15 +14,11 @@ _KEYS_OF_ANY_BUS = ("stop_policy",)
 class DriveJoint:
     """A joint as a driver sees it.
 
-    gear_ratio : float
-        motor turns per joint turn
-    torque_per_unit : float or None
-        joint torque for one unit that the drive measures, signed as the robot file's ``sign`` and ``torque_constant``
-        are; None where it does not say [Nm or N]
-    torque_limit, velocity_limit : float or None
-        of the joint; None where the robot file states none [Nm or N, rad/s or m/s]
-    position_range : tuple of two float, or None
-        lowest and highest; None where the robot file states none [rad or m]
+    `gear_ratio`: motor turns per joint turn.
+    `torque_per_unit`: joint torque for one unit that the drive measures, signed as the robot file's ``sign`` and
+        ``torque_constant`` are; None where it does not say [Nm or N].
+    `torque_limit`, `velocity_limit`: of the joint; None where the robot file states none [Nm or N, rad/s or m/s].
+    `position_range`: lowest and highest; None where the robot file states none [rad or m].
     """
 
     name: str
@@ -38,15 +34,9 @@ class DriveJoint:
 def require_known_keys(joints: Sequence[DriveJoint], bus_keys: Sequence[str], own_keys: Sequence[str]) -> None:
     """Refuse keys that nobody knows, and several buses.
 
-    Parameters
-    ----------
-    joints : sequence of DriveJoint
-        base first; what they say of the bus stands on the first
+    Raises DriverError ``refused``, which names the joint and the key.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: names the joint and the key
+    `joints`: base first; what they say of the bus stands on the first.
     """
     first = joints[0]
     known = sorted({*bus_keys, *own_keys, *_KEYS_OF_ANY_BUS})
@@ -60,13 +50,7 @@ def require_known_keys(joints: Sequence[DriveJoint], bus_keys: Sequence[str], ow
 
 
 def require_distinct(joints: Sequence[DriveJoint], key: str) -> None:
-    """Refuse an address that is there twice.
-
-    Raises
-    ------
-    DriverError
-        ``refused``: names the joint
-    """
+    """Refuse an address that is there twice. Raises DriverError ``refused``, which names the joint."""
     addresses = [joint.drive[key] for joint in joints]
     for joint, address in zip(joints, addresses, strict=True):
         if addresses.count(address) > 1:
@@ -76,15 +60,9 @@ def require_distinct(joints: Sequence[DriveJoint], key: str) -> None:
 def read_whole(joint: DriveJoint, key: str, default: int | None, *, least: int, most: int) -> int:
     """A whole number.
 
-    Parameters
-    ----------
-    default : int or None
-        where the key is missing; None where it has to be there
+    Raises DriverError ``refused`` where it is none, or out of range.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: it is none, or out of range
+    `default`: where the key is missing; None where it has to be there.
     """
     value = joint.drive.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
@@ -95,10 +73,7 @@ def read_whole(joint: DriveJoint, key: str, default: int | None, *, least: int, 
 def read_direction(joint: DriveJoint) -> int:
     """Which way a drive turns: -1 where it is against the joint, else 1.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: another number
+    Raises DriverError ``refused`` where another number.
     """
     direction = read_whole(joint, "direction", 1, least=-1, most=1)
     if direction == 0:
@@ -107,13 +82,7 @@ def read_direction(joint: DriveJoint) -> int:
 
 
 def read_positive(joint: DriveJoint, key: str) -> float | None:
-    """A positive number; None where the key is missing.
-
-    Raises
-    ------
-    DriverError
-        ``refused``: it is none
-    """
+    """A positive number; None where the key is missing. Raises DriverError ``refused`` where it is none."""
     value = joint.drive.get(key)
     if value is None:
         return None
@@ -123,13 +92,7 @@ def read_positive(joint: DriveJoint, key: str) -> float | None:
 
 
 def read_text(joint: DriveJoint, key: str, what: str) -> str:
-    """A text that has to be there.
-
-    Raises
-    ------
-    DriverError
-        ``refused``: it is missing
-    """
+    """A text that has to be there. Raises DriverError ``refused`` where it is missing."""
     value = joint.drive.get(key)
     if not isinstance(value, str) or not value:
         raise refusal(joint, key, f"is missing; {what}")

@@ -42,10 +42,8 @@ class Connection:
 class ArmDescription:
     """An arm as a driver is told of it.
 
-    robot : object
-        the whole robot as Tauscope reads it, for a driver that simulates it
-    folder : Path or None
-        for files of the driver's own
+    `robot`: the whole robot as Tauscope reads it, for a driver that simulates it.
+    `folder`: for files of the driver's own.
     """
 
     joints: tuple[DriveJoint, ...]
@@ -74,10 +72,7 @@ class Driver(ABC):
     def make_backend(self, arm: ArmDescription, settings: Mapping[str, Any]) -> Connection:
         """The arm as a backend, not connected yet; the settings have no other names than those of `options`.
 
-        Raises
-        ------
-        DriverError
-            ``refused``: a ``drive`` block or a setting is not valid
+        Raises DriverError: ``refused``: a ``drive`` block or a setting is not valid.
         """
 
 
@@ -88,6 +83,8 @@ class BusDriver(Driver):
     """The least ``drive`` block, as a message shows it."""
     port_help: str
     """What ``bus scan`` takes as port."""
+    neighbours: str = ""
+    """Devices that hang on such a bus and do not answer this driver, in a sentence for who finds nobody."""
     bus_options: tuple[str, ...] = ()
     """Names of the options that replace a key of the first joint's ``drive`` block."""
 
@@ -107,44 +104,29 @@ class BusDriver(Driver):
     def examine(self, joints: Sequence[DriveJoint]) -> list[Finding]:
         """Adapter and every drive that the robot file names.
 
-        Raises
-        ------
-        DriverError
-            ``refused``: a ``drive`` block is not valid
+        Raises DriverError: ``refused``: a ``drive`` block is not valid.
         """
 
     @abstractmethod
     def scan(self, port: str, bit_rates: Sequence[int] | None) -> Iterator[FoundDevice]:
         """Devices that answer, whoever they belong to.
 
-        Parameters
-        ----------
-        bit_rates : sequence of int or None
-            to try [bit/s]; the usual ones where None
+        Raises DriverError where the port is missing, not permitted or taken.
 
-        Raises
-        ------
-        DriverError
-            the port is missing, not permitted or taken
+        `bit_rates`: to try [bit/s]; the usual ones where None.
         """
 
     @abstractmethod
     def plan_frames(self, joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:
         """The frames of a run, without a port.
 
-        Raises
-        ------
-        DriverError
-            ``refused``: a ``drive`` block or a limit is not possible
+        Raises DriverError: ``refused``: a ``drive`` block or a limit is not possible.
         """
 
     def read_patience_s(self, settings: Mapping[str, Any]) -> float:
         """How much longer than it takes an answer is waited for [s].
 
-        Raises
-        ------
-        DriverError
-            ``refused``: it is no time up to a second
+        Raises DriverError ``refused`` where it is no time up to a second.
         """
         patience_s = settings.get(PATIENCE.name, PATIENCE.default)
         is_number = isinstance(patience_s, int | float) and not isinstance(patience_s, bool)

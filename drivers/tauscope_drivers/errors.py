@@ -8,8 +8,7 @@ from enum import StrEnum
 class Fault:
     """A fault that a drive or the bus reports, decoded.
 
-    joint : int or None
-        joint number, counted from 1; None where it concerns the whole arm
+    `joint`: joint number, counted from 1; None where it concerns the whole arm.
     """
 
     code: str

@@ -41,8 +41,7 @@ class FoundDevice:
 class FrameRequest:
     """The run whose frames are asked for.
 
-    targets : (K, n) float64
-        positions of the first K cycles; the arm stands at the first of them [rad or m]
+    `targets`: (K, n), positions of the first K cycles; the arm stands at the first of them [rad or m].
     """
 
     mode: ControlMode
@@ -56,8 +55,7 @@ class FrameRequest:
 class PlannedFrame:
     """A frame that would be sent.
 
-    wire : str
-        as the bus's own tools write it: bytes in hexadecimal on a serial bus, ``201#0F00`` on CAN
+    `wire`: as the bus's own tools write it: bytes in hexadecimal on a serial bus, ``201#0F00`` on CAN.
     """
 
     phase: str

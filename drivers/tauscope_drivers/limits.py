@@ -45,15 +45,9 @@ def stated_limits(joints: Sequence[DriveJoint]) -> DriveLimits:
 def require_sensible(limits: DriveLimits, position: Array, labels: Sequence[str]) -> None:
     """Refuse limits that leave no motion, are no numbers, or are those of another place.
 
-    Parameters
-    ----------
-    position : (n,) float64
-        where the arm stands [rad or m]
+    Raises DriverError ``refused``, which names the joint and the limit.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: names the joint and the limit
+    `position`: (n,), where the arm stands [rad or m].
     """
     joint_count = len(position)
     for name in ("position_low", "position_high", "velocity", "torque"):
@@ -76,13 +70,7 @@ def require_sensible(limits: DriveLimits, position: Array, labels: Sequence[str]
 
 
 def require_finite(setpoint: Setpoint, joint_count: int) -> None:
-    """Refuse targets that are missing or no numbers.
-
-    Raises
-    ------
-    DriverError
-        ``refused``
-    """
+    """Refuse targets that are missing or no numbers. Raises DriverError: ``refused``."""
     for targets in (setpoint.position, setpoint.torque):
         if np.shape(targets) != (joint_count,) or not np.isfinite(targets).all():
             raise DriverError(
@@ -94,19 +82,13 @@ class RunawayWatch:
     """Looks at every reading of an arm that is given torque."""
 
     def __init__(self, limits: DriveLimits) -> None:
-        """Begin with a sound arm."""
         self._limits = limits
         self._fast = np.zeros(len(limits.velocity), dtype=np.int64)
 
     def look(self, position: Array, velocity: Array) -> Fault | None:
         """The first joint that leaves its limits; NaN leaves none.
 
-        Parameters
-        ----------
-        position : (n,) float64
-            [rad or m]
-        velocity : (n,) float64
-            [rad/s or m/s]
+        `position`: (n,) [rad or m]; `velocity`: (n,) [rad/s or m/s].
         """
         limits = self._limits
         with np.errstate(invalid="ignore"):
@@ -131,10 +113,7 @@ class TorqueWatch:
     def __init__(self, torque: Array) -> None:
         """Begin with a sound arm.
 
-        Parameters
-        ----------
-        torque : (n,) float64
-            largest torque; infinite where the drive limits it, or where there is no limit [Nm or N]
+        `torque`: (n,), largest torque; infinite where the drive limits it, or where there is no limit [Nm or N].
         """
         self._torque = torque
         self._over = np.zeros(len(torque), dtype=np.int64)
@@ -142,10 +121,7 @@ class TorqueWatch:
     def look(self, effort: Array) -> Fault | None:
         """The first joint beyond its limit for `PERSISTENCE` cycles; NaN is none.
 
-        Parameters
-        ----------
-        effort : (n,) float64
-            measured torque [Nm or N]
+        `effort`: (n,), measured torque [Nm or N].
         """
         with np.errstate(invalid="ignore"):
             over = np.abs(effort) > TORQUE_MARGIN * self._torque

@@ -16,20 +16,16 @@ class ArmState:
 
     A value that was not received in this cycle is NaN, never the one before.
 
-    time_ns : int
-        instant of the reading by the backend's clock [ns]
-    position : (n,) float64
-        q [rad or m]
-    velocity : (n,) float64
-        q̇ as the drive reports it, NaN where it reports none [rad/s or m/s]
-    effort : (n,) float64
-        measured effort as `Capabilities.effort_unit` says: joint torque [Nm or N], or what the drive reports instead
-    temperature : (n,) float64
-        of the motor, NaN where it is not reported [°C]
-    enabled : (n,) bool
-        whether the joint's drive holds or drives the joint
-    late_ns : int
-        how much later than the bus takes the answers came: the instant of the reading is not known any better [ns]
+    `time_ns`: instant of the reading by the backend's clock [ns].
+    `position`: (n,), q [rad or m].
+    `velocity`: (n,), q̇ as the drive reports it, NaN where it reports none [rad/s or m/s].
+    `effort`: (n,), measured effort as `Capabilities.effort_unit` says: joint torque [Nm or N], or what the drive
+        reports instead.
+    `temperature`: (n,), of the motor, NaN where it is not reported [°C].
+    `enabled`: (n,), whether the joint's drive holds or drives the joint.
+    `voltage`: (n,) or None, supply of the drive's bridge; None where the drives report none [V].
+    `late_ns`: how much later than the bus takes the answers came: the instant of the reading is not known any better
+        [ns].
     """
 
     time_ns: int
@@ -40,6 +36,7 @@ class ArmState:
     enabled: NDArray[np.bool_]
     faults: tuple[Fault, ...] = ()
     late_ns: int = 0
+    voltage: Array | None = None
 
     @property
     def fresh(self) -> NDArray[np.bool_]:
@@ -51,11 +48,9 @@ class ArmState:
 class Setpoint:
     """What the drives shall do until the next cycle, in joint units; which field counts is the control mode's matter.
 
-    position : (n,) float64
-        target position in `ControlMode.POSITION` [rad or m]
-    torque : (n,) float64
-        target torque in `ControlMode.TORQUE`; feed-forward in `ControlMode.POSITION` where the backend takes one, else
-        unused [Nm or N]
+    `position`: (n,), target position in `ControlMode.POSITION` [rad or m].
+    `torque`: (n,), target torque in `ControlMode.TORQUE`; feed-forward in `ControlMode.POSITION` where the backend
+        takes one, else unused [Nm or N].
     """
 
     position: Array

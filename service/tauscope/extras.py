@@ -38,17 +38,13 @@ POSIX_ONLY = ("fcntl", "resource", "termios")
 def require_extra(user: str) -> Iterator[None]:
     """Say in one line what is needed, where an import fails because an extra or a POSIX module is missing.
 
+    Raises MissingExtraError where an optional dependency is not installed. Raises TauscopeError where the operating
+    system lacks a POSIX module.
+
     Parameters
     ----------
     user : str
         what needs the extra, as the first words of the message
-
-    Raises
-    ------
-    MissingExtraError
-        an optional dependency is not installed
-    TauscopeError
-        the operating system lacks a POSIX module
     """
     try:
         yield

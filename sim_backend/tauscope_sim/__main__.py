@@ -10,17 +10,14 @@ import numpy as np
 from tauscope.errors import TauscopeError
 from tauscope.robot import read_robot
 from tauscope_sim.motion import LEAST_HARMONICS, random_fourier_motion
-from tauscope_sim.recording import simulate_recording
-from tauscope_sim.recording_csv import write_recording_csv
+from tauscope_sim.recording import simulate_recording, write_recording_csv
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Simulate a recording and write it.
 
-    Returns
-    -------
-    int
-        exit status: 0 done, 1 the robot file or the output file does not allow it (2, wrong usage, exits by itself)
+    Returns int: exit status: 0 done, 1 the robot file or the output file does not allow it (2, wrong usage, exits by
+    itself).
     """
     options = _parser().parse_args(arguments)
     try:

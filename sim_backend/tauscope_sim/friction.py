@@ -17,6 +17,9 @@ def static_friction_torque(
 ) -> Array:
     """Friction torque τ_f = τ_s S₀(v) + τ_sc (2/π) arctan(v δ) + τ_v v, with S₀(v) = (2/π) arctan(v K_v).
 
+    Raises RobotFileError where a shape constant that is needed is None, or where the number of entries is not the
+    number of joints.
+
     Parameters
     ----------
     velocity : (N, n) float64
@@ -28,11 +31,6 @@ def static_friction_torque(
     -------
     (N, n) float64
         τ_f, positive where the drive has to overcome it in the positive direction [Nm or N]
-
-    Raises
-    ------
-    RobotFileError
-        where a shape constant that is needed is None, or where the number of entries is not the number of joints
 
     Notes
     -----
@@ -59,25 +57,19 @@ def shape_constants(
 ) -> list[tuple[float, float]]:
     """K_v and δ of each joint; zero where the coefficient that they shape is zero and the robot file states none.
 
-    Parameters
-    ----------
-    friction_shape : sequence of FrictionShape
-        K_v and δ, one entry a joint [s/rad or s/m]
+    Raises RobotFileError where a shape constant that is needed is None.
 
-    Raises
-    ------
-    RobotFileError
-        where a shape constant that is needed is None
+    `friction_shape`: K_v and δ, one entry a joint [s/rad or s/m].
     """
     constants: list[tuple[float, float]] = []
     for number, (coefficients, shape) in enumerate(zip(friction, friction_shape, strict=True), 1):
         place = f"joint {number}: friction_shape"
-        k_v = _needed(shape.k_v, coefficients.stiction, f"{place}.k_v")
-        constants.append((k_v, _needed(shape.delta, coefficients.stribeck, f"{place}.delta")))
+        k_v = _require(shape.k_v, coefficients.stiction, f"{place}.k_v")
+        constants.append((k_v, _require(shape.delta, coefficients.stribeck, f"{place}.delta")))
     return constants
 
 
-def _needed(slope: float | None, level: float, place: str) -> float:
+def _require(slope: float | None, level: float, place: str) -> float:
     """Return the slope, which may be missing only where the level that it shapes is zero."""
     if slope is None and level != 0.0:
         raise RobotFileError(f"{place} is missing; a simulation with friction needs it [s/rad or s/m]")
@@ -87,25 +79,12 @@ def _needed(slope: float | None, level: float, place: str) -> float:
 def smooth_sign(velocity: float, k_v: float) -> float:
     """A(v) = (2/π) arctan(K_v v), the continuous stand-in for sgn v, equation (8).
 
-    Parameters
-    ----------
-    velocity : float
-        v [rad/s or m/s]
-    k_v : float
-        K_v [s/rad or s/m]
+    `velocity`: v [rad/s or m/s]; `k_v`: K_v [s/rad or s/m].
     """
     return math.atan(k_v * velocity) / (0.5 * math.pi)
 
 
 def smooth_sign_slope(velocity: float, k_v: float) -> float:
-    """dA/dv = (2/π) K_v / (1 + (K_v v)²) [s/rad or s/m].
-
-    Parameters
-    ----------
-    velocity : float
-        v [rad/s or m/s]
-    k_v : float
-        K_v [s/rad or s/m]
-    """
+    """dA/dv = (2/π) K_v / (1 + (K_v v)²) [s/rad or s/m]. `velocity`: v [rad/s or m/s]; `k_v`: K_v [s/rad or s/m]."""
     scaled = k_v * velocity
     return k_v / (1.0 + scaled * scaled) / (0.5 * math.pi)

@@ -22,8 +22,7 @@ from tauscope.errors import RobotFileError
 from tauscope.robot.actuator import Actuator
 from tauscope.robot.chain import Chain, ResultWarning, default_ends_note, rigid_branch_note
 from tauscope.robot.document import MOST_JOINTS
-from tauscope.robot.finding import Finding, Severity
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import Finding, Severity, nearest, one_line, shown
 from tauscope.robot.placement import compose, rotation_of_z_to
 from tauscope.robot.robot import (
     Coupling,
@@ -51,17 +50,10 @@ def read_chain(
 ) -> Chain:
     """The chain from body `base` to body `tip`; by default from the root to the deepest body.
 
-    Parameters
-    ----------
-    path : Path or None
-        where the file lies, for the files that it names; None for text without files beside it
-    locked : mapping of str to float
-        position of joints that do not move [rad or m]
+    Raises RobotFileError if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip.
 
-    Raises
-    ------
-    RobotFileError
-        if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip
+    `path`: where the file lies, for the files that it names; None for text without files beside it; `locked`: position
+    of joints that do not move [rad or m].
     """
     return _Reader(compile_model(data, label, path), label, locked).chain(base, tip)
 

@@ -16,15 +16,9 @@ from tauscope.robot.messages import one_line
 def compile_model(data: bytes, label: str, path: Path | None) -> mujoco.MjModel:
     """The compiled model; where files of shapes or textures are missing, without the shapes that carry no mass.
 
-    Parameters
-    ----------
-    path : Path or None
-        where the file lies, for the files that it names; None for text without files beside it
+    Raises RobotFileError if MuJoCo refuses the file.
 
-    Raises
-    ------
-    RobotFileError
-        if MuJoCo refuses the file
+    `path`: where the file lies, for the files that it names; None for text without files beside it.
     """
     try:
         with warnings.catch_warnings(action="ignore"):  # attributes that MuJoCo will remove one day

@@ -36,12 +36,8 @@ def build_spec(robot: Robot) -> mujoco.MjSpec:
     The generalised coordinates are the positions of the segments, in chain order; what ties a segment to a joint that
     it follows is not in the model, see `tauscope_sim.plant.rigid_bodies`. There are no geometries, no
     joint limits, no damping and no actuators: what is not in the robot file is not in the model. Friction is not part
-    of it either; see `tauscope_sim.friction`.
-
-    Raises
-    ------
-    RobotFileError
-        where the robot file states no links, or where MuJoCo refuses the model
+    of it either; see `tauscope_sim.friction`. Raises RobotFileError where the robot file states no links, or where
+    MuJoCo refuses the model.
     """
     links = robot.model.links
     if links is None or len(links) != robot.link_count:
@@ -70,10 +66,7 @@ def build_spec(robot: Robot) -> mujoco.MjSpec:
 def build_model(robot: Robot) -> mujoco.MjModel:
     """Compiled MuJoCo model of an arm; see `build_spec`.
 
-    Raises
-    ------
-    RobotFileError
-        where the robot file states no links, or where MuJoCo refuses the model
+    Raises RobotFileError where the robot file states no links, or where MuJoCo refuses the model.
     """
     spec = build_spec(robot)
     with _mujoco_refusals(robot):
@@ -126,14 +119,10 @@ def _weigh(body: mujoco.MjsBody, link: LinkInertia) -> None:
 class BodyInertia:
     """Inertia of a body in MuJoCo's terms.
 
-    mass : float
-        m, above zero [kg]
-    centre : (3,) float64
-        centre of mass in the link frame [m]
-    quaternion : (4,) float64
-        (w, x, y, z) of the principal axes in the link frame
-    moments : (3,) float64
-        principal moments about the centre of mass, ascending, above zero [kg m²]
+    `mass`: m, above zero [kg].
+    `centre`: (3,), centre of mass in the link frame [m].
+    `quaternion`: (4,), (w, x, y, z) of the principal axes in the link frame.
+    `moments`: (3,), principal moments about the centre of mass, ascending, above zero [kg m²].
     """
 
     mass: float

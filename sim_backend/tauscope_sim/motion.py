@@ -20,8 +20,7 @@ LEAST_HARMONICS = 2
 class MotionSamples:
     """A motion at given instants.
 
-    position, velocity, acceleration : (N, n) float64
-        q, q̇, q̈ [rad or m, and per s, per s²]
+    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈ [rad or m, and per s, per s²].
     """
 
     position: Array
@@ -33,14 +32,10 @@ class MotionSamples:
 class FourierMotion:
     """A finite Fourier series a joint, the form of the paper's section 5.2 about a centre position.
 
-    period_s : float
-        duration of one period, 2π/ω_f [s]
-    centre : (n,) float64
-        mean position [rad or m]
-    cosine : (n, M) float64
-        a_l, velocity amplitude of the cosine of harmonic l [rad/s or m/s]
-    sine : (n, M) float64
-        b_l, velocity amplitude of the sine of harmonic l [rad/s or m/s]
+    `period_s`: duration of one period, 2π/ω_f [s].
+    `centre`: (n,), mean position [rad or m].
+    `cosine`: (n, M), a_l, velocity amplitude of the cosine of harmonic l [rad/s or m/s].
+    `sine`: (n, M), b_l, velocity amplitude of the sine of harmonic l [rad/s or m/s].
     """
 
     period_s: float
@@ -49,13 +44,7 @@ class FourierMotion:
     sine: Array
 
     def evaluate(self, time: Array) -> MotionSamples:
-        """Exact position, velocity and acceleration.
-
-        Parameters
-        ----------
-        time : (N,) float64
-            instants since the start of a period [s]
-        """
+        """Exact position, velocity and acceleration. `time`: (N,), instants since the start of a period [s]."""
         omega = 2.0 * np.pi / self.period_s * np.arange(1, self.cosine.shape[1] + 1)
         phase = np.multiply.outer(time, omega)
         cosine, sine = np.cos(phase), np.sin(phase)
@@ -77,19 +66,10 @@ def random_fourier_motion(
     """Random finite Fourier series, each joint scaled until the first of its limits is reached.
 
     Velocity and acceleration are zero at the start and the end of the period: Σ a_l = 0 and Σ l b_l = 0. The limits
-    hold at every instant, not only at samples. A limit that is not stated does not bind.
+    hold at every instant, not only at samples. A limit that is not stated does not bind. Raises RobotFileError where a
+    joint states no limit. Raises RecordingError where `period_s`, `harmonics` or `limit_fraction` is out of its range.
 
-    Parameters
-    ----------
-    period_s : float
-        duration of one period [s]
-
-    Raises
-    ------
-    RobotFileError
-        where a joint states no limit
-    RecordingError
-        where `period_s`, `harmonics` or `limit_fraction` is out of its range
+    `period_s`: duration of one period [s].
     """
     if not (np.isfinite(period_s) and period_s > 0.0):
         raise RecordingError(f"period_s is {period_s}; give a positive duration")

@@ -31,15 +31,9 @@ class MujocoLog:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, joints: Sequence[str] | None = None) -> None:
         """Take a simulation; nothing of it is changed.
 
-        Parameters
-        ----------
-        joints : sequence of str or None
-            hinges and slides, base first; None: all of them, as the file has them
+        Raises RecordingError where a joint is not there, or is no hinge or slide.
 
-        Raises
-        ------
-        RecordingError
-            a joint is not there, or is no hinge or slide
+        `joints`: hinges and slides, base first; None: all of them, as the file has them.
         """
         every = [model.joint(index).name for index in range(model.njnt) if model.jnt_type[index] in HINGE_OR_SLIDE]
         self.joints = tuple(every if joints is None else joints)
@@ -56,10 +50,7 @@ class MujocoLog:
     def step(self, command: NDArray[np.float64] | None = None) -> None:
         """Do what ``mujoco.mj_step(model, data)`` does, and keep a row.
 
-        Parameters
-        ----------
-        command : (n,) float64 or None
-            that is kept as ``qref``; None: the actuators' control
+        `command`: (n,), that is kept as ``qref``; None: the actuators' control.
         """
         data = self._data
         time, position, velocity = data.time, data.qpos[self._qpos].copy(), data.qvel[self._dof].copy()
@@ -71,10 +62,7 @@ class MujocoLog:
     def save(self, path: str | Path, *, with_torque: bool = True) -> None:
         """Write all rows as CSV.
 
-        Parameters
-        ----------
-        with_torque : bool
-            whether torque is among the columns; a position servo's log has none
+        `with_torque`: whether torque is among the columns; a position servo's log has none.
         """
         rows, count = np.array(self._rows), len(self.joints)
         groups = ("q", "tau", "qd", "qref") if with_torque else ("q", "qd", "qref")

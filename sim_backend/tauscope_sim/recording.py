@@ -1,37 +1,53 @@
 """A recording that a simulated arm would leave: exact motion, exact torque, and what noisy sensors make of them."""
 
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's extension modules come without type stubs)
+
+import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauscope.errors import RecordingError
-from tauscope.robot.robot import FrictionCoefficients, FrictionShape, Robot
+from tauscope.robot.robot import FrictionCoefficients, FrictionShape, Joint, Robot
 from tauscope_sim.friction import static_friction_torque
-from tauscope_sim.inverse_dynamics import rigid_body_torque
 from tauscope_sim.model import build_model
 from tauscope_sim.motion import FourierMotion, MotionSamples
 
 Array = NDArray[np.float64]
 
 
+def rigid_body_torque(model: mujoco.MjModel, position: Array, velocity: Array, acceleration: Array) -> Array:
+    """Joint torque τ = H(q) q̈ + h(q, q̇) + c(q) along a motion, by ``mj_inverse``.
+
+    `position`: (N, n), q [rad or m]; `velocity`: (N, n), q̇ [rad/s or m/s]; `acceleration`: (N, n), q̈ [rad/s² or
+    m/s²]. Returns (N, n), τ without friction, the paper's equation (1) [Nm or N].
+    """
+    data = mujoco.MjData(model)
+    torque = np.empty_like(position)
+    for row in range(len(position)):
+        data.qpos[:] = position[row]
+        data.qvel[:] = velocity[row]
+        data.qacc[:] = acceleration[row]
+        mujoco.mj_inverse(model, data)
+        torque[row] = data.qfrc_inverse
+    return torque
+
+
 @dataclass(frozen=True, eq=False)
 class SimulatedRecording:
     """A simulated measurement together with the truth behind it.
 
-    time : (N,) float64
-        instants, uniform, from zero [s]
-    position : (N, n) float64
-        q as the encoder reports it [rad or m]
-    torque : (N, n) float64
-        τ as measured: exact torque plus noise [Nm or N]
-    exact : MotionSamples
-        q, q̇, q̈ without noise, (N, n) each
-    torque_exact : (N, n) float64
-        τ without noise, friction included [Nm or N]
-    period : (N,) int64
-        index of the repeated period, from zero
+    `time`: (N,), instants, uniform, from zero [s].
+    `position`: (N, n), q as the encoder reports it [rad or m].
+    `torque`: (N, n), τ as measured: exact torque plus noise [Nm or N].
+    `exact`: q, q̇, q̈ without noise, (N, n) each.
+    `torque_exact`: (N, n), τ without noise, friction included [Nm or N].
+    `period`: (N,) int64, index of the repeated period, from zero.
     """
 
     time: Array
@@ -57,27 +73,15 @@ def simulate_recording(
 ) -> SimulatedRecording:
     """Record an arm that follows a motion exactly: τ = H(q) q̈ + h(q, q̇) + c(q) + τ_f(q̇) + noise, equations (1), (6).
 
-    The noise is Gaussian, white, of zero mean, and independent between joints, as in the paper's section 3.
+    The noise is Gaussian, white, of zero mean, and independent between joints, as in the paper's section 3. Raises
+    RobotFileError where the robot file lacks what the simulation needs. Raises RecordingError where the settings make
+    no recording.
 
-    Parameters
-    ----------
-    rate_hz : float
-        samples per second; each period has to hold a whole number of samples [Hz]
-    noise_std : (n,) float64 or float
-        standard deviation of the torque noise [Nm or N]
-    position_noise_std : (n,) float64 or float
-        standard deviation of the position noise [rad or m]
-    encoder_step : (n,) float64 or float
-        resolution to which positions are rounded, zero for none [rad or m]
-    friction_shape : sequence of FrictionShape, optional
-        K_v and δ of each joint [s/rad or s/m]; the robot file's where None
-
-    Raises
-    ------
-    RobotFileError
-        where the robot file lacks what the simulation needs
-    RecordingError
-        where the settings make no recording
+    `rate_hz`: samples per second; each period has to hold a whole number of samples [Hz].
+    `noise_std`: (n,) or float, standard deviation of the torque noise [Nm or N].
+    `position_noise_std`: (n,) or float, standard deviation of the position noise [rad or m].
+    `encoder_step`: (n,) or float, resolution to which positions are rounded, zero for none [rad or m].
+    `friction_shape`: K_v and δ of each joint [s/rad or s/m]; the robot file's where None.
     """
     samples_per_period = _samples_per_period(motion.period_s, rate_hz)
     if periods < 1:
@@ -100,7 +104,7 @@ def simulate_recording(
     torque_noise, position_noise = rng.standard_normal(shape), rng.standard_normal(shape)
     return SimulatedRecording(
         time=np.arange(shape[0]) / rate_hz,
-        position=_quantised(exact.position + position_std * position_noise, step),
+        position=_quantise(exact.position + position_std * position_noise, step),
         torque=torque_exact + torque_std * torque_noise,
         exact=exact,
         torque_exact=torque_exact,
@@ -149,9 +153,42 @@ def _torque(
     return torque + static_friction_torque(samples.velocity, friction, shape)
 
 
-def _quantised(position: Array, step: Array) -> Array:
+def _quantise(position: Array, step: Array) -> Array:
     """Positions rounded to the encoder's step; joints with step zero as they are."""
     rounded = position.copy()
     coarse = step > 0.0
     rounded[:, coarse] = np.rint(position[:, coarse] / step[coarse]) * step[coarse]
     return rounded
+
+
+def write_recording_csv(
+    path: Path, recording: SimulatedRecording, joints: Sequence[Joint], *, as_current: bool = False
+) -> None:
+    """Write what a real arm's logger would have written, the joints' wiring included.
+
+    A joint with ``sign: -1`` is recorded the other way round; with `as_current` the columns are i1…in and hold torque
+    divided by the joint's torque constant. Numbers are written so that reading them gives the same float64. Raises
+    RecordingError where the file exists, or cannot be written.
+    """
+    signs = np.array([joint.sign for joint in joints], dtype=np.float64)
+    constants = np.array([joint.torque_constant for joint in joints])
+    effort = recording.torque * signs / (constants if as_current else 1.0)
+    table = np.column_stack([recording.time, recording.position, effort])
+    try:
+        with path.open("x", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(_header(len(joints), "i" if as_current else "tau"))
+            # tolist turns a row into Python floats, whose text is the shortest that reads back exactly
+            writer.writerows([*row.tolist(), int(period)] for row, period in zip(table, recording.period, strict=True))
+    except FileExistsError as error:
+        raise RecordingError(
+            f"{path}: exists already, and recordings are not overwritten; choose another name"
+        ) from error
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
+
+
+def _header(joint_count: int, effort: str) -> list[str]:
+    """Column names of the recording file."""
+    numbers = range(1, joint_count + 1)
+    return ["t", *(f"q{number}" for number in numbers), *(f"{effort}{number}" for number in numbers), "period"]

@@ -23,14 +23,8 @@ class MujocoPlant:
     def __init__(self, mjcf: str, joints: Sequence[str], step_s: float, damping: Array) -> None:
         """Compile the file.
 
-        Parameters
-        ----------
-        joints : sequence of str
-            names of the driven joints, base first
-        step_s : float
-            [s]
-        damping : (n,) float64
-            added to that of the file [Nm s/rad or N s/m]
+        `joints`: names of the driven joints, base first; `step_s`: [s]; `damping`: (n,), added to that of the file [Nm
+        s/rad or N s/m].
         """
         model = mujoco.MjModel.from_xml_string(mjcf)
         model.opt.timestep = step_s
@@ -50,15 +44,7 @@ class MujocoPlant:
         self._inertial = np.zeros(model.nv)
 
     def reset(self, position: Array, velocity: Array) -> None:
-        """Put the joints somewhere.
-
-        Parameters
-        ----------
-        position : (n,) float64
-            [rad or m]
-        velocity : (n,) float64
-            [rad/s or m/s]
-        """
+        """Put the joints somewhere. `position`: (n,) [rad or m]; `velocity`: (n,) [rad/s or m/s]."""
         model, data = self._model, self._data
         mujoco.mj_resetData(model, data)
         data.qpos[self._qpos], data.qvel[self._dof] = position, velocity
@@ -73,12 +59,8 @@ class MujocoPlant:
     def advance(self, torque: Array, dry: Array) -> None:
         """One step.
 
-        Parameters
-        ----------
-        torque : (n,) float64
-            on the joints [Nm or N]
-        dry : (n,) float64
-            dry friction, which holds a joint at rest up to this level [Nm or N]
+        `torque`: (n,), on the joints [Nm or N]; `dry`: (n,), dry friction, which holds a joint at rest up to this level
+        [Nm or N].
         """
         self._data.qfrc_applied[self._dof] = torque
         self._model.dof_frictionloss[self._dof] = dry

@@ -22,14 +22,10 @@ def _zero() -> Array:
 class Scenario:
     """What differs from the robot file, and how well the sensors see it; ``Scenario()`` conceals nothing.
 
-    torque_noise_std : (n,) or () float64
-        standard deviation of the recorded torque's white noise [Nm or N]
-    position_noise_std : (n,) or () float64
-        of the recorded position's [rad or m]
-    encoder_step : (n,) or () float64
-        resolution to which positions are recorded, zero for none [rad or m]
-    command_latency_s : float
-        time from a setpoint's arrival to its effect [s]
+    `torque_noise_std`: (n,) or (), standard deviation of the recorded torque's white noise [Nm or N].
+    `position_noise_std`: (n,) or (), of the recorded position's [rad or m].
+    `encoder_step`: (n,) or (), resolution to which positions are recorded, zero for none [rad or m].
+    `command_latency_s`: time from a setpoint's arrival to its effect [s].
     """
 
     effects: tuple[Effect, ...] = ()
@@ -43,30 +39,17 @@ class Scenario:
     def plant(self, robot: Robot, *, step_s: float = STEP) -> Plant:
         """Forward physics of the arm with its concealed effects.
 
-        Parameters
-        ----------
-        step_s : float
-            longest step of the integration [s]
+        Raises RobotFileError where the robot file lacks what the simulation needs. Raises ScenarioError where effects
+        contradict one another or the robot.
 
-        Raises
-        ------
-        RobotFileError
-            where the robot file lacks what the simulation needs
-        ScenarioError
-            where effects contradict one another or the robot
+        `step_s`: longest step of the integration [s].
         """
         for effect in self.effects:
             effect.check(robot)
         return Plant(robot, self.effects, step_s=step_s)
 
     def sensors(self, robot: Robot, rng: np.random.Generator | None = None) -> "Sensors":
-        """The sensors, at the beginning of a recording.
-
-        Raises
-        ------
-        ScenarioError
-            where an effect contradicts the robot
-        """
+        """The sensors, at the beginning of a recording. Raises ScenarioError where an effect contradicts the robot."""
         for effect in self.sensor_effects:
             effect.check(robot)
         return Sensors(self, robot.joint_count, np.random.default_rng(self.seed) if rng is None else rng)

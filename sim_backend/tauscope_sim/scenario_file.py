@@ -41,8 +41,7 @@ MOST_EFFECTS = 200
 class ScenarioDocument(Document):
     """The scenario file's keys.
 
-    command_latency : float
-        [s]
+    `command_latency`: [s].
     """
 
     torque_noise_std: NotNegativeNumbers = Field(default_factory=single_zero)
@@ -56,10 +55,8 @@ class ScenarioDocument(Document):
 def read_scenario(path: Path | str, robot: Robot) -> Scenario:
     """The scenario of a file.
 
-    Raises
-    ------
-    ScenarioError
-        if the file cannot be read, is not valid or does not fit the robot; one line naming file, entry and key
+    Raises ScenarioError if the file cannot be read, is not valid or does not fit the robot; one line naming file, entry
+    and key.
     """
     try:
         data = read_bounded(Path(path), LARGEST_SCENARIO_FILE)
@@ -69,13 +66,7 @@ def read_scenario(path: Path | str, robot: Robot) -> Scenario:
 
 
 def scenario_from_yaml(data: bytes, label: str, robot: Robot) -> Scenario:
-    """The scenario of a YAML document.
-
-    Raises
-    ------
-    ScenarioError
-        if the document is not valid or does not fit the robot
-    """
+    """The scenario of a YAML document. Raises ScenarioError if the document is not valid or does not fit the robot."""
     try:
         content = read_yaml(decode_utf8(data, label), label)
     except RobotFileError as error:
@@ -91,7 +82,7 @@ class _Reader:
 
     def scenario(self, data: Any) -> Scenario:
         """The scenario of plain data."""
-        document = self._validated(ScenarioDocument, data, (), "")
+        document = self._validate(ScenarioDocument, data, (), "")
         entries = [self._entry(value, number) for number, value in enumerate(document.effects)]
         scenario = Scenario(
             effects=tuple(entry for entry in entries if isinstance(entry, Effect)),
@@ -117,7 +108,7 @@ class _Reader:
             hint = nearest(name, EFFECTS) if isinstance(name, str) else "write an effect id"
             raise self._error((*place, "effect"), "", f"unknown effect {shown(name)}; {hint}")
         keys = {key: self._joint_number(key, part) for key, part in value.items() if key != "effect"}
-        entry = self._validated(EFFECTS[name], keys, place, name)
+        entry = self._validate(EFFECTS[name], keys, place, name)
         try:
             entry.check(self._robot)
         except ScenarioError as error:
@@ -145,7 +136,7 @@ class _Reader:
         except ScenarioError as error:
             raise self._error(("effects",), "", str(error)) from error
 
-    def _validated(self, kind: type, data: Any, place: Place, name: str) -> Any:
+    def _validate(self, kind: type, data: Any, place: Place, name: str) -> Any:
         """The data as a validated document."""
         if not isinstance(data, Mapping):
             raise self._error(place, name, f"must be a mapping, but is {shown(data)}")

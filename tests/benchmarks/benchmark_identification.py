@@ -34,8 +34,7 @@ from tauscope.identification import identify  # noqa: E402
 from tauscope.recording import read_recording  # noqa: E402
 from tauscope.robot import FrictionShape, Joint, LinkInertia, Model, Robot  # noqa: E402
 from tauscope_sim.motion import FourierMotion  # noqa: E402
-from tauscope_sim.recording import simulate_recording  # noqa: E402
-from tauscope_sim.recording_csv import write_recording_csv  # noqa: E402
+from tauscope_sim.recording import simulate_recording, write_recording_csv  # noqa: E402
 
 RATE_HZ = 500.0
 NOISE_STD = 0.3

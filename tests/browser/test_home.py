@@ -23,7 +23,7 @@ DROP = """
 """
 
 
-def renamed(name: str) -> str:
+def rename_robot(name: str) -> str:
     """A recording of the example as another tool names its columns, the positions of its joints the wrong way round."""
     text = example_files()[name].decode()
     return text.replace("t,q1,q2,tau1,tau2", "timestamp,pos_2,pos_1,torque_1,torque_2", 1)
@@ -168,7 +168,7 @@ def test_files_of_another_tool_are_dropped_and_a_column_is_mended(
     visit.go("/")
     expect(page.locator(".drop")).to_be_visible()
     files = {"example-arm.yaml": example_files()["example-arm.yaml"].decode(), "notes.md": "none"}
-    files |= {name: renamed(name) for name in example_files() if name.endswith(".csv")}
+    files |= {name: rename_robot(name) for name in example_files() if name.endswith(".csv")}
     page.evaluate(DROP, files)
     read(page)
     expect(page.get_by_text("Guessed from the names")).to_be_visible()

@@ -12,8 +12,7 @@ from server.http.serving import Served, served
 from server.queue.paper_files import PAPER_ROBOT
 from tauscope.robot import read_robot
 from tauscope_sim.motion import random_fourier_motion
-from tauscope_sim.recording import simulate_recording
-from tauscope_sim.recording_csv import write_recording_csv
+from tauscope_sim.recording import simulate_recording, write_recording_csv
 
 ROBOT = "paper-arm"
 VISCOUS = (0.5, 0.75, 1.0)

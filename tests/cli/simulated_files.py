@@ -9,8 +9,7 @@ from tauscope.cli.demo import robot_text_without_model
 from tauscope.robot import Robot, read_robot
 from tauscope_sim.examples import example_robot
 from tauscope_sim.motion import random_fourier_motion
-from tauscope_sim.recording import simulate_recording
-from tauscope_sim.recording_csv import write_recording_csv
+from tauscope_sim.recording import simulate_recording, write_recording_csv
 
 NOISE_STD = (0.05, 0.03, 0.07)
 
@@ -47,7 +46,7 @@ def record(arm: Robot, path: Path, seed: int, rate_hz: float = 100.0, periods: i
     return path
 
 
-def renamed(arm: Robot, name: str, joints: tuple[str, ...]) -> Robot:
+def rename_arm(arm: Robot, name: str, joints: tuple[str, ...]) -> Robot:
     """The same arm under other names."""
     return replace(
         arm, name=name, joints=tuple(replace(joint, name=new) for joint, new in zip(arm.joints, joints, strict=True))

@@ -28,8 +28,7 @@ from tauscope.cli.demo import (
     TRAIN_TRAJECTORY,
     robot_text_without_model,
 )
-from tauscope.cli.demo_folder import MARK, prepare_folder
-from tauscope.cli.demo_page import DATA, PORT, PageShown, leave_page
+from tauscope.cli.demo_page import DATA, MARK, PORT, PageShown, leave_page, prepare_folder
 from tauscope.errors import ExportError, StoreError
 from tauscope.recording import read_recording
 from tauscope.robot import read_robot

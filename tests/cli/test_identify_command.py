@@ -12,7 +12,7 @@ import typer
 
 from cli.conftest import Ended
 from cli.simulated_files import NOISE_STD, SimulatedFiles
-from tauscope.cli.identify_command import parse_cutoff
+from tauscope.cli.arguments import parse_cutoff
 from tauscope.robot import read_robot
 
 Run = Callable[..., Ended]

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauscope.cli.values import spread_values
+from tauscope.cli.verbs import spread_values
 
 OPTIONS = {"--held-out", "-H"}
 

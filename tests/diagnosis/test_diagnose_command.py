@@ -13,8 +13,7 @@ import tauscope.tasks.diagnose
 from diagnosis.diagnosed_arm import recordings
 from diagnosis.test_diagnosis_of_simulated_arms import spring
 from tauscope.cli.diagnose_command import diagnose
-from tauscope.cli.values import SeveralValuesCommand
-from tauscope.cli.verbs import add_verb
+from tauscope.cli.verbs import SeveralValuesCommand, add_verb
 from tauscope.diagnosis import Diagnosis, DiagnosisDocument
 from tauscope.errors import ExcitationError
 from tauscope.excitation import require_within_limits

@@ -16,13 +16,14 @@ from diagnosis.diagnosed_arm import EffectTorque, at_joint, recordings
 from effects.piece_of_motion import SIGNALS, context
 from identification.simulated import Array, SimulatedArm, paper_robot
 from tauscope.diagnosis import Diagnosis, against_saved, diagnose, document
-from tauscope.diagnosis.extended_model.saved import ModelDocument, _entry, _term, model_document, read_model, restored
+from tauscope.diagnosis.extended_model import ModelDocument, _entry, _term, model_document, restore_model
 from tauscope.diagnosis.model.extended import with_terms
 from tauscope.diagnosis.model.residual import raw_squares
 from tauscope.diagnosis.model.term import Term
 from tauscope.effects import Effect, TimeLocalEffect, catalogue, possible_effects
 from tauscope.errors import IdentificationError
 from tauscope.export.extended_compensation import compensation_code
+from tauscope.export.model_file import read_extended_model
 from tauscope.export.simulation_files import improved_robot, scenario_text
 from tauscope.recording import EffortKind
 from tauscope.robot import read_robot
@@ -85,7 +86,7 @@ def test_a_saved_model_predicts_the_same_and_finds_nothing_missing_again(tmp_pat
     assert names == {("cable_force", "joint1"), ("cogging", "joint3")}
     path = tmp_path / "model.json"
     path.write_text(model_document(found()).model_dump_json(by_alias=True))
-    again = read_model(path, paper_robot())
+    again = read_extended_model(path, paper_robot())
     observations = found().fitter.observations
     np.testing.assert_allclose(
         raw_squares(again, observations)[0], raw_squares(found().selection.fit.model, observations)[0], rtol=1e-12
@@ -105,13 +106,15 @@ def test_a_saved_model_predicts_the_same_and_finds_nothing_missing_again(tmp_pat
 def test_a_model_of_another_arm_or_of_nothing_is_refused_in_one_line(tmp_path: Path) -> None:
     plain = model_document(sound())
     with pytest.raises(IdentificationError, match="other joints or links"):
-        restored(ModelDocument.model_validate(plain.model_dump(by_alias=True) | {"joints": ["a"]}), paper_robot())
+        restore_model(ModelDocument.model_validate(plain.model_dump(by_alias=True) | {"joints": ["a"]}), paper_robot())
     with pytest.raises(IdentificationError, match="covariance: is not square"):
-        restored(ModelDocument.model_validate(plain.model_dump(by_alias=True) | {"covariance": [[1.0]]}), paper_robot())
+        restore_model(
+            ModelDocument.model_validate(plain.model_dump(by_alias=True) | {"covariance": [[1.0]]}), paper_robot()
+        )
     path = tmp_path / "model.json"
     path.write_text('{"schema": "something/1"}')
     with pytest.raises(IdentificationError, match=r"model\.json") as refused:
-        read_model(path, paper_robot())
+        read_extended_model(path, paper_robot())
     assert "\n" not in str(refused.value)
 
 

@@ -7,7 +7,7 @@ from diagnosis.linked_arm import linked_recordings
 from identification.simulated import Array, paper_robot
 from tauscope.diagnosis import Diagnosis, diagnose, document
 from tauscope.diagnosis.deflection.measured import MeasuredDeflection, measure_deflection
-from tauscope.diagnosis.extended_model.saved import model_document, restored
+from tauscope.diagnosis.extended_model import model_document, restore_model
 from tauscope.diagnosis.model.nominal import nominal_model
 from tauscope.effects import possible_effects
 from tauscope.identification import identify
@@ -118,7 +118,7 @@ def test_a_diagnosis_names_what_the_encoders_show() -> None:
     limits = {(each.effect, each.joint): each.minimum for each in found.detectable}
     assert limits["joint_elasticity", "joint3"] is not None
     terms = diagnosis.selection.fit.model.terms
-    again = restored(model_document(diagnosis), paper_robot()).terms
+    again = restore_model(model_document(diagnosis), paper_robot()).terms
     assert [type(term.effect) for term in again] == [type(term.effect) for term in terms]
 
 

@@ -9,7 +9,7 @@ from diagnosis.warm_arm import COLD_C, PER_KELVIN, VISCOUS, warm_recordings
 from effects.piece_of_motion import SIGNALS, context
 from identification.simulated import paper_robot
 from tauscope.diagnosis import diagnose, document
-from tauscope.diagnosis.extended_model.saved import model_document, restored
+from tauscope.diagnosis.extended_model import model_document, restore_model
 from tauscope.diagnosis.observations.temperature import read_temperature
 from tauscope.effects.friction_drift import FrictionDrift, ThermalDrift
 from tauscope.recording.conditioning import Conditioner
@@ -71,7 +71,7 @@ def test_viscous_friction_that_falls_as_a_joint_warms_up_is_named_with_its_tempe
     assert drift.held_out_rms_before is not None
     assert drift.held_out_rms_after is not None
     assert drift.held_out_rms_after[0] < 0.85 * drift.held_out_rms_before[0]
-    (term,) = restored(model_document(diagnosis), paper_robot()).terms
+    (term,) = restore_model(model_document(diagnosis), paper_robot()).terms
     assert isinstance(term.effect, ThermalDrift)
     assert term.effect.reference_c == values["T_0"].value
 

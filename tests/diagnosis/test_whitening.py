@@ -8,13 +8,13 @@ from tauscope.diagnosis.observations.whitening import fitted_noise
 from tauscope.recording.conditioning.common_band import Decimator
 
 
-def coloured(rng: np.random.Generator, rows: int) -> np.ndarray:
+def colour_noise(rng: np.random.Generator, rows: int) -> np.ndarray:
     return signal.lfilter([1.0], [1.0, -0.5, 0.3], rng.standard_normal(rows + 200))[200:]
 
 
 def test_autoregressive_noise_becomes_white_with_unit_variance() -> None:
     rng = np.random.default_rng(1)
-    rows = coloured(rng, 20_000)
+    rows = colour_noise(rng, 20_000)
     noise = fitted_noise([(rows, np.ones(len(rows), bool), 1.0)])
     white = noise.whitened(rows)
     assert noise.order >= 2
@@ -33,7 +33,7 @@ def test_white_noise_is_only_scaled() -> None:
 
 def test_whitened_rows_whose_past_was_not_measured_are_left_out() -> None:
     rng = np.random.default_rng(3)
-    rows = coloured(rng, 5000)
+    rows = colour_noise(rng, 5000)
     noise = fitted_noise([(rows, np.ones(len(rows), bool), 1.0)])
     used = np.ones(5000, bool)
     used[1000] = False

@@ -12,6 +12,7 @@ from _pytest.mark import ParameterSet
 from arm_rigs import Rig, remote_rigs, virtual_rigs
 from hardware_emulated.canopen_rig import canopen_rigs
 from hardware_emulated.dynamixel_rig import dynamixel_rigs
+from hardware_emulated.feetech_rig import feetech_rigs
 from prompt_process import prompt_process
 from tauscope.runtime.drivers import driver_names
 from tauscope_drivers import StopPolicy
@@ -21,6 +22,7 @@ RigMaker = Callable[[Path], AbstractContextManager[Callable[[], Rig]]]
 RIGS: dict[str, dict[str, RigMaker]] = {
     "sim": {"virtual": virtual_rigs, "real-time": remote_rigs},
     "dynamixel": {"dynamixel": dynamixel_rigs},
+    "feetech": {"feetech": feetech_rigs},
     "canopen": {"canopen": canopen_rigs, "canopen-stepped": partial(canopen_rigs, stepped=True)},
 }
 """Makers of rigs by the driver's name: a new driver joins the suite here."""
@@ -35,6 +37,7 @@ if SOCKETCAN := os.environ.get("TAUSCOPE_SOCKETCAN"):
 MARKS = {
     "real-time": [pytest.mark.realtime],
     "dynamixel": [pytest.mark.realtime],
+    "feetech": [pytest.mark.realtime],
     "canopen": [pytest.mark.realtime],
     "canopen-stepped": [pytest.mark.slow],
 }

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from arm_rigs import START, Rig, ask, drive, enable, setpoint, slide, wide_limits
+from arm_rigs import RATE_HZ, START, Rig, ask, drive, enable, setpoint, slide, wide_limits
 from tauscope_drivers import Backend, ControlMode, DriverError, Setpoint, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device import Disturbance, Injection
@@ -179,7 +179,8 @@ def test_the_state_has_the_joints_shape_and_si_units(rig: Rig) -> None:
     # over ten cycles each, so that an instant that is known to a fraction of a millisecond does not count
     slope = (position[10:] - position[:-10]) / (time[10:] - time[:-10])[:, None]
     mean = np.array([velocity[k : k + 11].mean(axis=0) for k in range(len(slope))])
-    assert np.all(np.nanmedian(np.abs(slope - mean), axis=0) < 0.02)
+    step = rig.position_resolution * RATE_HZ / 10.0
+    assert np.all(np.nanmedian(np.abs(slope - mean), axis=0) < max(0.02, step))
     assert np.all(np.nanmax(position, axis=0) - START > 0.05)
 
 

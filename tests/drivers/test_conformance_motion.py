@@ -14,6 +14,7 @@ from arm_rigs import (
     ask,
     drive,
     enable,
+    require_mode,
     require_policy,
     setpoint,
     settled,
@@ -42,6 +43,7 @@ def test_enabling_never_moves_the_arm(rig: Rig, mode: ControlMode) -> None:
 
 @pytest.mark.parametrize("mode", list(ControlMode))
 def test_a_target_from_before_is_forgotten(rig: Rig, mode: ControlMode) -> None:
+    require_mode(rig, mode)
     enable(rig)
     drive(rig, slide(START, 0.3), 0.2)
     rig.backend.exchange(setpoint(START + 2.0, np.array([5.0, 5.0, 5.0])))
@@ -63,7 +65,7 @@ def test_it_keeps_its_place_under_gravity(rig: Rig) -> None:
     drive(rig, lambda _: setpoint(START), 0.3)
     assert np.abs(rig.torque(ask(rig, setpoint(START)).effort)[1:]).min() > 1.0, "gravity is carried"
     rig.backend.stop(StopPolicy.HOLD)
-    assert np.abs(rig.watch(0.4).position - START).max() < 1e-4
+    assert np.abs(rig.watch(0.4).position - START).max() < max(1e-4, 0.6 * rig.position_resolution)
 
 
 def test_a_damped_arm_sinks_slowly_and_a_free_one_falls(rig: Rig) -> None:

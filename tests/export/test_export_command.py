@@ -15,8 +15,7 @@ from tauscope.dynamics import inverse_dynamics
 from tauscope.export.model_file import read_export_model
 from tauscope.robot import Robot, read_robot
 from tauscope_sim.motion import random_fourier_motion
-from tauscope_sim.recording import simulate_recording
-from tauscope_sim.recording_csv import write_recording_csv
+from tauscope_sim.recording import simulate_recording, write_recording_csv
 
 Run = Callable[..., Ended]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from emulator_process import EmulatorProcess
 from prompt_process import prompt_process
-from tauscope_drivers import ArmState, ControlMode, DriveLimits, Setpoint, StopPolicy
+from tauscope_drivers import ArmState, Backend, ControlMode, DriveLimits, Setpoint, StopPolicy
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_sim.dynamixel_bus import DynamixelOrder, ServoSpecification
@@ -114,7 +114,7 @@ def setpoint(position: Any, torque: Any = 0.0) -> Setpoint:
     return Setpoint(place, np.zeros_like(place) + np.array(torque, dtype=np.float64))
 
 
-def drive(arm: DynamixelArm, target: Callable[[float], Setpoint], seconds: float) -> list[ArmState]:
+def drive(arm: Backend, target: Callable[[float], Setpoint], seconds: float) -> list[ArmState]:
     """States of cycles at the usual rate, or as fast as the machine can; each target is that of its instant."""
     clock = arm.clock
     begin = deadline = clock.now_ns()

@@ -27,6 +27,7 @@ class EmulatedRig:
 
     is_real_time = True
     answers_within = 1
+    has_watchdog = True
     backend: Backend
 
     def __init__(self, emulator: EmulatorProcess) -> None:

@@ -21,7 +21,7 @@ from tauscope.recording.journal_reading import read_journal
 from tauscope.robot import Robot
 from tauscope.runtime.states import RunState
 from tauscope_drivers.canopen.arm import CanopenArm
-from tauscope_drivers.canopen.glitch_filter import FASTEST, SLACK_S
+from tauscope_drivers.canopen.node import FASTEST, SLACK_S
 from tauscope_sim.canopen_bus.order import CanOrder
 
 INTERFACE = os.environ.get("TAUSCOPE_SOCKETCAN", "")

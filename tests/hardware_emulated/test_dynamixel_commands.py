@@ -95,6 +95,7 @@ def test_scan_of_an_empty_bus_fails(tauscope: Tauscope, emulator: EmulatorProces
     status, _, err = tauscope("bus", "scan", "dynamixel", emulator.order.port, "--bit-rate", "57600")
     assert status == 1
     assert "nobody answers" in err
+    assert "Feetech" in err
     assert len(err.splitlines()) == 1
 
 

@@ -4,10 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, PacketHandler
+from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, PacketHandler, PortHandler
 
 from hardware_emulated.dynamixel_bench import bench
-from tauscope_drivers.dynamixel.port import SerialPort
 from tauscope_sim.dynamixel_bus import ServoSpecification
 
 pytestmark = pytest.mark.realtime  # other people's masters wait by the machine's clock
@@ -32,10 +31,11 @@ def test_rustypot_reads_and_moves_the_servos(tmp_path: Path) -> None:
         np.testing.assert_allclose(master.sync_read_present_position(ids), [START, START, 0.7], atol=0.01)
 
 
-def test_the_librarys_own_packet_handler_works_over_our_port(tmp_path: Path) -> None:
+def test_the_librarys_own_packet_handler_reads_and_writes_the_servos(tmp_path: Path) -> None:
     with bench(tmp_path, start=START) as one:
-        port = SerialPort(one.emulator.order.port, 1_000_000, slack_s=0.03)
-        port.open()
+        port = PortHandler(one.emulator.order.port)
+        assert port.openPort()
+        assert port.setBaudRate(1_000_000)
         handler = PacketHandler(2.0)
         assert handler.ping(port, 2) == (1020, COMM_SUCCESS, 0)
         assert handler.read4ByteTxRx(port, 1, 132)[0] == round(START * 4096 / (2.0 * np.pi)) + 2048
@@ -46,4 +46,4 @@ def test_the_librarys_own_packet_handler_works_over_our_port(tmp_path: Path) -> 
             assert all(group.addParam(servo) for servo in (1, 2, 3))
             assert (group.fastSyncRead() if fast else group.txRxPacket()) == COMM_SUCCESS
             assert group.getData(3, 132, 4) == round(START * 4096 / (2.0 * np.pi)) + 2048
-        port.close()
+        port.closePort()

@@ -28,7 +28,7 @@ from tauscope.export.compensation import (
     to_python,
     to_yaml,
 )
-from tauscope.export.compensation.identifiers import c_string, comment_text, identifier
+from tauscope.export.compensation.source_code import c_string, comment_text, identifier
 from tauscope.recording import EffortKind
 from tauscope.robot import Joint, JointType
 

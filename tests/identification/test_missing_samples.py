@@ -24,9 +24,9 @@ from tauscope.identification.result import ConditioningEntry
 from tauscope.recording import EffortKind, Recording
 from tauscope.robot import FrictionCoefficients, Joint, Robot
 from tauscope_sim.friction import static_friction_torque
-from tauscope_sim.inverse_dynamics import rigid_body_torque
 from tauscope_sim.model import build_model
 from tauscope_sim.motion import random_fourier_motion
+from tauscope_sim.recording import rigid_body_torque
 
 Mask = NDArray[np.bool_]
 

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from pydantic_core import to_json
 
 from shared_data import REPOSITORY
 from tauscope.errors import RecordingError
@@ -37,7 +39,16 @@ def rows(count: int = 600, joints: int = 2, seed: int = 3) -> np.ndarray:
     table["lateness_ns"] = rng.integers(0, 900_000, count)
     table["phase"] = np.where(np.arange(count) < RAMP, Phase.RAMP, Phase.MOTION)
     table["period"] = np.where(np.arange(count) < RAMP, np.nan, np.arange(count) // 250)
-    for group in ("position", "velocity", "effort", "temperature", "reference", "reference_velocity", "command"):
+    for group in (
+        "position",
+        "velocity",
+        "effort",
+        "temperature",
+        "voltage",
+        "reference",
+        "reference_velocity",
+        "command",
+    ):
         table[group] = rng.normal(size=(count, joints))
     table["position"][rng.random((count, joints)) < 0.02] = np.nan
     return table
@@ -133,7 +144,7 @@ def test_effort_beside_a_missed_sample_is_unknown(tmp_path: Path) -> None:
 
 def test_what_nobody_reported_is_no_column(tmp_path: Path) -> None:
     table = rows()
-    for group in ("velocity", "temperature", "command", "period"):
+    for group in ("velocity", "temperature", "voltage", "command", "period"):
         table[group] = np.nan
     path = written(tmp_path / "journal.mcap", table, header(has_velocity=False))
     recording = journal_recording(read_journal(path), "run")
@@ -267,3 +278,13 @@ def test_an_existing_journal_is_not_overwritten(tmp_path: Path) -> None:
     with pytest.raises(FileExistsError):
         JournalWriter(path, header())
     assert path.read_bytes() == before
+
+
+def test_a_journal_from_before_there_was_a_voltage_has_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def without_voltage(document: dict[str, Any], **options: Any) -> bytes:
+        return to_json({key: value for key, value in document.items() if key != "voltage"}, **options)
+
+    monkeypatch.setattr("tauscope.recording.journal.to_json", without_voltage)
+    path = written(tmp_path / "journal.mcap", rows(), header())
+    assert np.isnan(read_journal(path).rows["voltage"]).all()
+    assert journal_recording(read_journal(path), "run").samples().voltage is None

@@ -6,7 +6,7 @@ import pytest
 
 from recording.recording_files import csv_text, message_of
 from tauscope.recording import Recording, check_recording, measures, report_recording
-from tauscope.robot.finding import Severity
+from tauscope.robot.messages import Severity
 
 SAMPLES = 4000
 

@@ -6,8 +6,8 @@ from typing import Any
 from reliability.ledger import HandedInJob, KeptRecording, Ledger
 from reliability.requests import IDENTIFICATIONS, RECORDINGS, BrokenPromiseError, Note, Requests
 from tauscope.server.http.services import Services
+from tauscope.server.queue.job_folder import Workspace
 from tauscope.server.queue.queue import MOST_ATTEMPTS
-from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.files import hash_file
 
 PATIENCE_S = 100.0

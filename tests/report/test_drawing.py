@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from matplotlib.figure import Figure
 
-from tauscope.report.decimation import envelope_indices
+from tauscope.report.series import envelope_indices
 from tauscope.report.svg import PREDICTED, draw_svg
 from tauscope.report.torque_figure import worst_part
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from tauscope import number_text
 from tauscope.number_text import ABSENT, counted, percent, significant, with_uncertainty
-from tauscope.report.quantities import base_parameter_unit, torque_unit, velocity_unit
+from tauscope.report.words import base_parameter_unit, torque_unit, velocity_unit
 from tauscope.robot import JointType
 
 numbers = st.floats(-1e12, 1e12)

@@ -20,7 +20,7 @@ from tauscope.runtime.drivers import (
     to_drive_joints,
     translate_driver_errors,
 )
-from tauscope.runtime.options import RunOptions, choose_rate_hz, chosen_stop_policy
+from tauscope.runtime.options import RunOptions, choose_rate_hz, choose_stop_policy
 from tauscope_drivers import Capabilities, ControlMode, DriveLimits, StopPolicy
 
 
@@ -146,8 +146,8 @@ def test_a_policy_is_held_against_the_mode() -> None:
         rate_limited_by="the wire takes 4 ms of each cycle, use a higher baud rate",
     )
     joints = paper_arm().joints
-    assert chosen_stop_policy(RunOptions(), joints, capabilities) is StopPolicy.HOLD
+    assert choose_stop_policy(RunOptions(), joints, capabilities) is StopPolicy.HOLD
     torque = RunOptions(mode=ControlMode.TORQUE)
-    assert "in mode torque; choose torque_off" in refusal(chosen_stop_policy, torque, joints, capabilities)
+    assert "in mode torque; choose torque_off" in refusal(choose_stop_policy, torque, joints, capabilities)
     assert "the wire takes 4 ms" in refusal(choose_rate_hz, RunOptions(rate_hz=500.0), capabilities)
     assert choose_rate_hz(RunOptions(), capabilities) == 200.0

@@ -1,5 +1,6 @@
 """Runs of the simulated arm: the registry, virtual time, and both ways of control."""
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from tauscope.dynamics import friction_torque, inverse_dynamics
 from tauscope.errors import AcquisitionError, ScenarioError
 from tauscope.recording import read_recording
 from tauscope.robot import Robot, read_robot
-from tauscope.runtime.drivers import driver_names, make_backend
+from tauscope.runtime.drivers import DEFAULT_BACKEND, driver_names, make_backend
 from tauscope.runtime.in_process import run_trajectory
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.states import RunState
@@ -114,4 +115,7 @@ def test_a_missing_scenario_is_named(robot: Robot, tmp_path: Path) -> None:
 
 
 def test_every_backend_has_a_name() -> None:
-    assert driver_names() == ("sim", "canopen", "dynamixel")
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    first, *others = driver_names()
+    assert first == DEFAULT_BACKEND
+    assert others == sorted(project["entry-points"]["tauscope.drivers"].keys() - {DEFAULT_BACKEND})

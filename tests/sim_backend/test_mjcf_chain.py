@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tauscope.dynamics import inverse_dynamics
 from tauscope.errors import MissingExtraError, RobotFileError
-from tauscope.robot import Actuator, Robot, Severity, mjcf, read_robot
+from tauscope.robot import Actuator, Robot, Severity, read_robot, robot_building
 
 # pyright: reportAttributeAccessIssue=false
 
@@ -241,7 +241,7 @@ def test_extra_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.Monk
             raise ModuleNotFoundError("No module named 'mujoco'", name="mujoco")
 
     path = write_robot(tmp_path, ARM)
-    monkeypatch.setattr(mjcf, "entry_points", lambda group: [Entry()])
+    monkeypatch.setattr(robot_building, "entry_points", lambda group: [Entry()])
     with pytest.raises(MissingExtraError, match=r"arm\.xml: reading an MJCF needs the sim extra: pip install"):
         read_robot(path)
 

@@ -15,8 +15,8 @@ from arms import Array, arm, dh_segment, random_arm, random_link, random_states
 from tauscope.errors import RobotFileError
 from tauscope.robot import nearest_body
 from tauscope.robot.robot import JointType, LinkInertia, Model, Robot
-from tauscope_sim.inverse_dynamics import rigid_body_torque
 from tauscope_sim.model import build_model, build_spec
+from tauscope_sim.recording import rigid_body_torque
 
 
 def with_links(robot: Robot, *links: LinkInertia) -> Robot:

@@ -15,8 +15,8 @@ from tauscope.errors import ScenarioError
 from tauscope.robot import read_robot
 from tauscope.robot.robot import Robot
 from tauscope_sim.effects import EFFECTS, Effect, SensorEffect
-from tauscope_sim.effects.cogging import Cogging
-from tauscope_sim.effects.time_delay import TimeDelay
+from tauscope_sim.effects.periodic_torques import Cogging
+from tauscope_sim.effects.sensor_effects import TimeDelay
 from tauscope_sim.examples import example_robot
 from tauscope_sim.plant import Plant
 from tauscope_sim.scenario import Scenario

@@ -11,11 +11,9 @@ import pytest
 from tauscope.errors import RecordingError
 from tauscope.robot.robot import FrictionCoefficients, Robot
 from tauscope_sim.friction import static_friction_torque
-from tauscope_sim.inverse_dynamics import rigid_body_torque
 from tauscope_sim.model import build_model
 from tauscope_sim.motion import random_fourier_motion
-from tauscope_sim.recording import SimulatedRecording, simulate_recording
-from tauscope_sim.recording_csv import write_recording_csv
+from tauscope_sim.recording import SimulatedRecording, rigid_body_torque, simulate_recording, write_recording_csv
 
 
 def record(robot: Robot, seed: int = 1, **settings: Any) -> SimulatedRecording:

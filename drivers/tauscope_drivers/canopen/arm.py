@@ -58,10 +58,7 @@ class CanopenArm:
     ) -> None:
         """Check the configuration; nothing is opened yet.
 
-        Raises
-        ------
-        DriverError
-            ``refused``: the configuration is not usable; names the joint and the key
+        Raises DriverError ``refused`` where the configuration is not usable; names the joint and the key.
         """
         self._configuration = read_configuration(joints)
         self._given_bus = bus
@@ -111,7 +108,7 @@ class CanopenArm:
 
     def acknowledge_faults(self) -> ArmState:
         """Reset drives in fault, once, and forget emergencies; a drive that holds goes on holding."""
-        session = self._reached()
+        session = self._require_session()
         self._mode = None
         state = reset_faults(session)
         if state.faults:
@@ -128,12 +125,10 @@ class CanopenArm:
     ) -> ArmState:
         """Configure and commission every drive, arm its heartbeat consumer, take all to *operation enabled* together.
 
-        Parameters
-        ----------
-        cycle_s : float or None
-            time between two SYNCs, over which the drives interpolate; they keep the one that they know where None [s]
+        `cycle_s`: time between two SYNCs, over which the drives interpolate; they keep the one that they know where
+        None [s].
         """
-        session = self._reached()
+        session = self._require_session()
         if self._mode is not None:
             raise DriverError(DriverErrorKind.REFUSED, "the arm is enabled already; stop it first")
         self._refuse_impossible(mode, stop_policy, watchdog_s)
@@ -166,7 +161,7 @@ class CanopenArm:
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
         """Targets out, SYNC, answers in; a node that does not answer in time leaves NaN."""
-        session = self._reached()
+        session = self._require_session()
         mode, limiter = self._mode, self._limiter
         if mode is None or limiter is None:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the drives are not enabled; enable the arm first")
@@ -239,7 +234,7 @@ class CanopenArm:
         if reason is not None:
             raise DriverError(DriverErrorKind.REFUSED, reason)
 
-    def _reached(self) -> Session:
+    def _require_session(self) -> Session:
         if self._session is None:
             raise DriverError(DriverErrorKind.NOT_CONNECTED, "the CAN bus is not open; connect first")
         return self._session
@@ -248,10 +243,7 @@ class CanopenArm:
 def _require_hold(nodes: Sequence[DriveNode], mode: ControlMode, policy: StopPolicy) -> None:
     """Refuse torque mode where a drive would fall at a stop that is to hold: it has no targets of position to stay at.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: names the joint
+    Raises DriverError ``refused``, which names the joint.
     """
     falling = [node for node in nodes if not node.stays_stopped]
     if falling and mode is ControlMode.TORQUE and policy is StopPolicy.HOLD:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.configuration import NodeConfiguration, read_configuration, read_node
 from tauscope_drivers.canopen.data_sheet.needs import present_objects, states_rated_torque
-from tauscope_drivers.canopen.optional_objects import describe_absent
+from tauscope_drivers.canopen.objects import describe_absent
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError
 from tauscope_drivers.inspection import Finding, Severity, failure

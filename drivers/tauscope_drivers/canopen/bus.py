@@ -45,10 +45,7 @@ class CanBus:
     ) -> None:
         """Open the bus.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the interface is not there, or another program holds it
+        Raises DriverError ``cannot-connect`` where the interface is not there, or another program holds it.
         """
         self._name = f"{configuration.interface} {configuration.channel}"
         self._clock = clock or MonotonicClock()
@@ -58,7 +55,7 @@ class CanBus:
         self._next_heartbeat_ns = 0
         self._claim: BusClaim | None = None
         try:
-            self._claim = _claimed(configuration) if bus is None else None
+            self._claim = _claim_interface(configuration) if bus is None else None
             self._bus = bus or open_interface(
                 configuration.interface, configuration.channel, configuration.bit_rate, configuration.options
             )
@@ -85,32 +82,20 @@ class CanBus:
         return NodeDictionary(client, node_id)
 
     def send(self, identifier: int, data: bytes) -> None:
-        """Send a frame.
-
-        Raises
-        ------
-        DriverError
-            ``lost``: the bus does not take it
-        """
+        """Send a frame. Raises DriverError ``lost`` where the bus does not take it."""
         try:
             self._bus.send(
                 can.Message(arbitration_id=identifier, data=data, is_extended_id=False), timeout=SEND_TIMEOUT_S
             )
         except (can.CanError, OSError, ValueError) as error:
-            raise self._lost(error) from error
+            raise self._report_loss(error) from error
 
     def send_together(self, frames: Iterable[tuple[int, bytes]]) -> None:
         """Send frames one after the other, with one write where the adapter takes that.
 
-        Parameters
-        ----------
-        frames : iterable of (int, bytes)
-            identifier and payload of each, in their order
+        Raises DriverError ``lost`` where the bus does not take them.
 
-        Raises
-        ------
-        DriverError
-            ``lost``: the bus does not take them
+        `frames`: iterable of (int, bytes), identifier and payload of each, in their order.
         """
         gathering = self._bus.gathering() if isinstance(self._bus, SerialAdapterBus) else nullcontext()
         try:
@@ -118,20 +103,14 @@ class CanBus:
                 for identifier, data in frames:
                     self.send(identifier, data)
         except (can.CanError, OSError, ValueError) as error:
-            raise self._lost(error) from error
+            raise self._report_loss(error) from error
 
     def receive(self, deadline_ns: int) -> bool:
         """Wait for one frame and hand it to its handler; the heartbeat is sent meanwhile when it is due.
 
-        Returns
-        -------
-        bool
-            False where none came
+        Raises DriverError ``lost`` where the bus is gone.
 
-        Raises
-        ------
-        DriverError
-            ``lost``: the bus is gone
+        Returns bool: False where none came.
         """
         self.beat()
         wait_s = max(0.0, (deadline_ns - time.monotonic_ns()) * 1e-9)
@@ -140,7 +119,7 @@ class CanBus:
         try:
             message = self._bus.recv(wait_s)
         except (can.CanError, OSError, ValueError) as error:
-            raise self._lost(error) from error
+            raise self._report_loss(error) from error
         if message is None:
             return False
         if message.is_error_frame or message.is_extended_id or message.is_remote_frame:
@@ -160,10 +139,7 @@ class CanBus:
     def start_heartbeat(self, period_s: float) -> None:
         """Be alive to the drives from now on, as long as `receive` or `beat` is called.
 
-        Parameters
-        ----------
-        period_s : float
-            time between heartbeats; 0 ends them [s]
+        `period_s`: time between heartbeats; 0 ends them [s].
         """
         self._heartbeat_period_ns = round(period_s * 1e9)
         self._next_heartbeat_ns = self._clock.now_ns()
@@ -192,14 +168,14 @@ class CanBus:
             self._claim.release()
             self._claim = None
 
-    def _lost(self, error: Exception) -> DriverError:
+    def _report_loss(self, error: Exception) -> DriverError:
         text = " ".join(str(error).split())
         return DriverError(
             DriverErrorKind.LOST, f"CAN bus {self._name} is gone ({text}); check the adapter and the cable"
         )
 
 
-def _claimed(configuration: BusConfiguration) -> BusClaim | None:
+def _claim_interface(configuration: BusConfiguration) -> BusClaim | None:
     """The claim on an interface that several programs may open; None where only one can."""
     if configuration.interface in ONE_PROCESS:
         return None

@@ -18,10 +18,8 @@ _SYNC_BYTES = 0
 class CycleFrames:
     """Cyclic frames of one node.
 
-    received_bytes : tuple of int
-        payloads of its RPDOs [bytes]
-    sent_bytes : tuple of int
-        payloads of its TPDOs [bytes]
+    `received_bytes`: payloads of its RPDOs [bytes].
+    `sent_bytes`: payloads of its TPDOs [bytes].
     """
 
     received_bytes: tuple[int, ...]
@@ -31,10 +29,7 @@ class CycleFrames:
 def frame_bits(payload_bytes: int) -> int:
     """Longest form of a standard data frame: 47 + 8 d + ⌊(34 + 8 d − 1)/4⌋ bits for d bytes, interframe space included.
 
-    Parameters
-    ----------
-    payload_bytes : int
-        d, 0 to 8 [bytes]
+    `payload_bytes`: d, 0 to 8 [bytes].
     """
     return 47 + 8 * payload_bytes + (34 + 8 * payload_bytes - 1) // 4
 
@@ -48,15 +43,9 @@ def cycle_bits(nodes: int, frames: CycleFrames) -> int:
 def largest_rate_hz(nodes: int, frames: CycleFrames, bit_rate: float, serial_baud: float | None = None) -> float:
     """Most cycles a second that the bus carries, and the adapter where it is a true serial line.
 
-    Parameters
-    ----------
-    serial_baud : float or None
-        of the adapter's serial line at 10 bits a byte [bit/s]; None where it is none (a USB CDC adapter ignores it)
-
-    Returns
-    -------
-    float
-        [Hz]
+    `serial_baud`: of the adapter's serial line at 10 bits a byte [bit/s]; None where it is none (a USB CDC adapter
+        ignores it).
+    Returns float: [Hz].
     """
     bus_s = cycle_bits(nodes, frames) / (LARGEST_LOAD * bit_rate)
     return 1.0 / max(bus_s, _serial_s(nodes, frames, serial_baud))
@@ -65,10 +54,7 @@ def largest_rate_hz(nodes: int, frames: CycleFrames, bit_rate: float, serial_bau
 def rate_limit(nodes: int, frames: CycleFrames, bit_rate: float, serial_baud: float | None = None) -> str:
     """What limits the rate, the bus or the adapter's serial line, and what to do about it.
 
-    Parameters
-    ----------
-    serial_baud : float or None
-        of the adapter's serial line [bit/s]; None where it is none
+    `serial_baud`: of the adapter's serial line [bit/s]; None where it is none.
     """
     bus_s = cycle_bits(nodes, frames) / bit_rate
     serial_s = _serial_s(nodes, frames, serial_baud)

@@ -12,8 +12,7 @@ from tauscope_drivers.canopen.bus import MASTER_NODE
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile
 from tauscope_drivers.canopen.data_sheet.settings import Setting, settings_of
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.objects import DriveObject
-from tauscope_drivers.canopen.optional_objects import STAYING_OPTIONS
+from tauscope_drivers.canopen.objects import STAYING_OPTIONS, DriveObject
 from tauscope_drivers.canopen.pdo_mapping import map_process_data
 from tauscope_drivers.canopen.state_machine import POWERED, decode_state
 from tauscope_drivers.errors import DriverError, DriverErrorKind
@@ -31,12 +30,9 @@ _NOTHING = 0
 def write_settings(node: DriveNode) -> bool:
     """Give a drive those values of its DCF file that it does not have yet; whether there was any.
 
-    They may change what its positions and torques mean, so that nothing that was read before holds any more.
-
-    Raises
-    ------
-    DriverError
-        ``refused``: the drive does not take a value, or is under power; ``cannot-connect``: it does not answer
+    They may change what its positions and torques mean, so that nothing that was read before holds any more. Raises
+    DriverError: ``refused``: the drive does not take a value, or is under power; ``cannot-connect``: it does not
+    answer.
     """
     file = node.configuration.device_file
     if file is None:
@@ -50,12 +46,10 @@ def write_settings(node: DriveNode) -> bool:
 def find_missing(node: DriveNode, file: DeviceFile) -> list[Setting]:
     """Values of a DCF file that a drive does not have yet; only reads.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: it does not have their objects, or is under power; ``cannot-connect``: it does not answer
+    Raises DriverError: ``refused``: it does not have their objects, or is under power; ``cannot-connect``: it does not
+    answer.
     """
-    missing = [one for one in settings_of(file).written if _kept(node, file, one) != one.data]
+    missing = [one for one in settings_of(file).written if _read_setting(node, file, one) != one.data]
     if missing and decode_state(node.dictionary.read(objects.STATUSWORD)) in POWERED:
         raise DriverError(
             DriverErrorKind.REFUSED,
@@ -65,7 +59,7 @@ def find_missing(node: DriveNode, file: DeviceFile) -> list[Setting]:
     return missing
 
 
-def _kept(node: DriveNode, file: DeviceFile, setting: Setting) -> bytes:
+def _read_setting(node: DriveNode, file: DeviceFile, setting: Setting) -> bytes:
     """What the drive has where a setting goes."""
     with _refusals_named(node, file, setting):
         return node.dictionary.read_data(setting.entry)
@@ -75,7 +69,7 @@ def _give(node: DriveNode, file: DeviceFile, setting: Setting) -> None:
     """Write one value and read it back."""
     with _refusals_named(node, file, setting):
         node.dictionary.send_data(setting.entry, setting.data, setting.text)
-    if (kept := _kept(node, file, setting)) != setting.data:
+    if (kept := _read_setting(node, file, setting)) != setting.data:
         raise DriverError(
             DriverErrorKind.REFUSED,
             f"{node.place}: {setting.entry} was written as {setting.text}, as {file.name} has it, and reads back as "
@@ -108,15 +102,9 @@ def commission_drive(
 ) -> None:
     """Write all of it by SDO; each value is read back.
 
-    Parameters
-    ----------
-    cycle_s : float or None
-        time between two SYNCs; the drive keeps the one that it knows where None [s]
+    Raises DriverError ``refused`` where the drive does not take a value.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: the drive does not take a value
+    `cycle_s`: time between two SYNCs; the drive keeps the one that it knows where None [s].
     """
     write = node.dictionary.write
     holds = stop_policy is StopPolicy.HOLD
@@ -143,13 +131,7 @@ def _choose(node: DriveNode, entry: DriveObject, values: Sequence[int]) -> int |
 
 
 def _arm_abort(node: DriveNode, *, holds: bool) -> None:
-    """Make the drive stop by itself where its master is silent.
-
-    Raises
-    ------
-    DriverError
-        ``refused``: it would go on
-    """
+    """Make the drive stop by itself where its master is silent. Raises DriverError ``refused`` where it would go on."""
     values = (_ABORT_BY_QUICK_STOP if holds else _ABORT_BY_DISABLING, _ABORT_BY_FAULT)
     if _choose(node, objects.ABORT_CONNECTION, values) == _NOTHING:
         raise DriverError(
@@ -216,11 +198,7 @@ def interpolation_period(cycle_s: float, exponents: Sequence[int] = _PERIOD_EXPO
     """Value and exponent (0x60C2) of a cycle, value · 10^exponent seconds: exact where possible, else the nearest.
 
     A drive moves to a target within this time: too short a time makes a halt at every target, too long a time a lag.
-
-    Raises
-    ------
-    ValueError
-        the cycle is shorter or longer than the object can tell
+    Raises ValueError where the cycle is shorter or longer than the object can tell.
     """
     best: tuple[float, int, int] | None = None
     for exponent in exponents:

@@ -37,10 +37,8 @@ _NODE_KEYS = ("node_id", "counts_per_turn", "zero_count", "direction", "rated_to
 class NodeConfiguration:
     """One drive.
 
-    rated_torque_nm : float or None
-        at the motor shaft, in place of what the drive states (0x6076): makers scale it differently [Nm]
-    torque_limit : float or None
-        of the joint; None where there is none [Nm or N]
+    `rated_torque_nm`: at the motor shaft, in place of what the drive states (0x6076): makers scale it differently [Nm].
+    `torque_limit`: of the joint; None where there is none [Nm or N].
     """
 
     node_id: int
@@ -57,8 +55,7 @@ class NodeConfiguration:
 class BusConfiguration:
     """The bus and the drives on it, in the order of the joints.
 
-    serial_baud : float or None
-        of an adapter on a true serial line [bit/s]
+    `serial_baud`: of an adapter on a true serial line [bit/s].
     """
 
     nodes: tuple[NodeConfiguration, ...]
@@ -72,11 +69,8 @@ class BusConfiguration:
 def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
     """Bus and drives of an arm.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: a key is missing, unknown or not usable, or the EDS or DCF file describes no drive that the driver
-        can use; names the joint and the key
+    Raises DriverError ``refused`` where a key is missing, unknown or not usable, or the EDS or DCF file describes no
+    drive that the driver can use; names the joint and the key.
     """
     first = joints[0]
     require_known_keys(joints, _BUS_KEYS, _NODE_KEYS)
@@ -95,10 +89,7 @@ def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
 def require_targets(configuration: BusConfiguration, mode: ControlMode) -> None:
     """Refuse a mode whose targets a drive does not take, by its EDS or DCF file.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: names joint, file and object
+    Raises DriverError ``refused``, which names joint, file and object.
     """
     for joint, node in enumerate(configuration.nodes, 1):
         if node.device_file is None:
@@ -111,13 +102,7 @@ def require_targets(configuration: BusConfiguration, mode: ControlMode) -> None:
 
 
 def read_node(joint: DriveJoint) -> NodeConfiguration:
-    """The drive of a joint.
-
-    Raises
-    ------
-    DriverError
-        ``refused``: as `read_configuration`
-    """
+    """The drive of a joint. Raises DriverError ``refused`` as `read_configuration`."""
     counts_per_turn = read_positive(joint, "counts_per_turn")
     if counts_per_turn is None:
         raise refusal(joint, "counts_per_turn", "is missing; give the position counts of a motor turn")

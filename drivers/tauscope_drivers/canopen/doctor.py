@@ -9,9 +9,8 @@ from tauscope_drivers.canopen.bus import CanBus
 from tauscope_drivers.canopen.configuration import BusConfiguration, read_configuration
 from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile
 from tauscope_drivers.canopen.data_sheet.settings import settings_of
-from tauscope_drivers.canopen.drive_modes import TARGETS
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.optional_objects import DOUBTFUL
+from tauscope_drivers.canopen.objects import DOUBTFUL, TARGETS
 from tauscope_drivers.canopen.rehearsal import rehearse
 from tauscope_drivers.canopen.session import possible_rate_hz
 from tauscope_drivers.canopen.state_machine import POWERED
@@ -46,10 +45,7 @@ def can_interfaces() -> list[Finding]:
 def examine(joints: Sequence[DriveJoint]) -> list[Finding]:
     """Bus, and every drive that the robot file names.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: a ``drive`` block is not valid
+    Raises DriverError: ``refused``: a ``drive`` block is not valid.
     """
     configuration = read_configuration(joints)
     subject = f"{configuration.interface} {configuration.channel}"
@@ -131,12 +127,12 @@ def _examine_file(file: DeviceFile, place: str) -> list[Finding]:
         given = ", ".join(f"{one.entry} = {one.text}" for one in settings.written)
         findings.append(Finding(Severity.GOOD, place, f"{file.name} gives it, before each run: {given}"))
     for reason, described in settings.left_out.items():
-        detail = f"{file.name} has values that are not written ({reason}): {_listed_places(described)}"
+        detail = f"{file.name} has values that are not written ({reason}): {_list_places(described)}"
         findings.append(Finding(Severity.GOOD, place, detail))
     return findings
 
 
-def _listed_places(described: Sequence[DescribedObject]) -> str:
+def _list_places(described: Sequence[DescribedObject]) -> str:
     """Places in the object dictionary, the subindices of an index together."""
     subindices: dict[int, list[str]] = {}
     for one in described:
@@ -180,17 +176,10 @@ def scan_bus(interface: str, channel: str, bit_rates: Sequence[int] | None = Non
     """Every node that answers, one bit rate after the other.
 
     Reads the device type (0x1000) by SDO, then name and version of those that answered. At a wrong bit rate
-    this disturbs a bus that is in use: name the rate where anything moves.
+    this disturbs a bus that is in use: name the rate where anything moves. Raises DriverError ``cannot-connect`` where
+    the bus is missing, not permitted or taken.
 
-    Parameters
-    ----------
-    bit_rates : sequence of int or None
-        to try [bit/s]; the usual ones where None, one where the interface has a fixed one
-
-    Raises
-    ------
-    DriverError
-        ``cannot-connect``: the bus is missing, not permitted or taken
+    `bit_rates`: to try [bit/s]; the usual ones where None, one where the interface has a fixed one.
     """
     if bit_rates is None:
         bit_rates = USUAL_BIT_RATES[:1] if interface in _FIXED_RATE else USUAL_BIT_RATES

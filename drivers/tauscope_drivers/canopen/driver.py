@@ -22,6 +22,7 @@ class CanopenDriver(BusDriver):
     file_keys = ("eds",)
     block_example = "{node_id: 1, ...}"
     port_help = "INTERFACE:CHANNEL of python-can"
+    neighbours = "motors of Damiao, Robstride, ODrive and moteus speak no CANopen"
     bus_options = ("interface", "channel")
 
     def is_meant(self, block: Mapping[str, Any]) -> bool:

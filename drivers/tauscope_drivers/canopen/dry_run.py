@@ -11,9 +11,8 @@ from tauscope_drivers.canopen.bus import HEARTBEAT_ID, MASTER_NODE, NMT_ID, NMT_
 from tauscope_drivers.canopen.commissioning import commission_drive, write_settings
 from tauscope_drivers.canopen.configuration import NodeConfiguration, read_configuration, require_targets
 from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects
-from tauscope_drivers.canopen.drive_modes import select_modes
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.objects import DriveObject
+from tauscope_drivers.canopen.objects import DriveObject, select_modes
 from tauscope_drivers.canopen.state_machine import DriveState, Goal, next_controlword
 from tauscope_drivers.canopen.units import drive_units
 from tauscope_drivers.drive_block import DriveJoint
@@ -84,22 +83,15 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
     """Frames of a connection, of enabling, of some cycles and of a stop, for drives that answer as they should.
 
     An SDO is shown as an expedited transfer, and one of more than four bytes by its first frame alone; heartbeats,
-    which are sent as time passes, are shown once.
+    which are sent as time passes, are shown once. Raises DriverError: ``refused``: a ``drive`` block or a limit is not
+    possible.
 
-    Parameters
-    ----------
-    joints : sequence of DriveJoint
-        base first; each ``drive`` block has to state ``rated_torque_nm``
-
-    Raises
-    ------
-    DriverError
-        ``refused``: a ``drive`` block or a limit is not possible
+    `joints`: base first; each ``drive`` block has to state ``rated_torque_nm``.
     """
     mode, limits, targets, cycle_s = request.mode, request.limits, request.targets, request.cycle_s
     configuration = read_configuration(joints)
     require_targets(configuration, mode)
-    nodes = [_planned_node(number, wanted) for number, wanted in enumerate(configuration.nodes, 1)]
+    nodes = [_plan_node(number, wanted) for number, wanted in enumerate(configuration.nodes, 1)]
     require_sensible(limits, targets[0], [node.place for node, _ in nodes])
     yield _frame("connect", "all nodes: pre-operational", NMT_ID, bytes([NMT_PRE_OPERATIONAL, 0]))
     for node, _ in nodes:
@@ -119,7 +111,7 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
     yield from _cycle([node for node, _ in nodes], mode, "stop", word, targets[-1])
 
 
-def _planned_node(joint: int, configuration: NodeConfiguration) -> tuple[DriveNode, _PlannedDictionary]:
+def _plan_node(joint: int, configuration: NodeConfiguration) -> tuple[DriveNode, _PlannedDictionary]:
     """A drive that nobody has asked, in the units that the robot file states."""
     label = f"joint {joint} (node {configuration.node_id})"
     if configuration.rated_torque_nm is None:

@@ -56,10 +56,7 @@ def decode_emergency(payload: bytes) -> int | None:
 def describe_error(code: int, joint: int) -> Fault | None:
     """A fault for an error code (0x603F or an emergency); None for 0x00xx, which says that an error is gone.
 
-    Parameters
-    ----------
-    joint : int
-        number of the joint, from 1
+    `joint`: number of the joint, from 1.
     """
     if code & 0xFF00 == 0:
         return None

@@ -22,19 +22,16 @@ STILL_CYCLES = 4
 def power_up(session: Session, mode: ControlMode) -> tuple[ArmState, Array]:
     """Take all drives to *operation enabled*; targets are where the joints are when their drives get there.
 
+    Raises DriverError: ``fault`` or ``refused``: a drive does not get there.
+
     Returns
     -------
     ArmState
         of the last cycle
     (n,) float64
         targets that the drives stand at [rad or m]
-
-    Raises
-    ------
-    DriverError
-        ``fault`` or ``refused``: a drive does not get there
     """
-    place = _settled_place(session, mode)
+    place = _read_settled_place(session, mode)
 
     def cycle() -> ArmState:
         for index, node in enumerate(session.nodes):
@@ -64,7 +61,7 @@ def _note_mode(node: DriveNode, mode: ControlMode) -> None:
         node.remarks += (remark,)
 
 
-def _settled_place(session: Session, mode: ControlMode) -> Array:
+def _read_settled_place(session: Session, mode: ControlMode) -> Array:
     """Where the joints are now, by process data, read before any drive changes its state.
 
     One that holds may be back under power with its first target: that must not be where it was when commissioning

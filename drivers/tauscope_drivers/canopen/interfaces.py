@@ -26,10 +26,8 @@ _CONNECT_S = 3.0
 def open_interface(interface: str, channel: str, bit_rate: int, options: Mapping[str, Any]) -> can.BusABC:
     """An interface by the name that python-can knows it by.
 
-    Raises
-    ------
-    can.CanError, OSError, ValueError, NotImplementedError, ImportError, TypeError
-        it is not there, not permitted, taken, or needs an option that it was not given
+    Raises can.CanError, OSError, ValueError, NotImplementedError, ImportError, TypeError where it is not there, not
+    permitted, taken, or needs an option that it was not given.
     """
     if interface == "slcan":
         if options:
@@ -70,13 +68,7 @@ class BusClaim:
     """
 
     def __init__(self, interface: str) -> None:
-        """Claim.
-
-        Raises
-        ------
-        ClaimedError
-            another process has it
-        """
+        """Claim. Raises ClaimedError where another process has it."""
         name = f"\0tauscope-can-{interface}"
         self._socket = socket.socket(socket.AF_UNIX)
         try:

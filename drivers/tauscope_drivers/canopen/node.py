@@ -9,11 +9,15 @@ from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, NMT_OPERATIONAL_STATE, CanBus
 from tauscope_drivers.canopen.configuration import NodeConfiguration
 from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects, require_identity
-from tauscope_drivers.canopen.drive_modes import TARGETS, select_modes
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST, decode_emergency, describe_error
-from tauscope_drivers.canopen.glitch_filter import GlitchFilter
-from tauscope_drivers.canopen.objects import DriveObject
-from tauscope_drivers.canopen.optional_objects import STAYING_OPTIONS, SUBSTITUTES, describe_absent
+from tauscope_drivers.canopen.objects import (
+    STAYING_OPTIONS,
+    SUBSTITUTES,
+    TARGETS,
+    DriveObject,
+    describe_absent,
+    select_modes,
+)
 from tauscope_drivers.canopen.pdo_plan import (
     MEASURED,
     MEASURED_WHERE_THERE,
@@ -24,11 +28,56 @@ from tauscope_drivers.canopen.pdo_plan import (
     sent_identifier,
 )
 from tauscope_drivers.canopen.process_data import PdoLayout, decode_pdo, encode_pdo
-from tauscope_drivers.canopen.rated_torque import read_rated_torque
 from tauscope_drivers.canopen.sdo import NodeDictionary
 from tauscope_drivers.canopen.state_machine import ENABLE_OPERATION, DriveState, Goal, decode_state, next_controlword
-from tauscope_drivers.canopen.units import DriveUnits, drive_units
+from tauscope_drivers.canopen.units import DriveUnits, drive_units, read_rated_torque
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
+
+FASTEST = 3.0
+"""A joint is believed to be so many times as fast as its limit, no faster."""
+
+SLACK_S = 0.002
+"""How much later than the host thinks a drive may have sampled [s]."""
+
+
+class GlitchFilter:
+    """Doubts a reading that is farther from the one before than its joint can have gone, or faster than it can go.
+
+    One reading is doubted at a time: a joint that truly runs away, or whose encoder jumped, gives the next one too.
+
+    `limit`: speed limit of the joint; infinite as long as nothing is doubted [rad/s or m/s].
+    """
+
+    def __init__(self) -> None:
+        self.limit = math.inf
+        self._believed: tuple[float, int] | None = None
+        self._doubts_place = self._doubts_speed = False
+
+    def believes_place(self, position: float, time_ns: int) -> bool:
+        """Whether a position may be true.
+
+        `position`: NaN where there is none, which is no lie [rad or m]; `time_ns`: instant of the reading, never before
+        that of the last [ns].
+        """
+        if math.isnan(position):
+            return True
+        self._doubts_place = not self._doubts_place and self._is_out_of_reach(position, time_ns)
+        if not self._doubts_place:
+            self._believed = position, time_ns
+        return not self._doubts_place
+
+    def believes_speed(self, velocity: float) -> bool:
+        """Whether a velocity may be true. `velocity`: NaN where there is none, which is no lie [rad/s or m/s]."""
+        self._doubts_speed = not self._doubts_speed and abs(velocity) > FASTEST * self.limit
+        return not self._doubts_speed
+
+    def _is_out_of_reach(self, position: float, time_ns: int) -> bool:
+        """Whether the joint cannot have gone there since it was believed last."""
+        if self._believed is None:
+            return False
+        before, before_ns = self._believed
+        return abs(position - before) > FASTEST * self.limit * ((time_ns - before_ns) * 1e-9 + SLACK_S)
+
 
 _CIA_402 = 402
 _INTERPOLATE = 0x10
@@ -42,12 +91,9 @@ Listener = Callable[[int, Callable[[int, bytes], None]], None]
 class Measurement:
     """Of a joint, by its drive; NaN where it did not come.
 
-    position : float
-        [rad or m]
-    velocity : float
-        [rad/s or m/s]
-    effort : float
-        torque at the joint [Nm or N]
+    `position`: [rad or m].
+    `velocity`: [rad/s or m/s].
+    `effort`: torque at the joint [Nm or N].
     """
 
     position: float
@@ -59,20 +105,13 @@ class Measurement:
 class DriveNode:
     """A drive on the bus.
 
-    joint : int
-        number of its joint, from 1
-    last_position : float
-        of the joint when it last answered: the place to stay at, never a measurement [rad or m]
-    last_velocity : float
-        of the joint when it last told one [rad/s or m/s]
-    present : frozenset of DriveObject
-        optional objects that it has
-    mode_numbers : mapping of ControlMode to int
-        mode of operation for each control mode that it has
-    held : dict
-        of DriveObject to int: values of other objects in its RPDOs of fixed mapping
-    stays_stopped : bool
-        whether it keeps its power after a quick stop
+    `joint`: number of its joint, from 1.
+    `last_position`: of the joint when it last answered: the place to stay at, never a measurement [rad or m].
+    `last_velocity`: of the joint when it last told one [rad/s or m/s].
+    `present`: optional objects that it has.
+    `mode_numbers`: mode of operation for each control mode that it has.
+    `held`: values of other objects in its RPDOs of fixed mapping.
+    `stays_stopped`: whether it keeps its power after a quick stop.
     """
 
     configuration: NodeConfiguration
@@ -99,13 +138,7 @@ class DriveNode:
 
     @staticmethod
     def on_bus(bus: CanBus, configuration: NodeConfiguration, joint: int) -> "DriveNode":
-        """A drive whose frames are listened to from now on.
-
-        Parameters
-        ----------
-        joint : int
-            number of its joint, from 1
-        """
+        """A drive whose frames are listened to from now on. `joint`: number of its joint, from 1."""
         node_id = configuration.node_id
         node = DriveNode(configuration, joint, bus.add_node(node_id), listen=bus.subscribe)
         node.use_plan(node.plan_for(ControlMode.POSITION))
@@ -143,11 +176,8 @@ class DriveNode:
     def identify(self) -> frozenset[ControlMode]:
         """Make sure that it is the drive that is meant, learn its units, and return the modes that it has.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: it does not answer or is no CiA 402 drive; ``refused``: its rated torque is not usable,
-            it does not watch its master, or it is not the drive of its EDS or DCF file
+        Raises DriverError: ``cannot-connect``: it does not answer or is no CiA 402 drive; ``refused``: its rated torque
+        is not usable, it does not watch its master, or it is not the drive of its EDS or DCF file.
         """
         kind = self.dictionary.read(objects.DEVICE_TYPE) & 0xFFFF
         if kind != _CIA_402:
@@ -174,7 +204,7 @@ class DriveNode:
 
     def remember(self, time_ns: int) -> None:
         """Keep state and place of this cycle for cycles without an answer; a frame that cannot be true is none."""
-        self.measurement = measured = self._measured()
+        self.measurement = measured = self._decode_measurements()
         if not self.glitches.believes_place(measured.position, time_ns):
             self._forget(objects.POSITION_ACTUAL)
         elif not math.isnan(measured.position):
@@ -194,17 +224,9 @@ class DriveNode:
     def targets(self, mode: ControlMode, controlword: int, position: float, torque: float) -> list[tuple[int, bytes]]:
         """Identifier and payload of its target frames.
 
-        Parameters
-        ----------
-        position : float
-            of the joint, finite [rad or m]
-        torque : float
-            of the joint, finite [Nm or N]
+        Raises DriverError ``refused`` where the target is beyond what the drive can be told.
 
-        Raises
-        ------
-        DriverError
-            ``refused``: the target is beyond what the drive can be told
+        `position`: of the joint, finite [rad or m]; `torque`: of the joint, finite [Nm or N].
         """
         target = TARGETS[mode][self.mode_numbers[mode]]
         quantity = self.units.counts(position) if mode is ControlMode.POSITION else self.units.permille(torque)
@@ -250,16 +272,16 @@ class DriveNode:
         """Joint and node, for messages."""
         return f"joint {self.joint} (node {self.configuration.node_id})"
 
-    def _measured(self) -> Measurement:
+    def _decode_measurements(self) -> Measurement:
         """What this cycle's values say of the joint."""
 
-        def converted(entry: DriveObject, to_joint: Callable[[int], float]) -> float:
+        def convert(entry: DriveObject, to_joint: Callable[[int], float]) -> float:
             return to_joint(self.values[entry]) if entry in self.values else math.nan
 
         return Measurement(
-            position=converted(objects.POSITION_ACTUAL, self.units.position),
-            velocity=converted(objects.VELOCITY_ACTUAL, self.units.velocity),
-            effort=converted(objects.TORQUE_ACTUAL, self.units.torque),
+            position=convert(objects.POSITION_ACTUAL, self.units.position),
+            velocity=convert(objects.VELOCITY_ACTUAL, self.units.velocity),
+            effort=convert(objects.TORQUE_ACTUAL, self.units.torque),
         )
 
     def _learn_units(self) -> DriveUnits:
@@ -300,7 +322,7 @@ class DriveNode:
         """Drop a whole frame by one of its values."""
         gone = {entry for pdo in self.plan.sent if doubted in pdo.layout.objects for entry in pdo.layout.objects}
         self.values = {entry: value for entry, value in self.values.items() if entry not in gone}
-        self.measurement = self._measured()
+        self.measurement = self._decode_measurements()
 
     def _take_heartbeat(self, data: bytes) -> None:
         self.is_deaf = len(data) == 1 and data[0] & 0x7F != NMT_OPERATIONAL_STATE

@@ -1,6 +1,9 @@
 """Entries of the object dictionary that the driver uses: communication profile CiA 301, drive profile CiA 402."""
 
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
+
+from tauscope_drivers.backend import ControlMode
 
 
 @dataclass(frozen=True)
@@ -69,3 +72,64 @@ CYCLIC_POSITION = 8
 
 CYCLIC_TORQUE = 10
 """Mode of operation: cyclic synchronous torque."""
+
+
+TARGETS: Mapping[ControlMode, Mapping[int, DriveObject]] = {
+    ControlMode.POSITION: {
+        CYCLIC_POSITION: TARGET_POSITION,
+        INTERPOLATED_POSITION: INTERPOLATION_DATA,
+    },
+    ControlMode.TORQUE: {CYCLIC_TORQUE: TARGET_TORQUE},
+}
+"""Modes of operation, the best first, and the target of each."""
+
+
+def select_modes(supported: int) -> dict[ControlMode, int]:
+    """Mode of operation for each control mode that a drive has.
+
+    `supported`: 0x6502, in which bit n - 1 stands for mode n.
+    """
+    found = {
+        mode: next((number for number in targets if supported >> (number - 1) & 1), None)
+        for mode, targets in TARGETS.items()
+    }
+    return {mode: number for mode, number in found.items() if number is not None}
+
+
+SUBSTITUTES: Mapping[DriveObject, str] = {
+    ABORT_CONNECTION: (
+        "by the standard it goes into fault when the host is silent; make sure of that with the arm supported"
+    ),
+    QUICK_STOP_OPTION: (
+        "a quick stop ends without power, so Tauscope brakes and holds by targets; if the host is gone, the drive "
+        "lets go of the joint"
+    ),
+    FAULT_REACTION_OPTION: "its reaction to a fault is the maker's",
+    LARGEST_TORQUE: "Tauscope stops the arm where the measured torque exceeds the joint's limit",
+    LOWEST_POSITION: "Tauscope keeps the targets within the joint's range",
+    HIGHEST_POSITION: "Tauscope keeps the targets within the joint's range",
+    VELOCITY_ACTUAL: "no velocity is recorded, and the arm runs in position mode alone",
+    ERROR_CODE: "errors are known by emergency messages alone",
+    PRODUCER_HEARTBEAT: "a restart of the drive shows in its power state alone",
+    INTERPOLATION_VALUE: "it finds the cycle from SYNC",
+}
+"""Optional objects, and what is done where one is absent."""
+
+WRITTEN = frozenset(SUBSTITUTES) - {VELOCITY_ACTUAL, ERROR_CODE}
+"""Optional objects that the driver sets; one that is read-only counts as absent."""
+
+
+STAYING_OPTIONS = range(5, 9)
+"""Quick stop options (0x605A) after which a drive keeps its power."""
+
+DOUBTFUL = (ABORT_CONNECTION, QUICK_STOP_OPTION)
+"""Optional objects without which an operator has to try how the arm stops."""
+
+
+def describe_absent(present: Container[DriveObject]) -> list[str]:
+    """One line for each optional object that a drive does not have."""
+    lines: dict[str, list[str]] = {}
+    for entry, substitute in SUBSTITUTES.items():
+        if entry not in present:
+            lines.setdefault(substitute, []).append(str(entry))
+    return [f"has no {' and '.join(names)}: {substitute}" for substitute, names in lines.items()]

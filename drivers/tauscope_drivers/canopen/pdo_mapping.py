@@ -38,10 +38,7 @@ _COMMANDED = {objects.CONTROLWORD, objects.TARGET_POSITION, objects.TARGET_TORQU
 def map_process_data(node: DriveNode, mode: ControlMode) -> None:
     """Write the parameters of all PDOs that a mode needs, by explicit SDOs, and listen to them.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: a needed object is in none of its PDOs, or a PDO is not exchanged at SYNC
+    Raises DriverError ``refused`` where a needed object is in none of its PDOs, or a PDO is not exchanged at SYNC.
     """
     for _ in range(2 * PDO_COUNT + 1):
         plan = node.plan_for(mode)
@@ -55,10 +52,10 @@ def map_process_data(node: DriveNode, mode: ControlMode) -> None:
     node.use_plan(plan)
     unknown = {entry for pdo in plan.received for entry in pdo.layout.objects} - _COMMANDED
     # a frame of fixed mapping holds other objects as well: they keep the values that they have
-    node.held = {entry: _held(node, entry) for entry in unknown} | dict.fromkeys(_COMMANDED, 0)
+    node.held = {entry: _read_held(node, entry) for entry in unknown} | dict.fromkeys(_COMMANDED, 0)
 
 
-def _held(node: DriveNode, entry: DriveObject) -> int:
+def _read_held(node: DriveNode, entry: DriveObject) -> int:
     """Value of another object of an RPDO; a place that is only kept free has none."""
     return 0 if entry.index < 0x1000 else node.dictionary.read(entry)
 

@@ -28,12 +28,9 @@ _KNOWN = {
 class PdoSlot:
     """A PDO that a drive has.
 
-    number : int
-        from 0
-    fixed : tuple of DriveObject or None
-        its objects, where its mapping cannot be written; None where it can
-    entries : int
-        most objects that it takes
+    `number`: from 0.
+    `fixed`: its objects, where its mapping cannot be written; None where it can.
+    `entries`: most objects that it takes.
     """
 
     number: int
@@ -54,8 +51,7 @@ class Pdo:
 class PdoPlan:
     """All PDOs of a drive that are used.
 
-    missing : tuple of DriveObject
-        needed, and in none of them
+    `missing`: needed, and in none of them.
     """
 
     received: tuple[Pdo, ...]
@@ -74,12 +70,7 @@ class PdoSlots:
 def plan_pdos(slots: PdoSlots, target: DriveObject, optional: Iterable[DriveObject]) -> PdoPlan:
     """PDOs for a target and for all measurements.
 
-    Parameters
-    ----------
-    target : DriveObject
-        what the mode is commanded by
-    optional : iterable of DriveObject
-        measurements that the drive has beside the needed ones
+    `target`: what the mode is commanded by; `optional`: measurements that the drive has beside the needed ones.
     """
     received, not_received = _assign(slots.received, (objects.CONTROLWORD, target), ())
     sent, not_sent = _assign(slots.sent, MEASURED, tuple(optional))

@@ -29,12 +29,7 @@ def encode_pdo(layout: PdoLayout, values: Mapping[DriveObject, int]) -> bytes:
     """Payload of a frame.
 
     A value that its object cannot hold is an error and never cut to size: a target that wraps round or saturates is
-    full torque.
-
-    Raises
-    ------
-    OverflowError
-        a value does not fit its object; names the object
+    full torque. Raises OverflowError where a value does not fit its object; names the object.
     """
     payload = bytearray()
     for entry in layout.objects:
@@ -78,28 +73,12 @@ class PdoParameters:
 
 
 def received_parameters(number: int, entries: int) -> PdoParameters:
-    """Parameters of a PDO with targets.
-
-    Parameters
-    ----------
-    number : int
-        from 0
-    entries : int
-        objects that it holds
-    """
+    """Parameters of a PDO with targets. `number`: from 0; `entries`: objects that it holds."""
     return _parameters(0x1400 + number, 0x1600 + number, entries)
 
 
 def sent_parameters(number: int, entries: int) -> PdoParameters:
-    """Parameters of a PDO with measurements.
-
-    Parameters
-    ----------
-    number : int
-        from 0
-    entries : int
-        objects that it holds
-    """
+    """Parameters of a PDO with measurements. `number`: from 0; `entries`: objects that it holds."""
     return _parameters(0x1800 + number, 0x1A00 + number, entries)
 
 

@@ -18,13 +18,7 @@ from tauscope_drivers.limits import require_sensible, stated_limits
 
 
 def rehearse(node: DriveNode, joint: DriveJoint) -> list[Finding]:
-    """What would keep a run with the limits of the robot file from starting.
-
-    Parameters
-    ----------
-    node : DriveNode
-        identified and read
-    """
+    """What would keep a run with the limits of the robot file from starting. `node`: identified and read."""
     checks: tuple[Callable[[], list[Finding]], ...] = (
         lambda: _examine_settings(node),
         lambda: _examine_place(node, joint),

@@ -1,7 +1,7 @@
 """SDOs: a node's object dictionary, read and written; lost, late and doubled answers are made up for."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Protocol, TypeVar
 
 import can
@@ -10,8 +10,43 @@ from canopen.sdo.client import SdoClient
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError, SdoError
 
 from tauscope_drivers.canopen.objects import DriveObject
-from tauscope_drivers.canopen.sdo_aborts import describe_abort
 from tauscope_drivers.errors import DriverError, DriverErrorKind
+
+_OTHER_DRIVE = "check that drive.eds and the firmware are those of this drive"
+_OTHER_VALUE = "see the drive's manual for the values that it takes, and correct the robot file's limits or its DCF"
+_OTHER_STATE = "let go of the drive's power (tauscope release), close the maker's tool, and try again"
+
+_MEANINGS: Mapping[int, tuple[str, str]] = {
+    0x05040001: ("the drive does not know the transfer's command", _OTHER_DRIVE),
+    0x05040005: ("the drive is out of memory", "restart the drive"),
+    0x06010000: ("the drive does not give access to it", _OTHER_DRIVE),
+    0x06010001: ("the drive lets it be written only", _OTHER_DRIVE),
+    0x06010002: ("the drive lets it be read only", _OTHER_DRIVE),
+    0x06020000: ("the drive has no such object", _OTHER_DRIVE),
+    0x06040041: ("the drive cannot map this object to a PDO", "name its EDS file as drive.eds"),
+    0x06040042: ("the drive's PDO would be too long", "name its EDS file as drive.eds"),
+    0x06040043: ("the drive finds its parameters incompatible", _OTHER_VALUE),
+    0x06040047: ("the drive has an internal incompatibility", "restart the drive"),
+    0x06060000: ("the drive has a hardware error", "see the drive's own display"),
+    0x06070010: ("the object has another length", _OTHER_DRIVE),
+    0x06070012: ("the object is shorter", _OTHER_DRIVE),
+    0x06070013: ("the object is longer", _OTHER_DRIVE),
+    0x06090011: ("the drive has no such subindex", _OTHER_DRIVE),
+    0x06090030: ("the drive does not take this value", _OTHER_VALUE),
+    0x06090031: ("the value is too high for the drive", _OTHER_VALUE),
+    0x06090032: ("the value is too low for the drive", _OTHER_VALUE),
+    0x06090036: ("the drive's upper limit would be below its lower one", _OTHER_VALUE),
+    0x08000000: ("the drive states a general error", "see the drive's own display"),
+    0x08000020: ("the drive cannot store it", _OTHER_STATE),
+    0x08000021: ("another program controls the drive", _OTHER_STATE),
+    0x08000022: ("the drive does not take it in its present state", _OTHER_STATE),
+}
+
+
+def describe_abort(code: int) -> tuple[str, str]:
+    """Meaning and remedy of an abort code."""
+    return _MEANINGS.get(code, ("the drive aborts the transfer", "see the drive's manual for the code"))
+
 
 SDO_TIMEOUT_S = 0.3
 ATTEMPTS = 2
@@ -50,21 +85,15 @@ class NodeDictionary:
     def read(self, entry: DriveObject) -> int:
         """Value of an entry.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the node does not answer; ``refused``: it has no such entry
+        Raises DriverError: ``cannot-connect``: the node does not answer; ``refused``: it has no such entry.
         """
         return int.from_bytes(self.read_data(entry), "little", signed=entry.signed)
 
     def read_surely(self, entry: DriveObject) -> int:
         """Value of an entry that every measurement hangs on: as two readings in a row have it.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the node does not answer, or gives another value each time; ``refused``: it has no such
-            entry
+        Raises DriverError: ``cannot-connect``: the node does not answer, or gives another value each time; ``refused``:
+        it has no such entry.
         """
         values = [self.read(entry)]
         for _ in range(_READINGS):
@@ -79,13 +108,10 @@ class NodeDictionary:
     def read_data(self, entry: DriveObject) -> bytes:
         """Value of an entry as transferred, cut to its size; of a text without the zeros that end it.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the node does not answer; ``refused``: it has no such entry
+        Raises DriverError: ``cannot-connect``: the node does not answer; ``refused``: it has no such entry.
         """
         try:
-            data = bytes(_transferred(lambda: self._client.upload(entry.index, entry.subindex)))
+            data = bytes(_retry_transfer(lambda: self._client.upload(entry.index, entry.subindex)))
         except (SdoError, can.CanError, OSError) as error:
             raise self._failure(f"{entry} cannot be read", error) from error
         return data[: entry.bits // 8] if entry.bits else data.rstrip(b"\0")
@@ -109,10 +135,8 @@ class NodeDictionary:
     def write(self, entry: DriveObject, value: int) -> None:
         """Write an entry and read it back.
 
-        Raises
-        ------
-        DriverError
-            ``refused``: the drive keeps another value or forbids the write; ``cannot-connect``: it does not answer
+        Raises DriverError: ``refused``: the drive keeps another value or forbids the write; ``cannot-connect``: it does
+        not answer.
         """
         kept = None
         for _ in range(_WRITES):
@@ -128,23 +152,17 @@ class NodeDictionary:
     def send(self, entry: DriveObject, value: int) -> None:
         """Write an entry that cannot be read back yet.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the drive does not answer; ``refused``: it forbids the write
+        Raises DriverError: ``cannot-connect``: the drive does not answer; ``refused``: it forbids the write.
         """
         self.send_data(entry, value.to_bytes(entry.bits // 8, "little", signed=entry.signed), str(value))
 
     def send_data(self, entry: DriveObject, data: bytes, text: str) -> None:
         """Write an entry as transferred.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the drive does not answer; ``refused``: it forbids the write
+        Raises DriverError: ``cannot-connect``: the drive does not answer; ``refused``: it forbids the write.
         """
         try:
-            _transferred(lambda: self._client.download(entry.index, entry.subindex, data))
+            _retry_transfer(lambda: self._client.download(entry.index, entry.subindex, data))
         except (SdoError, can.CanError, OSError) as error:
             raise self._failure(f"{entry} = {text} cannot be written", error) from error
 
@@ -160,7 +178,7 @@ class NodeDictionary:
         )
 
 
-def _transferred(transfer: Callable[[], _Answer]) -> _Answer:
+def _retry_transfer(transfer: Callable[[], _Answer]) -> _Answer:
     """What a transfer comes to, which is begun again where it fails."""
     for _ in range(TRANSFERS - 1):
         try:

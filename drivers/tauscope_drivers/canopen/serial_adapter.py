@@ -35,10 +35,7 @@ class SerialAdapterBus(slcanBus):
     def __init__(self, path: str, bit_rate: int) -> None:
         """Open the adapter, and the channel on it.
 
-        Raises
-        ------
-        CanInitializationError
-            the port is missing, not permitted or taken; names the holder
+        Raises CanInitializationError where the port is missing, not permitted or taken; names the holder.
         """
         holder = find_holder(path)
         if holder is not None:
@@ -56,10 +53,7 @@ class SerialAdapterBus(slcanBus):
     def gathering(self) -> Iterator[None]:
         """Send what is sent within the context with one write, on leaving it; nothing of it where that fails.
 
-        Raises
-        ------
-        CanOperationError
-            the port does not take it
+        Raises CanOperationError where the port does not take it.
         """
         self._gathered = bytearray()
         try:

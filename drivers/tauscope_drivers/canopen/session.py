@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tauscope_drivers.answer_time import AnswerTime
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import NMT_PRE_OPERATIONAL, SYNC_ID, CanBus
@@ -17,7 +16,7 @@ from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.observation import arm_faults, arm_state
 from tauscope_drivers.canopen.pdo_plan import MEASURED_WHERE_THERE, PdoSlots, plan_pdos
 from tauscope_drivers.canopen.state_machine import DriveState, Goal, decode_state
-from tauscope_drivers.clock import Clock
+from tauscope_drivers.clock import AnswerTime, Clock
 from tauscope_drivers.errors import Fault
 from tauscope_drivers.state import ArmState, Array, Setpoint
 
@@ -31,14 +30,7 @@ class HostBrake:
     def __init__(self, position: Array, velocity: Array, begin_ns: int) -> None:
         """Begin at the present motion.
 
-        Parameters
-        ----------
-        position : (n,) float64
-            [rad or m]
-        velocity : (n,) float64
-            [rad/s or m/s]
-        begin_ns : int
-            present instant [ns]
+        `position`: (n,) [rad or m]; `velocity`: (n,) [rad/s or m/s]; `begin_ns`: present instant [ns].
         """
         self._position, self._velocity, self._begin_ns = position, velocity, begin_ns
 
@@ -76,10 +68,8 @@ def rate_limited_by(configuration: BusConfiguration) -> str:
 class Session:
     """An arm's drives, reached.
 
-    answer_ns : int
-        time that drives get to answer SYNC in the control loop [ns]
-    settling_ns : int
-        cycle while drives change state: that of the control loop, once it is known [ns]
+    `answer_ns`: time that drives get to answer SYNC in the control loop [ns].
+    `settling_ns`: cycle while drives change state: that of the control loop, once it is known [ns].
     """
 
     bus: CanBus
@@ -123,10 +113,7 @@ class Session:
     def learn_cycle(self, cycle_s: float | None) -> None:
         """Settle in the control loop's own cycle from now on.
 
-        Parameters
-        ----------
-        cycle_s : float or None
-            of the loop; `SETTLING_CYCLE_S` where it is not known [s]
+        `cycle_s`: of the loop; `SETTLING_CYCLE_S` where it is not known [s].
         """
         self.settling_ns = round((SETTLING_CYCLE_S if cycle_s is None else cycle_s) * 1e9)
 
@@ -202,11 +189,5 @@ class Session:
 
 
 def stay_at(place: Array) -> Setpoint:
-    """Targets that neither move a joint nor push it.
-
-    Parameters
-    ----------
-    place : (n,) float64
-        where the joints are [rad or m]
-    """
+    """Targets that neither move a joint nor push it. `place`: (n,), where the joints are [rad or m]."""
     return Setpoint(place, np.zeros(len(place)))

@@ -62,12 +62,7 @@ def stop_one_by_one(nodes: Sequence[DriveNode], goal: Goal, *, is_stopped: bool)
     """Stop drives that no longer take process data, let all forget the master, and read them.
 
     One that holds already stays as it is. A fault for each drive that does not answer: the others are stopped all the
-    same.
-
-    Raises
-    ------
-    DriverError
-        ``lost``: the bus is gone
+    same. Raises DriverError ``lost`` where the bus is gone.
     """
     silent: list[Fault] = []
     for node in nodes:

@@ -28,14 +28,10 @@ _ARRIVED = 1e-6
 class _Reached:
     """What a cycle has come to.
 
-    position, velocity : (n,) float64
-        targets sent, and how fast a drive in time goes there
-    begin : (n,) float64
-        where drives were by then
-    wanted : (n,) float64
-        targets asked for
-    behind : (n,) bool
-        joints that are still on their way to them
+    `position`, `velocity`: (n,), targets sent, and how fast a drive in time goes there.
+    `begin`: (n,), where drives were by then.
+    `wanted`: (n,), targets asked for.
+    `behind`: (n,), joints that are still on their way to them.
     """
 
     position: Array
@@ -60,13 +56,7 @@ class TargetLimiter:
     """
 
     def __init__(self, limits: DriveLimits, position: Array, cycle_s: float) -> None:
-        """Begin where the arm stands, at rest.
-
-        Parameters
-        ----------
-        position : (n,) float64
-            where the arm stands [rad or m]
-        """
+        """Begin where the arm stands, at rest. `position`: (n,), where the arm stands [rad or m]."""
         self._limits = limits
         rest, not_behind = np.zeros_like(position), np.zeros(len(position), dtype=np.bool_)
         self._before = self._reached = _Reached(position.copy(), rest, position.copy(), position.copy(), not_behind)
@@ -90,13 +80,13 @@ class TargetLimiter:
         way = np.minimum(self._limits.velocity, _FASTEST) * self._cycle_s
         reach = SPEED_MARGIN * (1.0 + _SLACK) * way
         behind = before.behind | (np.abs(wanted - before.position) > reach) | (np.abs(wanted - place) > reach)
-        position = np.where(behind, self._approached(before, wanted), wanted)
+        position = np.where(behind, self._approach(before, wanted), wanted)
         velocity = (position - before.position) / self._cycle_s
         is_too_far = behind & (np.abs(position - place) > way)
         position = np.where(is_too_far, place + np.copysign(way, position - place), position)
         return _Reached(position, velocity, place, wanted, behind & (np.abs(wanted - position) > _ARRIVED))
 
-    def _approached(self, before: _Reached, wanted: Array) -> Array:
+    def _approach(self, before: _Reached, wanted: Array) -> Array:
         """One step towards targets that are far, no faster beside them than can still be taken back in time."""
         gap = wanted - before.position
         fastest = np.minimum(self._limits.velocity, _FASTEST)

@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from tauscope_drivers.backend import Capabilities, ControlMode, DriveLimits, StopPolicy
 from tauscope_drivers.clock import Clock, MonotonicClock
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.dynamixel.bus import ServoBus
+from tauscope_drivers.dynamixel.bus import PATIENCE_S, ServoBus
 from tauscope_drivers.dynamixel.bus_budget import (
     BusTiming,
     CycleTraffic,
@@ -25,17 +26,58 @@ from tauscope_drivers.dynamixel.enabling import Bounds, enable_servos, goals_of
 from tauscope_drivers.dynamixel.faults import lost_bus_fault, silent_servo_fault
 from tauscope_drivers.dynamixel.group import GroupReading
 from tauscope_drivers.dynamixel.models import WATCHDOG_MOST, WATCHDOG_STEP_S
-from tauscope_drivers.dynamixel.observation import arm_state, blind_state, observe
-from tauscope_drivers.dynamixel.pacing import GoalPace
-from tauscope_drivers.dynamixel.port import SerialPort
 from tauscope_drivers.dynamixel.preparation import commissioning_writes
 from tauscope_drivers.dynamixel.session import Session, open_session
 from tauscope_drivers.dynamixel.stopping import clear_errors, clear_watchdogs, stop_servos
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
+from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.limits import RunawayWatch, require_finite
+from tauscope_drivers.serial_port import SerialPort
 from tauscope_drivers.state import ArmState, Setpoint
 
 Array = NDArray[np.float64]
+
+
+def observe(session: Session, temperature: Array | None = None, *failures: Fault) -> ArmState:
+    """State without moving anything, with the errors of servos that set their alert bit.
+
+    `temperature`: (n,), where it was just read [°C].
+    """
+    reading = session.group.read_patiently()
+    for joint, alert in enumerate(reading.alerts):
+        if alert and not session.health.states_error(joint):
+            servo = session.servos[joint]
+            item = servo.model.error_item
+            answer = session.bus.read_once(servo.servo, item.address, item.size, PATIENCE_S)
+            if answer is not None and len(answer.data) == item.size:
+                session.health.take(joint, {item.name: item.decode(answer.data, item.address)})
+    unknown = np.full(len(session.servos), np.nan)
+    state = arm_state(session, reading, unknown if temperature is None else temperature)
+    return replace(state, faults=state.faults + failures)
+
+
+def arm_state(session: Session, reading: GroupReading, temperature: Array) -> ArmState:
+    """State of a cycle. `temperature`: (n,), where it was read in this cycle, else NaN [°C]."""
+    for joint, alert in enumerate(reading.alerts):
+        if alert is not None:
+            session.health.take_alert(joint, alert)
+    return ArmState(
+        time_ns=reading.time_ns,
+        position=reading.position,
+        velocity=reading.velocity,
+        effort=reading.current,
+        temperature=temperature,
+        enabled=session.enabled,
+        faults=session.health.faults,
+        late_ns=reading.late_ns,
+    )
+
+
+def blind_state(time_ns: int, joint_count: int, faults: tuple[Fault, ...]) -> ArmState:
+    """State of an arm that cannot be seen."""
+    unknown = np.full(joint_count, np.nan)
+    return ArmState(time_ns, unknown, unknown, unknown, unknown, np.zeros(joint_count, dtype=np.bool_), faults)
+
 
 _POLICIES = {
     ControlMode.POSITION: frozenset([StopPolicy.HOLD]),
@@ -66,15 +108,9 @@ class DynamixelArm:
     ) -> None:
         """Nothing is opened yet.
 
-        Parameters
-        ----------
-        keeps_settings : bool
-            whether changes of EEPROM stay after the arm is let go
+        Raises DriverError: ``refused``: a ``drive`` block is not valid.
 
-        Raises
-        ------
-        DriverError
-            ``refused``: a ``drive`` block is not valid
+        `keeps_settings`: whether changes of EEPROM stay after the arm is let go.
         """
         self._configuration = read_configuration(joints)
         self._clock = MonotonicClock() if clock is None else clock
@@ -116,22 +152,14 @@ class DynamixelArm:
         return self._clock
 
     def require_rate(self, rate_hz: float) -> None:
-        """Refuse a rate that the bus does not carry.
-
-        Raises
-        ------
-        DriverError
-            ``refused``: names what limits it
-        """
+        """Refuse a rate that the bus does not carry. Raises DriverError ``refused``, which names what limits it."""
         require_rate(rate_hz, *self._budget())
 
     def connect(self) -> ArmState:
         """Lock the port and reach every servo; moves nothing and switches no torque on.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: connected already, the port is taken or missing, a servo is missing or of the wrong kind
+        Raises DriverError ``cannot-connect``: connected already, the port is taken or missing, a servo is missing or of
+        the wrong kind.
         """
         if self._session is not None:
             raise DriverError(DriverErrorKind.CANNOT_CONNECT, "the arm is connected already; disconnect it first")
@@ -149,13 +177,9 @@ class DynamixelArm:
 
         A hardware error (overload, heat …) stays until the servo was switched off and on: it is never restarted from
         here, for a restart lets go of the joint. Servos of the Y series forget errors without one, and are told to.
-
-        Raises
-        ------
-        DriverError
-            ``not-connected``, or ``fault`` where a fault stays
+        Raises DriverError: ``not-connected``, or ``fault`` where a fault stays.
         """
-        session = self._reached()
+        session = self._require_session()
         with self._watching_the_port():
             if self._mode is not None:
                 self.stop(self._policy)
@@ -184,20 +208,13 @@ class DynamixelArm:
     ) -> ArmState:
         """Take the arm under power where it stands.
 
-        Parameters
-        ----------
-        watchdog_s : float
-            time without `exchange` after which they do; rounded down to 20 ms [s]
-        cycle_s : float or None
-            time between two goals, over which the servos go from one to the next; they leap where it is None, or too
-            short for a bus that has to carry the speeds as well [s]
+        Raises DriverError: ``not-connected``, ``refused`` or ``fault``.
 
-        Raises
-        ------
-        DriverError
-            ``not-connected``, ``refused`` or ``fault``
+        `watchdog_s`: time without `exchange` after which they do; rounded down to 20 ms [s].
+        `cycle_s`: time between two goals, over which the servos go from one to the next; they leap where it is None, or
+            too short for a bus that has to carry the speeds as well [s].
         """
-        session = self._reached()
+        session = self._require_session()
         self._require_possible(mode, stop_policy)
         with self._watching_the_port():
             session.read_health()
@@ -217,12 +234,9 @@ class DynamixelArm:
     def exchange(self, setpoint: Setpoint) -> ArmState:
         """One cycle: Sync Write of the goals, Sync Read of all servos, health of one servo.
 
-        Raises
-        ------
-        DriverError
-            ``not-enabled``, ``refused`` (nothing is sent), or ``lost``
+        Raises DriverError: ``not-enabled``, ``refused`` (nothing is sent), or ``lost``.
         """
-        session = self._reached()
+        session = self._require_session()
         if self._mode is None or self._bounds is None:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the arm is not enabled; enable it first")
         require_finite(setpoint, len(session.servos))
@@ -320,7 +334,7 @@ class DynamixelArm:
         """State of an arm that cannot be seen."""
         return blind_state(self._clock.now_ns(), len(self._configuration.servos), self._lost)
 
-    def _reached(self) -> Session:
+    def _require_session(self) -> Session:
         if self._session is None:
             raise DriverError(DriverErrorKind.NOT_CONNECTED, "the servos are not reached; connect first")
         return self._session

@@ -5,13 +5,12 @@ import time
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from tauscope_drivers.answer_time import AnswerTime
-from tauscope_drivers.clock import Clock, MonotonicClock
+from tauscope_drivers.clock import AnswerTime, Clock, MonotonicClock
 from tauscope_drivers.dynamixel import packets
 from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
 from tauscope_drivers.dynamixel.packets import FrameParser, Status
-from tauscope_drivers.dynamixel.port import BITS_PER_BYTE, SerialPort
 from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.serial_port import BITS_PER_BYTE, SerialPort
 
 
 class Turns:
@@ -23,9 +22,8 @@ class Turns:
     """
 
     def __init__(self, servos: Sequence[int], owed: Collection[int] = ()) -> None:
-        """Nothing has come yet."""
         self._place = {servo: place for place, servo in enumerate(servos)}
-        self._owed = frozenset(owed)
+        self._list_owing = frozenset(owed)
         self._found: dict[int, Status] = {}
         self._contradicted: set[int] = set()
         self._heard: set[int] = set()
@@ -39,7 +37,7 @@ class Turns:
     @property
     def answers(self) -> dict[int, Status]:
         """What can be believed, by ID."""
-        return {} if self._found.keys() <= self._owed else dict(self._found)
+        return {} if self._found.keys() <= self._list_owing else dict(self._found)
 
     @property
     def unheard(self) -> set[int]:
@@ -89,12 +87,9 @@ _FAST_SERVO_BYTES = 4
 class Answers:
     """What came of one question to many servos.
 
-    asked_ns : int
-        instant at which the question had left [ns, by the bus' clock]
-    late_ns : int
-        how much later than usual the last answer came [ns]
-    beyond_ns : int
-        how much longer than bus and adapter should take for it [ns]
+    `asked_ns`: instant at which the question had left [ns, by the bus' clock].
+    `late_ns`: how much later than usual the last answer came [ns].
+    `beyond_ns`: how much longer than bus and adapter should take for it [ns].
     """
 
     asked_ns: int
@@ -107,7 +102,6 @@ class ServoBus:
     """Speaks to the servos of one port; one thread's own."""
 
     def __init__(self, port: SerialPort, clock: Clock | None = None) -> None:
-        """Use a port, open or not yet."""
         self.port = port
         self._clock = MonotonicClock() if clock is None else clock
         self.return_delay_s = FACTORY_RETURN_DELAY_S
@@ -145,10 +139,7 @@ class ServoBus:
     def read_block(self, servo: int, block: Block) -> dict[str, int]:
         """Values of a block by their names.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the servo does not answer; ``refused``: it has no such block
+        Raises DriverError: ``cannot-connect``: the servo does not answer; ``refused``: it has no such block.
         """
         answer = None
         for _ in range(ATTEMPTS):
@@ -160,20 +151,14 @@ class ServoBus:
     def read(self, servo: int, item: Item) -> int:
         """Value of an item.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the servo does not answer; ``refused``: it has no such item
+        Raises DriverError: ``cannot-connect``: the servo does not answer; ``refused``: it has no such item.
         """
         return self.read_block(servo, Block(item.address, item.size, (item,)))[item.name]
 
     def write(self, servo: int, item: Item, value: int) -> None:
         """Write an item and read it back.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the servo does not answer; ``refused``: it does not take the value
+        Raises DriverError: ``cannot-connect``: the servo does not answer; ``refused``: it does not take the value.
         """
         answer = None
         for _ in range(ATTEMPTS):
@@ -207,11 +192,11 @@ class ServoBus:
         Nothing in an answer says to which question it belongs. Where an earlier one was not answered in time, as many
         bytes before the block as make another length are read with it, so that what comes late has the wrong length.
         """
-        if any(self._owed(servos, block.length + surplus) for surplus in range(spare + 1)):
+        if any(self._list_owing(servos, block.length + surplus) for surplus in range(spare + 1)):
             self.port.drain()
         surplus = min(range(spare + 1), key=lambda surplus: self._last_missed_ns(servos, block.length + surplus))
         length = block.length + surplus
-        owed = self._owed(servos, length)
+        owed = self._list_owing(servos, length)
         request = packets.encode_sync_read(servos, block.address - surplus, length, fast=fast)
         # Taken before: who is woken by the bytes may run before this process does again.
         asked_ns = self._clock.now_ns() + round(len(request) * BITS_PER_BYTE * 1e9 / self.port.baudrate)
@@ -229,14 +214,14 @@ class ServoBus:
         times = self._answer_times.setdefault((tuple(servos), fast), AnswerTime())
         return Answers(asked_ns, times.late_ns(taken_ns), wanted, max(0, taken_ns))
 
-    def _owed(self, servos: Sequence[int], length: int) -> set[int]:
+    def _list_owing(self, servos: Sequence[int], length: int) -> set[int]:
         """Servos whose answer of this length to an earlier question may still be under way."""
         since_ns = time.monotonic_ns() - _LATEST_ANSWER_NS
         return {servo for servo in servos if self._missed_ns.get((servo, length), 0) > since_ns}
 
     def _last_missed_ns(self, servos: Sequence[int], length: int) -> int:
         """When the last answer of this length was missed that may still be under way; zero where none is."""
-        return max((self._missed_ns[servo, length] for servo in self._owed(servos, length)), default=0)
+        return max((self._missed_ns[servo, length] for servo in self._list_owing(servos, length)), default=0)
 
     def _miss(self, servos: Collection[int], length: int) -> None:
         """Note who has not answered at all: that answer may come yet."""
@@ -291,7 +276,7 @@ class ServoBus:
 
     def _ask(self, servo: int, request: bytes, length: int, patience_s: float) -> Status | None:
         """Send an instruction to one servo and wait for its answer."""
-        if self._owed([servo], length):
+        if self._list_owing([servo], length):
             self.port.drain()
         self.port.send(request)
         delay_s = self.return_delay_s + patience_s

@@ -9,9 +9,9 @@ import os
 from dataclasses import dataclass, replace
 
 from tauscope_drivers.dynamixel.configuration import BusConfiguration
-from tauscope_drivers.dynamixel.port import BITS_PER_BYTE, LEAST_LATENCY_S, read_latency_timer_ms
 from tauscope_drivers.dynamixel.session import SHORTEST_RETURN_DELAY_S, Session
 from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.serial_port import BITS_PER_BYTE, LEAST_LATENCY_S, read_latency_timer_ms
 
 LARGEST_LOAD = 0.85
 """Share of a cycle that the bus may take; the rest is for the servos' own turnaround and for the host."""
@@ -27,8 +27,7 @@ _READ_BYTES = 14
 class CycleTraffic:
     """What goes over the bus in one cycle.
 
-    health_bytes : int
-        that one servo is asked for besides; 0 for no such read [bytes]
+    `health_bytes`: that one servo is asked for besides; 0 for no such read [bytes].
     """
 
     servos: int
@@ -66,10 +65,8 @@ class CycleTraffic:
 class BusTiming:
     """How fast a bus is.
 
-    return_delay_s : float
-        largest Return Delay Time of the servos [s]
-    latency_s : float
-        latency timer of the adapter; 0 on a plain serial line [s]
+    `return_delay_s`: largest Return Delay Time of the servos [s].
+    `latency_s`: latency timer of the adapter; 0 on a plain serial line [s].
     """
 
     baud: float
@@ -94,10 +91,7 @@ def largest_rate_hz(traffic: CycleTraffic, timing: BusTiming, load: float = LARG
 def require_rate(rate_hz: float, traffic: CycleTraffic, timing: BusTiming) -> None:
     """Refuse a rate that the bus does not carry, and say what limits it.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: names the limit and the rate that is possible
+    Raises DriverError ``refused``, which names the limit and the rate that is possible.
     """
     most = largest_rate_hz(traffic, timing)
     if rate_hz <= most:

@@ -33,17 +33,12 @@ _LOWEST_BAUD, _HIGHEST_BAUD = 9_600, 10_500_000
 class ServoConfiguration:
     """One servo.
 
-    torque_per_milliampere : float or None
-        joint torque for one milliampere; None: the driver tracks positions, but neither limits torque in newton metres
-        nor commands it [Nm/mA or N/mA]
-    reduction : float
-        turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints
-    zero_count : int or None
-        count at which the joint stands at zero; None for the model's own
-    milliampere_per_unit : float or None
-        one unit of Present Current, in place of the model's [mA]
-    current_limit_ma : float or None
-        most current that it is given, besides its own Current Limit [mA]
+    `torque_per_milliampere`: joint torque for one milliampere; None: the driver tracks positions, but neither limits
+        torque in newton metres nor commands it [Nm/mA or N/mA].
+    `reduction`: turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints.
+    `zero_count`: count at which the joint stands at zero; None for the model's own.
+    `milliampere_per_unit`: one unit of Present Current, in place of the model's [mA].
+    `current_limit_ma`: most current that it is given, besides its own Current Limit [mA].
     """
 
     joint: str
@@ -69,10 +64,7 @@ class BusConfiguration:
 def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
     """Bus and servos of an arm.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: a key is missing, unknown or not usable; names the joint and the key
+    Raises DriverError ``refused`` where a key is missing, unknown or not usable; names the joint and the key.
     """
     first = joints[0]
     require_known_keys(joints, _BUS_KEYS, _SERVO_KEYS)

@@ -27,8 +27,7 @@ BYTES_BEFORE_STATE = 3
 class Item:
     """An entry of a control table.
 
-    size : int
-        [bytes]
+    `size`: [bytes].
     """
 
     name: str
@@ -55,8 +54,7 @@ def encode_items(items: Iterable[Item], values: Iterable[int]) -> bytes:
 class Block:
     """A stretch of a control table that is read at once.
 
-    length : int
-        [bytes]
+    `length`: [bytes].
     """
 
     address: int
@@ -74,12 +72,9 @@ class Block:
 class ServoModel:
     """A model of servo.
 
-    counts_per_radian : float
-        of the horn [1/rad]
-    velocity_unit : float
-        one unit of Present Velocity [rad/s]
-    current_unit : CurrentUnit or None
-        one unit of Present Current; None where no source states it
+    `counts_per_radian`: of the horn [1/rad].
+    `velocity_unit`: one unit of Present Velocity [rad/s].
+    `current_unit`: one unit of Present Current; None where no source states it.
     """
 
     number: int
@@ -180,10 +175,7 @@ def model_names() -> Mapping[int, str]:
 def find_model(number: int, firmware: int = 0) -> ServoModel:
     """The model of a number, with the table of its firmware.
 
-    Raises
-    ------
-    DriverError
-        ``cannot-connect``: no table is known for it
+    Raises DriverError ``cannot-connect`` where no table is known for it.
     """
     name = model_names().get(number)
     family = None if name is None else family_of(name)
@@ -216,10 +208,7 @@ def find_model(number: int, firmware: int = 0) -> ServoModel:
 def find_model_by_name(name: str) -> ServoModel:
     """The model of a name, with the table of its oldest firmware.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: there is no such model
+    Raises DriverError ``refused`` where there is no such model.
     """
     wanted = name.lower().replace("-", "_")
     for number, known in model_names().items():

@@ -1,11 +1,8 @@
 """Looks at a port and the servos on it, moves nothing, writes nothing, and says what to do about what it finds."""
 
 import math
-import os
 import time
 from collections.abc import Iterator, Sequence
-
-from serial.tools.list_ports import comports
 
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.drive_block import DriveJoint
@@ -17,14 +14,14 @@ from tauscope_drivers.dynamixel.enabling import plan_tasks
 from tauscope_drivers.dynamixel.faults import hardware_faults, watchdog_fault
 from tauscope_drivers.dynamixel.health import Health
 from tauscope_drivers.dynamixel.models import WATCHDOG_MOST, WATCHDOG_STEP_S
-from tauscope_drivers.dynamixel.port import SerialPort, read_latency_timer_ms
 from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, drive_mode, operating_mode
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.dynamixel.session import Session, make_session, read_items, read_settings
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.inspection import Finding, FoundDevice, Severity, failure
 from tauscope_drivers.limits import stated_limits
-from tauscope_drivers.port_holder import find_holder
+from tauscope_drivers.serial_adapters import latency_finding
+from tauscope_drivers.serial_port import SerialPort
 
 MEASURED_CYCLES = 50
 """Reads of which the loop rate is measured."""
@@ -41,10 +38,7 @@ _LEAST_FIRMWARE = 45
 def examine(joints: Sequence[DriveJoint], *, slack_s: float = 0.002) -> list[Finding]:
     """Port, adapter, and every servo that the robot file names.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: a ``drive`` block is not valid
+    Raises DriverError: ``refused``: a ``drive`` block is not valid.
     """
     configuration = read_configuration(joints)
     port = SerialPort(configuration.port, configuration.baud, slack_s)
@@ -219,43 +213,6 @@ def _loop_rate(bus: ServoBus, servos: Sequence[JointServo], return_delay_s: floa
     return Finding(Severity.GOOD, bus.port.path, detail)
 
 
-def serial_adapters() -> list[Finding]:
-    """Every serial adapter: whether it may be opened, who holds it, and its latency timer."""
-    found: list[Finding] = []
-    for adapter in sorted(comports(), key=lambda one: one.device):
-        what = adapter.description if adapter.description not in (None, "n/a", "") else "serial port"
-        found.append(_access(adapter.device, what))
-        if read_latency_timer_ms(adapter.device) is not None:
-            found.append(latency_finding(adapter.device))
-    return found
-
-
-def latency_finding(path: str) -> Finding:
-    """The adapter's latency timer, which caps every rate where it is long."""
-    latency_ms = read_latency_timer_ms(path)
-    if latency_ms is None:
-        return Finding(Severity.GOOD, path, "the adapter has no latency timer")
-    if latency_ms <= 1:
-        return Finding(Severity.GOOD, path, f"latency timer {latency_ms} ms")
-    name = os.path.basename(os.path.realpath(path))
-    remedy = f"write 1 to /sys/class/tty/{name}/device/latency_timer, for good by a udev rule"
-    # Two reads a cycle wait for it.
-    return Finding(
-        Severity.WARNING, path, f"latency timer {latency_ms} ms: no more than {500 / latency_ms:.0f} Hz", remedy
-    )
-
-
-def _access(path: str, what: str) -> Finding:
-    """Whether this program may open a port."""
-    if not os.access(path, os.R_OK | os.W_OK):
-        remedy = "add your account to the group that owns it (dialout), then log in again"
-        return Finding(Severity.FAILURE, path, f"{what}; may not be opened", remedy)
-    holder = find_holder(path)
-    if holder is not None:
-        return Finding(Severity.WARNING, path, f"{what}; held by {holder}", "end that program first")
-    return Finding(Severity.GOOD, path, what)
-
-
 USUAL_BAUDS = (57_600, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 115_200, 4_500_000, 9_600)
 """Rates that servos can be set to, the factory's first [bit/s]."""
 
@@ -263,10 +220,7 @@ USUAL_BAUDS = (57_600, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 115_200, 4_50
 def scan_bus(path: str, bauds: Sequence[int] = USUAL_BAUDS, *, slack_s: float = 0.002) -> Iterator[FoundDevice]:
     """Every servo that answers a ping to all, one baud rate after the other; about a second each.
 
-    Raises
-    ------
-    DriverError
-        ``cannot-connect``: the port is missing, not permitted or taken
+    Raises DriverError ``cannot-connect`` where the port is missing, not permitted or taken.
     """
     for baud in bauds:
         port = SerialPort(path, baud, slack_s)

@@ -21,6 +21,7 @@ class DynamixelDriver(BusDriver):
     )
     block_example = "{id: 1}"
     port_help = "serial device"
+    neighbours = "servos of protocol 1.0 and of Feetech answer to tauscope bus scan feetech"
     bus_options = ("port",)
 
     def is_meant(self, block: Mapping[str, Any]) -> bool:
@@ -40,7 +41,7 @@ class DynamixelDriver(BusDriver):
 
     def list_adapters(self) -> list[Finding]:
         """Serial ports of this machine."""
-        from tauscope_drivers.dynamixel.doctor import serial_adapters
+        from tauscope_drivers.serial_adapters import serial_adapters
 
         return serial_adapters()
 

@@ -13,7 +13,6 @@ from tauscope_drivers.dynamixel.configuration import read_configuration
 from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
 from tauscope_drivers.dynamixel.enabling import Bounds, goals_of
 from tauscope_drivers.dynamixel.group import health_turns, paced_goals, servo_families
-from tauscope_drivers.dynamixel.pacing import GoalPace
 from tauscope_drivers.dynamixel.preparation import (
     SETTINGS,
     ServoTask,
@@ -24,6 +23,7 @@ from tauscope_drivers.dynamixel.preparation import (
     watchdog_steps,
 )
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
+from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.inspection import FrameRequest, PlannedFrame
 from tauscope_drivers.limits import require_sensible
 from tauscope_drivers.state import Setpoint
@@ -43,17 +43,10 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
     """Frames of a connection, of enabling, of some cycles and of a stop, for servos as delivered.
 
     What only the servos themselves know is missing or assumed: their own current and PWM limits are those of an X
-    series servo, a status packet is never lost, and every servo knows Fast Sync Read.
+    series servo, a status packet is never lost, and every servo knows Fast Sync Read. Raises DriverError: ``refused``:
+    a ``drive`` block, a limit or the watchdog's time is not possible.
 
-    Parameters
-    ----------
-    joints : sequence of DriveJoint
-        base first; each ``drive`` block has to name its model
-
-    Raises
-    ------
-    DriverError
-        ``refused``: a ``drive`` block, a limit or the watchdog's time is not possible
+    `joints`: base first; each ``drive`` block has to name its model.
     """
     mode, limits, targets, cycle_s = request.mode, request.limits, request.targets, request.cycle_s
     configuration = read_configuration(joints)
@@ -122,7 +115,7 @@ def _cycles(
             yield from _goals(servos, name, goals)
         else:
             pace = pace or GoalPace(servos, goals, bounds.velocity, cycle_s, 0)
-            yield from _paced_goals(servos, goals, pace.speeds(goals, round(cycle * cycle_s * 1e9)))
+            yield from _pace_goals(servos, goals, pace.speeds(goals, round(cycle * cycle_s * 1e9)))
         yield from _questions(servos, *turns[cycle % len(turns)])
 
 
@@ -141,7 +134,7 @@ def _goals(servos: Sequence[JointServo], name: str, goals: Sequence[int]) -> Ite
         yield _sync_write(items, {servos[index].servo: [goals[index]] for index in members})
 
 
-def _paced_goals(servos: Sequence[JointServo], goals: Sequence[int], speeds: Sequence[int]) -> Iterator[PlannedFrame]:
+def _pace_goals(servos: Sequence[JointServo], goals: Sequence[int], speeds: Sequence[int]) -> Iterator[PlannedFrame]:
     """Goals of a cycle with the speeds towards them."""
     for items, values in paced_goals(servos, goals, speeds):
         yield _sync_write(items, values)

@@ -30,12 +30,9 @@ from tauscope_drivers.state import Setpoint
 class Bounds:
     """Ranges of the goals, in units of the servos, one a joint.
 
-    low, high : tuple of int
-        of Goal Position [counts]
-    current : tuple of int
-        of Goal Current, either sign [units]
-    velocity : tuple of int
-        of Profile Velocity, 0 for none [units]
+    `low`, `high`: of Goal Position [counts].
+    `current`: of Goal Current, either sign [units].
+    `velocity`: of Profile Velocity, 0 for none [units].
     """
 
     low: tuple[int, ...]
@@ -66,7 +63,8 @@ def enable_servos(
     """Prepare every servo, then give each its place for a goal, its watchdog and torque, one servo at a time.
 
     An arm may fall meanwhile: each servo is asked where it is at the last moment, and catches its joint there. A servo
-    that holds its joint already, in the mode that is asked for, is taken over without letting go.
+    that holds its joint already, in the mode that is asked for, is taken over without letting go. Raises DriverError:
+    ``refused`` or ``cannot-connect``: no servo has torque that had none before.
 
     Returns
     -------
@@ -74,11 +72,6 @@ def enable_servos(
         for the cyclic exchange
     list of int
         Goal Position that each servo was given where positions are tracked [counts]
-
-    Raises
-    ------
-    DriverError
-        ``refused`` or ``cannot-connect``: no servo has torque that had none before
     """
     tasks, ranges = plan_tasks(session, mode, limits, watchdog_s)
     taken = _give_torque(session, tasks)
@@ -92,17 +85,14 @@ def plan_tasks(
 ) -> tuple[list[ServoTask], list[tuple[int, int]]]:
     """Check everything that enabling needs, and plan it; only reads.
 
+    Raises DriverError: ``refused`` or ``cannot-connect``: names the joint.
+
     Returns
     -------
     list of ServoTask
         one a joint
     list of tuple of two int
         lowest and highest Goal Position, one a joint [counts]
-
-    Raises
-    ------
-    DriverError
-        ``refused`` or ``cannot-connect``: names the joint
     """
     steps = watchdog_steps(watchdog_s)
     present = [_present_position(session, joint) for joint in range(len(session.servos))]

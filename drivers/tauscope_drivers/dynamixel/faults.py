@@ -37,13 +37,7 @@ _WATCHDOG_CODE = 18
 
 
 def hardware_faults(model: ServoModel, register: int, joint: int) -> tuple[Fault, ...]:
-    """Faults that a servo's error register states; empty for 0.
-
-    Parameters
-    ----------
-    joint : int
-        number of the joint, from 1
-    """
+    """Faults that a servo's error register states; empty for 0. `joint`: number of the joint, from 1."""
     if not register:
         return ()
     name = model.error_item.name
@@ -61,36 +55,21 @@ def hardware_faults(model: ServoModel, register: int, joint: int) -> tuple[Fault
 
 
 def watchdog_fault(joint: int | None) -> Fault:
-    """The Bus Watchdog of a servo has fired, or those of all.
-
-    Parameters
-    ----------
-    joint : int or None
-        number of the joint, from 1; None for all
-    """
+    """The Bus Watchdog of a servo has fired, or those of all. `joint`: number of the joint, from 1; None for all."""
     who = "the servos" if joint is None else "the servo"
     detail = f"{who} heard no instruction in time and stopped"
     return Fault("watchdog", joint, detail, "make sure the host runs, then acknowledge")
 
 
 def alert_fault(joint: int) -> Fault:
-    """The servo sets the alert bit, and which error it is was not read yet.
-
-    Parameters
-    ----------
-    joint : int
-        number of the joint, from 1
-    """
+    """The servo sets the alert bit, and which error it is was not read yet. `joint`: number of the joint, from 1."""
     return Fault("hardware-error", joint, "the servo sets its alert bit", "read Hardware Error Status with the wizard")
 
 
 def torque_lost_fault(joint: int) -> Fault:
     """The servo is without torque though it was given some: it restarted, or was switched off by somebody else.
 
-    Parameters
-    ----------
-    joint : int
-        number of the joint, from 1
+    `joint`: number of the joint, from 1.
     """
     return Fault(
         "restarted",

@@ -25,16 +25,11 @@ _CURRENT, _VELOCITY, _POSITION = STATE_ITEMS
 class GroupReading:
     """What the servos measured in one cycle; NaN for who did not answer in it.
 
-    position : (n,) float64
-        [rad or m]
-    velocity : (n,) float64
-        [rad/s or m/s]
-    current : (n,) float64
-        [mA]
-    alerts : tuple of bool or None
-        alert bit of each servo; None for who did not answer
-    late_ns : int
-        how much later than the bus takes the last answer came [ns]
+    `position`: (n,) [rad or m].
+    `velocity`: (n,) [rad/s or m/s].
+    `current`: (n,) [mA].
+    `alerts`: alert bit of each servo; None for who did not answer.
+    `late_ns`: how much later than the bus takes the last answer came [ns].
     """
 
     time_ns: int
@@ -49,7 +44,6 @@ class ServoGroup:
     """All servos of an arm; servos of different families are asked one family after the other."""
 
     def __init__(self, bus: ServoBus, servos: Sequence[JointServo]) -> None:
-        """Nothing is asked yet."""
         self.servos = tuple(servos)
         self.fast = False
         self._bus = bus
@@ -82,12 +76,7 @@ class ServoGroup:
     def write_goals(self, goals: Sequence[int], speeds: Sequence[int]) -> None:
         """Write Goal Position of all servos, with Profile Velocity where that is its neighbour.
 
-        Parameters
-        ----------
-        goals : sequence of int
-            one a joint [counts]
-        speeds : sequence of int
-            one a joint [units]
+        `goals`: one a joint [counts]; `speeds`: one a joint [units].
         """
         for items, values in paced_goals(self.servos, goals, speeds):
             self._bus.sync_write(items, values)
@@ -197,12 +186,7 @@ def paced_goals(
 ) -> Iterator[tuple[list[Item], dict[int, list[int]]]]:
     """Items and values of the Sync Writes of a cycle's goals, one a family.
 
-    Parameters
-    ----------
-    goals : sequence of int
-        one a joint [counts]
-    speeds : sequence of int
-        one a joint [units]
+    `goals`: one a joint [counts]; `speeds`: one a joint [units].
     """
     for _, members in servo_families(servos):
         model = servos[members[0]].model

@@ -17,7 +17,6 @@ class Health:
     """Faults and torque of all servos, as last read."""
 
     def __init__(self, servos: Sequence[JointServo]) -> None:
-        """Nothing is known yet."""
         count = len(servos)
         self.has_torque = np.zeros(count, dtype=np.bool_)
         self.is_latched = np.zeros(count, dtype=np.bool_)
@@ -30,13 +29,7 @@ class Health:
         self._lost = np.zeros(count, dtype=np.bool_)
 
     def take(self, joint: int, values: Mapping[str, int]) -> None:
-        """Take what was read of one servo.
-
-        Parameters
-        ----------
-        joint : int
-            index of the joint, from 0
-        """
+        """Take what was read of one servo. `joint`: index of the joint, from 0."""
         model = self._servos[joint].model
         if "Torque Enable" in values:
             self.has_torque[joint] = bool(values["Torque Enable"])
@@ -52,23 +45,11 @@ class Health:
             self.temperature[joint] = float(values[model.temperature_item.name])
 
     def take_alert(self, joint: int, alert: bool) -> None:
-        """Take the alert bit of an answer.
-
-        Parameters
-        ----------
-        joint : int
-            index of the joint, from 0
-        """
+        """Take the alert bit of an answer. `joint`: index of the joint, from 0."""
         self._alerts[joint] = alert
 
     def states_error(self, joint: int) -> bool:
-        """Whether a servo's error register was read and stated an error.
-
-        Parameters
-        ----------
-        joint : int
-            index of the joint, from 0
-        """
+        """Whether a servo's error register was read and stated an error. `joint`: index of the joint, from 0."""
         return bool(self._registers[joint])
 
     def expect_torque(self, expected: bool) -> None:

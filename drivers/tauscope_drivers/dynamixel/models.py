@@ -32,8 +32,7 @@ class CurrentUnit:
 class FamilyFacts:
     """What servos of one family have in common.
 
-    voltage_unit_v : float
-        of Present Input Voltage [V]
+    `voltage_unit_v`: of Present Input Voltage [V].
     """
 
     name: str

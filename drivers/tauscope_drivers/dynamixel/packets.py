@@ -120,10 +120,7 @@ class FrameParser:
     def __init__(self, longest: int = LONGEST_FRAME) -> None:
         """Begin with nothing.
 
-        Parameters
-        ----------
-        longest : int
-            longest frame that can be meant, so that a damaged length does not swallow what follows [bytes]
+        `longest`: longest frame that can be meant, so that a damaged length does not swallow what follows [bytes].
         """
         self.discarded = 0
         self._longest = longest

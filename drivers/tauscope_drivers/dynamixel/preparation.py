@@ -44,12 +44,9 @@ class RegisterWrite:
 class ServoTask:
     """What a servo shall do once it has torque.
 
-    current_cap : int
-        most current [units]
-    velocity_cap : int
-        largest speed of its target while it tracks positions, 0 for none [units]
-    present : int
-        Present Position [counts]
+    `current_cap`: most current [units].
+    `velocity_cap`: largest speed of its target while it tracks positions, 0 for none [units].
+    `present`: Present Position [counts].
     """
 
     mode: ControlMode
@@ -117,10 +114,7 @@ def taking_writes(servo: JointServo, task: ServoTask, *, holds: bool) -> list[Re
 def watchdog_steps(watchdog_s: float) -> int:
     """Bus Watchdog for a time, at most that time.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: shorter or longer than the servos can
+    Raises DriverError ``refused``: shorter or longer than the servos can.
     """
     steps = math.floor(watchdog_s / WATCHDOG_STEP_S + _ROUNDING) if math.isfinite(watchdog_s) else 0
     if not 1 <= steps <= WATCHDOG_MOST:
@@ -135,15 +129,9 @@ def watchdog_steps(watchdog_s: float) -> int:
 def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -> int:
     """Most current within a torque limit, the robot file's limit and the servo's own Current Limit [units].
 
-    Parameters
-    ----------
-    torque : float
-        limit of the joint, infinite where there is none [Nm or N]
+    Raises DriverError ``refused`` where the limit cannot be turned into current, or leaves none.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: the limit cannot be turned into current, or leaves none
+    `torque`: limit of the joint, infinite where there is none [Nm or N].
     """
     cap = settings["Current Limit"]
     if servo.current_limit_ma is not None:
@@ -165,15 +153,9 @@ def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -
 def velocity_cap(servo: JointServo, settings: Mapping[str, int], velocity: float) -> int:
     """Profile Velocity within a speed limit and the servo's own Velocity Limit, beyond which it refuses it [units].
 
-    Parameters
-    ----------
-    velocity : float
-        limit of the joint, infinite where there is none [rad/s or m/s]
+    Raises DriverError ``refused`` where the servo's own limit leaves no motion.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: the servo's own limit leaves no motion
+    `velocity`: limit of the joint, infinite where there is none [rad/s or m/s].
     """
     cap, own = servo.units.velocity_cap(velocity), settings.get("Velocity Limit")
     if own is None:
@@ -190,10 +172,7 @@ def position_counts(
 ) -> tuple[int, int]:
     """Lowest and highest Goal Position within the joint's limits, and the servo's own where it applies them.
 
-    Parameters
-    ----------
-    low, high : float
-        limits of the joint, infinite where there are none [rad or m]
+    `low`, `high`: limits of the joint, infinite where there are none [rad or m].
     """
     lowest, highest = servo.units.counts_within(low, high)
     if mode is ControlMode.POSITION and servo.model.family.position_mode not in _MULTI_TURN_MODES:

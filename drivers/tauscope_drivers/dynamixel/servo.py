@@ -12,8 +12,7 @@ from tauscope_drivers.errors import DriverError, DriverErrorKind
 class JointServo:
     """A servo and what its numbers mean.
 
-    number : int
-        of the joint, from 1
+    `number`: of the joint, from 1.
     """
 
     number: int
@@ -25,6 +24,11 @@ class JointServo:
     current_limit_ma: float | None = None
 
     @property
+    def counts_per_speed_unit(self) -> float:
+        """One unit of Profile Velocity [counts/s]."""
+        return self.model.velocity_unit * self.model.counts_per_radian
+
+    @property
     def label(self) -> str:
         """What messages call it."""
         return f"joint {self.joint} (servo {self.servo}, {self.model.label})"
@@ -33,15 +37,10 @@ class JointServo:
 def make_servo(number: int, configuration: ServoConfiguration, identity: tuple[int, int] | None) -> JointServo:
     """A servo of a joint, with the identity that it stated, or without one as its configuration promises it.
 
-    Parameters
-    ----------
-    number : int
-        of the joint, from 1
+    Raises DriverError ``cannot-connect`` where not the model that the robot file names, one that senses no current or
+    has no watchdog.
 
-    Raises
-    ------
-    DriverError
-        ``cannot-connect``: not the model that the robot file names, one that senses no current or has no watchdog
+    `number`: of the joint, from 1.
     """
     place = f"joint {configuration.joint} (servo {configuration.servo})"
     if identity is not None:

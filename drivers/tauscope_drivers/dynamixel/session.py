@@ -36,23 +36,11 @@ class Session:
     originals: tuple[OriginalSettings, ...] = ()
 
     def read(self, joint: int, names: Iterable[str]) -> dict[str, int]:
-        """Items of one servo.
-
-        Parameters
-        ----------
-        joint : int
-            index of the joint, from 0
-        """
+        """Items of one servo. `joint`: index of the joint, from 0."""
         return read_items(self.bus, self.servos[joint], names)
 
     def write(self, joint: int, name: str, value: int) -> None:
-        """Write an item of one servo and read it back.
-
-        Parameters
-        ----------
-        joint : int
-            index of the joint, from 0
-        """
+        """Write an item of one servo and read it back. `joint`: index of the joint, from 0."""
         servo = self.servos[joint]
         before = self.settings[joint].get(name)
         if self.originals and name in CHANGED and before not in (None, value):
@@ -67,10 +55,7 @@ class Session:
     def restore(self) -> None:
         """Put back what was changed in EEPROM, on servos without torque; others keep it until they are let go.
 
-        Raises
-        ------
-        DriverError
-            a servo does not answer, or does not take it
+        Raises DriverError where a servo does not answer, or does not take it.
         """
         for joint, kept in enumerate(self.originals):
             before = kept.before
@@ -93,13 +78,7 @@ class Session:
         )
 
     def carry_out(self, joint: int, writes: Iterable[RegisterWrite]) -> None:
-        """Write what a plan says, one after the other, each read back.
-
-        Parameters
-        ----------
-        joint : int
-            index of the joint, from 0
-        """
+        """Write what a plan says, one after the other, each read back. `joint`: index of the joint, from 0."""
         for write in writes:
             self.write(joint, write.item.name, write.value)
 
@@ -119,10 +98,7 @@ class Session:
 def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) -> Session:
     """Reach every servo, set what moves nothing, and read its health.
 
-    Raises
-    ------
-    DriverError
-        ``cannot-connect``: a servo is missing or of the wrong kind
+    Raises DriverError ``cannot-connect`` where a servo is missing or of the wrong kind.
     """
     bus.return_delay_s = FACTORY_RETURN_DELAY_S
     servos = tuple(_reach(bus, number, servo) for number, servo in enumerate(configurations, 1))
@@ -153,10 +129,7 @@ def make_session(bus: ServoBus, servos: Sequence[JointServo], settings: Sequence
 def read_settings(bus: ServoBus, servo: JointServo) -> dict[str, int]:
     """Settings of a servo whose counts and speeds are those of its model's table.
 
-    Raises
-    ------
-    DriverError
-        ``cannot-connect``: it does not answer, or its gear is another one
+    Raises DriverError ``cannot-connect`` where it does not answer, or its gear is another one.
     """
     settings = read_items(bus, servo, SETTINGS)
     _require_delivered_gear(bus, servo)

@@ -21,17 +21,10 @@ def stop_servos(
     """Stop every servo, then end its watchdog, so that it stays so without cycles.
 
     Holding goes by position; servos in current mode are changed over, which lets go of the arm for the few milliseconds
-    that the change takes. These servos cannot damp: for `StopPolicy.DAMP` they hold, which gives way less.
+    that the change takes. These servos cannot damp: for `StopPolicy.DAMP` they hold, which gives way less. Raises
+    DriverError where a servo could not be reached; the others are stopped.
 
-    Parameters
-    ----------
-    caps : sequence of int
-        most current with which each servo may hold [units]
-
-    Raises
-    ------
-    DriverError
-        a servo could not be reached; the others are stopped
+    `caps`: most current with which each servo may hold [units].
     """
     everybody = range(len(session.servos))
     session.health.expect_torque(False)
@@ -54,12 +47,8 @@ def clear_watchdogs(session: Session) -> None:
 
     The clear lets a servo follow its old goal again, and while it is latched no new goal is taken. So the old goal has
     to be where the servo stands, but for a following error; it is approached at the slowest speed, and replaced by the
-    present position at once. A servo in current mode exerts nothing while it is latched, and is let go first.
-
-    Raises
-    ------
-    DriverError
-        ``fault``: a servo's old goal is too far away; nothing was cleared
+    present position at once. A servo in current mode exerts nothing while it is latched, and is let go first. Raises
+    DriverError ``fault`` where a servo's old goal is too far away; nothing was cleared.
     """
     latched = [joint for joint in range(len(session.servos)) if session.health.is_latched[joint]]
     _clear(session, latched, lambda joint: session.write(joint, "Bus Watchdog", 0))
@@ -68,12 +57,8 @@ def clear_watchdogs(session: Session) -> None:
 def clear_errors(session: Session) -> None:
     """Clear errors of servos that forget them without a restart (Y), just as `clear_watchdogs` does.
 
-    What cannot be cleared, or comes back at once, stays in the servo's Error Code.
-
-    Raises
-    ------
-    DriverError
-        ``fault``: a servo holds, and its old goal is too far away; nothing was cleared
+    What cannot be cleared, or comes back at once, stays in the servo's Error Code. Raises DriverError ``fault`` where a
+    servo holds, and its old goal is too far away; nothing was cleared.
     """
     stating = [
         joint

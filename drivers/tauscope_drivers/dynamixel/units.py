@@ -13,15 +13,12 @@ MULTI_TURN_COUNTS = 1_048_575
 class ServoUnits:
     """What one unit of a servo means at its joint.
 
-    radians_per_count : float
-        joint position for one count, negative where the servo is mounted the other way round [rad or m]
-    velocity_unit : float
-        joint velocity for one unit of Present Velocity, signed likewise [rad/s or m/s]
-    milliampere : float
-        current for one unit of Present Current, signed likewise [mA]
-    torque_per_milliampere : float or None
-        joint torque for one milliampere; None where the robot file does not say, for no maker's figure exists
-        [Nm/mA or N/mA]
+    `radians_per_count`: joint position for one count, negative where the servo is mounted the other way round [rad or
+        m].
+    `velocity_unit`: joint velocity for one unit of Present Velocity, signed likewise [rad/s or m/s].
+    `milliampere`: current for one unit of Present Current, signed likewise [mA].
+    `torque_per_milliampere`: joint torque for one milliampere; None where the robot file does not say, for no maker's
+        figure exists [Nm/mA or N/mA].
     """
 
     radians_per_count: float
@@ -36,22 +33,13 @@ class ServoUnits:
         return (counts - self.zero_count) * self.radians_per_count
 
     def counts(self, position: float) -> int:
-        """Nearest count of a joint position.
-
-        Parameters
-        ----------
-        position : float
-            finite [rad or m]
-        """
+        """Nearest count of a joint position. `position`: finite [rad or m]."""
         return round(position / self.radians_per_count) + self.zero_count
 
     def counts_within(self, low: float, high: float) -> tuple[int, int]:
         """Lowest and highest whole count between two joint positions.
 
-        Parameters
-        ----------
-        low, high : float
-            infinite where there is no limit [rad or m]
+        `low`, `high`: infinite where there is no limit [rad or m].
         """
         ends = sorted((low / self.radians_per_count, high / self.radians_per_count))
         lowest = -MULTI_TURN_COUNTS if ends[0] == -math.inf else math.ceil(ends[0] - _ROUNDING) + self.zero_count
@@ -65,10 +53,7 @@ class ServoUnits:
     def velocity_cap(self, velocity: float) -> int:
         """Profile Velocity for a largest speed; 0, which means none, where there is none.
 
-        Parameters
-        ----------
-        velocity : float
-            positive, may be infinite [rad/s or m/s]
+        `velocity`: positive, may be infinite [rad/s or m/s].
         """
         most = velocity / abs(self.velocity_unit)
         return 0 if most > _LARGEST_PROFILE else max(1, math.floor(most))
@@ -78,22 +63,13 @@ class ServoUnits:
         return units * self.milliampere
 
     def current_units(self, torque: float) -> int:
-        """Nearest Goal Current for a joint torque.
-
-        Parameters
-        ----------
-        torque : float
-            finite [Nm or N]
-        """
+        """Nearest Goal Current for a joint torque. `torque`: finite [Nm or N]."""
         return round(torque / self._torque_per_unit())
 
     def current_cap(self, torque: float) -> int:
         """Largest whole Goal Current within a torque limit; 0x7FFF where there is no limit.
 
-        Parameters
-        ----------
-        torque : float
-            positive, may be infinite [Nm or N]
+        `torque`: positive, may be infinite [Nm or N].
         """
         if torque == math.inf:
             return 0x7FFF
@@ -120,21 +96,12 @@ def servo_units(
 ) -> ServoUnits:
     """Units of a servo of this model at its joint.
 
-    Parameters
-    ----------
-    reduction : float
-        turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints
-    zero_count : int or None
-        count at which the joint stands at zero; None for the model's own
-    milliampere : float or None
-        one unit of Present Current, in place of the model's [mA]
-    torque_per_milliampere : float or None
-        as recorded torque constants are: joint torque for one milliampere [Nm/mA or N/mA]
+    Raises ValueError where no unit of current is known for the model, and none is given.
 
-    Raises
-    ------
-    ValueError
-        no unit of current is known for the model, and none is given
+    `reduction`: turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints.
+    `zero_count`: count at which the joint stands at zero; None for the model's own.
+    `milliampere`: one unit of Present Current, in place of the model's [mA].
+    `torque_per_milliampere`: as recorded torque constants are: joint torque for one milliampere [Nm/mA or N/mA].
     """
     unit = model.current_unit
     if milliampere is None and unit is None:

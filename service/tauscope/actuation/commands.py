@@ -34,17 +34,14 @@ def make_efforts(
 ) -> tuple[Robot, tuple[Recording, ...], tuple[Recording, ...]]:
     """Make torque where recordings hold commands in its place; delays that nothing states are estimated.
 
+    Raises RecordingError where a joint has no loop, or its loop lacks a voltage.
+
     Returns
     -------
     Robot
         with the delays, and with notes on what the torque is made of
     tuple of Recording, tuple of Recording
         training and held out, with torque
-
-    Raises
-    ------
-    RecordingError
-        a joint has no loop, or its loop lacks a voltage
     """
     commands = [each for each in recordings if each.effort_kind is EffortKind.COMMAND]
     unseen = [each for each in held_out if each.effort_kind is EffortKind.COMMAND]
@@ -74,10 +71,7 @@ def make_efforts(
 def require_loops(robot: Robot, recording: Recording) -> None:
     """Refuse a robot without loops, or without the supply of one.
 
-    Raises
-    ------
-    RecordingError
-        naming the joint and the key
+    Raises RecordingError naming the joint and the key.
     """
     for number, joint in enumerate(robot.joints, 1):
         loop = joint.actuator
@@ -148,12 +142,12 @@ def _describe(
             "" if loop.servo or loop.unit != "register" else ", or state the servo in joints[].actuator.servo"
         )
         notes.append(ResultWarning(code="made-effort", joint=joint.name, text=text, remedy=remedy))
-        limited = max(_limited_share(loop, *pair, index) for pair in zip(made, commands, strict=True))
+        limited = max(_measure_limited_share(loop, *pair, index) for pair in zip(made, commands, strict=True))
         notes.append(_separate(joint.name, loop, limited, is_weighed=index in weighed))
     return notes
 
 
-def _limited_share(loop: Actuator, made: Recording, commands: Recording, joint: int) -> float:
+def _measure_limited_share(loop: Actuator, made: Recording, commands: Recording, joint: int) -> float:
     """Share of rows in which the bridge is at its duty limit; zero for a loop in SI."""
     if loop.unit != "register":
         return 0.0

@@ -27,10 +27,8 @@ SEEN = 3.0
 class Delay:
     """Delay of one joint's command.
 
-    value : float
-        [s]
-    std : float or None
-        standard error [s]; None where it is stated
+    `value`: [s].
+    `std`: standard error [s]; None where it is stated.
     """
 
     value: float
@@ -40,23 +38,12 @@ class Delay:
 def shift_command(time: Array, command: Array, delay: float, rate_hz: float | None, at: Array) -> Array:
     """Command in force: late by a delay, and held from one update of the loop to the next.
 
-    Parameters
-    ----------
-    time : (N,) float64
-        of the recorded commands [s]
-    command : (N,) float64
-        [rad or m]
-    delay : float
-        [s]
-    rate_hz : float or None
-        updates a second; None: with every sample
-    at : (M,) float64
-        instants that are asked for [s]
-
-    Returns
-    -------
-    (M,) float64
-        [rad or m]
+    `time`: (N,), of the recorded commands [s].
+    `command`: (N,) [rad or m].
+    `delay`: [s].
+    `rate_hz`: updates a second; None: with every sample.
+    `at`: (M,), instants that are asked for [s].
+    Returns (M,) [rad or m].
     """
     since = at if rate_hz is None else time[0] + np.floor((at - time[0]) * rate_hz + 1e-9) / rate_hz
     known = np.isfinite(command)
@@ -64,13 +51,7 @@ def shift_command(time: Array, command: Array, delay: float, rate_hz: float | No
 
 
 def command_torque(robot: Robot, samples: Samples, delays: Sequence[float]) -> Array:
-    """Torque that the loops of all joints make, (N, n) [Nm or N].
-
-    Parameters
-    ----------
-    delays : sequence of float
-        one a joint [s]
-    """
+    """Torque that the loops of all joints make, (N, n) [Nm or N]. `delays`: one a joint [s]."""
     torque = np.full(samples.position.shape, np.nan)
     for joint, delay in enumerate(delays):
         torque[:, joint] = joint_torque(robot, samples, joint, delay)
@@ -102,7 +83,7 @@ def estimate_delays(robot: Robot, recordings: Sequence[Recording]) -> tuple[Dela
         grid = np.arange(0.0, LONGEST_S + STEP_S / 2, STEP_S)
         left, rows = np.zeros((len(open_), len(grid))), 0.0
         for recording in recordings:
-            squares, count = _unexplained(robot, recording, open_, grid)
+            squares, count = _sum_residual_squares(robot, recording, open_, grid)
             left, rows = left + squares, rows + count
         found = {joint: _least(grid, squares, rows) for joint, squares in zip(open_, left, strict=True)}
     sure = [each.value for each in found.values() if each.std is not None and each.std < FOUND_STD_S]
@@ -133,7 +114,9 @@ def _least(grid: Array, squares: Array, rows: float) -> Delay:
     return Delay(min(float(value), LONGEST_S) if value > SEEN * std else 0.0, std)
 
 
-def _unexplained(robot: Robot, recording: Recording, joints: Sequence[int], grid: Array) -> tuple[Array, float]:
+def _sum_residual_squares(
+    robot: Robot, recording: Recording, joints: Sequence[int], grid: Array
+) -> tuple[Array, float]:
     """Squares of torque that bodies and friction leave, (joints, delays), and independent rows behind them."""
     motion = SmoothMotion.of(recording)
     columns = np.asarray(base_parameters(robot).independent_columns)

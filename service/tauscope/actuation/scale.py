@@ -32,10 +32,7 @@ def is_open(joint: Joint) -> bool:
 def with_torque_per_volt(robot: Robot, values: dict[int, float], std: float | None = None) -> Robot:
     """The robot with torque per volt of some joints, by their index [Nm/V or N/V].
 
-    Parameters
-    ----------
-    std : float or None
-        relative standard error of all of them
+    `std`: relative standard error of all of them.
     """
     joints = list(robot.joints)
     for place, value in values.items():
@@ -51,12 +48,7 @@ def estimate_torque_per_volt(
 ) -> dict[int, float]:
     """Torque per volt by joint; a joint that tells nothing takes that of joints with the same servo, if any.
 
-    Parameters
-    ----------
-    robot : Robot
-        with 1 Nm/V at these joints
-    recordings : sequence of Recording
-        with commands
+    `robot`: with 1 Nm/V at these joints; `recordings`: with commands.
     """
     links = robot.model.links
     if links is None:

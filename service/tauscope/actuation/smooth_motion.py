@@ -27,12 +27,9 @@ REST = 0.02
 class SmoothMotion:
     """Motion on a uniform grid.
 
-    time : (N,) float64
-        [s]
-    position, velocity, acceleration : (N, n) float64
-        q, q̇, q̈
-    rate, band : float
-        sampling rate, and band of the comparison [Hz]
+    `time`: (N,) [s].
+    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈.
+    `rate`, `band`: sampling rate, and band of the comparison [Hz].
     """
 
     samples: Samples
@@ -64,14 +61,7 @@ class SmoothMotion:
     def onto(self, values: Array) -> Array:
         """Values of the recording on the grid.
 
-        Parameters
-        ----------
-        values : (M,) float64
-            one a row of the recording; NaN where it was missed
-
-        Returns
-        -------
-        (N,) float64
+        `values`: (M,), one a row of the recording; NaN where it was missed. Returns (N,).
         """
         return _onto(self.samples.time, values, self.time)
 
@@ -89,14 +79,7 @@ class SmoothMotion:
     def reduce(self, columns: Array, joint: int) -> Array:
         """Columns with those of a joint's friction and constant beside them, in the band, where the joint moves.
 
-        Parameters
-        ----------
-        columns : (N, k) float64
-            torque by coefficient
-
-        Returns
-        -------
-        (M, k + 3) float64
+        `columns`: (N, k), torque by coefficient. Returns (M, k + 3).
         """
         speed = self.velocity[:, joint]
         whole = np.column_stack([columns, speed, np.sign(speed), np.ones(len(speed))])

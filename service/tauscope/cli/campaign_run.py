@@ -8,8 +8,8 @@ import typer
 from pydantic import ValidationError
 
 from tauscope.cli.diagnose_summary import show_diagnosis
-from tauscope.cli.identify_summary import show_identification
 from tauscope.cli.output_files import write_file
+from tauscope.cli.result_summary import show_identification
 from tauscope.cli.terminal import output, plain, shown_progress
 from tauscope.errors import ExportError
 from tauscope.tasks import campaign
@@ -19,17 +19,10 @@ from tauscope.tasks.task import LocalFiles
 def run_campaign(robot: Path, steps: Mapping[str, str], out: Path) -> None:
     """Run a campaign on the arm of a robot file.
 
-    Parameters
-    ----------
-    steps : mapping of str to str
-        JSON by field of the request
+    Raises typer.BadParameter where an option is not valid. Raises TauscopeError where a step has no result, or the
+    folder exists.
 
-    Raises
-    ------
-    typer.BadParameter
-        where an option is not valid
-    TauscopeError
-        where a step has no result, or the folder exists
+    `steps`: JSON by field of the request.
     """
     request = _request(robot, steps)
     try:

@@ -14,10 +14,9 @@ from rich.console import Console
 from ruamel.yaml import YAML
 
 from tauscope.cli.demo_campaign import run_campaign
-from tauscope.cli.demo_folder import prepare_folder
-from tauscope.cli.demo_page import DATA, LEFT_FOR_S, PORT, PageShown, leave_page, show_page
-from tauscope.cli.identify_summary import show_identification
+from tauscope.cli.demo_page import DATA, LEFT_FOR_S, PORT, PageShown, leave_page, prepare_folder, show_page
 from tauscope.cli.output_files import write_file
+from tauscope.cli.result_summary import show_identification
 from tauscope.cli.run_session import keep_recording, why_unfinished
 from tauscope.cli.task_run import write_outputs
 from tauscope.cli.terminal import Told, output, plain, shown_progress, table
@@ -81,10 +80,8 @@ class Comparison:
 def run_demo(folder: Path, page: PageShown) -> None:
     """Design, run, identify, compare, and say where everything is.
 
-    Raises
-    ------
-    TauscopeError
-        where the folder holds somebody else's files of the same names, cannot be written, or the page not be served
+    Raises TauscopeError where the folder holds somebody else's files of the same names, cannot be written, or the page
+    not be served.
     """
     prepare_folder(folder, (*FILES, DATA))
     arm = read_robot(example_robot("paper_arm"))
@@ -127,10 +124,7 @@ def design_motion(robot: Path, out: Path, options: ExcitationOptions, told: Told
 def run_motion(folder: Path, trajectory: Path, out: Path, seed: int, told: Told) -> None:
     """Play a motion on the simulated arm, and keep what it recorded.
 
-    Raises
-    ------
-    AcquisitionError
-        if the run does not finish
+    Raises AcquisitionError if the run does not finish.
     """
     scenario = folder.with_suffix(".yaml")
     scenario.write_text(f"{SCENARIO_TEXT}seed: {seed}\n", encoding="utf-8")

@@ -29,15 +29,9 @@ MOTION = ExcitationDesignOptions(starts=1, periods=2, slow_postures=1, closing_p
 
 
 def run_campaign(data: Path, robot_file: Path, scenario: Mapping[str, Any], told: Told) -> DiagnosisDocument:
-    """Run a campaign on a simulated arm, and diagnose it.
-
-    Raises
-    ------
-    TauscopeError
-        if the campaign does not succeed
-    """
+    """Run a campaign on a simulated arm, and diagnose it. Raises TauscopeError if the campaign does not succeed."""
     with open_services(Settings(data_folder=data)) as services:
-        identifier = _begun(services, robot_file, scenario)
+        identifier = _begin(services, robot_file, scenario)
         _wait_for_end(services, identifier, told)
         found = result_of(services, identifier, ROOT).diagnosis
     if found is None:
@@ -45,7 +39,7 @@ def run_campaign(data: Path, robot_file: Path, scenario: Mapping[str, Any], told
     return found
 
 
-def _begun(services: Services, robot_file: Path, scenario: Mapping[str, Any]) -> str:
+def _begin(services: Services, robot_file: Path, scenario: Mapping[str, Any]) -> str:
     """Hand the campaign in."""
     with staged_workspace(services.campaigns.items, CampaignWorkspace) as workspace:
         shutil.copy(robot_file, workspace.robot)

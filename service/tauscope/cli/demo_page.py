@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
@@ -18,11 +19,44 @@ from typing import IO, cast
 
 import typer
 
-from tauscope.cli.demo_folder import MARK
+from tauscope.cli.output_files import write_file
 from tauscope.cli.serving import run_server
-from tauscope.errors import StoreError, TauscopeError
+from tauscope.errors import ExportError, StoreError, TauscopeError
 from tauscope.server.http.server import serve
 from tauscope.server.http.settings import Settings
+
+MARK = "README.txt"
+_FIRST_LINE = "Written by `tauscope demo`, which replaces the files named here when it runs again:"
+
+
+def prepare_folder(folder: Path, files: Sequence[str]) -> None:
+    """Make the folder, mark it, and take away the files that an earlier demo wrote into it; folders stay.
+
+    Raises ExportError where one of these names is taken by a file that no demo wrote, or the folder cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        ours = _list_own(folder / MARK)
+        for name in (MARK, *files):
+            if name not in ours and (folder / name).exists():
+                raise ExportError(
+                    f"{folder / name}: was not written by the demo, and is not replaced; choose another --out"
+                )
+        write_file(folder / MARK, "\n".join([_FIRST_LINE, "", *files, ""]).encode())
+        for name in ours.intersection(files):
+            if not (folder / name).is_dir():  # a service's data: whoever worked on it since may want it
+                (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise ExportError(f"{folder}: cannot be written ({error.strerror or error}); choose another --out") from error
+
+
+def _list_own(mark: Path) -> set[str]:
+    """Names that an earlier demo wrote down as its own, the mark included; none where the mark is not its own."""
+    if not mark.is_file():
+        return set()
+    first, *names = mark.read_text(encoding="utf-8", errors="replace").splitlines()[:100] or [""]
+    return {MARK, *filter(None, names)} if first == _FIRST_LINE else set()
+
 
 DATA = "service"
 """Data folder of a service within the demo's, which holds a campaign on an arm that conceals an effect."""
@@ -63,15 +97,9 @@ class LeftPage:
 def leave_page(folder: Path, seconds: float = LEFT_FOR_S) -> LeftPage:
     """Serve the page from a process of its own.
 
-    Parameters
-    ----------
-    seconds : float
-        after which it ends [s]
+    Raises StoreError if that process ends instead, with what it said.
 
-    Raises
-    ------
-    StoreError
-        if that process ends instead, with what it said
+    `seconds`: after which it ends [s].
     """
     process = subprocess.Popen(  # noqa: S603 - this program
         [sys.executable, "-m", __name__, str(folder.resolve()), str(seconds)],

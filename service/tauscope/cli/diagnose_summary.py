@@ -8,9 +8,9 @@ from tauscope.cli.terminal import plain, table
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.result import FindingEntry
 from tauscope.number_text import significant
-from tauscope.report.diagnosis_tables import difference_table, headroom_table, residual_table, shift_table
 from tauscope.report.diagnosis_words import MOST_FINDINGS, VERDICTS, refutations
 from tauscope.report.table import Table
+from tauscope.report.tables import difference_table, headroom_table, residual_table, shift_table
 from tauscope.report.words import noise_words
 
 

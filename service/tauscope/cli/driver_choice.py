@@ -36,39 +36,21 @@ def _fill(text: str | None) -> str | None:
 
 
 def check_backend(name: str) -> str:
-    """Read the name of a driver.
-
-    Raises
-    ------
-    typer.BadParameter
-        there is no such driver
-    """
+    """Read the name of a driver. Raises typer.BadParameter where there is no such driver."""
     from tauscope.runtime.drivers import driver_names
 
     return _check(name, driver_names())
 
 
 def check_bus(name: str) -> str:
-    """Read the name of a field bus.
-
-    Raises
-    ------
-    typer.BadParameter
-        there is no such bus
-    """
+    """Read the name of a field bus. Raises typer.BadParameter where there is no such bus."""
     from tauscope.runtime.drivers import bus_drivers
 
     return _check(name, bus_drivers())
 
 
 def require_options(backend: str, options: Collection[str]) -> None:
-    """Refuse options that a driver does not have.
-
-    Raises
-    ------
-    typer.BadParameter
-        naming the drivers that have the option
-    """
+    """Refuse options that a driver does not have. Raises typer.BadParameter naming the drivers that have the option."""
     from tauscope.runtime.drivers import driver_names, find_driver
 
     for option in options:

@@ -1,23 +1,12 @@
 """``tauscope excite``: its arguments."""
 
-import math
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from tauscope.cli.arguments import RobotFile
+from tauscope.cli.arguments import RobotFile, name_output, parse_numbers
 
-Json = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="OUT", dir_okay=False, help="Write the design, trajectory included, as JSON; - is standard output."
-    ),
-]
-Csv = Annotated[
-    Path | None,
-    typer.Option(metavar="OUT", dir_okay=False, help="Write the trajectory's samples as CSV for other controllers."),
-]
 Boxes = Annotated[
     list[str] | None,
     typer.Option(
@@ -89,8 +78,10 @@ def excite(
     closing_period: Annotated[
         bool, typer.Option("--closing-period/--no-closing-period", help="Repeat the first period at the end.")
     ] = True,
-    json: Json = None,
-    csv: Csv = None,
+    json: Annotated[
+        Path | None, name_output("Write the design, trajectory included, as JSON; - is standard output.")
+    ] = None,
+    csv: Annotated[Path | None, name_output("Write the trajectory's samples as CSV for other controllers.")] = None,
     rate: Annotated[
         float,
         typer.Option("--rate", "--rate-hz", metavar="HZ", min=1.0, max=10_000.0, help="Samples a second of the CSV."),
@@ -100,22 +91,11 @@ def excite(
 
     A finite Fourier series for every joint within the limits of position, velocity, acceleration, torque (predicted
     with the robot file's model) and space; repeated, then slow reversals, and the first period again.
-
-    Parameters
-    ----------
-    duration : float
-        length of one period [s]
-    floor : float or None
-        lowest height [m]
-    tool : str
-        tool point [m]
-    rate : float
-        samples a second of the CSV [Hz]
     """
     corners = [parse_numbers(text, "--box", 6) for text in box or ()]
     tool_m = parse_numbers(tool, "--tool", 3)
-    noise = None if noise_std is None else parse_numbers(noise_std, "--noise-std", None)
-    from tauscope.cli.excite_summary import show_design
+    noise = None if noise_std is None else parse_numbers(noise_std, "--noise-std")
+    from tauscope.cli.result_summary import show_design
     from tauscope.cli.task_run import make_request, run_task
     from tauscope.cli.terminal import output
     from tauscope.tasks import design_excitation as task
@@ -134,9 +114,9 @@ def excite(
         slow_postures=slow_postures if slow_reversals else 0,
         closing_period=closing_period,
         floor_m=floor,
-        boxes=tuple(make_request(task.ForbiddenBox, low=tuple(c[:3]), high=tuple(c[3:])) for c in corners),
-        tool_m=tuple(tool_m),
-        noise_std=None if noise is None else tuple(noise),
+        boxes=tuple(make_request(task.ForbiddenBox, low=c[:3], high=c[3:]) for c in corners),
+        tool_m=tool_m,
+        noise_std=noise,
     )
     run_task(
         task,
@@ -144,21 +124,3 @@ def excite(
         [(json, "result.json"), (csv, "trajectory.csv")],
         show=None if Path("-") in (json, csv) else lambda result: show_design(output(), result.design, result.robot),
     )
-
-
-def parse_numbers(text: str, option: str, count: int | None) -> list[float]:
-    """Numbers separated by commas.
-
-    Raises
-    ------
-    typer.BadParameter
-        for anything else
-    """
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if not numbers or not all(map(math.isfinite, numbers)) or (count is not None and len(numbers) != count):
-        wanted = "numbers" if count is None else f"{count} numbers"
-        raise typer.BadParameter(f"{text!r} is not {wanted} separated by commas", param_hint=f"'{option}'")
-    return numbers

@@ -29,14 +29,8 @@ CLUSTER_PATIENCE_S = 60.0
 def run_fleet(verb: Literal["identify", "diagnose"], manifest: Path, out: Path, workers: int) -> None:
     """Analyse every robot of a manifest.
 
-    Raises
-    ------
-    RecordingError
-        if the manifest is not valid: nothing is begun then
-    ExportError
-        if the results cannot be written
-    IdentificationError
-        if any robot failed
+    Raises RecordingError if the manifest is not valid: nothing is begun then. Raises ExportError if the results cannot
+    be written. Raises IdentificationError if any robot failed.
     """
     total = sum(1 for _ in read_manifest(manifest))
     try:

@@ -26,11 +26,6 @@ def run(
 
     A service that works with the data folder does it; where there is none, this command does. Exit status 0 where it
     succeeded; 1, with the reason, where it failed or nothing was started. Nothing is repeated by itself.
-
-    Parameters
-    ----------
-    timeout_s : float
-        how long its end is waited for [s]
     """
     from tauscope.cli.job_run import run_job
 
@@ -45,4 +40,4 @@ def list_(data: DataFolder = None, database: DatabaseUrl = None) -> None:
 
 
 add_verb(job, run)
-job.command("list", help="Show all schedules, and what came of each the last time.")(list_)
+add_verb(job, list_, name="list")

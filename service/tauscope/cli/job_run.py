@@ -30,17 +30,10 @@ GOOD_ENDS = ("succeeded", "finished")
 def run_job(name: str, data: Path | None, database: str | None, timeout_s: float) -> None:
     """Do what a schedule repeats now, and wait for its end.
 
-    Parameters
-    ----------
-    timeout_s : float
-        how long its end is waited for [s]
+    Raises NotFoundError if there is no such schedule. Raises StoreError if nothing was started, it did not succeed, or
+    its end did not come in time.
 
-    Raises
-    ------
-    NotFoundError
-        if there is no such schedule
-    StoreError
-        if nothing was started, it did not succeed, or its end did not come in time
+    `timeout_s`: how long its end is waited for [s].
     """
     folder = data or default_data_folder()
     if not folder.is_dir():
@@ -50,20 +43,14 @@ def run_job(name: str, data: Path | None, database: str | None, timeout_s: float
     if _is_free(folder):
         with open_services(settings) as services:
             firing = services.schedules.fire_now(name)
-            firing = _followed(firing, _fresh(services, firing.number), timeout_s)
+            firing = _follow(firing, _fresh(services, firing.number), timeout_s)
     else:
-        firing = _asked(name, folder, database, timeout_s)
+        firing = _ask_service(name, folder, database, timeout_s)
     _tell(name, firing)
 
 
 def list_jobs(data: Path | None, database: str | None) -> None:
-    """Show all schedules, and what came of each the last time.
-
-    Raises
-    ------
-    StoreError
-        if the database cannot be used
-    """
+    """Show all schedules, and what came of each the last time. Raises StoreError if the database cannot be used."""
     rows = []
     with open_database(data, database) as opened:
         book = ScheduleRepository(opened, "", "")
@@ -83,7 +70,7 @@ def _is_free(folder: Path) -> bool:
     return True
 
 
-def _asked(name: str, folder: Path, database: str | None, timeout_s: float) -> FiringEntry:
+def _ask_service(name: str, folder: Path, database: str | None, timeout_s: float) -> FiringEntry:
     """Have the service that works with the folder do it."""
     with open_database(folder, database) as opened:
         book = ScheduleRepository(opened, site_identifier(folder), new_boot())
@@ -94,7 +81,7 @@ def _asked(name: str, folder: Path, database: str | None, timeout_s: float) -> F
         if book.withdraw(number):
             text = f"schedule {name}: no service took it on within {PATIENCE_S:g} s"
             raise StoreError(f"{text}; is the service of its site up, and does it fire schedules?")
-        return _followed(book.firing(number), lambda: book.firing(number), timeout_s)
+        return _follow(book.firing(number), lambda: book.firing(number), timeout_s)
 
 
 def _fresh(services: Services, number: int) -> Callable[[], FiringEntry]:
@@ -107,7 +94,7 @@ def _fresh(services: Services, number: int) -> Callable[[], FiringEntry]:
     return look
 
 
-def _followed(firing: FiringEntry, look: Callable[[], FiringEntry], timeout_s: float) -> FiringEntry:
+def _follow(firing: FiringEntry, look: Callable[[], FiringEntry], timeout_s: float) -> FiringEntry:
     """The firing when what it started has ended."""
     deadline = time.monotonic() + timeout_s
     while not firing.is_final:

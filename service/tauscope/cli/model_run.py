@@ -15,12 +15,7 @@ from tauscope.server.history.trend import parameter_trends
 def list_models(robot: str, data: Path | None, database: str | None, limit: int) -> None:
     """Show the models of a robot.
 
-    Raises
-    ------
-    NotFoundError
-        if nothing is kept about this robot
-    StoreError
-        if the database cannot be used
+    Raises NotFoundError if nothing is kept about this robot. Raises StoreError if the database cannot be used.
     """
     with open_database(data, database) as opened:
         history = ModelHistory(opened)
@@ -33,12 +28,7 @@ def list_models(robot: str, data: Path | None, database: str | None, limit: int)
 def show_trend(robot: str, data: Path | None, database: str | None) -> None:
     """Show how every parameter of a robot has changed.
 
-    Raises
-    ------
-    NotFoundError
-        if nothing is kept about this robot
-    StoreError
-        if the database cannot be used
+    Raises NotFoundError if nothing is kept about this robot. Raises StoreError if the database cannot be used.
     """
     with open_database(data, database) as opened:
         trends = parameter_trends(ModelHistory(opened).documents(robot))
@@ -56,12 +46,8 @@ def show_trend(robot: str, data: Path | None, database: str | None) -> None:
 def show_events(robot: str, data: Path | None, database: str | None, limit: int) -> None:
     """Show the drifts of a robot that nobody has taken note of.
 
-    Raises
-    ------
-    NotFoundError
-        if nothing is kept about this robot
-    StoreError
-        if there are any, or the database cannot be used
+    Raises NotFoundError if nothing is kept about this robot. Raises StoreError if there are any, or the database cannot
+    be used.
     """
     with open_database(data, database) as opened:
         history = ModelHistory(opened)
@@ -79,12 +65,7 @@ def show_events(robot: str, data: Path | None, database: str | None, limit: int)
 def choose_model(identifier: str, role: str, reason: str, data: Path | None, database: str | None) -> None:
     """Make a model the active one, or the one that drift is counted from.
 
-    Raises
-    ------
-    NotFoundError
-        if there is no such model
-    StoreError
-        if the database cannot be used
+    Raises NotFoundError if there is no such model. Raises StoreError if the database cannot be used.
     """
     with open_database(data, database) as opened:
         entry = ModelHistory(opened).activate(identifier, role, reason, datetime.now(UTC))

@@ -16,10 +16,7 @@ STANDARD_OUTPUT = Path("-")
 def require_distinct(inputs: Sequence[Path]) -> None:
     """Refuse a file that is given twice: it would count twice, or be judged by what it taught.
 
-    Raises
-    ------
-    typer.BadParameter
-        naming the file
+    Raises typer.BadParameter naming the file.
     """
     seen: set[Path] = set()
     for path in inputs:
@@ -32,10 +29,7 @@ def require_distinct(inputs: Sequence[Path]) -> None:
 def require_free(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
     """Refuse, before any work is done, to write where it cannot be done or would destroy an input.
 
-    Raises
-    ------
-    typer.BadParameter
-        naming the file
+    Raises typer.BadParameter naming the file.
     """
     read = {path.resolve() for path in inputs}
     written: set[Path] = set()
@@ -57,12 +51,7 @@ def require_free(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
 def require_new(path: Path) -> None:
     """Refuse, before any work is done, to make a file that is there already or whose folder is not.
 
-    Raises
-    ------
-    typer.BadParameter
-        where its folder does not exist
-    ExportError
-        where it exists
+    Raises typer.BadParameter where its folder does not exist. Raises ExportError where it exists.
     """
     if not path.resolve().parent.is_dir():
         raise typer.BadParameter(f"output {str(path)!r}: folder {str(path.parent)!r} does not exist; make it first")
@@ -73,10 +62,7 @@ def require_new(path: Path) -> None:
 def keep_file(source: Path, target: Path) -> None:
     """Give a finished file its place; a file that is there already stays as it is.
 
-    Raises
-    ------
-    ExportError
-        where there is a file by now, or it cannot be written
+    Raises ExportError where there is a file by now, or it cannot be written.
     """
     try:
         os.link(source, target)
@@ -91,10 +77,7 @@ def keep_file(source: Path, target: Path) -> None:
 def write_file(path: Path, content: bytes) -> None:
     """Write a file that appears under its name only when it is complete.
 
-    Raises
-    ------
-    ExportError
-        where it cannot be written
+    Raises ExportError where it cannot be written.
     """
     if path == STANDARD_OUTPUT:
         typer.echo(content, nl=False)

@@ -19,31 +19,25 @@ from typing import Annotated
 import typer
 from typer.main import get_command
 
-from tauscope.cli.audit_command import audit
-from tauscope.cli.backup_command import backup, restore
-from tauscope.cli.bus_command import bus
+from tauscope.cli.access_command import audit, key
 from tauscope.cli.campaign_command import campaign
 from tauscope.cli.demo_command import demo
+from tauscope.cli.device_command import bus, doctor, release
 from tauscope.cli.diagnose_command import diagnose
-from tauscope.cli.doctor_command import doctor
 from tauscope.cli.driver_choice import DriverCommand
 from tauscope.cli.excite_command import excite
 from tauscope.cli.export_command import export
 from tauscope.cli.fleet_command import fleet
 from tauscope.cli.identify_command import identify
+from tauscope.cli.inputs_command import recording, robot
 from tauscope.cli.job_command import job
-from tauscope.cli.key_command import key
 from tauscope.cli.model_command import model
 from tauscope.cli.prove_command import prove
-from tauscope.cli.recording_command import recording
-from tauscope.cli.release_command import release
-from tauscope.cli.robot_command import robot
 from tauscope.cli.rollout_command import rollout
 from tauscope.cli.run_command import run
 from tauscope.cli.serve_command import serve
-from tauscope.cli.store_command import store
-from tauscope.cli.values import SeveralValuesCommand
-from tauscope.cli.verbs import add_verb
+from tauscope.cli.store_command import backup, restore, store
+from tauscope.cli.verbs import SeveralValuesCommand, add_verb
 from tauscope.errors import TauscopeError
 from tauscope.extras import require_extra
 

@@ -49,10 +49,7 @@ def prove(
 def become_trials(repository: Path, words: list[str]) -> NoReturn:
     """Run the trials of a clone in the place of this program: what ends it ends them, and their exit status is its own.
 
-    Raises
-    ------
-    NotFoundError
-        where the program was installed without its tests
+    Raises NotFoundError where the program was installed without its tests.
     """
     tests = repository / "tests"
     if not (tests / "concealed").is_dir():

@@ -13,8 +13,8 @@ from tauscope.recording.columns import map_columns
 from tauscope.recording.layout.guess import guess_parts, layout_text
 from tauscope.recording.reading import read_header
 from tauscope.recording.units import Reading
-from tauscope.recording.words import listed
 from tauscope.robot import RecordingLayout, layout_from_dict, read_robot
+from tauscope.robot.messages import listed
 from tauscope.robot.recording_layout import Source
 from tauscope.robot.yaml_text import read_yaml
 
@@ -31,10 +31,7 @@ NONE = "-"
 def map_recording(path: Path, robot_file: Path | None, out: Path | None, asks: bool | None) -> None:
     """Show or write the mapping of a file's columns.
 
-    Raises
-    ------
-    RecordingError
-        the file cannot be read, or the mapping does not fit it
+    Raises RecordingError where the file cannot be read, or the mapping does not fit it.
     """
     robot = None if robot_file is None else read_robot(robot_file)
     reading = Reading().for_robot(robot)

@@ -1,6 +1,7 @@
 """``tauscope run``: its arguments."""
 
 import math
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -35,6 +36,59 @@ Start = Annotated[
 ]
 
 
+@dataclass(frozen=True, kw_only=True)
+class RunArguments:
+    """How a run is made: fields of `RunOptions`.
+
+    `rate_hz`: cycles a second [Hz].
+    """
+
+    mode: Annotated[Literal["position", "torque"], typer.Option(help="Who closes the loop: drives or host.")] = (
+        "position"
+    )
+    rate_hz: Annotated[
+        float | None,
+        typer.Option(
+            "--rate", "--rate-hz", metavar="HZ", min=1.0, max=10_000.0, help="Cycles a second; 500 where possible."
+        ),
+    ] = None
+    stop_policy: Annotated[
+        Literal["hold", "damp", "torque_off", "release"] | None,
+        typer.Option(
+            help="How the arm is stopped; as the robot file says by default, else hold. "
+            "release: hold, then let go once it stands still, where the robot file states that."
+        ),
+    ] = None
+    watchdog_s: Annotated[
+        float, typer.Option(metavar="S", help="Time without a cycle after which the device stops itself.")
+    ] = 0.1
+    heartbeat_s: Annotated[
+        float, typer.Option(metavar="S", help="Silence of its owner after which a run is interrupted.")
+    ] = 1.0
+    following_error: Annotated[
+        float | None, typer.Option(help="Allowed distance of arm and target; 0.2 rad or 0.05 m by default.")
+    ] = None
+    missed: Annotated[int, typer.Option(help="Readings in a row that a joint may not fail to answer.")] = 3
+    lost_s: Annotated[
+        float, typer.Option(metavar="S", help="Time after which a joint that does not answer counts as lost.")
+    ] = 0.05
+    stale_ms: Annotated[
+        float, typer.Option(metavar="MS", help="How much later than usual an answer may come and be a sample.")
+    ] = 1.0
+    least_kept: Annotated[
+        float, typer.Option(help="Share of the motion's samples below which the run ends as degraded.")
+    ] = 0.98
+    temperature_c: Annotated[float, typer.Option(metavar="C", help="Hottest motor that is allowed [°C].")] = 80.0
+    feed_forward: Annotated[
+        bool, typer.Option("--feed-forward/--no-feed-forward", help="Give the drives the torque of the robot's model.")
+    ] = True
+    bandwidth_rad_s: Annotated[float, typer.Option(help="Of the host's loop in torque mode [rad/s].")] = 25.0
+    settle_s: Annotated[float, typer.Option(metavar="S", help="Pause between the ramp and the motion.")] = 0.25
+    acknowledge_faults: Annotated[
+        bool, typer.Option("--acknowledge-faults", help="Clear the faults that the drives have latched.")
+    ] = False
+
+
 def run(
     robot: RobotFile,
     *,
@@ -48,51 +102,8 @@ def run(
         Literal["virtual", "real"], typer.Option(help="Of the simulated arm: as fast as it computes, or by the clock.")
     ] = "virtual",
     start: Start = None,
-    mode: Annotated[
-        Literal["position", "torque"], typer.Option(help="Who closes the loop: drives or host.")
-    ] = "position",
-    rate: Annotated[
-        float | None,
-        typer.Option(
-            "--rate", "--rate-hz", metavar="HZ", min=1.0, max=10_000.0, help="Cycles a second; 500 where possible."
-        ),
-    ] = None,
-    stop_policy: Annotated[
-        Literal["hold", "damp", "torque_off", "release"] | None,
-        typer.Option(
-            help="How the arm is stopped; as the robot file says by default, else hold. "
-            "release: hold, then let go once it stands still, where the robot file states that."
-        ),
-    ] = None,
-    watchdog_s: Annotated[
-        float, typer.Option(metavar="S", help="Time without a cycle after which the device stops itself.")
-    ] = 0.1,
-    heartbeat_s: Annotated[
-        float, typer.Option(metavar="S", help="Silence of its owner after which a run is interrupted.")
-    ] = 1.0,
-    following_error: Annotated[
-        float | None, typer.Option(help="Allowed distance of arm and target; 0.2 rad or 0.05 m by default.")
-    ] = None,
-    missed: Annotated[int, typer.Option(help="Readings in a row that a joint may not fail to answer.")] = 3,
-    lost_s: Annotated[
-        float, typer.Option(metavar="S", help="Time after which a joint that does not answer counts as lost.")
-    ] = 0.05,
-    stale_ms: Annotated[
-        float, typer.Option(metavar="MS", help="How much later than usual an answer may come and be a sample.")
-    ] = 1.0,
-    least_kept: Annotated[
-        float, typer.Option(help="Share of the motion's samples below which the run ends as degraded.")
-    ] = 0.98,
-    temperature_c: Annotated[float, typer.Option(metavar="C", help="Hottest motor that is allowed [°C].")] = 80.0,
-    feed_forward: Annotated[
-        bool, typer.Option("--feed-forward/--no-feed-forward", help="Give the drives the torque of the robot's model.")
-    ] = True,
-    bandwidth_rad_s: Annotated[float, typer.Option(help="Of the host's loop in torque mode [rad/s].")] = 25.0,
-    settle_s: Annotated[float, typer.Option(metavar="S", help="Pause between the ramp and the motion.")] = 0.25,
+    arguments: RunArguments,
     seed: Annotated[int, typer.Option(min=0, help="Of the default excitation.")] = 0,
-    acknowledge_faults: Annotated[
-        bool, typer.Option("--acknowledge-faults", help="Clear the faults that the drives have latched.")
-    ] = False,
     keep_settings: Annotated[
         bool, typer.Option("--keep-settings", help="Leave in servos' EEPROM what the run changed; else it is put back.")
     ] = False,
@@ -103,13 +114,6 @@ def run(
     """Move an arm and record it.
 
     Ctrl-C stops the arm by its stop policy; what was recorded until then is kept, and the exit status is 1.
-
-    Parameters
-    ----------
-    start : str or None
-        where the simulated arm stands at first [rad or m]
-    rate : float or None
-        cycles a second [Hz]
     """
     posture = parse_posture(start)
     given = {"scenario": scenario, "start": start, "time": None if time == "virtual" else time}
@@ -118,26 +122,9 @@ def run(
     from tauscope.cli.task_run import make_request
     from tauscope.runtime.options import RunOptions
 
-    options = make_request(
-        RunOptions,
-        mode=mode,
-        rate_hz=rate,
-        stop_policy=stop_policy,
-        watchdog_s=watchdog_s,
-        heartbeat_s=heartbeat_s,
-        following_error=following_error,
-        missed=missed,
-        lost_s=lost_s,
-        stale_ms=stale_ms,
-        least_kept=least_kept,
-        temperature_c=temperature_c,
-        feed_forward=feed_forward,
-        bandwidth_rad_s=bandwidth_rad_s,
-        settle_s=settle_s,
-        acknowledge_faults=acknowledge_faults,
-    )
+    options = make_request(RunOptions, **asdict(arguments))
     if dry_run:
-        from tauscope.cli.bus_summary import show_frames
+        from tauscope.cli.device_run import show_frames
 
         show_frames(robot, backend, trajectory, options)
         return
@@ -156,13 +143,7 @@ def run(
 
 
 def parse_posture(text: str | None) -> tuple[float, ...] | None:
-    """Read the value of ``--start``.
-
-    Raises
-    ------
-    typer.BadParameter
-        for anything else
-    """
+    """Read the value of ``--start``. Raises typer.BadParameter for anything else."""
     if text is None:
         return None
     try:

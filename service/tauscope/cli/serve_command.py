@@ -83,13 +83,6 @@ def serve(
     """Offer everything over HTTP.
 
     REST under /api/v1, its documentation under /docs. When it ends, arms that move are stopped first.
-
-    Parameters
-    ----------
-    requests_per_second : float or None
-        how often a caller may call [1/s]
-    prune_older_than : float or None
-        age of what is removed, hour after hour [days]; nothing is where None
     """
     from pydantic import SecretStr
 

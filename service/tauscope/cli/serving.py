@@ -13,12 +13,8 @@ from tauscope.server.http.settings import Settings, default_data_folder
 def run_server(data: Path | None, **choices: Any) -> None:
     """Serve until interrupted.
 
-    Raises
-    ------
-    typer.BadParameter
-        if a setting is out of its range
-    TauscopeError
-        if the address cannot be listened at, or is one that others could reach without a key
+    Raises typer.BadParameter if a setting is out of its range. Raises TauscopeError if the address cannot be listened
+    at, or is one that others could reach without a key.
     """
     try:
         settings = Settings(data_folder=data or default_data_folder(), **choices)

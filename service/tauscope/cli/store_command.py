@@ -1,4 +1,4 @@
-"""``tauscope store``: its arguments."""
+"""``tauscope store``, ``tauscope backup`` and ``tauscope restore``: their arguments."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -68,11 +68,6 @@ def prune(
     """Remove what is old. Identifications of active models, and whatever is damaged, stay.
 
     No service may work with the folder meanwhile.
-
-    Parameters
-    ----------
-    older_than : float
-        age [days]
     """
     from tauscope.cli.store_run import prune_store
 
@@ -81,3 +76,25 @@ def prune(
 
 add_verb(store, check)
 add_verb(store, prune)
+
+
+def backup(
+    file: Annotated[Path, typer.Argument(metavar="FILE", dir_okay=False, help="File to make, as in monday.tar.gz.")],
+    data: DataFolder = None,
+    database: DatabaseUrl = None,
+) -> None:
+    """Write everything that is kept into one file; a service may work with it meanwhile."""
+    from tauscope.cli.store_run import make_backup
+
+    make_backup(file, data, database)
+
+
+def restore(
+    file: Annotated[Path, typer.Argument(metavar="FILE", exists=True, dir_okay=False, help="Of `tauscope backup`.")],
+    data: Annotated[Path, typer.Option(metavar="DIR", file_okay=False, help="Data folder to make.")],
+    database: DatabaseUrl = None,
+) -> None:
+    """Make a data folder from a backup; also where the database was one of the other kind."""
+    from tauscope.cli.store_run import use_backup
+
+    use_backup(file, data, database)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
 
+from tauscope.cli.output_files import require_new
 from tauscope.cli.terminal import output, plain, shown_progress, table
 from tauscope.errors import StoreError
 from tauscope.number_text import ABSENT, counted
@@ -14,11 +15,13 @@ from tauscope.server.history.indexer import Indexer, open_index
 from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.history.retention import RetentionRule, plan_removal, remove
 from tauscope.server.http.settings import default_data_folder
+from tauscope.server.store.backup import restore_backup, write_backup
 from tauscope.server.store.data_folder import FOLDERS, RECORDINGS, FolderLock, item_stores, site_identifier
 from tauscope.server.store.database.database import FILE_NAME, Database
 from tauscope.server.store.database.index import Index
 from tauscope.server.store.items import utc_now
 from tauscope.server.store.recordings import RecordingStore
+from tauscope.version import tauscope_version
 
 _OWN_FILES = "its state, its order or its result"
 
@@ -36,12 +39,8 @@ class OpenStore:
 def open_store(data: Path | None, database: str | None) -> Iterator[OpenStore]:
     """Take a data folder.
 
-    Raises
-    ------
-    StoreError
-        if there is no such folder, or its database cannot be used
-    TauscopeError
-        if a service works with it
+    Raises StoreError if there is no such folder, or its database cannot be used. Raises TauscopeError if a service
+    works with it.
     """
     folder = data or default_data_folder()
     if not folder.is_dir():
@@ -64,10 +63,7 @@ def open_store(data: Path | None, database: str | None) -> Iterator[OpenStore]:
 def open_database(data: Path | None, database: str | None) -> Iterator[Database]:
     """Open the database alone, beside a service that may work with it.
 
-    Raises
-    ------
-    StoreError
-        if there is none, or it cannot be used
+    Raises StoreError if there is none, or it cannot be used.
     """
     path = (data or default_data_folder()) / FILE_NAME
     if database is None and not path.is_file():
@@ -82,10 +78,7 @@ def open_database(data: Path | None, database: str | None) -> Iterator[Database]
 def check_store(data: Path | None, database: str | None, *, quick: bool) -> None:
     """Compare every file of every finished item with what it was when the item ended.
 
-    Raises
-    ------
-    StoreError
-        if a file is missing or is another one
+    Raises StoreError if a file is missing or is another one.
     """
     with shown_progress() as progress, open_store(data, database) as store:
         progress(f"compare the files of {store.folder}")
@@ -114,15 +107,9 @@ def prune_store(
 ) -> None:
     """Remove what is old.
 
-    Parameters
-    ----------
-    days : float
-        age [days]
+    Raises StoreError if the database cannot be used, or something cannot be removed.
 
-    Raises
-    ------
-    StoreError
-        if the database cannot be used, or something cannot be removed
+    `days`: age [days].
     """
     rule = RetentionRule(timedelta(days=days), frozenset(kinds or FOLDERS), recordings)
     with open_store(data, database) as store:
@@ -140,3 +127,34 @@ def prune_store(
     if rows:
         output().print(table(done.capitalize(), Table(("kind", "item", "robot"), rows, words=3)))
     output().print(plain(f"{store.folder}: {counted(len(rows), 'item')} {done}"), soft_wrap=True)
+
+
+def make_backup(file: Path, data: Path | None, database: str | None) -> None:
+    """Write everything that is kept into one file.
+
+    Raises ExportError if the file is there already. Raises StoreError if the database cannot be used, or the file
+    cannot be written.
+    """
+    require_new(file)
+    folder = data or default_data_folder()
+    with shown_progress() as progress, open_database(folder, database) as opened:
+        progress(f"copy {folder}")
+        try:
+            count = write_backup(folder, opened, file, tauscope_version())
+        except OSError as error:
+            raise StoreError(f"{file}: cannot be written ({error.strerror or error}); choose another place") from error
+    output().print(plain(f"wrote {file}: {counted(count, 'file')} and the database"), soft_wrap=True)
+
+
+def use_backup(file: Path, data: Path, database: str | None) -> None:
+    """Make a data folder from a backup.
+
+    Raises StoreError if the backup is damaged, there is something already, or it cannot be written.
+    """
+    with shown_progress() as progress:
+        progress(f"unpack {file}")
+        try:
+            count = restore_backup(file, data, database)
+        except OSError as error:
+            raise StoreError(f"{data}: cannot be written ({error.strerror or error}); choose another place") from error
+    output().print(plain(f"restored {data}: {counted(count, 'file')} and the database"), soft_wrap=True)

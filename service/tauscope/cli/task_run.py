@@ -19,13 +19,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def make_request(kind: type[Model], **fields: Any) -> Model:
-    """A request or its options.
-
-    Raises
-    ------
-    typer.BadParameter
-        naming the field
-    """
+    """A request or its options. Raises typer.BadParameter naming the field."""
     try:
         return kind(**fields)
     except ValidationError as error:
@@ -38,29 +32,21 @@ def run_task(
     task: ModuleType,
     request: Any,
     asked: Sequence[tuple[Path | None, str]],
-    recordings: Sequence[Path] = (),
     show: Callable[[Any], None] | None = None,
 ) -> Any:
     """Perform a task, write its outputs, and show the result.
 
-    Parameters
-    ----------
-    asked : sequence of (Path or None, str)
-        files to write, each with the name of its output
-    show : callable or None
-        shows the result on the terminal
+    Raises typer.BadParameter where files are given twice, or an output would destroy an input. Raises TauscopeError
+    where the data or the robot cannot answer.
 
-    Raises
-    ------
-    typer.BadParameter
-        where files are given twice, or an output would destroy an input
-    TauscopeError
-        where the data or the robot cannot answer
+    `asked`: sequence of (Path, str), files to write, each with the name of its output; `show`: shows the result on the
+    terminal.
     """
     outputs = [(path, name) for path, name in asked if path is not None]
     paths, robot_file = tuple(path for path, _ in outputs), Path(request.robot)
-    require_distinct(recordings)
-    require_free(paths, (robot_file, *recordings))
+    inputs = list_files(request)
+    require_distinct(inputs)
+    require_free(paths, (robot_file, *inputs))
     robot = read_robot(robot_file)
     require_free(paths, [path for _, path in robot.files])
     with shown_progress() as progress:
@@ -74,10 +60,23 @@ def run_task(
     return result
 
 
+def list_files(request: Any) -> list[Path]:
+    """Recordings and models that a request names."""
+    return [Path(name) for names in getattr(request, "inputs", {}).values() for name in names]
+
+
+def name_files(paths: Iterable[Path] | None) -> tuple[str, ...]:
+    """Files as a request names them."""
+    return tuple(map(str, paths or ()))
+
+
 def write_outputs(
     task: ModuleType, request: Any, outputs: Mapping[Path, str], progress: Told
 ) -> tuple[Any, Iterable[Path]]:
     """Perform a task and write its outputs: all of them, or none where one cannot be made.
+
+    Raises TauscopeError where the data or the robot cannot answer, a format cannot hold the model, or a file cannot be
+    written.
 
     Returns
     -------
@@ -85,11 +84,6 @@ def write_outputs(
         of the task
     iterable of Path
         what was written; an output that the result does not have is left out
-
-    Raises
-    ------
-    TauscopeError
-        where the data or the robot cannot answer, a format cannot hold the model, or a file cannot be written
     """
     result = task.perform(request, LocalFiles({name: path for path, name in outputs.items()}), progress)
     progress("make outputs")
@@ -104,22 +98,13 @@ def write_outputs(
 def export_outputs(paths: Sequence[Path], files: Mapping[ExportFormat, ExportFile]) -> list[tuple[Path, str]]:
     """The outputs that ``--export`` asks for, by the files' suffixes.
 
-    Raises
-    ------
-    typer.BadParameter
-        where a suffix names no format
+    Raises typer.BadParameter where a suffix names no format.
     """
     return [(path, files[parse_export_format(path, files, "'--export'")].output) for path in paths]
 
 
 def parse_export_format(path: Path, files: Mapping[ExportFormat, ExportFile], option: str) -> ExportFormat:
-    """The format that the suffix of a file names.
-
-    Raises
-    ------
-    typer.BadParameter
-        where it names none
-    """
+    """The format that the suffix of a file names. Raises typer.BadParameter where it names none."""
     kind = SUFFIXES.get(path.suffix.lower())
     if kind is None or kind not in files:
         known = ", ".join(suffix for suffix, kind in SUFFIXES.items() if kind in files)

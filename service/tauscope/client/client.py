@@ -15,7 +15,7 @@ from tauscope.server.http.campaigns import CampaignAnswer
 from tauscope.server.http.diagnoses import DiagnosisAnswer
 from tauscope.server.http.excitations import ExcitationAnswer
 from tauscope.server.http.identifications import IdentificationAnswer
-from tauscope.server.http.leases.models import LeaseAnswer, StopAllAnswer
+from tauscope.server.http.leases import LeaseAnswer, StopAllAnswer
 from tauscope.server.http.recordings.models import RecordingAnswer
 from tauscope.server.http.robots.models import RobotReportAnswer
 from tauscope.server.http.rollouts import RolloutAnswer
@@ -46,13 +46,7 @@ class Client:
         self, url: str = "http://127.0.0.1:8000", key: str | None = None, *, timeout_s: float = 30.0,
         ca_file: Path | None = None,
     ) -> None:  # fmt: skip
-        """Name the service; nothing is sent yet.
-
-        Parameters
-        ----------
-        timeout_s : float
-            how long each step of a request may take [s]
-        """
+        """Name the service; nothing is sent yet. `timeout_s`: how long each step of a request may take [s]."""
         self._transport = Transport(url, key, timeout_s, ca_file)
 
     def is_ready(self) -> bool:
@@ -109,19 +103,13 @@ class Client:
     def wait(self, item: Followed, timeout_s: float | None = None, lease: HeldLease | None = None) -> Followed:
         """Wait until a job, run or campaign has ended.
 
-        Parameters
-        ----------
-        timeout_s : float or None
-            how long; for good where None [s]
+        Raises TimeoutError if it has not ended by then.
 
-        Raises
-        ------
-        TimeoutError
-            if it has not ended by then
+        `timeout_s`: how long; for good where None [s].
         """
         last = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
-            item = _parsed(self._transport.send("GET", item.links.self_), type(item))
+            item = _parse(self._transport.send("GET", item.links.self_), type(item))
             if str(item.state) in ENDS:
                 return item
             if lease is not None:
@@ -145,10 +133,7 @@ class Client:
     def lease(self, robot: str, *, backend: str | None = None, ttl_s: float = 10.0, take: bool = False) -> HeldLease:
         """Take an arm; use the result as a context, within which it is kept.
 
-        Parameters
-        ----------
-        ttl_s : float
-            time after which the arm stops when this program is gone [s]
+        `ttl_s`: time after which the arm stops when this program is gone [s].
         """
         wanted = {"robot": robot, "backend": backend, "ttl_s": ttl_s, "take": take}
         taken = self._create("leases", LeaseAnswer, json_content(wanted))
@@ -165,7 +150,7 @@ class Client:
 
     def stop(self, run: RunAnswer) -> StopAnswer:
         """Stop a run."""
-        return _parsed(self._transport.send("POST", run.links.stop), StopAnswer)
+        return _parse(self._transport.send("POST", run.links.stop), StopAnswer)
 
     def stop_everything(self) -> StopAllAnswer:
         """Stop every arm; needs no lease."""
@@ -180,18 +165,18 @@ class Client:
             "POST", f"{PREFIX}/{path}", headers=once, content=content
         )
         try:
-            return _parsed(send(), kind)
+            return _parse(send(), kind)
         except ApiError as error:
             if error.problem_code != "unreachable":
                 raise
-        return _parsed(send(), kind)
+        return _parse(send(), kind)
 
     def _post(self, path: str, kind: type[Model], content: Content) -> Model:
         """A POST that is sent once."""
-        return _parsed(self._transport.send("POST", f"{PREFIX}/{quote(path)}", content=content), kind)
+        return _parse(self._transport.send("POST", f"{PREFIX}/{quote(path)}", content=content), kind)
 
 
-def _parsed(answer: Answer, kind: type[Model]) -> Model:
+def _parse(answer: Answer, kind: type[Model]) -> Model:
     """An answer as its model; one of a newer service may hold more than we know."""
     try:
         return kind.model_validate_json(answer.body, extra="ignore")

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from types import TracebackType
 
 from tauscope.client.transport import ApiError
-from tauscope.server.http.leases.models import LeaseAnswer
+from tauscope.server.http.leases import LeaseAnswer
 
 BEATS_A_TTL = 3.0
 """Heartbeats in the time that the lease lasts without one."""
@@ -15,7 +15,6 @@ class HeldLease:
     """A lease kept by heartbeats; use it as a context. When the program hangs or dies, the arm stops by itself."""
 
     def __init__(self, lease: LeaseAnswer, beat: Callable[[], object], release: Callable[[], object]) -> None:
-        """Begin to keep a lease."""
         self.lease = lease
         self.lost: str | None = None
         self._beat, self._release = beat, release
@@ -28,13 +27,7 @@ class HeldLease:
         return self.lease.token or ""
 
     def require(self) -> None:
-        """Refuse to go on with a lease that was lost.
-
-        Raises
-        ------
-        ApiError
-            if it was
-        """
+        """Refuse to go on with a lease that was lost. Raises ApiError if it was."""
         if self.lost is not None:
             raise ApiError("lease-lost", 409, self.lost)
 

@@ -39,15 +39,9 @@ class Transport:
     def __init__(self, url: str, key: str | None, timeout_s: float, ca_file: Path | None = None) -> None:
         """Prepare; nothing is sent yet.
 
-        Parameters
-        ----------
-        timeout_s : float
-            how long each step of a request may take [s]
+        Raises ValueError if that is no address, or a key would go over the network in clear.
 
-        Raises
-        ------
-        ValueError
-            if that is no address, or a key would go over the network in clear
+        `timeout_s`: how long each step of a request may take [s].
         """
         parts = urlsplit(url)
         if parts.scheme not in ("http", "https") or not parts.hostname or parts.path.strip("/") or parts.query:
@@ -63,10 +57,7 @@ class Transport:
     ) -> Answer:
         """Make a request, and wait for its answer.
 
-        Raises
-        ------
-        ApiError
-            the problem that the service answered with, or that it did not answer
+        Raises ApiError where the problem that the service answered with, or that it did not answer.
         """
         body = content or Content("", (), 0)
         sent = {**self._headers, "Content-Length": str(body.length), **(headers or {})}
@@ -123,12 +114,8 @@ def json_content(document: Any) -> Content:
 def form_content(document: Any, files: Sequence[tuple[str, Path]]) -> Content:
     """A form of a JSON part and files.
 
-    Parameters
-    ----------
-    document : dict or None
-        for the part ``request``; None for a form without it
-    files : sequence of (str, Path)
-        name of the part, and the file
+    `document`: for the part ``request``; None for a form without it; `files`: sequence of (str, Path), name of the
+    part, and the file.
     """
     boundary = uuid.uuid4().hex
     parts: list[bytes | Path] = []

@@ -21,16 +21,11 @@ _TWO_OVER_PI = 2.0 / np.pi
 class Variants:
     """Parameters of V models of one arm.
 
-    links : (V, 10 m) float64
-        standard parameters
-    rotor, stiction, viscous, offset : (V, n) float64
-        [kg m² or kg, Nm or N, Nm s/rad or N s/m, Nm or N]
-    stribeck, delta : (n,) float64
-        the same in all models
-    driving, braking : (V, n) float64
-        as `LoadFriction`
-    slope : (V,) float64
-        loss of torque per volt with temperature [1/K]
+    `links`: (V, 10 m), standard parameters.
+    `rotor`, `stiction`, `viscous`, `offset`: (V, n) [kg m² or kg, Nm or N, Nm s/rad or N s/m, Nm or N].
+    `stribeck`, `delta`: (n,), the same in all models.
+    `driving`, `braking`: (V, n), as `LoadFriction`.
+    `slope`: (V,), loss of torque per volt with temperature [1/K].
     """
 
     links: Array
@@ -121,10 +116,7 @@ def _invert(mass: Array) -> Array:
 def _brake(inverse: Array, velocity: Array, most: Array) -> Array:
     """Velocity after dry friction, which stops a joint and never turns it round, (n, S, V).
 
-    Parameters
-    ----------
-    most : (n, S, V) float64
-        largest impulse of friction [Nm s or N s]
+    `most`: (n, S, V), largest impulse of friction [Nm s or N s].
     """
     impulse, out = np.zeros_like(velocity), velocity.copy()
     for _ in range(SWEEPS if len(velocity) > 1 else 1):

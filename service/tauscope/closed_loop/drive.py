@@ -24,14 +24,10 @@ STATE_BAND_HZ = 15.0
 class RecordedMotion:
     """A recording on the steps of a rollout.
 
-    time : (K,) float64
-        of the steps [s]
-    position, velocity : (K, n) float64
-        of the real arm [rad or m, rad/s or m/s]
-    rows : (N,) float64
-        instants of the recording [s]
-    measured : (N, n) float64
-        q at these instants; NaN where it was missed
+    `time`: (K,), of the steps [s].
+    `position`, `velocity`: (K, n), of the real arm [rad or m, rad/s or m/s].
+    `rows`: (N,), instants of the recording [s].
+    `measured`: (N, n), q at these instants; NaN where it was missed.
     """
 
     name: str
@@ -48,13 +44,7 @@ class Drive(Protocol):
     is_closed: bool
 
     def torque(self, step: int, position: Array, velocity: Array) -> Array:
-        """Torque at a step, (n,) [Nm or N].
-
-        Parameters
-        ----------
-        position, velocity : (n,) float64
-            q, q̇ of the simulated arm
-        """
+        """Torque at a step, (n,) [Nm or N]. `position`, `velocity`: (n,), q, q̇ of the simulated arm."""
         ...
 
 
@@ -82,10 +72,7 @@ class LoopDrive:
     def __init__(self, loops: Sequence[Actuator], recording: Recording, time: Array, *, is_damped: bool) -> None:
         """Put the commands, supplies and gains on the steps.
 
-        Parameters
-        ----------
-        is_damped : bool
-            whether torque includes the loops' damping; where not, the plant has it
+        `is_damped`: whether torque includes the loops' damping; where not, the plant has it.
         """
         self._damped = 1.0 if is_damped else 0.0
         samples = recording.samples()
@@ -101,13 +88,7 @@ class LoopDrive:
         )
 
     def torque(self, step: int, position: Array, velocity: Array) -> Array:
-        """Torque at a step, (n,) [Nm or N].
-
-        Parameters
-        ----------
-        position, velocity : (n,) float64
-            q, q̇ of the simulated arm
-        """
+        """Torque at a step, (n,) [Nm or N]. `position`, `velocity`: (n,), q, q̇ of the simulated arm."""
         out = np.empty(len(self._loops))
         for joint, loop in enumerate(self._loops):
             measured = position[joint] if loop.kind == "position" else velocity[joint]
@@ -127,7 +108,6 @@ class TorqueDrive:
     is_closed = False
 
     def __init__(self, robot: Robot, recording: Recording, motion: RecordedMotion, inertia: Array) -> None:
-        """Put the torque on the steps."""
         samples = recording.samples()
         effort = samples.effort if samples.effort_command is None else samples.effort_command
         torque = recording.joint_torque(effort, robot)
@@ -137,13 +117,7 @@ class TorqueDrive:
         self.squares, self.steps = np.zeros(len(inertia)), 0
 
     def torque(self, step: int, position: Array, velocity: Array) -> Array:
-        """Torque at a step, (n,) [Nm or N].
-
-        Parameters
-        ----------
-        position, velocity : (n,) float64
-            q, q̇ of the simulated arm
-        """
+        """Torque at a step, (n,) [Nm or N]. `position`, `velocity`: (n,), q, q̇ of the simulated arm."""
         motion = self._motion
         ahead, faster = motion.position[step] - position, motion.velocity[step] - velocity
         added = self._stiffness * ahead + self._damping * faster

@@ -33,16 +33,10 @@ class JointLaws:
     ) -> None:
         """Take a model.
 
-        Parameters
-        ----------
-        effects : tuple of FoundEffect
-            that the MJCF does not hold and whose torque follows from position, velocity and load
-        held : (n,) float64
-            dry friction that the MJCF's bristles hold [Nm or N]
-        has_offset : tuple of bool
-            joints whose constant torque the MJCF holds
-        friction_by_load : LoadFriction or None
-            of a refinement
+        `effects`: that the MJCF does not hold and whose torque follows from position, velocity and load.
+        `held`: (n,), dry friction that the MJCF's bristles hold [Nm or N].
+        `has_offset`: joints whose constant torque the MJCF holds.
+        `friction_by_load`: of a refinement.
         """
         friction: tuple[JointFriction, ...] = model.friction
         self._stiction = np.array([each.stiction for each in friction])
@@ -72,19 +66,8 @@ class JointLaws:
     def __call__(self, position: Array, velocity: Array, load: Array, drive: Array) -> tuple[Array, Array]:
         """Levels of dry friction, and torque against the motion beside them.
 
-        Parameters
-        ----------
-        position, velocity : (n,) float64
-            q, q̇
-        load : (n,) float64
-            torque of the rigid body [Nm or N]
-        drive : (n,) float64
-            torque of the drive, which gives a resting joint its direction [Nm or N]
-
-        Returns
-        -------
-        (n,) float64, (n,) float64
-            [Nm or N]
+        `position`, `velocity`: (n,), q, q̇; `load`: (n,), torque of the rigid body [Nm or N]; `drive`: (n,), torque of
+        the drive, which gives a resting joint its direction [Nm or N]. Returns (n,), (n,) [Nm or N].
         """
         level = self._stiction + self._stribeck * _TWO_OVER_PI * np.arctan(self._delta * np.abs(velocity))
         torque = self._offset.copy()

@@ -20,10 +20,8 @@ and a friction that takes more than half of any further load would make the two 
 class LoadFriction:
     """Coefficients of all joints.
 
-    driving : (n,) float64 or (n, 1, V) float64
-        μ_d [1/Nm or 1/N]
-    braking : (n,) float64 or (n, 1, V) float64
-        μ_b [1]
+    `driving`: (n,) or (n, 1, V), μ_d [1/Nm or 1/N].
+    `braking`: (n,) or (n, 1, V), μ_b [1].
     """
 
     driving: Array
@@ -32,17 +30,8 @@ class LoadFriction:
     def level(self, load: Array, direction: Array) -> Array:
         """Level of dry friction.
 
-        Parameters
-        ----------
-        load : (n,) float64 or (n, S, V) float64
-            torque of the rigid body [Nm or N]
-        direction : (n,) float64 or (n, S, V) float64
-            sign of the motion
-
-        Returns
-        -------
-        (n,) float64 or (n, S, V) float64
-            [Nm or N]
+        `load`: (n,) or (n, S, V), torque of the rigid body [Nm or N]; `direction`: (n,) or (n, S, V), sign of the
+        motion. Returns (n,) or (n, S, V) [Nm or N].
         """
         size = np.abs(load)
         return np.where(direction * load > 0.0, self.driving * size, self.braking) * size

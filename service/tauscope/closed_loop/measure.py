@@ -17,10 +17,7 @@ MOVES = 0.05
 def rms_error(measured: Array, simulated: Array) -> Array:
     """Root mean square of the position error per joint, (n,) [rad or m].
 
-    Parameters
-    ----------
-    measured, simulated : (N, n) float64
-        q of the real and of the simulated arm [rad or m]; NaN where it was missed
+    `measured`, `simulated`: (N, n), q of the real and of the simulated arm [rad or m]; NaN where it was missed.
     """
     return np.sqrt(np.nanmean((simulated - measured) ** 2, axis=0))
 
@@ -28,10 +25,7 @@ def rms_error(measured: Array, simulated: Array) -> Array:
 def worst_error(measured: Array, simulated: Array) -> Array:
     """Largest position error per joint, (n,) [rad or m].
 
-    Parameters
-    ----------
-    measured, simulated : (N, n) float64
-        q of the real and of the simulated arm [rad or m]; NaN where it was missed
+    `measured`, `simulated`: (N, n), q of the real and of the simulated arm [rad or m]; NaN where it was missed.
     """
     return np.nanmax(np.abs(simulated - measured), axis=0)
 
@@ -39,12 +33,8 @@ def worst_error(measured: Array, simulated: Array) -> Array:
 def lag(time: Array, measured: Array, simulated: Array) -> Array:
     """Delay of the real motion behind the simulated one, (n,) [s]: that at which both differ least.
 
-    Parameters
-    ----------
-    time : (N,) float64
-        [s]
-    measured, simulated : (N, n) float64
-        q of the real and of the simulated arm [rad or m]; NaN where it was missed
+    `time`: (N,) [s]; `measured`, `simulated`: (N, n), q of the real and of the simulated arm [rad or m]; NaN where it
+    was missed.
     """
     step = float(np.median(np.diff(time)))
     reach = int(LONGEST_LAG_S / step)
@@ -69,16 +59,10 @@ def lag(time: Array, measured: Array, simulated: Array) -> Array:
 def reversal_error(rows: Array, measured: Array, simulated: Array, time: Array, velocity: Array) -> Array:
     """Rms of the position error within `REVERSAL_S` of a reversal of the real joint, (n,) [rad or m]; NaN without one.
 
-    Parameters
-    ----------
-    rows : (N,) float64
-        instants of both positions [s]
-    measured, simulated : (N, n) float64
-        q of the real and of the simulated arm [rad or m]; NaN where it was missed
-    time : (K,) float64
-        instants of the velocity [s]
-    velocity : (K, n) float64
-        of the real arm [rad/s or m/s]
+    `rows`: (N,), instants of both positions [s].
+    `measured`, `simulated`: (N, n), q of the real and of the simulated arm [rad or m]; NaN where it was missed.
+    `time`: (K,), instants of the velocity [s].
+    `velocity`: (K, n), of the real arm [rad/s or m/s].
     """
     found = np.full(measured.shape[1], np.nan)
     for joint, speed in enumerate(velocity.T):

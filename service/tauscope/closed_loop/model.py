@@ -28,14 +28,10 @@ TRACE_RADIUS_M = 0.01
 class RolloutModel:
     """One model of the arm.
 
-    name : str
-        ``stated``, ``identified`` or ``findings``
-    joints : tuple of str
-        names of the driven joints in the MJCF
-    inertia : (n,) float64
-        of each joint at q = 0 with all that it carries [kg m² or kg]
-    left_out : tuple of str
-        findings that the simulation lacks, each with the reason
+    `name`: ``stated``, ``identified`` or ``findings``.
+    `joints`: names of the driven joints in the MJCF.
+    `inertia`: (n,), of each joint at q = 0 with all that it carries [kg m² or kg].
+    `left_out`: findings that the simulation lacks, each with the reason.
     """
 
     name: str
@@ -78,13 +74,7 @@ def stated_model(robot: Robot) -> ExportModel | None:
 
 
 def rollout_model(name: str, model: ExportModel, friction_by_load: LoadFriction | None = None) -> RolloutModel:
-    """The model as a simulator and the laws beside it take it.
-
-    Raises
-    ------
-    ExportError
-        a link cannot exist
-    """
+    """The model as a simulator and the laws beside it take it. Raises ExportError where a link cannot exist."""
     from tauscope.dynamics import mass_matrix
 
     added = add_findings(model)

@@ -16,11 +16,11 @@ from tauscope.closed_loop.tables import (
     summary_table,
 )
 from tauscope.number_text import counted, significant
-from tauscope.report.csv_text import csv_text
-from tauscope.report.decimation import envelope_indices
 from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.provenance import Provenance
+from tauscope.report.series import envelope_indices
 from tauscope.report.svg import HELD_OUT, INK, MEASURED, PREDICTED, RESIDUAL, draw_svg
+from tauscope.report.table import csv_text
 from tauscope.report.tables import input_table
 
 HEIGHT_INCHES = 3.4

@@ -52,18 +52,10 @@ class PlantMaker(Protocol):
 def make_plant(mjcf: str, joints: Sequence[str], damping: Array) -> Plant:
     """The plant of an MJCF.
 
-    Parameters
-    ----------
-    damping : (n,) float64
-        torque per velocity of the loops, which MuJoCo integrates implicitly as it does an actuator's kv
-        [Nm s/rad or N s/m]
+    Raises MissingExtraError where MuJoCo is not installed. Raises TauscopeError where no simulator is registered.
 
-    Raises
-    ------
-    MissingExtraError
-        MuJoCo is not installed
-    TauscopeError
-        no simulator is registered
+    `damping`: (n,), torque per velocity of the loops, which MuJoCo integrates implicitly as it does an actuator's kv
+    [Nm s/rad or N s/m].
     """
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         with require_extra("tauscope rollout"):

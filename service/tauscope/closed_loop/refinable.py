@@ -33,14 +33,10 @@ PER_BODY, PER_JOINT = 5, 5
 class Term:
     """One parameter.
 
-    start, prior_std : float
-        mean and standard error of its prior; infinite without one
-    scale : float
-        of its steps
-    least : float
-        lower bound
-    is_optional : bool
-        whether a model does without it: zero then
+    `start`, `prior_std`: mean and standard error of its prior; infinite without one.
+    `scale`: of its steps.
+    `least`: lower bound.
+    `is_optional`: whether a model does without it: zero then.
     """
 
     name: str
@@ -56,7 +52,6 @@ class RefinableModel:
     """A model as a function of P parameters, and its errors on segments."""
 
     def __init__(self, model: ExportModel, loops: tuple[Actuator, ...], segments: Segments) -> None:
-        """Take a model without findings, and its loops."""
         self.segments = segments
         self._model = model
         self._loops = loops
@@ -104,30 +99,11 @@ class RefinableModel:
         return [loss] if self._is_warmed else []
 
     def clip(self, values: Array) -> Array:
-        """Parameters within their bounds.
-
-        Parameters
-        ----------
-        values : (..., P) float64
-
-        Returns
-        -------
-        (..., P) float64
-        """
+        """Parameters within their bounds. `values`: (..., P). Returns (..., P)."""
         return np.maximum(values, [term.least for term in self.terms])
 
     def errors(self, values: Array) -> Array:
-        """Position errors on the segments.
-
-        Parameters
-        ----------
-        values : (V, P) float64
-
-        Returns
-        -------
-        (K, n, S, V) float64
-            [rad or m]
-        """
+        """Position errors on the segments. `values`: (V, P). Returns (K, n, S, V) [rad or m]."""
         with np.errstate(all="ignore"):  # models that no arm can have may fly off
             found = simulate_segments(self._model.robot, self._loops, self.segments, self._variants(values))
         return np.nan_to_num(np.clip(found - self.segments.position[..., None], -LOST, LOST), nan=LOST)
@@ -154,12 +130,7 @@ class RefinableModel:
         )
 
     def model_of(self, values: Array) -> tuple[ExportModel, LoadFriction, tuple[Actuator, ...]]:
-        """The model of parameters, its friction by load, and its loops.
-
-        Parameters
-        ----------
-        values : (P,) float64
-        """
+        """The model of parameters, its friction by load, and its loops. `values`: (P,)."""
         found = self._variants(values[None])
         friction = tuple(
             replace(law, stiction=float(stiction), viscous=float(viscous), offset=float(offset))

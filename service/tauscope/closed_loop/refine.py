@@ -48,12 +48,9 @@ class RefinedTerm:
 class Refined:
     """A refined model.
 
-    loops : tuple of Actuator
-        with torque per volt that falls with temperature, where that was recorded
-    left_out : tuple of str
-        terms that are not significant
-    before, after : float
-        rms position error of the segments over all joints [rad or m]
+    `loops`: with torque per volt that falls with temperature, where that was recorded.
+    `left_out`: terms that are not significant.
+    `before`, `after`: rms position error of the segments over all joints [rad or m].
     """
 
     model: ExportModel
@@ -74,17 +71,9 @@ def refine_model(
 ) -> Refined:
     """Refine a model on recordings with commands; terms of friction by load that are not significant are left out.
 
-    Parameters
-    ----------
-    model : ExportModel
-        without findings
-    loops : sequence of Actuator
-        one a joint, with their delays
+    Raises RecordingError where no recording is long enough.
 
-    Raises
-    ------
-    RecordingError
-        no recording is long enough
+    `model`: without findings; `loops`: one a joint, with their delays.
     """
     arm = RefinableModel(model, tuple(loops), Segments.of(recordings, loops))
     progress(f"refine {len(arm.terms)} parameters on {arm.segments.count} segments")

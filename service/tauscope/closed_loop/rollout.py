@@ -40,8 +40,7 @@ Progress = Callable[[str], None]
 class Trace:
     """One recording and its simulations.
 
-    simulated : dict of str to (N, n) float64
-        positions by model, from one start [rad or m]
+    `simulated`: dict of str to (N, n), positions by model, from one start [rad or m].
     """
 
     motion: RecordedMotion
@@ -114,19 +113,11 @@ def roll_out(
 ) -> Rollout:
     """Simulate what a recording commanded, without and with the findings of a model.
 
-    Parameters
-    ----------
-    exports : sequence of ExportModel
-        of a model file, as `read_export_models` reads it; empty where the robot file's own model is judged alone
-    training : sequence of Recording
-        with commands, by which the model without findings is refined; the other recordings judge it
+    Raises RecordingMismatchError where the model is of another arm, or nothing states a model. Raises TauscopeError
+    where a recording holds neither commands for loops nor torque, or there is no simulator.
 
-    Raises
-    ------
-    RecordingMismatchError
-        the model is of another arm, or nothing states a model
-    TauscopeError
-        a recording holds neither commands for loops nor torque, or there is no simulator
+    `exports`: of a model file, as `read_export_models` reads it; empty where the robot file's own model is judged
+    alone; `training`: with commands, by which the model without findings is refined; the other recordings judge it.
     """
     models = _models(robot, exports)
     known = exports[-1].robot if exports else None
@@ -190,7 +181,7 @@ def _models(robot: Robot, exports: Sequence[ExportModel]) -> list[RolloutModel]:
 def _complete_loops(robot: Robot, recordings: Sequence[Recording], known: Robot | None) -> tuple[Robot, bool]:
     """The robot with delays of its loops, and whether loops can close: commands of all joints are there."""
     loops = [joint.actuator for joint in robot.joints]
-    commands = [_as_commands(recording) for recording in recordings]
+    commands = [_take_commands(recording) for recording in recordings]
     if not all(loop is not None and loop.has_loop for loop in loops) or any(each is None for each in commands):
         return robot, False
     others = [None] * len(loops) if known is None else [joint.actuator for joint in known.joints]
@@ -225,7 +216,7 @@ def _fill(loop: Actuator, known: Actuator) -> Actuator:
     )
 
 
-def _as_commands(recording: Recording) -> Recording | None:
+def _take_commands(recording: Recording) -> Recording | None:
     """The recording with its commands in place of effort; None where a joint has none."""
     if recording.effort_kind is EffortKind.COMMAND:
         return recording
@@ -257,14 +248,8 @@ def _plain_model(robot: Robot, exports: Sequence[ExportModel]) -> ExportModel | 
 def _refine(
     model: ExportModel | None, loops: tuple[Actuator, ...], training: Sequence[Recording], progress: Progress
 ) -> Refined:
-    """The refined model.
-
-    Raises
-    ------
-    RecordingMismatchError
-        no commands reach loops
-    """
-    commands = [_as_commands(recording) for recording in training]
+    """The refined model. Raises RecordingMismatchError where no commands reach loops."""
+    commands = [_take_commands(recording) for recording in training]
     lacking = [recording.name for recording, each in zip(training, commands, strict=True) if each is None]
     if not loops or model is None or lacking:
         raise RecordingMismatchError(

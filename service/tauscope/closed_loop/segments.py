@@ -29,14 +29,11 @@ MOST_SEGMENTS = 120
 class Segments:
     """Motion and commands of S segments of K steps.
 
-    position : (K, n, S) float64
-        q of the real arm; NaN where it was missed [rad or m]
-    begin : (n, S) float64
-        q̇ at the first step [rad/s or m/s]
-    command : (K, n, S) float64
-        of the loops
-    voltage, gain, temperature : (K, n, S) float64
-        of the loops; temperature is NaN where it was not recorded [V, register or Nm/rad, °C]
+    `position`: (K, n, S), q of the real arm; NaN where it was missed [rad or m].
+    `begin`: (n, S), q̇ at the first step [rad/s or m/s].
+    `command`: (K, n, S), of the loops.
+    `voltage`, `gain`, `temperature`: (K, n, S), of the loops; temperature is NaN where it was not recorded [V, register
+        or Nm/rad, °C].
     """
 
     position: Array
@@ -64,13 +61,7 @@ class Segments:
 
     @staticmethod
     def of(recordings: Sequence[Recording], loops: Sequence[Actuator]) -> "Segments":
-        """Segments of recordings with commands.
-
-        Raises
-        ------
-        RecordingError
-            no recording is long enough
-        """
+        """Segments of recordings with commands. Raises RecordingError where no recording is long enough."""
         steps = round(SEGMENT_S / plant.STEP_S)
         pieces: list[tuple[Array, ...]] = []
         for recording in recordings:

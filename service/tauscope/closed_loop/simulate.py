@@ -18,15 +18,9 @@ def simulate_motion(
 ) -> Array:
     """Positions of the simulated arm at the rows of the recording, (N, n) [rad or m].
 
-    Parameters
-    ----------
-    horizon_s : float or None
-        time between restarts at the real state [s]; None starts once
+    Raises TauscopeError where the recording holds no torque for a joint.
 
-    Raises
-    ------
-    TauscopeError
-        the recording holds no torque for a joint
+    `horizon_s`: time between restarts at the real state [s]; None starts once.
     """
     steps = len(motion.time)
     every = steps if horizon_s is None else max(round(horizon_s / STEP_S), 1)

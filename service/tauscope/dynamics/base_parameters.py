@@ -53,16 +53,12 @@ _UNITS = (slice(0, 6), slice(6, 7), slice(7, 10))
 class BaseParameters:
     """The base parameters Θ* = Θ_L + B Θ_K of an arm, equation (14), m of them.
 
-    independent_columns : (m,) int
-        j_L: the standard parameter that leads each base parameter, counted over all links from 0
-    dependent_columns : (k,) int
-        j_K: standard parameters that appear in combinations only
-    unidentifiable_columns : (u,) int
-        standard parameters that no motion of the arm shows
-    combination : (m, k) float64
-        B, equation (12)
-    first_links : tuple of int, length n
-        first link that each joint moves, from 0
+    `independent_columns`: (m,) int, j_L: the standard parameter that leads each base parameter, counted over all links
+        from 0.
+    `dependent_columns`: (k,) int, j_K: standard parameters that appear in combinations only.
+    `unidentifiable_columns`: (u,) int, standard parameters that no motion of the arm shows.
+    `combination`: (m, k), B, equation (12).
+    `first_links`: first link that each joint moves, from 0.
     """
 
     independent_columns: Columns
@@ -78,20 +74,14 @@ class BaseParameters:
     def is_independent(self, index: int) -> bool:
         """Whether a base parameter is one standard parameter alone: its row of B is zero.
 
-        Parameters
-        ----------
-        index : int
-            base parameter, from 0
+        `index`: base parameter, from 0.
         """
         return not np.any(self.combination[index])
 
     def outward(self, joint: int) -> slice:
         """Base parameters of the links that a joint moves: from its own link's first one to the last of all.
 
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
+        `joint`: joint index, from 0.
         """
         return slice(
             int(np.searchsorted(self.independent_columns, len(STANDARD_PARAMETERS) * self.first_links[joint])), None
@@ -100,15 +90,7 @@ class BaseParameters:
     def project(self, parameters: Array) -> Array:
         """Values of the base parameters, Θ* = Θ_L + B Θ_K, equation (14).
 
-        Parameters
-        ----------
-        parameters : (10 n,) float64
-            Θ, ten standard parameters a link
-
-        Returns
-        -------
-        (m,) float64
-            Θ*
+        `parameters`: (10 n,), Θ, ten standard parameters a link. Returns (m,), Θ*.
         """
         return parameters[self.independent_columns] + self.combination @ parameters[self.dependent_columns]
 

@@ -45,14 +45,11 @@ _ALIGNMENT = 64
 class LinkMotion(NamedTuple):
     """Motion of link j in link frame j: views that hold until the next link is asked for.
 
-    screw_angular, screw_linear : three (j, N) float64
-        w_i and v_i of the j joints met so far
-    angular_velocity, angular_acceleration, acceleration : three (N,) float64
-        ω [rad/s], ω̇ [rad/s²], a [m/s²] of the origin, minus gravity
-    products : three (N,) float64
-        ω_y ω_z, ω_x ω_z, ω_x ω_y [rad²/s²]
-    field : three rows of three (N,) float64
-        M = S(ω̇) + S(ω)² [1/s²]
+    `screw_angular`, `screw_linear`: three (j, N), w_i and v_i of the j joints met so far.
+    `angular_velocity`, `angular_acceleration`, `acceleration`: three (N,), ω [rad/s], ω̇ [rad/s²], a [m/s²] of the
+        origin, minus gravity.
+    `products`: three (N,), ω_y ω_z, ω_x ω_z, ω_x ω_y [rad²/s²].
+    `field`: three rows of three (N,), M = S(ω̇) + S(ω)² [1/s²].
     """
 
     screw_angular: Vectors
@@ -80,14 +77,8 @@ class ChainMotion:
     def links(self, q: Array, qd: Array, qdd: Array) -> Iterator[LinkMotion]:
         """Motion of link 1, 2, … n in turn.
 
-        Parameters
-        ----------
-        q : (n, N) float64
-            joint position [rad or m], a contiguous row a joint
-        qd : (n, N) float64
-            joint velocity
-        qdd : (n, N) float64
-            joint acceleration
+        `q`: (n, N), joint position [rad or m], a contiguous row a joint; `qd`: (n, N), joint velocity; `qdd`: (n, N),
+        joint acceleration.
         """
         moving = _Frame(self._blocks, self._scratch, self._field, self._products, samples=q.shape[1])
         moving.rest(self._gravity)

@@ -23,16 +23,10 @@ ABOUT_Z: Plane = (0, 1)
 class Step:
     """Constants of one segment: turns and offsets before the joint's motion and after it.
 
-    Attributes
-    ----------
-    angle : float
-        turn about the joint's axis that is added to its position, where it is revolute [rad]
-    turns_before, turns_after : list of (Plane, float, float)
-        constant turns: plane, cosine, sine
-    before : three floats
-        translation of the placement before the joint, in frame j-1 [m]
-    after : three floats
-        translation of the placement after the joint, in frame j [m]
+    `angle`: turn about the joint's axis that is added to its position, where it is revolute [rad].
+    `turns_before`, `turns_after`: list of (Plane, float, float), constant turns: plane, cosine, sine.
+    `before`: translation of the placement before the joint, in frame j-1 [m].
+    `after`: translation of the placement after the joint, in frame j [m].
     """
 
     def __init__(self, segment: Segment) -> None:
@@ -51,15 +45,7 @@ class Step:
     def slid(self, q: Array) -> Offset:
         """Offset after a prismatic joint, p + ẑ q in frame j.
 
-        Parameters
-        ----------
-        q : (N,) float64
-            joint position [m]
-
-        Returns
-        -------
-        three floats or (N,) float64
-            the components [m]
+        `q`: (N,), joint position [m]. Returns three floats or (N,), the components [m].
         """
         x, y, z = (p if along == 0.0 else p + along * q for p, along in zip(self.after, self._axis, strict=True))
         return x, y, z
@@ -68,15 +54,7 @@ class Step:
 def euler_zxz(rotation: Array) -> tuple[float, float, float]:
     """Angles of R = Rz(φ) Rx(β) Rz(γ), with φ in [-π/2, π/2], and zero where z stays parallel to z.
 
-    Parameters
-    ----------
-    rotation : (3, 3) float64
-        R
-
-    Returns
-    -------
-    tuple of float
-        φ, β, γ [rad]
+    `rotation`: (3, 3), R. Returns tuple of float: φ, β, γ [rad].
     """
     first = 0.0
     sine_x, sine_y = rotation[0, 2], -rotation[1, 2]
@@ -89,22 +67,7 @@ def euler_zxz(rotation: Array) -> tuple[float, float, float]:
 
 
 def from_euler_zxz(first: float, about_x: float, last: float) -> Array:
-    """The rotation R = Rz(φ) Rx(β) Rz(γ).
-
-    Parameters
-    ----------
-    first : float
-        φ [rad]
-    about_x : float
-        β [rad]
-    last : float
-        γ [rad]
-
-    Returns
-    -------
-    (3, 3) float64
-        R
-    """
+    """The rotation R = Rz(φ) Rx(β) Rz(γ). `first`: φ [rad]; `about_x`: β [rad]; `last`: γ [rad]. Returns (3, 3), R."""
     (c1, c2, c3), (s1, s2, s3) = np.cos([first, about_x, last]), np.sin([first, about_x, last])
     return np.array(
         [

@@ -17,12 +17,7 @@ _TWO_OVER_PI = 2.0 / np.pi
 def smooth_sign(velocity: Array, k_v: float | Array) -> Array:
     """Smooth sign function S₀(v) = 2/π arctan(K_v v), the seed paper's equation (8).
 
-    Parameters
-    ----------
-    velocity : (...) float64
-        v [rad/s or m/s]
-    k_v : float or (...) float64
-        steepness K_v at rest [s/rad or s/m]
+    `velocity`: (...), v [rad/s or m/s]; `k_v`: float or (...), steepness K_v at rest [s/rad or s/m].
     """
     return _TWO_OVER_PI * np.arctan(k_v * velocity)
 
@@ -30,17 +25,8 @@ def smooth_sign(velocity: Array, k_v: float | Array) -> Array:
 def smooth_sign_slope(velocity: Array, k_v: float | Array) -> Array:
     """Derivative of S₀ by its steepness, ∂S₀/∂K_v = 2/π v / (1 + (K_v v)²); by δ likewise.
 
-    Parameters
-    ----------
-    velocity : (...) float64
-        v [rad/s or m/s]
-    k_v : float or (...) float64
-        steepness K_v or δ [s/rad or s/m]
-
-    Returns
-    -------
-    (...) float64
-        ∂S₀/∂K_v [rad/s or m/s]
+    `velocity`: (...), v [rad/s or m/s]; `k_v`: float or (...), steepness K_v or δ [s/rad or s/m]. Returns (...),
+    ∂S₀/∂K_v [rad/s or m/s].
     """
     return _TWO_OVER_PI * velocity / (1.0 + (k_v * velocity) ** 2)
 
@@ -48,22 +34,10 @@ def smooth_sign_slope(velocity: Array, k_v: float | Array) -> Array:
 def friction_columns(velocity: Array, shape: FrictionShape, *, offset: bool = True) -> Array:
     """Friction columns of one joint, the seed paper's (9): Φ_fric = [2/π arctan(v K_v), 2/π arctan(v δ), v, 1].
 
-    Parameters
-    ----------
-    velocity : (N,) float64
-        v [rad/s or m/s]
-    shape : FrictionShape
-        K_v and δ, both given [s/rad or s/m]
+    Raises IdentificationError: K_v or δ is not given.
 
-    Returns
-    -------
-    (N, 4) or (N, 3) float64
-        columns of τ_s, τ_sc, τ_v and the offset, as in `FRICTION_COLUMNS`
-
-    Raises
-    ------
-    IdentificationError
-        K_v or δ is not given
+    `velocity`: (N,), v [rad/s or m/s]; `shape`: K_v and δ, both given [s/rad or s/m]. Returns (N, 4) or (N, 3), columns
+    of τ_s, τ_sc, τ_v and the offset, as in `FRICTION_COLUMNS`.
     """
     k_v, delta = _given(shape)
     columns = np.empty((4 if offset else 3, len(velocity))).T
@@ -78,24 +52,10 @@ def friction_columns(velocity: Array, shape: FrictionShape, *, offset: bool = Tr
 def friction_torque(coefficients: FrictionCoefficients, shape: FrictionShape, velocity: Array) -> Array:
     """Friction torque τ_f = τ_s S₀(v) + τ_sc 2/π arctan(v δ) + τ_v v, the seed paper's equation (7).
 
-    The paper prints (7) without the v of its last term; (9) has it.
+    The paper prints (7) without the v of its last term; (9) has it. Raises IdentificationError: K_v or δ is not given.
 
-    Parameters
-    ----------
-    shape : FrictionShape
-        K_v and δ, both given [s/rad or s/m]
-    velocity : (N,) float64
-        v [rad/s or m/s]
-
-    Returns
-    -------
-    (N,) float64
-        τ_f, which the drive has to overcome [Nm or N]
-
-    Raises
-    ------
-    IdentificationError
-        K_v or δ is not given
+    `shape`: K_v and δ, both given [s/rad or s/m]; `velocity`: (N,), v [rad/s or m/s]. Returns (N,), τ_f, which the
+    drive has to overcome [Nm or N].
     """
     weights = np.array([coefficients.stiction, coefficients.stribeck, coefficients.viscous])
     return friction_columns(velocity, shape, offset=False) @ weights

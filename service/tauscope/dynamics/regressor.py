@@ -42,21 +42,12 @@ _PER_LINK = len(STANDARD_PARAMETERS)
 def torque_regressor(robot: Robot, q: Array, qd: Array, qdd: Array, *, columns: Columns | None = None) -> Array:
     """Regressor Φ of τ = Φ(q, q̇, q̈) Θ, the seed paper's equation (2).
 
-    Parameters
-    ----------
-    q : (N, n) float64
-        joint position [rad or m]
-    qd : (N, n) float64
-        joint velocity [rad/s or m/s]
-    qdd : (N, n) float64
-        joint acceleration [rad/s² or m/s²]
-    columns : (C,) int or None
-        the standard parameters wanted, ascending, counted over all links from 0; all of them where None
-
-    Returns
-    -------
-    (N, n, C) float64
-        Φ, a view of a C-contiguous (n, C, N) array: samples are adjacent in memory
+    `q`: (N, n), joint position [rad or m].
+    `qd`: (N, n), joint velocity [rad/s or m/s].
+    `qdd`: (N, n), joint acceleration [rad/s² or m/s²].
+    `columns`: (C,) int, the standard parameters wanted, ascending, counted over all links from 0; all of them where
+        None.
+    Returns (N, n, C), Φ, a view of a C-contiguous (n, C, N) array: samples are adjacent in memory.
     """
     regressor = TorqueRegressor(robot, columns=columns, chunk=min(CHUNK, max(len(q), 1)))
     shape = (robot.joint_count, regressor.column_count, len(q))
@@ -72,10 +63,8 @@ def torque_regressor(robot: Robot, q: Array, qd: Array, qdd: Array, *, columns: 
 class TorqueRegressor:
     """The torque regressor of one robot with its work buffers, for callers that go through a recording in pieces.
 
-    Parameters
-    ----------
-    columns : (C,) int or None
-        the standard parameters wanted, ascending, counted over all links from 0; all of them where None
+    `columns`: (C,) int, the standard parameters wanted, ascending, counted over all links from 0; all of them where
+        None.
     """
 
     def __init__(self, robot: Robot, *, columns: Columns | None = None, chunk: int = CHUNK) -> None:
@@ -92,16 +81,10 @@ class TorqueRegressor:
     def write(self, q: Array, qd: Array, qdd: Array, out: Array) -> None:
         """Write Φ into the caller's buffer.
 
-        Parameters
-        ----------
-        q : (N, n) float64
-            joint position [rad or m]
-        qd : (N, n) float64
-            joint velocity
-        qdd : (N, n) float64
-            joint acceleration
-        out : (n, C, N) float64
-            receives Φ, samples on the last axis
+        `q`: (N, n), joint position [rad or m].
+        `qd`: (N, n), joint velocity.
+        `qdd`: (N, n), joint acceleration.
+        `out`: (n, C, N), receives Φ, samples on the last axis.
         """
         for joint, inner in enumerate(self._inner_columns):
             out[joint, :inner] = 0.0
@@ -110,16 +93,10 @@ class TorqueRegressor:
     def write_shares(self, q: Array, qd: Array, qdd: Array, out: Array) -> None:
         """Write Φ except where it is always zero (joints beyond the link): into zeros, or a buffer used before.
 
-        Parameters
-        ----------
-        q : (N, n) float64
-            joint position [rad or m]
-        qd : (N, n) float64
-            joint velocity
-        qdd : (N, n) float64
-            joint acceleration
-        out : (n, C, N) float64
-            receives Φ, samples on the last axis
+        `q`: (N, n), joint position [rad or m].
+        `qd`: (N, n), joint velocity.
+        `qdd`: (N, n), joint acceleration.
+        `out`: (n, C, N), receives Φ, samples on the last axis.
         """
         with _rows_used_in_place():
             for start in range(0, len(q), self._chunk):

@@ -40,10 +40,7 @@ class Screws(NamedTuple):
 class RegressorGradient:
     """Gradients of functions of the torque regressor of one robot.
 
-    Parameters
-    ----------
-    columns : (C,) int or None
-        the standard parameters that the regressor has columns for, ascending; all of them where None
+    `columns`: (C,) int, the standard parameters that the regressor has columns for, ascending; all of them where None.
     """
 
     def __init__(self, robot: Robot, *, columns: Columns | None = None, capacity: int) -> None:
@@ -61,21 +58,11 @@ class RegressorGradient:
     def contract(self, q: Array, qd: Array, qdd: Array, weight: Array) -> tuple[Array, Array, Array]:
         """Σ G ∂Φ/∂q, Σ G ∂Φ/∂q̇ and Σ G ∂Φ/∂q̈, each sample by itself.
 
-        Parameters
-        ----------
-        q : (N, n) float64
-            joint position [rad or m]
-        qd : (N, n) float64
-            joint velocity
-        qdd : (N, n) float64
-            joint acceleration
-        weight : (n, C, N) float64
-            G = ∂S/∂Φ, laid out as `TorqueRegressor.write` writes Φ
-
-        Returns
-        -------
-        tuple of (N, n) float64
-            ∂S/∂q, ∂S/∂q̇, ∂S/∂q̈
+        `q`: (N, n), joint position [rad or m].
+        `qd`: (N, n), joint velocity.
+        `qdd`: (N, n), joint acceleration.
+        `weight`: (n, C, N), G = ∂S/∂Φ, laid out as `TorqueRegressor.write` writes Φ.
+        Returns tuple of (N, n), ∂S/∂q, ∂S/∂q̇, ∂S/∂q̈.
         """
         state = [self._ratios @ array.T for array in (q, qd, qdd)]
         state[0] += self._offsets[:, None]

@@ -15,21 +15,11 @@ _LEVI_CIVITA = np.array([[[(i - j) * (j - k) * (k - i) / 2.0 for k in range(3)] 
 def inverse_dynamics(robot: Robot, parameters: Array, q: Array, qd: Array, qdd: Array) -> Array:
     """Joint torque τ = H(q) q̈ + h(q, q̇) + c(q) = Φ(q, q̇, q̈) Θ, the seed paper's equations (1) and (2).
 
-    Parameters
-    ----------
-    parameters : (10 m,) float64
-        Θ, ten standard parameters of each of the m links in the order of `STANDARD_PARAMETERS`
-    q : (N, n) float64
-        joint position [rad or m]
-    qd : (N, n) float64
-        joint velocity [rad/s or m/s]
-    qdd : (N, n) float64
-        joint acceleration [rad/s² or m/s²]
-
-    Returns
-    -------
-    (N, n) float64
-        joint torque or force, without friction [Nm or N]
+    `parameters`: (10 m,), Θ, ten standard parameters of each of the m links in the order of `STANDARD_PARAMETERS`.
+    `q`: (N, n), joint position [rad or m].
+    `qd`: (N, n), joint velocity [rad/s or m/s].
+    `qdd`: (N, n), joint acceleration [rad/s² or m/s²].
+    Returns (N, n), joint torque or force, without friction [Nm or N].
     """
     joints, maps = robot.joint_count, [_wrench_of_motion(link) for link in _links(parameters)]
     motion = ChainMotion(robot, min(CHUNK, max(len(q), 1)))
@@ -46,17 +36,8 @@ def inverse_dynamics(robot: Robot, parameters: Array, q: Array, qd: Array, qdd: 
 def gravity_torque(robot: Robot, parameters: Array, q: Array) -> Array:
     """Torque c(q) that holds the arm against gravity, the last term of the seed paper's equation (1).
 
-    Parameters
-    ----------
-    parameters : (10 m,) float64
-        Θ, ten standard parameters a link
-    q : (N, n) float64
-        joint position [rad or m]
-
-    Returns
-    -------
-    (N, n) float64
-        joint torque or force [Nm or N]
+    `parameters`: (10 m,), Θ, ten standard parameters a link; `q`: (N, n), joint position [rad or m]. Returns (N, n),
+    joint torque or force [Nm or N].
     """
     rest = np.zeros_like(q)
     return inverse_dynamics(robot, parameters, q, rest, rest)
@@ -67,17 +48,8 @@ def mass_matrix(robot: Robot, parameters: Array, q: Array) -> Array:
 
     J_j holds the joint screws of link j (`tauscope.dynamics.chain_motion`), G_j its inertia about its frame's origin.
 
-    Parameters
-    ----------
-    parameters : (10 m,) float64
-        Θ, ten standard parameters a link
-    q : (N, n) float64
-        joint position [rad or m]
-
-    Returns
-    -------
-    (N, n, n) float64
-        symmetric, and positive definite where the links are physically possible [kg m², kg m, kg]
+    `parameters`: (10 m,), Θ, ten standard parameters a link; `q`: (N, n), joint position [rad or m]. Returns (N, n, n),
+    symmetric, and positive definite where the links are physically possible [kg m², kg m, kg].
     """
     joints = robot.joint_count
     inertias = [_spatial_inertia(link) for link in _links(parameters)]

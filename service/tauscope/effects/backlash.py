@@ -54,21 +54,11 @@ def place_between_teeth(load: Array, inertia: Array, gap: float, rate_hz: float)
     The teeth carry the load on one side until it turns its sign. Then the link moves on under its load alone,
     I δ̈ = τ_rb, until it meets teeth again, where it stays: gears and their grease swallow the shock.
 
-    Parameters
-    ----------
-    load : (N,) float64
-        τ_rb [Nm or N]
-    inertia : (N,) float64
-        I; where it is zero all along, the link crosses at once [kg m² or kg]
-    gap : float
-        b, above zero [rad or m]
-    rate_hz : float
-        sampling rate [Hz]
-
-    Returns
-    -------
-    (N,) float64
-        δ/b
+    `load`: (N,), τ_rb [Nm or N].
+    `inertia`: (N,), I; where it is zero all along, the link crosses at once [kg m² or kg].
+    `gap`: b, above zero [rad or m].
+    `rate_hz`: sampling rate [Hz].
+    Returns (N,), δ/b.
     """
     sides = np.where(load >= 0.0, 0.5, -0.5)
     if not inertia.all():
@@ -98,25 +88,13 @@ def place_between_springs(
     δ: teeth push and never pull. c is the loss of Hunt and Crossley (J. Appl. Mech. 42, 1975), which grows with the
     overlap, D = 2 ζ √(K Ī). By leapfrog steps, from rest on the teeth under the first load.
 
-    Parameters
-    ----------
-    load : (N,) float64
-        τ_rb [Nm or N]
-    inertia : (N,) float64
-        I, above zero [kg m² or kg]
-    gap : float
-        b, above zero [rad or m]
-    compliance : float
-        1/K [rad/Nm or m/N]
-    loss : float
-        c [s/rad or s/m]
-    rate_hz : float
-        sampling rate [Hz]
-
-    Returns
-    -------
-    (N,) float64
-        δ/b
+    `load`: (N,), τ_rb [Nm or N].
+    `inertia`: (N,), I, above zero [kg m² or kg].
+    `gap`: b, above zero [rad or m].
+    `compliance`: 1/K [rad/Nm or m/N].
+    `loss`: c [s/rad or s/m].
+    `rate_hz`: sampling rate [Hz].
+    Returns (N,), δ/b.
     """
     highest_hz = 1.0 / (2.0 * np.pi * math.sqrt(compliance * float(inertia.min())))
     time = np.arange(len(load)) / rate_hz

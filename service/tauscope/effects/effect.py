@@ -168,38 +168,20 @@ class Effect(ABC):
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """Torque per unit of each coefficient, for several shapes at once.
 
-        Parameters
-        ----------
-        shapes : (g, k) float64
-            values of the shape parameters
-
-        Returns
-        -------
-        (g, c, m, N) or (g, c, m, P, N) float64
-            for the m joints of `touched`; with P where repetitions of the same motion differ
+        `shapes`: (g, k), values of the shape parameters. Returns (g, c, m, N) or (g, c, m, P, N), for the m joints of
+        `touched`; with P where repetitions of the same motion differ.
         """
 
     def torque_of(self, signals: Signals, coefficients: Array, shape: Array) -> Array:
         """Torque of the effect at its full size, (m, N) or (m, P, N): what its columns stand for to first order.
 
-        Parameters
-        ----------
-        coefficients : (c,) float64
-            values of the coefficients
-        shape : (k,) float64
-            values of the shape parameters
+        `coefficients`: (c,), values of the coefficients; `shape`: (k,), values of the shape parameters.
         """
         (columns,) = self.columns(signals, shape[None])
         return np.asarray(np.tensordot(coefficients, columns, axes=1), dtype=np.float64)
 
     def torque_code(self, coefficients: Sequence[float], shape: Sequence[float], k_v: float) -> str:
-        """`code` with its numbers.
-
-        Parameters
-        ----------
-        k_v : float
-            K_v of the joint [s/rad or s/m]
-        """
+        """`code` with its numbers. `k_v`: K_v of the joint [s/rad or s/m]."""
         step = _STEP.format(k_v=repr(k_v))
         return self.code.format(c=[*map(repr, coefficients)], s=[*map(repr, shape)], step=step, effect=self)
 
@@ -210,34 +192,22 @@ class Effect(ABC):
     def factor(self, coefficients: Array) -> float:
         """By how much it multiplies what the parameters of the plain model make at its joint: 1 where it only adds.
 
-        Parameters
-        ----------
-        coefficients : (c,) float64
-            values of the coefficients
+        `coefficients`: (c,), values of the coefficients.
         """
         return 1.0
 
     def is_possible(self, shape: Array, k_v: float | None) -> bool:
         """Whether this shape is still what the effect means, beside the joint's friction as it was fitted with it.
 
-        Parameters
-        ----------
-        shape : (k,) float64
-            values of the shape parameters
-        k_v : float or None
-            K_v of the effect's joint; None where there is none [s/rad or s/m]
+        `shape`: (k,), values of the shape parameters; `k_v`: K_v of the effect's joint; None where there is none [s/rad
+        or s/m].
         """
         return True
 
     def is_consistent(self, coefficients: Array, shape: Array) -> bool:
         """Whether coefficients and shape, each fitted freely, can belong to one thing.
 
-        Parameters
-        ----------
-        coefficients : (c,) float64
-            values of the coefficients
-        shape : (k,) float64
-            values of the shape parameters
+        `coefficients`: (c,), values of the coefficients; `shape`: (k,), values of the shape parameters.
         """
         return True
 
@@ -271,13 +241,7 @@ class Effect(ABC):
 
     @staticmethod
     def unit_at(template: str, context: ArmContext, joint: int | None) -> str:
-        """The same for any joint.
-
-        Parameters
-        ----------
-        joint : int or None
-            joint index, from 0; None for the whole arm
-        """
+        """The same for any joint. `joint`: joint index, from 0; None for the whole arm."""
         kind = context.robot.joints[joint or 0].type
         return template.format(tau=_TORQUE[kind], q=_POSITION[kind])
 
@@ -286,14 +250,7 @@ class Effect(ABC):
     ) -> tuple[Quantity, ...]:
         """The parameters of a finding: coefficients, then shapes.
 
-        Parameters
-        ----------
-        coefficients : (c,) float64
-            estimates
-        shape : (k,) float64
-            estimates
-        covariance : (c + k, c + k) float64
-            of both
+        `coefficients`: (c,), estimates; `shape`: (k,), estimates; `covariance`: (c + k, c + k), of both.
         """
         std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         names = (*self.coefficients, *self.shapes)
@@ -308,20 +265,11 @@ class Effect(ABC):
 def per_joint_columns(rows: Array) -> Array:
     """Columns (g, c, N) of a single joint in the form that `Effect.columns` returns, (g, c, 1, N).
 
-    Parameters
-    ----------
-    rows : (g, c, N) float64
-        columns
+    `rows`: (g, c, N), columns.
     """
     return rows[:, :, None, :]
 
 
 def mesh(*axes: Array) -> Array:
-    """All combinations of the shape parameters' values, (g, k).
-
-    Parameters
-    ----------
-    *axes : (g_i,) float64
-        values of each shape parameter
-    """
+    """All combinations of the shape parameters' values, (g, k). `*axes`: (g_i,), values of each shape parameter."""
     return np.stack([part.ravel() for part in np.meshgrid(*axes, indexing="ij")], axis=1)

@@ -32,21 +32,11 @@ def transmitted(load: Array, inertia: Array, compliance: float, rate_hz: float) 
 
     D = 2 ζ √(K Ī) with the mean inertia Ī. By the trapezoidal rule, from rest under the first load.
 
-    Parameters
-    ----------
-    load : (N,) float64
-        τ_rb [Nm or N]
-    inertia : (N,) float64
-        I, above zero [kg m² or kg]
-    compliance : float
-        1/K [rad/Nm or m/N]
-    rate_hz : float
-        sampling rate [Hz]
-
-    Returns
-    -------
-    (N,) float64
-        K δ [Nm or N]
+    `load`: (N,), τ_rb [Nm or N].
+    `inertia`: (N,), I, above zero [kg m² or kg].
+    `compliance`: 1/K [rad/Nm or m/N].
+    `rate_hz`: sampling rate [Hz].
+    Returns (N,), K δ [Nm or N].
     """
     by_acceleration = rate_hz**2 * compliance * inertia
     by_rate = DAMPING * rate_hz * np.sqrt(compliance * inertia.mean())

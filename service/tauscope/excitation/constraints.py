@@ -37,10 +37,8 @@ RANDOM_STATES = 256
 class SmoothMaximum:
     """Smooth stand-ins of the largest usages.
 
-    values : (C,) float64
-        one a constraint
-    jacobian : (C, n, columns) float64
-        their derivatives by the vector x
+    `values`: (C,), one a constraint.
+    `jacobian`: (C, n, columns), their derivatives by the vector x.
     """
 
     values: Array
@@ -61,10 +59,7 @@ class KinematicUsage:
     def signed(self, x: Array) -> tuple[Array, Array, Array]:
         """Position, velocity and acceleration as parts of their limits, -1 to 1 within; (K, n) each.
 
-        Parameters
-        ----------
-        x : (n, columns) float64
-            centre and coefficients
+        `x`: (n, columns), centre and coefficients.
         """
         motion = self._grid.motion(x)
         place = (motion.position - self._limits.middle) / self._limits.half_range
@@ -79,20 +74,14 @@ class KinematicUsage:
     def largest(self, x: Array) -> Array:
         """Largest usage of position, velocity and acceleration at any instant, (3, n).
 
-        Parameters
-        ----------
-        x : (n, columns) float64
-            centre and coefficients
+        `x`: (n, columns), centre and coefficients.
         """
         return np.stack([np.abs(part).max(axis=0) for part in self.signed(x)])
 
     def fitted(self, x: Array, fraction: float = 1.0) -> Array:
         """The nearest series of the same shape within the limits: amplitudes taken back, then centres shifted.
 
-        Parameters
-        ----------
-        x : (n, columns) float64
-            centre and coefficients
+        `x`: (n, columns), centre and coefficients.
         """
         place, velocity, acceleration = self.signed(x)
         swing = place - x[:, 0]
@@ -109,12 +98,7 @@ class KinematicUsage:
     def smooth(self, x: Array, scale: Array) -> SmoothMaximum:
         """Smooth largest usages, position, velocity, acceleration of every joint.
 
-        Parameters
-        ----------
-        x : (n, columns) float64
-            centre and coefficients
-        scale : (3 n,) float64
-            factors that make them exact at the present motion
+        `x`: (n, columns), centre and coefficients; `scale`: (3 n,), factors that make them exact at the present motion.
         """
         joints = len(x)
         values = np.empty(3 * joints)
@@ -136,12 +120,8 @@ class KinematicUsage:
 class StateUsage:
     """Usage of what depends on the whole state: predicted torque and workspace.
 
-    Parameters
-    ----------
-    torque : TorquePrediction or None
-        None where there is no prior model or no torque limit
-    workspace : WorkspaceUsage or None
-        None where nothing is forbidden
+    `torque`: None where there is no prior model or no torque limit.
+    `workspace`: None where nothing is forbidden.
     """
 
     def __init__(
@@ -154,10 +134,7 @@ class StateUsage:
     def usages(self, motion: MotionSamples, base: Array | None = None) -> list[Array]:
         """Usage of torque, then of workspace, as far as they are constrained; (N, n) and (N, obstacles × points).
 
-        Parameters
-        ----------
-        base : (n, m, N) float64 or None
-            base regressor of the same motion, where the caller has it
+        `base`: (n, m, N), base regressor of the same motion, where the caller has it.
         """
         parts = []
         if self.torque is not None:
@@ -189,12 +166,8 @@ class StateUsage:
     def smooth_values(self, motion: MotionSamples, base: Array, scale: Array) -> Array:
         """Smooth largest usages over all samples and joints, or points, (count,).
 
-        Parameters
-        ----------
-        base : (n, m, N) float64
-            base regressor of the same motion
-        scale : (count,) float64
-            factors that make them exact at the present motion
+        `base`: (n, m, N), base regressor of the same motion; `scale`: (count,), factors that make them exact at the
+        present motion.
         """
         parts = self.usages(motion, base)
         return np.array([smooth_maximum(p.reshape(-1, 1), s)[0][0] for p, s in zip(parts, scale, strict=True)])
@@ -202,12 +175,8 @@ class StateUsage:
     def smooth_gradients(self, motion: MotionSamples, base: Array, scale: Array) -> list[MotionGradient]:
         """Derivatives of `smooth_values` by the motion.
 
-        Parameters
-        ----------
-        base : (n, m, N) float64
-            base regressor of the same motion
-        scale : (count,) float64
-            factors that make them exact at the present motion
+        `base`: (n, m, N), base regressor of the same motion; `scale`: (count,), factors that make them exact at the
+        present motion.
         """
         parts = self.usages(motion, base)
         weights = [smooth_maximum(p.reshape(-1, 1), s)[1].reshape(p.shape) for p, s in zip(parts, scale, strict=True)]
@@ -222,17 +191,8 @@ class StateUsage:
 def smooth_maximum(usage: Array, scale: float | Array = 1.0) -> tuple[Array, Array]:
     """The p-norm mean of usages over time and its derivatives.
 
-    Parameters
-    ----------
-    usage : (N, C) float64
-        not negative
-    scale : float or (C,) float64
-        factors
-
-    Returns
-    -------
-    tuple of (C,) and (N, C) float64
-        values, and derivatives of value c by usage [:, c]
+    `usage`: (N, C), not negative; `scale`: float or (C,), factors. Returns tuple of (C,) and (N, C), values, and
+    derivatives of value c by usage [:, c].
     """
     top = np.maximum(usage.max(axis=0), 1e-12)
     powers = (usage / top) ** (POWER - 1.0)

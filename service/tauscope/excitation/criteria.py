@@ -34,8 +34,7 @@ class Criterion(StrEnum):
 class CriterionValue:
     """A criterion at one information matrix.
 
-    gradient : (p, p) float64
-        derivative of `cost` by A, symmetric
+    `gradient`: (p, p), derivative of `cost` by A, symmetric.
     """
 
     own: float
@@ -47,10 +46,7 @@ class CriterionValue:
 def criterion_value(criterion: Criterion, information: Array, information_weight: float = 0.0) -> CriterionValue:
     """A criterion, its gradient, and the condition number, from one eigenvalue decomposition.
 
-    Parameters
-    ----------
-    information : (p, p) float64
-        A = LᵀL, symmetric
+    `information`: (p, p), A = LᵀL, symmetric.
     """
     values, vectors = np.linalg.eigh(information)
     low, high = float(values[0]), float(values[-1])

@@ -27,10 +27,9 @@ ACTIVE_CLEARANCE_M = 0.005
 class ExcitationDesign:
     """A designed excitation.
 
-    history : tuple of (int, int, float, float)
-        start, iteration, criterion's value as the optimiser sees it, largest violation of a constraint
-    seconds : float
-        time that the optimiser took [s]
+    `history`: tuple of (int, int, float, float), start, iteration, criterion's value as the optimiser sees it, largest
+        violation of a constraint.
+    `seconds`: time that the optimiser took [s].
     """
 
     trajectory: Trajectory
@@ -56,10 +55,7 @@ def design_excitation(
 ) -> ExcitationDesign:
     """The best excitation found within the limits: the seed paper's (20) and (21).
 
-    Raises
-    ------
-    ExcitationError
-        where no motion keeps the limits, naming the constraint and the joint that block
+    Raises ExcitationError where no motion keeps the limits, naming the constraint and the joint that block.
     """
     options = options or ExcitationOptions()
     setting = Setting.of(robot, options)

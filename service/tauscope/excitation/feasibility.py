@@ -44,10 +44,7 @@ class Feasibility:
     def standing_postures(self, rng: np.random.Generator) -> Array:
         """Postures at which the arm may stand, (K, n), K ≥ 1 [rad or m].
 
-        Raises
-        ------
-        ExcitationError
-            where there is none, naming the constraint and the joint that block
+        Raises ExcitationError where there is none, naming the constraint and the joint that block.
         """
         unit = rng.uniform(-1.0, 1.0, (POSTURES, self.space.joint_count))
         unit[0] = 0.0
@@ -64,10 +61,7 @@ class Feasibility:
     def random_start(self, postures: Array, rng: np.random.Generator) -> Array | None:
         """A random series within all limits about one of the postures, (n, columns); None where none was found.
 
-        Parameters
-        ----------
-        postures : (K, n) float64
-            where the arm may stand
+        `postures`: (K, n), where the arm may stand.
         """
         n = self.space.joint_count
         at_rest = np.zeros((n, self.space.columns))
@@ -92,12 +86,7 @@ class Feasibility:
     def repaired(self, x: Array, anchor: Array) -> Array:
         """A feasible vector near x: limits of each joint first, then as far from the anchor as torque and space allow.
 
-        Parameters
-        ----------
-        x : (n, columns) float64
-            nearly feasible
-        anchor : (n, columns) float64
-            feasible
+        `x`: (n, columns), nearly feasible; `anchor`: (n, columns), feasible.
         """
         fitted = self.kinematics.fitted(x)
         return fitted if self.state_usage(fitted) <= SETTLED else self.towards(anchor, fitted)
@@ -105,12 +94,7 @@ class Feasibility:
     def towards(self, feasible: Array, wanted: Array) -> Array:
         """The farthest feasible point found on the straight way from a feasible vector to a wanted one.
 
-        Parameters
-        ----------
-        feasible : (n, columns) float64
-            where torque and workspace are kept
-        wanted : (n, columns) float64
-            where they are not
+        `feasible`: (n, columns), where torque and workspace are kept; `wanted`: (n, columns), where they are not.
         """
         low, high = 0.0, 1.0
         for _ in range(BISECTIONS):
@@ -124,10 +108,7 @@ class Feasibility:
     def state_usage(self, x: Array) -> float:
         """Largest usage of torque and workspace, between the instants of the grid too.
 
-        Parameters
-        ----------
-        x : (n, columns) float64
-            centre and coefficients
+        `x`: (n, columns), centre and coefficients.
         """
         largest = 0.0
         for part in self.states.usages(self.grid.motion(x)) if self.states.count else ():
@@ -172,13 +153,7 @@ class Feasibility:
 
 
 def require_room(robot: Robot, limits: MotionLimits) -> None:
-    """Refuse limits of a joint that leave no motion.
-
-    Raises
-    ------
-    ExcitationError
-        naming the joint and the limit
-    """
+    """Refuse limits of a joint that leave no motion. Raises ExcitationError naming the joint and the limit."""
     for j, joint in enumerate(robot.joints):
         unit = "rad" if joint.type is JointType.REVOLUTE else "m"
         low, high = limits.position_low[j], limits.position_high[j]

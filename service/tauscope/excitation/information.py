@@ -41,8 +41,7 @@ class ColumnScaling(StrEnum):
 class MotionGradient:
     """Derivatives of a scalar by a motion.
 
-    position, velocity, acceleration : (N, n) float64
-        by q, q̇ and q̈ of every sample
+    `position`, `velocity`, `acceleration`: (N, n), by q, q̇ and q̈ of every sample.
     """
 
     position: Array
@@ -53,13 +52,10 @@ class MotionGradient:
 class ExcitationRegressor:
     """The regressor L of a motion, joint by joint, its information matrix and the way back from it.
 
-    Parameters
-    ----------
-    noise_std : (n,) float64 or None
-        expected torque noise of each joint, by which its rows are divided [Nm or N]; equal weights where None
-    steepest : (n,) float64 or None
-        largest K_v that the samples resolve: a steeper sign function is taken so, for a gradient that means something
-        [s/rad or s/m]; None for the curve as it is
+    `noise_std`: (n,), expected torque noise of each joint, by which its rows are divided [Nm or N]; equal weights where
+        None.
+    `steepest`: (n,), largest K_v that the samples resolve: a steeper sign function is taken so, for a gradient that
+        means something [s/rad or s/m]; None for the curve as it is.
     """
 
     def __init__(
@@ -100,10 +96,7 @@ class ExcitationRegressor:
     def rows(self, motion: MotionSamples, base: Array | None = None) -> list[Array]:
         """L joint by joint: for each its columns that are not always zero, (C_j, N), weighted.
 
-        Parameters
-        ----------
-        base : (n, m, N) float64 or None
-            `base_regressor` of the same motion, where the caller has it
+        `base`: (n, m, N), `base_regressor` of the same motion, where the caller has it.
         """
         base = self.base_regressor(motion) if base is None else base
         rows = []
@@ -120,13 +113,7 @@ class ExcitationRegressor:
         return rows
 
     def information(self, rows: list[Array]) -> Array:
-        """A = LᵀL / N, (p, p).
-
-        Parameters
-        ----------
-        rows : list of (C_j, N) float64
-            from `rows`
-        """
+        """A = LᵀL / N, (p, p). `rows`: list of (C_j, N), from `rows`."""
         information = np.zeros((self.column_count, self.column_count))
         for block, columns in zip(rows, self._columns, strict=True):
             information[np.ix_(columns, columns)] += block @ block.T
@@ -143,12 +130,7 @@ class ExcitationRegressor:
     def pull_back(self, motion: MotionSamples, rows: list[Array], by_information: Array) -> MotionGradient:
         """Derivatives by the motion of a scalar whose derivative by A is known.
 
-        Parameters
-        ----------
-        rows : list of (C_j, N) float64
-            from `rows`
-        by_information : (p, p) float64
-            symmetric derivative by A
+        `rows`: list of (C_j, N), from `rows`; `by_information`: (p, p), symmetric derivative by A.
         """
         count = len(motion.position)
         weight = np.zeros((self.joint_count, len(self.base_columns), count))
@@ -167,10 +149,7 @@ class ExcitationRegressor:
     def pull_back_base(self, motion: MotionSamples, weight: Array) -> MotionGradient:
         """Derivatives by the motion of a scalar whose derivatives by the base parameters' columns are known.
 
-        Parameters
-        ----------
-        weight : (n, m, N) float64
-            derivative by `base_regressor`
+        `weight`: (n, m, N), derivative by `base_regressor`.
         """
         parts = self._gradient.contract(motion.position, motion.velocity, motion.acceleration, weight)
         return MotionGradient(*parts)

@@ -30,12 +30,11 @@ ROUNDING = 1e-6
 class Margins:
     """What is left of every limit, as part of the limit; negative where it is exceeded.
 
-    position, velocity, acceleration : (n,) float64
-        of each joint's limits; position counts from the middle of the range
-    torque : (n,) float64 or None
-        of the torque that may be used, by the prior model; infinite where there is no limit, None without a model
-    workspace_m : float or None
-        smallest clearance of joint origins and tool from floor and boxes [m]; None where nothing is forbidden
+    `position`, `velocity`, `acceleration`: (n,), of each joint's limits; position counts from the middle of the range.
+    `torque`: (n,), of the torque that may be used, by the prior model; infinite where there is no limit, None without a
+        model.
+    `workspace_m`: smallest clearance of joint origins and tool from floor and boxes [m]; None where nothing is
+        forbidden.
     """
 
     position: Array
@@ -62,16 +61,13 @@ def trajectory_margins(
 ) -> Margins:
     """Margins over a whole trajectory.
 
-    Parameters
-    ----------
-    available : (n,) float64
-        torque that may be used, infinite where there is no limit [Nm or N]
+    `available`: (n,), torque that may be used, infinite where there is no limit [Nm or N].
     """
     usage = np.zeros((3, trajectory.joint_count))
     torque = np.zeros(trajectory.joint_count)
     clearance = np.inf
     for segment in trajectory.segments:
-        motion, between = _looked_at(segment)
+        motion, between = _sample_extremes(segment)
         usage = np.maximum(usage, _kinematic_usage(segment, motion, between, limits))
         if states is not None and states.torque is not None:
             torque = np.maximum(torque, states.torque.torque(motion).max(axis=0) / available)
@@ -88,10 +84,7 @@ def trajectory_margins(
 def require_within_limits(trajectory: Trajectory, robot: Robot, limits: MotionLimits, name: str = "trajectory") -> None:
     """Refuse a trajectory that leaves the limits of position, velocity or acceleration at any instant.
 
-    Raises
-    ------
-    ExcitationError
-        naming joint, instant, value and limit
+    Raises ExcitationError naming joint, instant, value and limit.
     """
     margins = kinematic_margins(trajectory, limits)
     for kind in ("position", "velocity", "acceleration"):
@@ -102,7 +95,7 @@ def require_within_limits(trajectory: Trajectory, robot: Robot, limits: MotionLi
         begin = 0.0
         worst = (-np.inf, 0.0, 0.0)
         for segment in trajectory.segments:
-            motion, _ = _looked_at(segment)
+            motion, _ = _sample_extremes(segment)
             values = getattr(motion, kind)[:, j]
             centre = limits.middle[j] if kind == "position" else 0.0
             at = int(np.argmax(np.abs(values - centre)))
@@ -125,7 +118,7 @@ def require_within_limits(trajectory: Trajectory, robot: Robot, limits: MotionLi
         )
 
 
-def _looked_at(segment: Segment) -> tuple[MotionSamples, float]:
+def _sample_extremes(segment: Segment) -> tuple[MotionSamples, float]:
     """A segment at instants that show its extremes, and the factor by which it may exceed them in between."""
     if isinstance(segment, FourierSegment):
         series = segment.series

@@ -49,8 +49,7 @@ class OptimiserProgress:
 class HistoryEntry:
     """One iteration.
 
-    start : int
-        from which start, counted from 1; 0 for the random series
+    `start`: from which start, counted from 1; 0 for the random series.
     """
 
     start: int
@@ -63,10 +62,8 @@ class HistoryEntry:
 class OptimiserResult:
     """What came of it.
 
-    x : (n, columns) float64
-        the best feasible vector found
-    seconds : float
-        time that it took [s]
+    `x`: (n, columns), the best feasible vector found.
+    `seconds`: time that it took [s].
     """
 
     x: Array
@@ -80,8 +77,7 @@ class OptimiserResult:
 class Stages:
     """The same question at two resolutions, and its answer without any smoothing.
 
-    exact : callable
-        the criterion of a vector (n, columns) with friction's curve as it is: what candidates are compared by
+    `exact`: the criterion of a vector (n, columns) with friction's curve as it is: what candidates are compared by.
     """
 
     coarse: ExcitationProblem
@@ -156,10 +152,7 @@ def optimise(
 ) -> OptimiserResult:
     """The best feasible vector of several starts.
 
-    Raises
-    ------
-    ExcitationError
-        where no motion is feasible, or none excites all parameters
+    Raises ExcitationError where no motion is feasible, or none excites all parameters.
     """
     begin = time.perf_counter()
     search = _Search(stages, feasibility, progress, starts * SHORT_ROUND + ROUNDS * LONG_ROUND)

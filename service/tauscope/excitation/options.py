@@ -18,12 +18,10 @@ Array = NDArray[np.float64]
 class ExcitationOptions:
     """What is wished of an excitation.
 
-    period_s : float
-        duration of one period [s]
-    noise_std : (n,) float64 or None
-        expected torque noise of each joint, which weights its equations [Nm or N]; equal weights where None
-    torque_offset : float
-        torque kept free besides [Nm or N]
+    `period_s`: duration of one period [s].
+    `noise_std`: (n,), expected torque noise of each joint, which weights its equations [Nm or N]; equal weights where
+        None.
+    `torque_offset`: torque kept free besides [Nm or N].
     """
 
     period_s: float = 10.0

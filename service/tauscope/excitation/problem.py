@@ -18,8 +18,7 @@ Array = NDArray[np.float64]
 class Objective:
     """What is minimised.
 
-    scaling : (p,) float64
-        what each column is divided by
+    `scaling`: (p,), what each column is divided by.
     """
 
     criterion: Criterion
@@ -66,58 +65,28 @@ class ExcitationProblem:
         self._last: _Evaluation | None = None
 
     def cost(self, vector: Array) -> float:
-        """What is minimised.
-
-        Parameters
-        ----------
-        vector : (size,) float64
-            x, its rows one after the other
-        """
+        """What is minimised. `vector`: (size,), x, its rows one after the other."""
         return self._at(vector).criterion.cost
 
     def own(self, vector: Array) -> float:
-        """The criterion alone, see `CriterionValue.own`.
-
-        Parameters
-        ----------
-        vector : (size,) float64
-            x, its rows one after the other
-        """
+        """The criterion alone, see `CriterionValue.own`. `vector`: (size,), x, its rows one after the other."""
         return self._at(vector).criterion.own
 
     def gradient(self, vector: Array) -> Array:
-        """Derivative of the cost, (size,).
-
-        Parameters
-        ----------
-        vector : (size,) float64
-            x
-        """
+        """Derivative of the cost, (size,). `vector`: (size,), x."""
         at = self._at(vector)
         by_motion = self._regressor.pull_back(at.motion, at.rows, at.criterion.gradient / self._scaling)
         return self._grid.pull_back(by_motion).ravel()
 
     def constraints(self, vector: Array) -> Array:
-        """1 - smooth largest usage of everything limited, (C,): not negative where feasible.
-
-        Parameters
-        ----------
-        vector : (size,) float64
-            x
-        """
+        """1 - smooth largest usage of everything limited, (C,): not negative where feasible. `vector`: (size,), x."""
         at = self._at(vector)
         kinematic = self._kinematics.smooth(at.x, self._kinematic_scale).values
         states = self._states.smooth_values(at.motion, at.base, self._state_scale)
         return 1.0 - np.concatenate([kinematic, states])
 
     def jacobian(self, vector: Array) -> Array:
-        """Derivatives of `constraints`, (C, size).
-
-        Parameters
-        ----------
-        vector : (size,) float64
-            x
-        """
+        """Derivatives of `constraints`, (C, size). `vector`: (size,), x."""
         at = self._at(vector)
         kinematic = self._kinematics.smooth(at.x, self._kinematic_scale).jacobian
         gradients = self._states.smooth_gradients(at.motion, at.base, self._state_scale)
@@ -127,10 +96,7 @@ class ExcitationProblem:
     def calibrate(self, vector: Array) -> None:
         """Make the smooth largest usages exact at a vector; from there on they are another problem's.
 
-        Parameters
-        ----------
-        vector : (size,) float64
-            the present motion
+        `vector`: (size,), the present motion.
         """
         at = self._at(vector)
         smooth = self._kinematics.smooth(at.x, np.ones_like(self._kinematic_scale)).values

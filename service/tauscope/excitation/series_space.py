@@ -22,15 +22,9 @@ class SeriesSpace:
     Row j is (centre, coefficients): the centre as part of half the position range away from its middle, the
     coefficients as parts of the speed limit. All entries are of order one.
 
-    Parameters
-    ----------
-    period_s : float
-        fundamental period [s]
+    `period_s`: fundamental period [s].
 
-    Raises
-    ------
-    ExcitationError
-        for too few harmonics
+    Raises ExcitationError for too few harmonics.
     """
 
     def __init__(self, limits: MotionLimits, period_s: float, harmonics: int) -> None:
@@ -54,13 +48,7 @@ class SeriesSpace:
         return self.joint_count * self.columns
 
     def series(self, x: Array) -> FourierSeries:
-        """The series of a vector.
-
-        Parameters
-        ----------
-        x : (n, columns) float64
-            centre and coefficients
-        """
+        """The series of a vector. `x`: (n, columns), centre and coefficients."""
         limits, free = self._limits, self.harmonics - 1
         speed = limits.velocity[:, None]
         return FourierSeries(
@@ -93,10 +81,7 @@ class SeriesSpace:
 class SeriesGrid:
     """Motion at fixed instants as a linear function of the vector x, and the way back.
 
-    Parameters
-    ----------
-    bases : three (K, 2 (M - 1)) float64
-        position, velocity and acceleration per coefficient
+    `bases`: three (K, 2 (M - 1)), position, velocity and acceleration per coefficient.
     """
 
     def __init__(self, limits: MotionLimits, bases: tuple[Array, Array, Array]) -> None:
@@ -109,13 +94,7 @@ class SeriesGrid:
         return len(self._bases[0])
 
     def motion(self, x: Array) -> MotionSamples:
-        """Position, velocity and acceleration at the instants.
-
-        Parameters
-        ----------
-        x : (n, columns) float64
-            centre and coefficients
-        """
+        """Position, velocity and acceleration at the instants. `x`: (n, columns), centre and coefficients."""
         limits = self._limits
         position, velocity, acceleration = (basis @ x[:, 1:].T * limits.velocity for basis in self._bases)
         return MotionSamples(position + limits.middle + limits.half_range * x[:, 0], velocity, acceleration)

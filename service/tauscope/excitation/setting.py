@@ -47,8 +47,7 @@ SCALING_STATES = 512
 class Setting:
     """One robot's limits, predictions and spaces.
 
-    available : (n,) float64
-        torque that may be used, infinite where there is no limit [Nm or N]
+    `available`: (n,), torque that may be used, infinite where there is no limit [Nm or N].
     """
 
     robot: Robot
@@ -63,13 +62,7 @@ class Setting:
 
     @staticmethod
     def of(robot: Robot, options: ExcitationOptions) -> "Setting":
-        """Prepare a design.
-
-        Raises
-        ------
-        ExcitationError
-            for options that do not fit the robot
-        """
+        """Prepare a design. Raises ExcitationError for options that do not fit the robot."""
         if options.noise_std is not None:
             _require_noise(np.asarray(options.noise_std), robot)
         base = base_parameters(robot)

@@ -23,12 +23,8 @@ class TorquePrediction:
     Friction counts with the larger of stiction and Coulomb level whatever the direction: near a reversal it acts
     either way, and the sum is an upper bound of |τ|.
 
-    Parameters
-    ----------
-    velocity : (n,) float64
-        speed limits [rad/s or m/s]
-    available : (n,) float64
-        torque that may be used, infinite where there is no limit [Nm or N]
+    `velocity`: (n,), speed limits [rad/s or m/s].
+    `available`: (n,), torque that may be used, infinite where there is no limit [Nm or N].
     """
 
     def __init__(
@@ -54,40 +50,30 @@ class TorquePrediction:
     def torque(self, motion: MotionSamples, base: Array | None = None) -> Array:
         """Bound of |τ| at every sample, (N, n) [Nm or N].
 
-        Parameters
-        ----------
-        base : (n, m, N) float64 or None
-            `ExcitationRegressor.base_regressor` of the same motion, where the caller has it
+        `base`: (n, m, N), `ExcitationRegressor.base_regressor` of the same motion, where the caller has it.
         """
         base = self._regressor.base_regressor(motion) if base is None else base
-        return self._rounded(self._rigid(base), self._small) + self._friction(motion)
+        return self._round_off(self._rigid(base), self._small) + self._friction(motion)
 
     def usage(self, motion: MotionSamples, base: Array | None = None) -> Array:
         """Part of the available torque that is used at every sample, (N, n); zero where there is no limit.
 
-        Parameters
-        ----------
-        base : (n, m, N) float64 or None
-            `ExcitationRegressor.base_regressor` of the same motion, where the caller has it
+        `base`: (n, m, N), `ExcitationRegressor.base_regressor` of the same motion, where the caller has it.
         """
         return self.torque(motion, base) / self.available
 
     def pull_back(self, motion: MotionSamples, base: Array, weight: Array) -> MotionGradient:
         """Derivatives by the motion of Σ weight · usage.
 
-        Parameters
-        ----------
-        base : (n, m, N) float64
-            `ExcitationRegressor.base_regressor` of the same motion
-        weight : (N, n) float64
-            derivative by `usage`
+        `base`: (n, m, N), `ExcitationRegressor.base_regressor` of the same motion; `weight`: (N, n), derivative by
+        `usage`.
         """
         rigid = self._rigid(base)
         by_torque = weight / self.available
-        by_rigid = by_torque * rigid / self._rounded(rigid, self._small)
+        by_rigid = by_torque * rigid / self._round_off(rigid, self._small)
         columns = by_rigid.T[:, None, :] * self._base[None, :, None]
         gradient = self._regressor.pull_back_base(motion, columns)
-        speed = motion.velocity / self._rounded(motion.velocity, self._rest)
+        speed = motion.velocity / self._round_off(motion.velocity, self._rest)
         return MotionGradient(
             gradient.position, gradient.velocity + by_torque * self._viscous * speed, gradient.acceleration
         )
@@ -98,9 +84,9 @@ class TorquePrediction:
         return np.stack([self._base[at:] @ base[joint, at:] for joint, at in enumerate(first)], axis=1)
 
     def _friction(self, motion: MotionSamples) -> Array:
-        return self._level + self._viscous * self._rounded(motion.velocity, self._rest)
+        return self._level + self._viscous * self._round_off(motion.velocity, self._rest)
 
     @staticmethod
-    def _rounded(values: Array, small: Array) -> Array:
+    def _round_off(values: Array, small: Array) -> Array:
         """√(x² + ε²), never less than |x|."""
         return np.sqrt(values**2 + small**2)

@@ -24,8 +24,7 @@ STILL_M = 1e-9
 class Box:
     """A forbidden box, its sides along the axes of the base frame.
 
-    low, high : (3,) float64
-        opposite corners [m]
+    `low`, `high`: (3,), opposite corners [m].
     """
 
     low: Array
@@ -45,10 +44,8 @@ class Box:
 class Workspace:
     """What the arm's joint origins and tool have to keep clear of.
 
-    floor_m : float or None
-        lowest height z in the base frame [m]; None where there is no floor
-    tool_m : (3,) float64
-        tool point in the last link's frame [m]
+    `floor_m`: lowest height z in the base frame [m]; None where there is no floor.
+    `tool_m`: (3,), tool point in the last link's frame [m].
     """
 
     floor_m: float | None = None
@@ -109,10 +106,7 @@ class WorkspaceUsage:
 
         Outside a box it is the largest distance along an axis, which is never more than the distance itself.
 
-        Parameters
-        ----------
-        position : (N, n) float64
-            postures [rad or m]
+        `position`: (N, n), postures [rad or m].
         """
         points = self._places(self._frames(position))
         columns = [] if self._workspace.floor_m is None else [points[..., 2] - self._workspace.floor_m]
@@ -125,13 +119,7 @@ class WorkspaceUsage:
         return np.maximum(1.0 - self.clearance(motion.position) / REFERENCE_M, 0.0)
 
     def pull_back(self, motion: MotionSamples, weight: Array) -> MotionGradient:
-        """Derivatives by the motion of Σ weight · usage.
-
-        Parameters
-        ----------
-        weight : (N, obstacles × points) float64
-            derivative by `usage`
-        """
+        """Derivatives by the motion of Σ weight · usage. `weight`: (N, obstacles × points), derivative by `usage`."""
         chain = self._frames(motion.position)
         points = self._places(chain)
         force = np.zeros_like(points)

@@ -27,10 +27,8 @@ class ActuatorKind(StrEnum):
 class ActuatorChoice:
     """Which actuators are written, and gains that go before those of the user's own MJCF.
 
-    kp : tuple of float
-        one for all joints or one a joint [Nm/rad or N/m]; empty where not given
-    kv : tuple of float
-        likewise [Nm s/rad or N s/m]
+    `kp`: one for all joints or one a joint [Nm/rad or N/m]; empty where not given.
+    `kv`: likewise [Nm s/rad or N s/m].
     """
 
     kind: ActuatorKind = ActuatorKind.MOTOR
@@ -47,17 +45,10 @@ def actuator_elements(
 ) -> tuple[list[str], list[str]]:
     """Actuator elements, one a joint, and notes on gains that are chosen rather than known.
 
-    Parameters
-    ----------
-    names : sequence of str
-        names of the joints as quoted attribute values
-    rotors : sequence of float
-        reflected rotor inertias, one a joint [kg m² or kg]
+    Raises ExportError if the number of gains is not one, nor that of the joints.
 
-    Raises
-    ------
-    ExportError
-        if the number of gains is not one, nor that of the joints
+    `names`: names of the joints as quoted attribute values; `rotors`: reflected rotor inertias, one a joint [kg m² or
+    kg].
     """
     if choice.kind is ActuatorKind.MOTOR:
         return [_motor(joint, name) for joint, name in zip(robot.joints, names, strict=True)], []
@@ -77,15 +68,9 @@ def joint_gains(
 ) -> tuple[list[tuple[float, float]], list[str]]:
     """Gains kp and kv of each joint: as given, as in the user's MJCF, or for a bandwidth; and notes on the last.
 
-    Parameters
-    ----------
-    rotors : sequence of float
-        reflected rotor inertias, one a joint [kg m² or kg]
+    Raises ExportError if the number of gains is not one, nor that of the joints.
 
-    Raises
-    ------
-    ExportError
-        if the number of gains is not one, nor that of the joints
+    `rotors`: reflected rotor inertias, one a joint [kg m² or kg].
     """
     count, notes = robot.joint_count, []
     for option, values in (("kp", choice.kp), ("kv", choice.kv)):
@@ -96,8 +81,8 @@ def joint_gains(
     gains: list[tuple[float, float]] = []
     for joint, described in enumerate(robot.joints):
         stated = described.actuator
-        kp = _given(choice.kp, joint)
-        kv = _given(choice.kv, joint)
+        kp = _choose_gain(choice.kp, joint)
+        kv = _choose_gain(choice.kv, joint)
         if kp is None and stated is not None and stated.kind == "position" and stated.stiffness is not None:
             kp, kv = stated.stiffness, stated.damping if kv is None else kv
         if kp is None:
@@ -110,7 +95,7 @@ def joint_gains(
     return gains, notes
 
 
-def _given(values: tuple[float, ...], joint: int) -> float | None:
+def _choose_gain(values: tuple[float, ...], joint: int) -> float | None:
     """A gain that is given for all joints or for this one."""
     return None if not values else values[0] if len(values) == 1 else values[joint]
 

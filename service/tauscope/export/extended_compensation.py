@@ -10,7 +10,7 @@ from datetime import datetime
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.errors import ExportError
 from tauscope.export.compensation import RecordingSource, to_c_header, to_python
-from tauscope.export.compensation.identifiers import identifier
+from tauscope.export.compensation.source_code import identifier
 from tauscope.export.model import ExportModel, FoundEffect, Origin, of_extended_model
 from tauscope.recording import EffortKind
 
@@ -26,23 +26,14 @@ def compensation_code(
 ) -> str:
     """Source code that gives the torque of friction and of the found effects.
 
-    Raises
-    ------
-    ExportError
-        for another suffix, or coefficients that no controller can use
+    Raises ExportError for another suffix, or coefficients that no controller can use.
     """
     origin = Origin(tuple(sources), effort_kind, created, version=version)
     return source_code(of_extended_model(diagnosis.selection.fit.model, (), origin), suffix)
 
 
 def source_code(model: ExportModel, suffix: str) -> str:
-    """The same of any model.
-
-    Raises
-    ------
-    ExportError
-        for another suffix, or coefficients that no controller can use
-    """
+    """The same of any model. Raises ExportError for another suffix, or coefficients that no controller can use."""
     plain = model.compensation
     if suffix == ".py":
         return to_python(plain) + (_python(identifier(plain.robot), model) if model.effects else "")
@@ -53,7 +44,7 @@ def source_code(model: ExportModel, suffix: str) -> str:
     raise ExportError(f"compensation code is .py or .h, not {suffix!r}; rename the file")
 
 
-def _left_out(model: ExportModel) -> list[str]:
+def _list_left_out(model: ExportModel) -> list[str]:
     """Effects that have no code, and why."""
     names = [joint.name for joint in model.robot.joints]
     without = [found.effect for found in model.effects if not found.effect.code]
@@ -79,7 +70,7 @@ def _python(name: str, model: ExportModel) -> str:
     """Function of the effects in Python."""
     lines = ["", "", f"def {name}_effect_torque(joint, position, velocity, load):"]
     lines.append('    """Torque in Nm (force in N) of what was found beside friction; load: rigid-body torque."""')
-    lines += [f"    # Not in this code: {each}" for each in _left_out(model)]
+    lines += [f"    # Not in this code: {each}" for each in _list_left_out(model)]
     lines += ["    from math import atan, copysign, cos, exp, fabs, pow, sin", ""]
     lines += ["    fmax = max", "    q, v = position, velocity", "    torque = 0.0"]
     for joint, expressions in _group_by_joint(model):
@@ -90,7 +81,7 @@ def _python(name: str, model: ExportModel) -> str:
 
 def _c(name: str, model: ExportModel) -> str:
     """Function of the effects in C."""
-    lines = [f"/* Not in this code: {each} */" for each in _left_out(model)]
+    lines = [f"/* Not in this code: {each} */" for each in _list_left_out(model)]
     lines.append("/* Torque in Nm (force in N) of what was found beside friction; load: rigid-body torque. */")
     lines.append(f"static inline double {name}_effect_torque(int joint, double q, double v, double load)")
     lines += ["{", "    double torque = 0.0;", "    (void)q;", "    (void)v;", "    (void)load;"]

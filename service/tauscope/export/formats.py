@@ -73,16 +73,9 @@ def make_export(export_format: ExportFormat, model: ExportModel, choice: Actuato
     """The content of an export.
 
     Controllers get the delivered friction; simulators the physically consistent links with the friction that fits them.
+    Raises ExportError if the format cannot hold this model.
 
-    Parameters
-    ----------
-    choice : ActuatorChoice or None
-        actuators of an MJCF; None writes torque motors
-
-    Raises
-    ------
-    ExportError
-        if the format cannot hold this model
+    `choice`: actuators of an MJCF; None writes torque motors.
     """
     match export_format:
         case ExportFormat.JSON:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 
 from tauscope.export.actuators import ActuatorChoice, joint_gains
-from tauscope.export.compensation.identifiers import comment_text, identifier
+from tauscope.export.compensation.source_code import comment_text, identifier
 from tauscope.export.joint_model import dry_friction_and_damping
 from tauscope.export.mjcf_findings import effects_in
 from tauscope.export.model import ExportModel
@@ -16,10 +16,7 @@ from tauscope.export.model import ExportModel
 def to_isaac_lab(model: ExportModel, choice: ActuatorChoice) -> str:
     """Python source with ``NAME_ACTUATORS``, for ``ArticulationCfg(actuators=…)``.
 
-    Raises
-    ------
-    ExportError
-        if a coefficient is not finite, or the number of gains is not one, nor that of the joints
+    Raises ExportError if a coefficient is not finite, or the number of gains is not one, nor that of the joints.
     """
     rotors = [value or 0.0 for value in model.rotor_inertia]
     gains, notes = joint_gains(model.robot, model.links, rotors, choice)

@@ -20,10 +20,8 @@ from tauscope.robot.messages import one_line, shown
 class JointModel:
     """One joint's part of the model; None leaves what the file says as it is.
 
-    rotor_inertia : float or None
-        the motor's inertia reflected to the joint [kg m² or kg]
-    branch : LinkInertia or None
-        the part of the link that the file has on moving joints beside the chain
+    `rotor_inertia`: the motor's inertia reflected to the joint [kg m² or kg].
+    `branch`: the part of the link that the file has on moving joints beside the chain.
     """
 
     link: LinkInertia | None = None
@@ -36,12 +34,9 @@ class JointModel:
 class CentredInertia:
     """A link as simulators want it.
 
-    mass : float
-        m [kg]
-    centre : (3,) float64
-        centre of mass in the link frame [m]
-    inertia : (3, 3) float64
-        about the centre of mass, along the axes of the link frame [kg m²]
+    `mass`: m [kg].
+    `centre`: (3,), centre of mass in the link frame [m].
+    `inertia`: (3, 3), about the centre of mass, along the axes of the link frame [kg m²].
     """
 
     mass: float
@@ -57,14 +52,7 @@ def joint_models(
 ) -> dict[str, JointModel]:
     """The whole robot's model by the labels of its segments, as the exports take it.
 
-    Parameters
-    ----------
-    links : sequence of LinkInertia
-        one a segment
-    friction : sequence of JointFriction
-        one a joint
-    rotor_inertia : sequence of float or None, length n, optional
-        identified rotor inertias [kg m² or kg]
+    `links`: one a segment; `friction`: one a joint; `rotor_inertia`: identified rotor inertias [kg m² or kg].
     """
     rotors = [None] * robot.joint_count if rotor_inertia is None else rotor_inertia
     own = {link: joint for joint, link in enumerate(robot.own_links)}
@@ -80,10 +68,7 @@ def joint_models(
 def centred(joint: str, link: LinkInertia) -> CentredInertia:
     """Centre of mass and inertia about it: I_c = I - m (sᵀs 1 - s sᵀ), equation (5) reversed.
 
-    Raises
-    ------
-    ExportError
-        if no rigid body has these parameters
+    Raises ExportError if no rigid body has these parameters.
     """
     finite = bool(np.isfinite(link.to_vector()).all())
     defect = find_defect(link) if finite and link.mass > 0.0 else f"mass {link.mass:g} kg"
@@ -98,15 +83,9 @@ def centred(joint: str, link: LinkInertia) -> CentredInertia:
 def dry_friction_and_damping(joint: str, friction: JointFriction) -> tuple[float, float]:
     """The two numbers that simulators hold: τ_s + τ_sc and τ_v, neither below zero.
 
-    Returns
-    -------
-    tuple of two float
-        dry friction [Nm or N], damping [Nm s/rad or N s/m]
+    Raises ExportError if a coefficient is not finite.
 
-    Raises
-    ------
-    ExportError
-        if a coefficient is not finite
+    Returns tuple of two float: dry friction [Nm or N], damping [Nm s/rad or N s/m].
     """
     check_friction(joint, friction)
     return max(0.0, friction.stiction + friction.stribeck), max(0.0, friction.viscous)
@@ -137,10 +116,7 @@ def friction_notes(joint: str, friction: JointFriction, format_name: str) -> lis
 def without_branch(name: str, model: JointModel) -> tuple[LinkInertia, list[str]]:
     """A joint's own link, without the bodies that the file has elsewhere; and notes.
 
-    Raises
-    ------
-    ExportError
-        if these bodies weigh more than the link
+    Raises ExportError if these bodies weigh more than the link.
     """
     link = model.link or LinkInertia.from_vector(np.zeros(10))
     if model.branch is None or not np.any(model.branch.to_vector()):

@@ -6,7 +6,7 @@ import numpy as np
 
 from tauscope.errors import ExportError
 from tauscope.export.actuators import ActuatorChoice, actuator_elements
-from tauscope.export.compensation.identifiers import comment_text
+from tauscope.export.compensation.source_code import comment_text
 from tauscope.export.joint_model import (
     JointModel,
     centred,
@@ -35,17 +35,13 @@ def to_mjcf(model: ExportModel, choice: ActuatorChoice = MOTORS) -> MjcfModel:
     """Write the arm as a complete MJCF: bodies, joints, inertials, friction, findings, an actuator a joint; no shapes.
 
     A body's frame is the link frame, and joint positions are the robot file's. damping = τ_v; frictionloss =
-    τ_s + τ_sc, the Coulomb level at speed; armature is the rotor's inertia where it was identified, else 0.
-
-    Raises
-    ------
-    ExportError
-        if a joint's link cannot exist, or a number is not finite
+    τ_s + τ_sc, the Coulomb level at speed; armature is the rotor's inertia where it was identified, else 0. Raises
+    ExportError if a joint's link cannot exist, or a number is not finite.
     """
     added = add_findings(model)
     robot, labels = added.robot, model.robot.segment_labels
     models = joint_models(robot, added.links, model.friction, model.rotor_inertia)
-    names = [_quoted(labels[link]) for link in robot.own_links]
+    names = [_quote(labels[link]) for link in robot.own_links]
     notes: list[str] = []
     lines: list[str] = []
     own_joints = {link: joint for joint, link in enumerate(robot.own_links)}
@@ -72,14 +68,14 @@ def to_mjcf(model: ExportModel, choice: ActuatorChoice = MOTORS) -> MjcfModel:
     comment = "".join(f"\n    {comment_text(note).replace('--', '- -')}" for note in notes)
     text = "\n".join(
         [
-            f"<mujoco model={_quoted(robot.name)}>",
+            f"<mujoco model={_quote(robot.name)}>",
             f"  <!-- Model identified by Tauscope.{comment} -->",
             '  <compiler angle="radian" autolimits="true"/>',
             f'  <option gravity="{numbers(*robot.gravity)}"/>',
             "  <worldbody>",
             *lines,
             "  </worldbody>",
-            *_followers(robot, [_quoted(label) for label in labels]),
+            *_followers(robot, [_quote(label) for label in labels]),
             *(["  <tendon>", *(f"    {line}" for line in tendons), "  </tendon>"] if tendons else []),
             "  <actuator>",
             *(f"    {line}" for line in actuators),
@@ -94,10 +90,7 @@ def to_mjcf(model: ExportModel, choice: ActuatorChoice = MOTORS) -> MjcfModel:
 def passive_elements(joint: int, extras: JointExtras, names: list[str]) -> list[str]:
     """Passive torques of a joint, which have no control input and whose motor is switched off.
 
-    Parameters
-    ----------
-    names : list of str
-        of the joints, as quoted attribute values
+    `names`: of the joints, as quoted attribute values.
     """
     return [
         f'<dcmotor joint={names[joint]} resistance="1.0" motorconst="0.0 0.0" input="none" {each}/>'
@@ -118,13 +111,7 @@ def _followers(robot: Robot, names: list[str]) -> list[str]:
 
 
 def tendon_elements(added: Additions, names: list[str]) -> list[str]:
-    """Friction on the sum or difference of two joints' motion.
-
-    Parameters
-    ----------
-    names : list of str
-        of the joints, as quoted attribute values
-    """
+    """Friction on the sum or difference of two joints' motion. `names`: of the joints, as quoted attribute values."""
     lines: list[str] = []
     for dry, damping, factors in added.tendons:
         lines.append(f'<fixed damping="{numbers(damping)}" frictionloss="{numbers(dry)}">')
@@ -148,7 +135,7 @@ def _body(
     position = segment.before.rotation @ segment.after.translation + segment.before.translation
     quaternion = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
     full = [inertia.inertia[row, column] for row, column in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-    name = _quoted(f"{label}_link")
+    name = _quote(f"{label}_link")
     return [
         f'<body name={name} pos="{numbers(*position)}" quat="{numbers(*quaternion)}">',
         f'  <inertial pos="{numbers(*inertia.centre)}" mass="{numbers(inertia.mass)}" fullinertia="{numbers(*full)}"/>',
@@ -173,7 +160,7 @@ def _joint(segment: Segment, label: str, model: JointModel, extras: JointExtras,
         attributes |= REST
     attributes["armature"] = numbers(_armature(label, model))
     written = " ".join(f'{key}="{value}"' for key, value in (attributes | extras.attributes).items())
-    return f"<joint name={_quoted(label)} {written}/>"
+    return f"<joint name={_quote(label)} {written}/>"
 
 
 def _armature(label: str, model: JointModel) -> float:
@@ -185,7 +172,7 @@ def _armature(label: str, model: JointModel) -> float:
     return armature
 
 
-def _quoted(name: str) -> str:
+def _quote(name: str) -> str:
     """A name as the value of an attribute."""
     from xml.sax.saxutils import quoteattr  # loads urllib and ssl
 

@@ -31,10 +31,8 @@ NEWER = "needs MuJoCo 3.8 or later"
 class JointExtras:
     """Attributes that findings add to the elements of one joint.
 
-    dry_friction : float
-        taken off frictionloss, since bristles have it [Nm or N]
-    passive : list of str
-        attributes of passive dcmotor elements
+    `dry_friction`: taken off frictionloss, since bristles have it [Nm or N].
+    `passive`: attributes of passive dcmotor elements.
     """
 
     attributes: dict[str, str] = field(default_factory=dict)
@@ -48,8 +46,7 @@ class JointExtras:
 class Additions:
     """Changes that findings make to a file.
 
-    left : list of FoundEffect
-        findings that MuJoCo cannot hold
+    `left`: findings that MuJoCo cannot hold.
     """
 
     robot: Robot
@@ -69,10 +66,7 @@ def numbers(*values: float | np.float64) -> str:
 def add_findings(model: ExportModel, *, without: Collection[str] = ()) -> Additions:
     """Everything that MuJoCo can hold of a model's findings, and a note on each of the others.
 
-    Parameters
-    ----------
-    without : collection of str
-        ids of effects that are left out, since they change more than joints and bodies
+    `without`: ids of effects that are left out, since they change more than joints and bodies.
     """
     extras = [JointExtras() for _ in model.robot.joints]
     added = Additions(model.robot, list(model.links), model.friction, extras)
@@ -193,13 +187,7 @@ WRITERS: Mapping[str, Callable[[Additions, FoundEffect], str | None]] = {
 
 
 def effects_in(model: ExportModel, included: Sequence[str], why: str) -> list[str]:
-    """Notes on the findings that a format does not hold.
-
-    Parameters
-    ----------
-    included : sequence of str
-        ids of the effects that it holds
-    """
+    """Notes on the findings that a format does not hold. `included`: ids of the effects that it holds."""
     names = [joint.name for joint in model.robot.joints]
     left = [found for found in model.effects if found.effect.id not in (*included, *IN_THE_MODEL)]
     return [f"{found.effect.name(names)} is not included: {why}. {_values(found)}" for found in left]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tauscope.errors import ExportError
-from tauscope.export.compensation.identifiers import comment_text
+from tauscope.export.compensation.source_code import comment_text
 from tauscope.export.joint_model import (
     CentredInertia,
     JointModel,
@@ -30,12 +30,9 @@ _MARKER = "Model identified by Tauscope."
 def patch_mjcf(path: Path, model: ExportModel) -> bytes:
     """Write links, friction, rotors and findings into an MJCF; every other byte stays.
 
-    The body of each joint gets an ``<inertial>`` about its centre of mass; bodies fixed to it keep theirs.
-
-    Raises
-    ------
-    ExportError
-        if the file is no MJCF, does not hold a joint itself or holds earlier findings, or the model is of another file
+    The body of each joint gets an ``<inertial>`` about its centre of mass; bodies fixed to it keep theirs. Raises
+    ExportError if the file is no MJCF, does not hold a joint itself or holds earlier findings, or the model is of
+    another file.
     """
     if not model.origin.is_mjcf:
         text = "the model comes from another file than an MJCF; give this MJCF as ROBOT to identify or diagnose"

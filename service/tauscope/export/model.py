@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.diagnosis import Diagnosis
-from tauscope.diagnosis.extended_model.consistent_links import consistent_links
+from tauscope.diagnosis.extended_model import consistent_links
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.torque_scale import on_the_arm
 from tauscope.effects import Effect
@@ -30,10 +30,8 @@ from tauscope.version import tauscope_version
 class FoundEffect:
     """An effect with its values, in the arm's own torque.
 
-    coefficients : (c,) float64
-        linear coefficients
-    shape : (k,) float64
-        shape parameters
+    `coefficients`: (c,), linear coefficients.
+    `shape`: (k,), shape parameters.
     """
 
     effect: Effect
@@ -45,8 +43,7 @@ class FoundEffect:
 class Origin:
     """Where a model came from.
 
-    is_mjcf : bool
-        whether the links' frames are bodies of an MJCF
+    `is_mjcf`: whether the links' frames are bodies of an MJCF.
     """
 
     sources: tuple[RecordingSource, ...]
@@ -61,12 +58,9 @@ class Origin:
 class ExportModel:
     """Bodies that can exist, friction for simulators and for controllers, and findings.
 
-    links : tuple of LinkInertia
-        one a segment
-    friction, delivered_friction : tuple of JointFriction
-        one a joint: beside these bodies, and as delivered
-    rotor_inertia : tuple of float or None
-        one a joint [kg m² or kg]
+    `links`: one a segment.
+    `friction`, `delivered_friction`: one a joint: beside these bodies, and as delivered.
+    `rotor_inertia`: one a joint [kg m² or kg].
     """
 
     robot: Robot
@@ -86,10 +80,7 @@ class ExportModel:
     def compensation(self) -> CompensationModel:
         """Friction as delivered, for controllers.
 
-        Raises
-        ------
-        ExportError
-            if a coefficient is not usable, or the drive's units contradict each other
+        Raises ExportError if a coefficient is not usable, or the drive's units contradict each other.
         """
         joints = tuple(
             JointCompensation(joint.name, joint.type, friction, drive_units(joint, self.origin.effort_kind))

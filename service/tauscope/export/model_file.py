@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from pydantic import Field, ValidationError
 
-from tauscope.diagnosis.extended_model.saved import (
+from tauscope.diagnosis.extended_model import (
     LARGEST_FILE,
     EffectEntry,
-    JointFrictionEntry,
     ModelDocument,
     NamedValue,
-    restored,
+    list_friction,
+    restore_model,
 )
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.effects.rotor_inertia import RotorInertia
@@ -80,18 +80,7 @@ def identified_document(result: Identification) -> ModelDocument:
         joints=names,
         base_parameters=[NamedValue(name=name, value=values[name]) for name in structure.base.expressions],
         links=[[float(value) for value in link.to_vector()] for link in result.consistent.links],
-        friction=[
-            JointFrictionEntry(
-                joint=name,
-                stiction=values.get(f"stiction {name}", 0.0),
-                stribeck=values.get(f"stribeck {name}"),
-                viscous=values.get(f"viscous {name}", 0.0),
-                offset=values.get(f"offset {name}", 0.0),
-                k_v=float(terms.k_v),
-                delta=None if terms.delta is None else float(terms.delta),
-            )
-            for name, terms in zip(names, structure.terms, strict=True)
-        ],
+        friction=list_friction(structure, values),
         effects=[
             EffectEntry(
                 effect=RotorInertia.id,
@@ -111,13 +100,7 @@ def identified_document(result: Identification) -> ModelDocument:
 
 
 def read_model_file(path: Path) -> ModelFile:
-    """The document of a file.
-
-    Raises
-    ------
-    IdentificationError
-        naming the file and the key
-    """
+    """The document of a file. Raises IdentificationError naming the file and the key."""
     text = decode_utf8(read_bounded(path, LARGEST_FILE), str(path))
     try:
         return ModelFile.model_validate_json(text)
@@ -131,13 +114,10 @@ def read_model_file(path: Path) -> ModelFile:
 def read_extended_model(path: Path, robot: Robot) -> ExtendedModel:
     """The extended model of a file, for an arm that is at hand.
 
-    Raises
-    ------
-    IdentificationError
-        naming the file and the key, or where it belongs to another arm
+    Raises IdentificationError naming the file and the key, or where it belongs to another arm.
     """
     try:
-        return restored(read_model_file(path), robot)
+        return restore_model(read_model_file(path), robot)
     except IdentificationError as error:
         text = str(error)
         raise IdentificationError(text if text.startswith(str(path)) else one_line(f"{path}: {text}")) from None
@@ -146,12 +126,7 @@ def read_extended_model(path: Path, robot: Robot) -> ExtendedModel:
 def read_export_model(path: Path) -> ExportModel:
     """The model of a file as exports need it, findings included.
 
-    Raises
-    ------
-    ExportError
-        where the file has no arm
-    IdentificationError
-        naming the file and the key
+    Raises ExportError where the file has no arm. Raises IdentificationError naming the file and the key.
     """
     return read_export_models(path)[-1]
 
@@ -159,12 +134,7 @@ def read_export_model(path: Path) -> ExportModel:
 def read_export_models(path: Path) -> tuple[ExportModel, ...]:
     """The models of a file as exports need them: without findings where the file has that, and with them.
 
-    Raises
-    ------
-    ExportError
-        where the file has no arm
-    IdentificationError
-        naming the file and the key
+    Raises ExportError where the file has no arm. Raises IdentificationError naming the file and the key.
     """
     document = read_model_file(path)
     arm = document.arm
@@ -181,7 +151,7 @@ def read_export_models(path: Path) -> tuple[ExportModel, ...]:
         for each in (document.plain, document):
             if each is not None:
                 links = [LinkInertia.from_vector(np.array(link)) for link in each.links]
-                models.append(of_extended_model(restored(each, robot), links, origin))
+                models.append(of_extended_model(restore_model(each, robot), links, origin))
     except (IdentificationError, RobotFileError, ValueError, TypeError) as error:
         raise IdentificationError(one_line(f"{path}: {error}")) from None
     return tuple(models)

@@ -12,7 +12,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from tauscope.diagnosis.extended_model.consistent_links import consistent_links
+from tauscope.diagnosis.extended_model import consistent_links
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.model.torque_scale import on_the_arm
 from tauscope.effects import Effect, Entry

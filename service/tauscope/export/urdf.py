@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from tauscope.errors import ExportError
-from tauscope.export.compensation.identifiers import comment_text
 from tauscope.export.compensation.model import JointFriction
+from tauscope.export.compensation.source_code import comment_text
 from tauscope.export.joint_model import (
     CentredInertia,
     JointModel,
@@ -39,17 +39,10 @@ def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel], remarks: 
     frame's axes. ``<dynamics>`` gets damping = τ_v and friction = τ_s + τ_sc, the Coulomb level at speed. Links on
     fixed joints below are part of the identified link: their own inertials are set to zero, not removed, because
     simulators make up a mass from the shapes of a link that has none. Bodies on joints beside the chain stay, and
-    their mass is taken off the link that carries them.
+    their mass is taken off the link that carries them. Raises ExportError if the file is not a URDF, a joint is not in
+    it or does not move, or a link cannot exist.
 
-    Parameters
-    ----------
-    remarks : sequence of str
-        further lines of the comment
-
-    Raises
-    ------
-    ExportError
-        if the file is not a URDF, a joint is not in it or does not move, or a link cannot exist
+    `remarks`: further lines of the comment.
     """
     data, label = _read(source)
     text = XmlText(data, label)

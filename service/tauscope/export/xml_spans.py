@@ -15,8 +15,7 @@ _TAG_END = re.compile(rb"""(?:[^>"']|"[^"]*"|'[^']*')*>""")
 class Element:
     """An element and where it stands in the file, in bytes.
 
-    comments : list of (int, int)
-        spans of the comments directly inside
+    `comments`: list of (int, int), spans of the comments directly inside.
     """
 
     name: str
@@ -50,10 +49,7 @@ class Edit:
 class XmlText:
     """The bytes of an XML file, its elements, and the edits that are to be made.
 
-    Raises
-    ------
-    ExportError
-        if the file is not well-formed XML in UTF-8, or declares a DOCTYPE
+    Raises ExportError if the file is not well-formed XML in UTF-8, or declares a DOCTYPE.
     """
 
     def __init__(self, data: bytes, label: str) -> None:

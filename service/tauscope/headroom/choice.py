@@ -21,8 +21,7 @@ Folds = NDArray[np.intp]
 class Member:
     """One black box at its best size, and what its predictions are multiplied by.
 
-    weight : float
-        0 where it predicts nothing of motion that it has not learned from
+    `weight`: 0 where it predicts nothing of motion that it has not learned from.
     """
 
     learner: Learner
@@ -34,8 +33,7 @@ class Member:
 class Choice:
     """Black boxes whose weighted predictions are added.
 
-    error : float
-        Σ e² of rows that are predicted from other motion, relative to that of the rows themselves
+    `error`: Σ e² of rows that are predicted from other motion, relative to that of the rows themselves.
     """
 
     error: float
@@ -44,10 +42,7 @@ class Choice:
     def predict(self, inputs: Inputs, target: Array, judged: Inputs) -> Array:
         """Learn from all training rows, and predict others, (J,).
 
-        Parameters
-        ----------
-        target : (R,) float64
-            what is to be predicted of the training rows [Nm or N]
+        `target`: (R,), what is to be predicted of the training rows [Nm or N].
         """
         total = np.zeros(len(judged.columns))
         for each in self.members:
@@ -73,10 +68,7 @@ def choose_black_box(inputs: Inputs, target: Array, splits: Sequence[Folds], lea
 
     Of several splits, the one by which most is predicted: motion may be told by other recordings, or by its neighbours.
 
-    Parameters
-    ----------
-    target : (R,) float64
-        what is to be predicted [Nm or N]
+    `target`: (R,), what is to be predicted [Nm or N].
     """
     choices = [_stack(inputs, target, folds, learners) for folds in splits]
     return min(choices, key=lambda each: each.error)

@@ -18,17 +18,10 @@ REFUTES_FROM = 0.05
 def require_black_box(held_out: int) -> None:
     """Check that headroom can be measured, before anything else is.
 
-    Parameters
-    ----------
-    held_out : int
-        number of held-out recordings
+    Raises MissingExtraError where scikit-learn is not installed. Raises IdentificationError where no recording is held
+    out.
 
-    Raises
-    ------
-    MissingExtraError
-        where scikit-learn is not installed
-    IdentificationError
-        where no recording is held out
+    `held_out`: number of held-out recordings.
     """
     with require_extra("tauscope diagnose --headroom"):
         import sklearn  # noqa: F401
@@ -39,12 +32,8 @@ def require_black_box(held_out: int) -> None:
 def measure_headroom(diagnosis: Diagnosis) -> list[HeadroomEntry]:
     """What a black box of the same training motion predicts of held-out motion, joint by joint.
 
-    Raises
-    ------
-    MissingExtraError
-        where scikit-learn is not installed
-    IdentificationError
-        where no recording is held out
+    Raises MissingExtraError where scikit-learn is not installed. Raises IdentificationError where no recording is held
+    out.
     """
     training, held_out = motion_rows(diagnosis)
     require_black_box(len(held_out))

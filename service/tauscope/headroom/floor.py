@@ -74,10 +74,7 @@ def noise_between_periods(observations: Observations, model: ExtendedModel) -> A
 def noise_above_band(observations: Observations, model: ExtendedModel, cutoff_hz: float) -> Array:
     """Rms in the band of white noise of the density above it, (n,) [Nm or N]; NaN where the band is open.
 
-    Parameters
-    ----------
-    cutoff_hz : float
-        of the band [Hz]
+    `cutoff_hz`: of the band [Hz].
     """
     joints = observations.robot.joint_count
     power, weight = np.zeros(joints), 0.0

@@ -32,9 +32,8 @@ STANDARD_ERRORS = 2.0
 class JointHeadroom:
     """Rms of a joint's held-out residual [Nm or N], and what the black box predicts of it; NaN without a black box.
 
-    share, share_std : float
-        part of the explained model's residual energy that the black box predicts, and its standard error over blocks;
-        negative where it predicts worse
+    `share`, `share_std`: part of the explained model's residual energy that the black box predicts, and its standard
+        error over blocks; negative where it predicts worse.
     """
 
     plain: float
@@ -57,10 +56,7 @@ def joint_headroom(training: Sequence[MotionRows], held_out: Sequence[MotionRows
 
     They start from the model with all findings: from the nominal model they would have to learn those again.
 
-    Parameters
-    ----------
-    joint : int
-        index, from 0
+    `joint`: index, from 0.
     """
     known, asked = _rows(training, joint), _rows(held_out, joint)
     plain, explained = (_residual(held_out, model, joint) for model in ("plain", "explained"))
@@ -77,12 +73,8 @@ def joint_headroom(training: Sequence[MotionRows], held_out: Sequence[MotionRows
 def compare_residuals(plain: Array, explained: Array, left: Array, blocks: NDArray[np.intp]) -> JointHeadroom:
     """Rms of each, and how much less is left than by the explained model.
 
-    Parameters
-    ----------
-    plain, explained, left : (R,) float64
-        residuals of both models and of the black box [Nm or N]
-    blocks : (R,) int
-        number of every row's block
+    `plain`, `explained`, `left`: (R,), residuals of both models and of the black box [Nm or N]; `blocks`: (R,) int,
+    number of every row's block.
     """
     energy = max(float(explained @ explained), np.finfo(float).tiny)
     _, place = np.unique(blocks, return_inverse=True)

@@ -32,15 +32,8 @@ class Learner(Protocol):
     def predict(self, inputs: Inputs, target: Array, judged: Inputs) -> Mapping[float, Array]:
         """Learn from some rows and predict others, by size of the black box.
 
-        Parameters
-        ----------
-        target : (R,) float64
-            what is to be predicted of the rows that are learned from [Nm or N]
-
-        Returns
-        -------
-        mapping of float to (J,) float64
-            predictions for the judged rows [Nm or N]
+        `target`: (R,), what is to be predicted of the rows that are learned from [Nm or N]. Returns mapping of float to
+        (J,), predictions for the judged rows [Nm or N].
         """
         ...
 
@@ -54,15 +47,8 @@ class BoostedTrees:
     def predict(self, inputs: Inputs, target: Array, judged: Inputs) -> Mapping[float, Array]:
         """By number of trees.
 
-        Parameters
-        ----------
-        target : (R,) float64
-            what is to be predicted of the rows that are learned from [Nm or N]
-
-        Returns
-        -------
-        mapping of float to (J,) float64
-            predictions for the judged rows [Nm or N]
+        `target`: (R,), what is to be predicted of the rows that are learned from [Nm or N]. Returns mapping of float to
+        (J,), predictions for the judged rows [Nm or N].
         """
         from sklearn.ensemble import HistGradientBoostingRegressor
 
@@ -92,15 +78,8 @@ class KernelRidge:
     def predict(self, inputs: Inputs, target: Array, judged: Inputs) -> Mapping[float, Array]:
         """By ridge weight.
 
-        Parameters
-        ----------
-        target : (R,) float64
-            what is to be predicted of the rows that are learned from [Nm or N]
-
-        Returns
-        -------
-        mapping of float to (J,) float64
-            predictions for the judged rows [Nm or N]
+        `target`: (R,), what is to be predicted of the rows that are learned from [Nm or N]. Returns mapping of float to
+        (J,), predictions for the judged rows [Nm or N].
         """
         from sklearn.kernel_approximation import Nystroem
 

@@ -12,18 +12,13 @@ from tauscope.recording.recording import Array
 class MotionRows:
     """Evenly spaced rows of one piece of motion, in the band in which models and torque are compared.
 
-    recording : int
-        number of the recording
-    time : (M,) float64
-        since the beginning of the recording [s]
-    progress : (M,) float64
-        part of the recording's motion that is over, 0 to 1; alike in every repetition of a motion
-    position, velocity, acceleration, load : (n, M) float64
-        q, q̇, q̈ and the rigid-body torque [SI]
-    torque, plain, explained : (n, M) float64
-        measured, by the nominal model, and by the model with all findings [Nm or N]
-    used : (n, M) bool
-        rows that rest on measured torque
+    `recording`: number of the recording.
+    `time`: (M,), since the beginning of the recording [s].
+    `progress`: (M,), part of the recording's motion that is over, 0 to 1; alike in every repetition of a motion.
+    `position`, `velocity`, `acceleration`, `load`: (n, M), q, q̇, q̈ and the rigid-body torque [SI].
+    `torque`, `plain`, `explained`: (n, M), measured, by the nominal model, and by the model with all findings [Nm or
+        N].
+    `used`: (n, M), rows that rest on measured torque.
     """
 
     recording: int
@@ -43,23 +38,15 @@ class MotionRows:
 class Inputs:
     """Rows by the columns that a black box learns from.
 
-    columns : (R, d) float64
-        those of the joint itself first
-    own : int
-        how many these are
+    `columns`: (R, d), those of the joint itself first.
+    `own`: how many these are.
     """
 
     columns: Array
     own: int
 
     def at(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> "Inputs":
-        """Some of the rows.
-
-        Parameters
-        ----------
-        rows : (R,) bool or (k,) int
-            mask or places
-        """
+        """Some of the rows. `rows`: (R,) or (k,) int, mask or places."""
         return Inputs(self.columns[rows], self.own)
 
 
@@ -68,10 +55,7 @@ def joint_inputs(motion: MotionRows, joint: int) -> Inputs:
 
     And the travel of the joint since its last reversal.
 
-    Parameters
-    ----------
-    joint : int
-        index, from 0
+    `joint`: index, from 0.
     """
     order = [joint, *(other for other in range(len(motion.position)) if other != joint)]
     now = (motion.position, motion.velocity, motion.acceleration, motion.load)
@@ -82,13 +66,7 @@ def joint_inputs(motion: MotionRows, joint: int) -> Inputs:
 
 
 def shifted(values: Array, step: int) -> Array:
-    """Signals some rows later, the row at the end repeated, (n, M).
-
-    Parameters
-    ----------
-    values : (n, M) float64
-        evenly spaced rows
-    """
+    """Signals some rows later, the row at the end repeated, (n, M). `values`: (n, M), evenly spaced rows."""
     places = np.clip(np.arange(values.shape[-1]) + step, 0, values.shape[-1] - 1)
     return values[..., places]
 
@@ -96,10 +74,7 @@ def shifted(values: Array, step: int) -> Array:
 def travel_since_reversal(position: Array, velocity: Array) -> Array:
     """Way since the velocity last changed its sign, with that sign, (M,) [rad or m].
 
-    Parameters
-    ----------
-    position, velocity : (M,) float64
-        of one joint
+    `position`, `velocity`: (M,), of one joint.
     """
     turns = np.flatnonzero(np.diff(np.signbit(velocity), prepend=np.signbit(velocity[:1])))
     last = np.searchsorted(turns, np.arange(len(position)), side="right")

@@ -147,14 +147,9 @@ def identify(
 ) -> Identification:
     """Identify a robot arm from recordings.
 
-    Raises
-    ------
-    RecordingMismatchError
-        where a recording has another number of joints than the robot
-    RecordingError
-        where a recording is too short or too broken to be used
-    IdentificationError
-        where the recordings hold too little for the parameters
+    Raises RecordingMismatchError where a recording has another number of joints than the robot. Raises RecordingError
+    where a recording is too short or too broken to be used. Raises IdentificationError where the recordings hold too
+    little for the parameters.
     """
     _require_joints(robot, (*recordings, *held_out))
     progress("condition recordings")

@@ -96,10 +96,7 @@ class Solution:
 def factorise(motions: Iterable[PreparedMotion], structure: ModelStructure) -> tuple[JointFactor, ...]:
     """One pass over the data: every joint's triangular factor.
 
-    Raises
-    ------
-    IdentificationError
-        where a joint has fewer measured rows than parameters
+    Raises IdentificationError where a joint has fewer measured rows than parameters.
     """
     joints = range(structure.robot.joint_count)
     columns = [structure.joint_columns(joint) for joint in joints]

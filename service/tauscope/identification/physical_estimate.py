@@ -30,17 +30,13 @@ def consistent_estimate(structure: ModelStructure, factor: Array, target: Array,
     """The most probable parameters that bodies and friction can have.
 
     Data that no arm could have made may put the estimate millions of standard errors away from any body. The program is
-    then solved for a noise ten times as large, and so on: the prior weighs more.
+    then solved for a noise ten times as large, and so on: the prior weighs more. Raises IdentificationError where no
+    noise makes the program solvable.
 
     Parameters
     ----------
     factor, target : (r, p), (r,) float64
         R and z of the whitened equations of the model's columns
-
-    Raises
-    ------
-    IdentificationError
-        where no noise makes the program solvable
     """
     full = FullParameters.of(structure)
     columns = factor @ full.map

@@ -9,10 +9,7 @@ from tauscope.recording.conditioning import Conditioner
 def require_motion(conditioners: Sequence[Conditioner]) -> None:
     """Refuse recordings in which no joint leaves the noise of its own encoder.
 
-    Raises
-    ------
-    IdentificationError
-        names the recordings
+    Raises IdentificationError, which names the recordings.
     """
     if not any(conditioner.moving.any() for conditioner in conditioners):
         names = ", ".join(conditioner.recording.name for conditioner in conditioners)

@@ -7,9 +7,9 @@ from tauscope.identification.excitation import Excitation
 from tauscope.identification.identification import Identification
 from tauscope.identification.posterior import DETERMINED
 from tauscope.recording.conditioning import ConditioningSummary
-from tauscope.recording.words import listed
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import JointType, Robot
+from tauscope.robot.messages import listed
 
 FEWEST_REVERSALS = 2
 """A joint turns round at least so often where friction is to be told from a constant torque."""

@@ -12,8 +12,7 @@ from tauscope.recording.measures import Gaps, JointMeasures, StepMeasures, measu
 from tauscope.recording.reading import read_recording
 from tauscope.recording.recording import EffortKind, Recording
 from tauscope.recording.units import SI, Reading
-from tauscope.recording.words import listed
-from tauscope.robot.finding import Finding, Severity
+from tauscope.robot.messages import Finding, Severity, listed
 from tauscope.robot.robot import Robot
 
 _MEANINGFUL_STEP = 1e-4
@@ -32,10 +31,8 @@ class Periods:
 class RecordingReport:
     """What `check_recording` found.
 
-    duration_s : float
-        from the first to the last sample [s]
-    rate_hz : float
-        1 / median step [Hz]
+    `duration_s`: from the first to the last sample [s].
+    `rate_hz`: 1 / median step [Hz].
     """
 
     name: str
@@ -55,10 +52,7 @@ class RecordingReport:
     def require_usable(self) -> None:
         """Refuse a recording that no other verb accepts.
 
-        Raises
-        ------
-        RecordingError
-            a column can hardly be in its unit, or a joint has no effort
+        Raises RecordingError where a column can hardly be in its unit, or a joint has no effort.
         """
         for finding in self.findings:
             if finding.severity is Severity.ERROR:
@@ -70,15 +64,9 @@ def check_recording(
 ) -> RecordingReport:
     """Read a recording and report what it holds, in memory that does not grow with its length.
 
-    Parameters
-    ----------
-    joint_count : int or None
-        joints that the recording must have; None where any number is welcome
+    Raises RecordingError where the file cannot be read or breaks a rule.
 
-    Raises
-    ------
-    RecordingError
-        the file cannot be read or breaks a rule
+    `joint_count`: joints that the recording must have; None where any number is welcome.
     """
     reading = reading.for_robot(robot)
     joints = None if robot is None else [joint.name for joint in robot.joints]

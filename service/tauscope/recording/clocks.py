@@ -13,21 +13,12 @@ class SplitClock:
     """Joins seconds and nanoseconds, from the first row on: a large count has no room for small parts of a second."""
 
     def __init__(self) -> None:
-        """Start before the first row."""
         self._first = np.nan
 
     def join(self, seconds: Array, nanoseconds: Array) -> Array:
         """Time since the first second.
 
-        Parameters
-        ----------
-        seconds, nanoseconds : (rows,) float64
-            parts of each stamp [s, ns]
-
-        Returns
-        -------
-        (rows,) float64
-            [s]
+        `seconds`, `nanoseconds`: (rows,), parts of each stamp [s, ns]. Returns (rows,) [s].
         """
         if len(seconds) and np.isnan(self._first):
             self._first = seconds[0]
@@ -38,13 +29,7 @@ class EpisodeClock:
     """Puts episodes one after another, `PAUSE_S` apart."""
 
     def __init__(self, unit_s: float) -> None:
-        """Start before the first row.
-
-        Parameters
-        ----------
-        unit_s : float
-            unit of the file's time [s]
-        """
+        """Start before the first row. `unit_s`: unit of the file's time [s]."""
         self._pause = PAUSE_S / unit_s
         self._episode, self._shift, self._last = np.nan, 0.0, np.nan
         self._count = 0
@@ -52,17 +37,8 @@ class EpisodeClock:
     def shift(self, time: Array, episode: Array) -> Array:
         """Time on the common clock.
 
-        Parameters
-        ----------
-        time : (rows,) float64
-            of each row within its episode, in the file's unit
-        episode : (rows,) float64
-            index of its episode
-
-        Returns
-        -------
-        (rows,) float64
-            in the file's unit
+        `time`: (rows,), of each row within its episode, in the file's unit; `episode`: (rows,), index of its episode.
+        Returns (rows,), in the file's unit.
         """
         starts = np.flatnonzero(np.diff(episode, prepend=self._episode) != 0)
         shifted = time + self._shift

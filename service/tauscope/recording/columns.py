@@ -12,8 +12,8 @@ from tauscope.recording.layout.rename import NANOSECONDS, rename_columns
 from tauscope.recording.layout.roles import role_of
 from tauscope.recording.samples import EffortKind
 from tauscope.recording.units import Reading
-from tauscope.recording.words import listed, printable
 from tauscope.result_warning import ResultWarning
+from tauscope.robot.messages import listed, printable
 from tauscope.robot.recording_layout import RecordingLayout
 
 OPTIONAL_GROUPS = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt", "kp")
@@ -53,12 +53,8 @@ def is_column(name: str) -> bool:
 def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLayout:
     """Find the columns of CONTRACT.md in a file's header, as its mapping, its preset or their own names say.
 
-    Raises
-    ------
-    RecordingError
-        a column is missing; the message holds the mapping that the header suggests
-    RecordingMismatchError
-        the file names other joints than the robot
+    Raises RecordingError where a column is missing; the message holds the mapping that the header suggests. Raises
+    RecordingMismatchError where the file names other joints than the robot.
     """
     renamed = rename_columns(header, reading, file)
     counts_rows = reading.units.get("t") == "index" and "t" not in renamed
@@ -129,13 +125,7 @@ def _note_command(header: Sequence[str], renamed: Sequence[str]) -> tuple[Result
 
 
 def find_layout(header: Sequence[str], reading: Reading, file: str) -> tuple[Reading, ColumnLayout]:
-    """How a file is read, and which of its columns is which.
-
-    Raises
-    ------
-    RecordingError
-        as `map_columns`
-    """
+    """How a file is read, and which of its columns is which. Raises RecordingError as `map_columns`."""
     reading = _choose_reading(header, reading, file)
     return reading, map_columns(header, reading, file)
 
@@ -154,15 +144,9 @@ def _choose_reading(header: Sequence[str], reading: Reading, file: str) -> Readi
 def find_columns(header: Sequence[str], file: str, *, counts_rows: bool = False) -> ColumnLayout:
     """Find the columns of CONTRACT.md in a header.
 
-    Parameters
-    ----------
-    counts_rows : bool
-        whether t is the number of the row, and the header's first name is no column of the file
+    Raises RecordingError where a required column is missing, a name appears twice, a joint's number leaves a gap.
 
-    Raises
-    ------
-    RecordingError
-        a required column is missing, a name appears twice, a joint's number leaves a gap
+    `counts_rows`: whether t is the number of the row, and the header's first name is no column of the file.
     """
     where = _positions(header, file)
     if "t" not in where:
@@ -192,15 +176,9 @@ def find_columns(header: Sequence[str], file: str, *, counts_rows: bool = False)
 def require_joint_count(found: int, expected: int | None, file: str) -> None:
     """Refuse a recording of another robot.
 
-    Parameters
-    ----------
-    expected : int or None
-        joints of the robot; None where any number is welcome
+    Raises RecordingMismatchError where the numbers differ.
 
-    Raises
-    ------
-    RecordingMismatchError
-        the numbers differ
+    `expected`: joints of the robot; None where any number is welcome.
     """
     if expected is None or found == expected:
         return

@@ -11,13 +11,12 @@ import numpy as np
 from tauscope.errors import RecordingError
 from tauscope.recording.clocks import SplitClock
 from tauscope.recording.columns import ColumnLayout, find_layout, require_joint_count
-from tauscope.recording.csv_dialect import BLANK, Dialect, find_delimiter, find_first_row
+from tauscope.recording.csv_dialect import BLANK, Dialect, find_delimiter, find_first_row, read_units_row
 from tauscope.recording.csv_numbers import Clock, is_number, parse_number, parse_quickly, shown
 from tauscope.recording.intake import RowIntake
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
 from tauscope.recording.units import SI, Reading
-from tauscope.recording.units_row import read_units_row
 
 _CHUNK_BYTES = 2**18
 _LONGEST_LINE_BYTES = 2**20
@@ -35,21 +34,9 @@ def read_csv(
 ) -> Recording:
     """Read a CSV recording, in time linear and in memory bounded in its number of lines.
 
-    Comma, semicolon, tab, | or blanks between the fields; an empty field or ``nan`` is a missed sample.
-
-    Parameters
-    ----------
-    joint_count : int or None
-        joints that the recording must have; None where any number is welcome
-    spool_above_bytes : int
-        size above which the rows go to a temporary file [bytes]
-
-    Raises
-    ------
-    RecordingError
-        names the line and column at fault
-    RecordingMismatchError
-        the file has another number of joints
+    Comma, semicolon, tab, | or blanks between the fields; an empty field or ``nan`` is a missed sample. Raises
+    RecordingError, which names the line and column at fault. Raises RecordingMismatchError where the file has another
+    number of joints.
     """
     with path.open("rb") as file:
         header = _read_header(file, name, reading)
@@ -72,10 +59,7 @@ def read_csv(
 def read_csv_header(path: Path, name: str, reading: Reading = SI) -> list[str]:
     """Names of a file's columns, or numbers from 1 where it has none.
 
-    Raises
-    ------
-    RecordingError
-        the file holds no line of text
+    Raises RecordingError where the file holds no line of text.
     """
     with path.open("rb") as file:
         return _read_names(file, name, reading).names

@@ -27,10 +27,8 @@ _SHOWN_CHARACTERS = 40
 def parse_quickly(text: bytes, delimiter: bytes, width: int, source: Sequence[int]) -> Array | None:
     """Parse a block of complete lines, or decline.
 
-    Returns
-    -------
-    (rows, len(source)) float64 or None
-        None where a line is not exactly `width` decimal numbers, NaN or empty fields: comments, text, anything unusual
+    Returns (rows, len(source)) or None, None where a line is not exactly `width` decimal numbers, NaN or empty fields:
+    comments, text, anything unusual.
     """
     if b"\r" in text:
         text = text.replace(b"\r\n", b"\n")
@@ -79,15 +77,9 @@ def _parse_numbers(text: bytes) -> Array | None:
 def parse_number(field: bytes, file: str, line: int, column: str) -> float:
     """Parse one field strictly: a decimal number, or NaN where it is empty or ``nan``.
 
-    Parameters
-    ----------
-    line : int
-        its line, counted from 1
+    Raises RecordingError where the text is not a number, or is infinite.
 
-    Raises
-    ------
-    RecordingError
-        the text is not a number, or is infinite
+    `line`: its line, counted from 1.
     """
     text = field.strip(b" \t")
     if not text or _MISSED.fullmatch(text):
@@ -104,26 +96,15 @@ class Clock:
     """Reads a file's column t: numbers, or ISO 8601 dates, of which seconds since the first are kept."""
 
     def __init__(self) -> None:
-        """Start before the first row."""
         self._first: datetime | None = None
 
     def parse(self, field: bytes, file: str, line: int) -> float:
         """Time of a row.
 
-        Parameters
-        ----------
-        line : int
-            its line, counted from 1
+        Raises RecordingError where the text is neither a number nor a date.
 
-        Returns
-        -------
-        float
-            [s], or in the file's own unit
-
-        Raises
-        ------
-        RecordingError
-            the text is neither a number nor a date
+        `line`: its line, counted from 1.
+        Returns float: [s], or in the file's own unit.
         """
         text = field.strip(b' \t"')
         if not _DATE.match(text):

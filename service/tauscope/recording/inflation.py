@@ -1,4 +1,8 @@
-"""Files that unpack to far more than any recording would: refused before they fill memory or disk."""
+"""Compressed data: unpacked, and refused before files that unpack to far more than a recording fill memory or disk."""
+
+from pathlib import Path
+
+import zstandard
 
 from tauscope.errors import RecordingError
 
@@ -19,10 +23,7 @@ def require_plausible_inflation(
 ) -> None:
     """Refuse a file that unpacks to more than `LARGEST_RATIO` times its size, beyond a size that does no harm.
 
-    Raises
-    ------
-    RecordingError
-        if it does
+    Raises RecordingError if it does.
     """
     accepted_bytes = ALWAYS_ACCEPTED_BYTES if accepted_bytes is None else accepted_bytes
     if unpacked_bytes > max(accepted_bytes, LARGEST_RATIO * packed_bytes):
@@ -38,3 +39,44 @@ ALWAYS_ACCEPTED_RECORDS = 200_000
 def count_plausible_records(packed_bytes: int) -> int:
     """Most records that a file may hold: one a byte, beyond a number that does no harm."""
     return ALWAYS_ACCEPTED_RECORDS + packed_bytes
+
+
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+"""First bytes of a zstd frame; a CDR message begins with a zero byte, JSON with a bracket."""
+
+LARGEST_MESSAGE_BYTES = 2**17
+"""Of a message with the states of a thousand joints."""
+
+_COPY_BYTES = 2**20
+
+
+def decompress_message(message: bytes) -> bytes:
+    """The message itself, where it is compressed.
+
+    Raises ValueError where the frame is damaged, or larger than any joint state.
+    """
+    if not message.startswith(ZSTD_MAGIC):
+        return message
+    try:
+        if zstandard.frame_content_size(message) > LARGEST_MESSAGE_BYTES:
+            raise ValueError("the compressed message is larger than any joint state")
+        return zstandard.ZstdDecompressor().decompress(message, max_output_size=LARGEST_MESSAGE_BYTES)
+    except zstandard.ZstdError as error:
+        raise ValueError(f"the compressed message is damaged: {error}") from error
+
+
+def decompress_file(source: Path, target: Path, name: str) -> Path:
+    """Write a compressed file's content to a target, which is returned.
+
+    Raises RecordingError where the file is damaged, or holds implausibly much.
+    """
+    size, written = source.stat().st_size, 0
+    try:
+        with source.open("rb") as packed, target.open("wb") as plain:
+            for piece in zstandard.ZstdDecompressor().read_to_iter(packed, write_size=_COPY_BYTES):
+                written += len(piece)
+                require_plausible_inflation(size, written, name)
+                plain.write(piece)
+    except (zstandard.ZstdError, ValueError) as error:
+        raise RecordingError(f"{name}: cannot be decompressed ({error}); copy the file again") from error
+    return target

@@ -35,10 +35,7 @@ class RowIntake:
     ) -> None:
         """Prepare for the first block.
 
-        Parameters
-        ----------
-        spool_above_bytes : int
-            size above which the rows go to a temporary file [bytes]
+        `spool_above_bytes`: size above which the rows go to a temporary file [bytes].
         """
         self._file = file
         self._conversion = Conversion.design(names, effort_kind, reading)
@@ -58,15 +55,9 @@ class RowIntake:
     def add(self, block: Array, place: Callable[[int], str]) -> None:
         """Take the next block.
 
-        Parameters
-        ----------
-        block : (rows, columns) float64
-            as the file has them
+        Raises RecordingError, which names the row and the column at fault.
 
-        Raises
-        ------
-        RecordingError
-            names the row and the column at fault
+        `block`: (rows, columns), as the file has them.
         """
         self._check(block, place)
         rows = np.append(self._tail_rows, np.arange(self._rows, self._rows + len(block)))
@@ -88,10 +79,7 @@ class RowIntake:
     ) -> Recording:
         """The recording of all rows.
 
-        Raises
-        ------
-        RecordingError
-            there is next to none, or too many have the same stamp
+        Raises RecordingError where there is next to none, or too many have the same stamp.
         """
         self._builder.append(self._tail)
         require_rows(len(self._builder), self._file)

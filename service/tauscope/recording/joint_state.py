@@ -28,10 +28,8 @@ _NANOSECONDS = 1_000_000_000
 class JointState:
     """One message.
 
-    stamp : int
-        time of measurement [ns]
-    position, velocity, effort : (n,) float64
-        empty where the publisher does not know them
+    `stamp`: time of measurement [ns].
+    `position`, `velocity`, `effort`: (n,), empty where the publisher does not know them.
     """
 
     stamp: int
@@ -45,10 +43,8 @@ class JointState:
 class JointStates:
     """Messages of one layout.
 
-    stamp : (N,) int64
-        time of measurement [ns]
-    position, velocity, effort : (N, n) or (N, 0) float64
-        one row a message
+    `stamp`: (N,) int64, time of measurement [ns].
+    `position`, `velocity`, `effort`: (N, n) or (N, 0), one row a message.
     """
 
     stamp: NDArray[np.int64]
@@ -62,13 +58,7 @@ class JointStateLayout:
     """Where a publisher's messages keep what; learned from one message."""
 
     def __init__(self, message: bytes) -> None:
-        """Learn the layout.
-
-        Raises
-        ------
-        ValueError
-            it is no JointState
-        """
+        """Learn the layout. Raises ValueError where it is no JointState."""
         cursor = CdrCursor(message)
         self.first = _decode(cursor)
         self._size = len(message)
@@ -83,10 +73,7 @@ class JointStateLayout:
     def decode(self, messages: Sequence[bytes]) -> JointStates | None:
         """Decode a batch at once, or decline.
 
-        Returns
-        -------
-        JointStates or None
-            None where one of the messages has another layout
+        Returns JointStates or None: None where one of the messages has another layout.
         """
         if any(len(message) != self._size for message in messages):
             return None
@@ -106,23 +93,14 @@ class JointStateLayout:
 
 
 def decode_cdr(message: bytes) -> JointState:
-    """Decode one CDR message.
-
-    Raises
-    ------
-    ValueError
-        it is no JointState
-    """
+    """Decode one CDR message. Raises ValueError where it is no JointState."""
     return _decode(CdrCursor(message))
 
 
 def decode_json(message: bytes) -> JointState:
     """Decode one message in JSON, with the field names of the ROS 2 message.
 
-    Raises
-    ------
-    ValueError
-        it is no JointState
+    Raises ValueError where it is no JointState.
     """
     content = from_json(message)
     if not isinstance(content, dict):
@@ -188,13 +166,7 @@ class CdrCursor:
         return value.decode("utf-8")
 
     def numbers(self) -> Array:
-        """A sequence of numbers.
-
-        Returns
-        -------
-        (n,) float64
-            as the message has them
-        """
+        """A sequence of numbers. Returns (n,), as the message has them."""
         count = self.length()
         if count:
             self._align(8)

@@ -22,10 +22,7 @@ _EFFORTS = ("effort", "torque", "current")
 def find_decoder(type_name: str, encoding: str, schema: bytes) -> Decoder | None:
     """The decoder of a topic's messages, None where they are no joint states.
 
-    Parameters
-    ----------
-    schema : bytes
-        of the type, empty where the log has none
+    `schema`: of the type, empty where the log has none.
     """
     if (type_name, encoding) == ("foxglove.JointStates", "protobuf"):
         return decode_foxglove_protobuf(schema)
@@ -35,10 +32,7 @@ def find_decoder(type_name: str, encoding: str, schema: bytes) -> Decoder | None
 def decode_ros1(message: bytes) -> JointState:
     """Decode sensor_msgs/JointState of ROS 1: no alignment, strings without a closing NUL.
 
-    Raises
-    ------
-    ValueError
-        it is no JointState
+    Raises ValueError where it is no JointState.
     """
     try:
         _, seconds, nanoseconds, length = struct.unpack_from("<IIII", message)
@@ -65,10 +59,7 @@ def decode_ros1(message: bytes) -> JointState:
 def decode_dynamic(message: bytes) -> JointState:
     """Decode control_msgs/msg/DynamicJointState: per joint, names and values of its interfaces.
 
-    Raises
-    ------
-    ValueError
-        it is no DynamicJointState
+    Raises ValueError where it is no DynamicJointState.
     """
     cursor = CdrCursor(message)
     stamp = cursor.stamp()
@@ -89,13 +80,7 @@ def decode_dynamic(message: bytes) -> JointState:
 
 
 def decode_foxglove_json(message: bytes) -> JointState:
-    """Decode foxglove.JointStates in JSON.
-
-    Raises
-    ------
-    ValueError
-        it is no JointStates
-    """
+    """Decode foxglove.JointStates in JSON. Raises ValueError where it is no JointStates."""
     content = from_json(message)
     joints = content.get("joints") if isinstance(content, dict) else None
     if not isinstance(joints, list) or not all(isinstance(joint, dict) for joint in joints):

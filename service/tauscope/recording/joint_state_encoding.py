@@ -32,7 +32,6 @@ class JointStateEncoder:
     """Writes joint states of the same joints, message after message, into one template."""
 
     def __init__(self, names: Sequence[str], *, has_velocity: bool = True, has_effort: bool = True) -> None:
-        """Lay the template out."""
         message = bytearray(_ENCAPSULATION + bytes(_STAMP.size))
         _append_string(message, "")
         _append_length(message, len(names))
@@ -46,16 +45,10 @@ class JointStateEncoder:
     def encode(self, stamp_ns: int, position: Array, velocity: Array | None, effort: Array | None) -> bytes:
         """One message.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            time of measurement since 1970 [ns]
-        position : (n,) float64
-            [rad or m]
-        velocity : (n,) float64 or None
-            [rad/s or m/s]; None where the layout has none
-        effort : (n,) float64 or None
-            [Nm or N]; None where the layout has none
+        `stamp_ns`: time of measurement since 1970 [ns].
+        `position`: (n,) [rad or m].
+        `velocity`: (n,) [rad/s or m/s]; None where the layout has none.
+        `effort`: (n,) [Nm or N]; None where the layout has none.
         """
         _STAMP.pack_into(self._message, len(_ENCAPSULATION), stamp_ns // _NANOSECONDS, stamp_ns % _NANOSECONDS)
         for target, values in zip(self._numbers, (position, velocity, effort), strict=True):

@@ -6,7 +6,7 @@ from tauscope.errors import RecordingError
 from tauscope.recording.joint_state_decoders import find_decoder
 from tauscope.recording.joint_state_topic import Choice, JointStateTopic
 from tauscope.recording.recording import Recording
-from tauscope.recording.words import listed
+from tauscope.robot.messages import listed
 
 _PREFERRED_TOPICS = ("/joint_states", "joint_states")
 
@@ -18,7 +18,6 @@ class JointStateLog:
     """Joint states of one or several container files that were recorded together."""
 
     def __init__(self, choice: Choice) -> None:
-        """Start empty."""
         self._choice = choice
         self._topics: dict[str, JointStateTopic] = {}
         self._others: list[str] = []
@@ -53,10 +52,7 @@ class JointStateLog:
 def choose_topic(topics: Mapping[str, JointStateTopic], other_topics: Sequence[str], file: str) -> JointStateTopic:
     """The one topic with efforts of the wanted joints, or the one of several that ROS itself would take.
 
-    Raises
-    ------
-    RecordingError
-        there is none, or more than one and none of them is ``/joint_states``
+    Raises RecordingError where there is none, or more than one and none of them is ``/joint_states``.
     """
     filled = {name: topic for name, topic in topics.items() if topic.messages}
     if not filled:

@@ -7,19 +7,77 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.errors import RecordingError
+from tauscope.errors import RecordingError, RecordingMismatchError
 from tauscope.recording.columns import table_columns
-from tauscope.recording.inflation import HELD_BYTES, require_plausible_inflation
+from tauscope.recording.inflation import (
+    HELD_BYTES,
+    LARGEST_MESSAGE_BYTES,
+    decompress_message,
+    require_plausible_inflation,
+)
 from tauscope.recording.intake import RowIntake
 from tauscope.recording.joint_state import JointState, JointStateLayout, JointStates, decode_cdr
 from tauscope.recording.joint_state_decoders import Decoder
-from tauscope.recording.message_compression import LARGEST_MESSAGE_BYTES, decompress_message
-from tauscope.recording.other_publishers import OtherPublishers
 from tauscope.recording.recording import EffortKind, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
 from tauscope.recording.units import SI, Reading
-from tauscope.recording.words import listed, reason
 from tauscope.result_warning import ResultWarning
+from tauscope.robot.messages import listed, reason
+
+_REMEDY = "record with one publisher on the topic, or choose another topic with --topic"
+
+
+class OtherPublishers:
+    """Counts a topic's messages of others."""
+
+    def __init__(self) -> None:
+        self._foreign: dict[tuple[str, ...], int] = {}
+        self._partial: dict[tuple[str, ...], int] = {}
+        self._incomplete: dict[tuple[str, tuple[str, ...]], int] = {}
+
+    def add(self, names: Sequence[str], wanted: Sequence[str], count: int) -> None:
+        """Messages that lack some of the wanted joints, or all of them."""
+        kind = self._partial if set(names) & set(wanted) else self._foreign
+        kind[tuple(names)] = kind.get(tuple(names), 0) + count
+
+    def add_incomplete(self, names: Sequence[str], missing: str, count: int) -> None:
+        """Messages without positions, or without efforts."""
+        key = missing, tuple(names)
+        self._incomplete[key] = self._incomplete.get(key, 0) + count
+
+    def notes(self, topic: str, wanted: Sequence[str]) -> tuple[ResultWarning, ...]:
+        """Warnings about messages that name wanted joints; a gripper's own messages are none of the arm's business."""
+        texts = [
+            f"{_messages(count)} no {missing}; left out"
+            for (missing, names), count in self._incomplete.items()
+            if not names or set(names) & set(wanted)
+        ]
+        texts += [
+            f"{_messages(count)} only the joints {listed(names)}; left out" for names, count in self._partial.items()
+        ]
+        return tuple(
+            ResultWarning(code="other-publisher", text=f"topic {topic}: {text}", remedy=_REMEDY) for text in texts
+        )
+
+    def error(self, place: str, wanted: Sequence[str] | None) -> RecordingError:
+        """The reason why no message was of use."""
+        if self._incomplete:
+            missing, _ = next(iter(self._incomplete))
+            return RecordingError(f"{place}: carries no {missing}; record position and effort of every joint")
+        found = max((*self._partial.items(), *self._foreign.items()), key=lambda entry: entry[1], default=((), 0))[0]
+        names = wanted or ()
+        missing = [name for name in names if name not in found]
+        lacks = f": {listed(missing)} is missing" if self._partial else ""
+        return RecordingMismatchError(
+            f"{place} carries {len(found)} joints ({listed(found)}), the robot has {len(names)} ({listed(names)})"
+            f"{lacks}; name the joints in the robot file as the recording does"
+        )
+
+
+def _messages(count: int) -> str:
+    """A count of messages, up to the verb."""
+    return "1 message holds" if count == 1 else f"{count} messages hold"
+
 
 _MESSAGES_AT_ONCE = 4096
 _BYTES_AT_ONCE = 2**24
@@ -37,12 +95,9 @@ Batch: TypeAlias = tuple[Rows, JointStates]
 class Choice:
     """What the user wants out of a log.
 
-    joint_count : int or None
-        joints that the recording must have; None where any number is welcome
-    spool_above_bytes : int
-        size above which the rows go to a temporary file [bytes]
-    packed_bytes : int or None
-        size of the log, by which its messages are plausible [bytes]; None where any are
+    `joint_count`: joints that the recording must have; None where any number is welcome.
+    `spool_above_bytes`: size above which the rows go to a temporary file [bytes].
+    `packed_bytes`: size of the log, by which its messages are plausible [bytes]; None where any are.
     """
 
     file: str
@@ -57,7 +112,6 @@ class JointStateTopic:
     """Collects the messages of one topic; a fault is kept until it is known whether this topic is the wanted one."""
 
     def __init__(self, topic: str, decoder: Decoder, choice: Choice) -> None:
-        """Start empty."""
         self.topic = topic
         self.messages = 0
         self.fault: RecordingError | None = None
@@ -71,13 +125,7 @@ class JointStateTopic:
         self._wanted = choice.joint_names
 
     def add(self, log_time: int, message: bytes) -> None:
-        """Take the next message.
-
-        Parameters
-        ----------
-        log_time : int
-            when it was logged [ns]
-        """
+        """Take the next message. `log_time`: when it was logged [ns]."""
         self.messages += 1
         if self.fault is not None:
             return
@@ -131,10 +179,7 @@ class JointStateTopic:
     def finish(self) -> Recording:
         """The recording that this topic holds.
 
-        Raises
-        ------
-        RecordingError
-            names the message at fault, counted from 1 within the topic
+        Raises RecordingError, which names the message at fault, counted from 1 within the topic.
         """
         self.flush()
         if self.fault is not None:

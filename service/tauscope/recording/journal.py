@@ -39,6 +39,7 @@ _CYCLE_SCHEMA = {
         "period": {"type": ["number", "null"]},
         "lateness_ns": {"type": "integer"},
         "temperature": {"type": "array", "items": {"type": ["number", "null"]}},
+        "voltage": {"type": "array", "items": {"type": ["number", "null"]}},
     },
 }
 _EVENT_SCHEMA = {"title": EVENT_TYPE, "type": "object", "properties": {"event": {"type": "string"}}}
@@ -49,13 +50,7 @@ class JournalWriter:
     """Writes rows and events of one run, in the order in which they come."""
 
     def __init__(self, path: Path, header: JournalHeader, *, synchronise: bool = False) -> None:
-        """Create the file; it must not exist.
-
-        Raises
-        ------
-        OSError
-            the file exists or cannot be created
-        """
+        """Create the file; it must not exist. Raises OSError where the file exists or cannot be created."""
         self.header = header
         self.rows = 0
         self._synchronise = synchronise
@@ -75,15 +70,9 @@ class JournalWriter:
     def write_rows(self, rows: NDArray[np.void]) -> None:
         """Write cycles.
 
-        Parameters
-        ----------
-        rows : (k,) of `journal_row_type`
-            the cycles, oldest first
+        Raises OSError where the disk does not take them.
 
-        Raises
-        ------
-        OSError
-            the disk does not take them
+        `rows`: (k,) of `journal_row_type`, the cycles, oldest first.
         """
         before = self._file.tell()
         for row in rows:
@@ -96,6 +85,7 @@ class JournalWriter:
                 "period": float(row["period"]),
                 "lateness_ns": int(row["lateness_ns"]),
                 "temperature": row["temperature"].tolist(),
+                "voltage": row["voltage"].tolist(),
             }
             self._add(JOINT_STATE_TOPIC, stamp, measured)
             self._add(REFERENCE_TOPIC, stamp, asked)
@@ -105,13 +95,7 @@ class JournalWriter:
             self._flush()
 
     def write_event(self, time_ns: int, event: Mapping[str, Any]) -> None:
-        """Write what happened.
-
-        Parameters
-        ----------
-        time_ns : int
-            when, by the clock of the rows [ns]
-        """
+        """Write what happened. `time_ns`: when, by the clock of the rows [ns]."""
         self._add(EVENT_TOPIC, time_ns + self.header.epoch_offset_ns, to_json(dict(event), inf_nan_mode="null"))
 
     def close(self) -> None:

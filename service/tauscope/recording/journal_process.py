@@ -35,13 +35,7 @@ def frame(kind: bytes, content: bytes) -> bytes:
 
 
 def event_frame(time_ns: int, event: dict[str, Any]) -> bytes:
-    """The frame of an event.
-
-    Parameters
-    ----------
-    time_ns : int
-        when, by the clock of the rows [ns]
-    """
+    """The frame of an event. `time_ns`: when, by the clock of the rows [ns]."""
     return frame(EVENT, EVENT_TIME.pack(time_ns) + json.dumps(event).encode())
 
 
@@ -55,13 +49,7 @@ class FrameWriter:
         self._pending = b""
 
     def feed(self, data: bytes) -> None:
-        """Take the next bytes.
-
-        Raises
-        ------
-        OSError
-            the disk does not take them
-        """
+        """Take the next bytes. Raises OSError where the disk does not take them."""
         data, at, rows = self._pending + data, 0, []
         while len(data) - at >= FRAME.size:
             length, kind = FRAME.unpack_from(data, at)
@@ -118,13 +106,7 @@ def main(path: str) -> int:
 
 
 def wait_for_writer(path: Path, patience_s: float) -> bool:
-    """Wait until nobody writes a journal any more.
-
-    Parameters
-    ----------
-    patience_s : float
-        how long to wait [s]
-    """
+    """Wait until nobody writes a journal any more. `patience_s`: how long to wait [s]."""
     deadline = time.monotonic() + patience_s
     with path.open("rb") as file:
         while True:

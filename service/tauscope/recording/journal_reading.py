@@ -15,7 +15,7 @@ from tauscope.recording.journal import CYCLE_TOPIC, EVENT_TOPIC, JOINT_STATE_TOP
 from tauscope.recording.journal_rows import JournalHeader, Phase, journal_row_type
 from tauscope.recording.mcap_format import scan_mcap
 from tauscope.recording.recording import Array, EffortKind, Recording
-from tauscope.recording.words import reason
+from tauscope.robot.messages import reason
 
 LONGEST_HOLD = 1.5
 """Cycles between two samples of which none was missed between them."""
@@ -25,10 +25,8 @@ LONGEST_HOLD = 1.5
 class Journal:
     """What a journal holds.
 
-    rows : (N,) of `journal_row_type`
-        the cycles, oldest first
-    damage : str or None
-        why reading stopped before the file's end, None where the file is whole
+    `rows`: (N,) of `journal_row_type`, the cycles, oldest first.
+    `damage`: why reading stopped before the file's end, None where the file is whole.
     """
 
     header: JournalHeader
@@ -45,10 +43,7 @@ class Journal:
 def read_journal(path: Path) -> Journal:
     """Read a journal up to its end or its first damage.
 
-    Raises
-    ------
-    RecordingError
-        the file cannot be read, or its header did not come through
+    Raises RecordingError where the file cannot be read, or its header did not come through.
     """
     collector = _Collector()
     try:
@@ -66,14 +61,10 @@ def read_journal(path: Path) -> Journal:
 def journal_recording(journal: Journal, name: str) -> Recording:
     """The recording of a journal's motion, without the ramp; time runs from the motion's first sample.
 
-    Columns t, q, tau (i where the drives report no torque), qd and temp where they report them, qref, taucmd where
-    effort was commanded, and period where the motion is repeated. Where the host commanded effort, tau (i) is the mean
-    of what acted before and after the sample; the journal keeps what was reported.
-
-    Raises
-    ------
-    RecordingError
-        next to nothing of the motion is there
+    Columns t, q, tau (i where the drives report no torque), qd, temp and volt where they report them, qref, taucmd
+    where effort was commanded, and period where the motion is repeated. Where the host commanded effort, tau (i) is the
+    mean of what acted before and after the sample; the journal keeps what was reported. Raises RecordingError: next to
+    nothing of the motion is there.
     """
     rows, header = journal.motion, journal.header
     if not len(rows):
@@ -85,12 +76,13 @@ def journal_recording(journal: Journal, name: str) -> Recording:
         name,
         (rows["time_ns"] - rows["time_ns"][0]) * 1e-9,
         rows["position"],
-        _at_samples(rows, 1e9 / header.rate_hz) if is_held else rows["effort"],
+        _sample_effort(rows, 1e9 / header.rate_hz) if is_held else rows["effort"],
         effort_kind=EffortKind.TORQUE if is_torque else EffortKind.CURRENT,
         velocity=_find_reported(rows["velocity"]),
         reference=_find_reported(rows["reference"]),
         effort_command=_find_reported(rows["command"]),
         temperature=_find_reported(rows["temperature"]),
+        voltage=_find_reported(rows["voltage"]),
         period=_find_reported(rows["period"]),
     )
 
@@ -136,6 +128,8 @@ class _Collector:
         rows["phase"] = [Phase[cycle["phase"].upper()] for cycle in cycles]
         rows["period"] = np.array([cycle["period"] for cycle in cycles], dtype=np.float64)
         rows["temperature"] = np.array([cycle["temperature"] for cycle in cycles], dtype=np.float64)
+        unknown = [None] * header.joint_count  # journals of before there was a voltage
+        rows["voltage"] = np.array([cycle.get("voltage", unknown) for cycle in cycles], dtype=np.float64)
         return rows
 
 
@@ -147,7 +141,7 @@ def _decode(messages: list[bytes]) -> JointStates:
     return states
 
 
-def _at_samples(rows: NDArray[np.void], period_ns: float) -> Array:
+def _sample_effort(rows: NDArray[np.void], period_ns: float) -> Array:
     """Effort at the instants of the samples, where drives hold it from one command to the next, (N, n).
 
     A drive reports what it has held until the sample: by itself that is half a cycle late. The next sample tells what

@@ -25,10 +25,8 @@ class Phase(IntEnum):
 class JournalHeader:
     """What all rows of a journal have in common.
 
-    rate_hz : float
-        cycles a second that were asked for [Hz]
-    epoch_offset_ns : int
-        to be added to a row's time to make it nanoseconds since 1970 [ns]
+    `rate_hz`: cycles a second that were asked for [Hz].
+    `epoch_offset_ns`: to be added to a row's time to make it nanoseconds since 1970 [ns].
     """
 
     robot: str
@@ -51,13 +49,7 @@ class JournalHeader:
 
     @staticmethod
     def from_dict(data: Any) -> "JournalHeader":
-        """The header of plain data.
-
-        Raises
-        ------
-        RecordingError
-            it is no such header
-        """
+        """The header of plain data. Raises RecordingError where it is no such header."""
         fields = {key: value for key, value in data.items() if key != "form"} if isinstance(data, dict) else {}
         try:
             header = TypeAdapter(JournalHeader).validate_python(fields)
@@ -77,9 +69,9 @@ def journal_row_type(joint_count: int) -> np.dtype[np.void]:
 
     ``time_ns`` instant of the reading by the backend's clock, ``lateness_ns`` of the cycle behind its deadline,
     ``phase`` as in `Phase`, ``period`` index of the excitation period or NaN; one number a joint: measured
-    ``position``, ``velocity``, ``effort``, ``temperature``; ``reference``, ``reference_velocity`` and ``command``
-    (effort, NaN where none was commanded).
+    ``position``, ``velocity``, ``effort``, ``temperature``, ``voltage``; ``reference``, ``reference_velocity`` and
+    ``command`` (effort, NaN where none was commanded).
     """
     scalars = [("time_ns", "<i8"), ("lateness_ns", "<i8"), ("phase", "<i8"), ("period", "<f8")]
-    groups = ("position", "velocity", "effort", "temperature", "reference", "reference_velocity", "command")
+    groups = ("position", "velocity", "effort", "temperature", "voltage", "reference", "reference_velocity", "command")
     return np.dtype([*scalars, *((group, "<f8", (joint_count,)) for group in groups)])

@@ -30,12 +30,10 @@ ONE_TURN = 2.0 * np.pi
 class LinkEncoders:
     """What the columns qlink say.
 
-    lag : (N, n) float64
-        q - qlink without whole turns and without its median [rad or m]; NaN where either is missing or a glitch
-    joints : tuple of int
-        joints, from 0, that have an encoder on the link
-    copies, strangers : tuple of int
-        joints whose column repeats q, and whose column does not move with it
+    `lag`: (N, n), q - qlink without whole turns and without its median [rad or m]; NaN where either is missing or a
+        glitch.
+    `joints`: joints, from 0, that have an encoder on the link.
+    `copies`, `strangers`: joints whose column repeats q, and whose column does not move with it.
     """
 
     lag: Array

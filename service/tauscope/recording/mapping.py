@@ -18,12 +18,9 @@ from tauscope.robot.robot import Robot
 class ColumnMapping:
     """A file's columns as they are understood.
 
-    columns : mapping of str to str
-        column of the file by that of CONTRACT.md, such as ``q1``; only those that were found
-    units : mapping of str to str
-        unit of ``t``, ``q``, ``qd`` and ``tau``
-    is_guessed : bool
-        whether words of the column names suggest it, and no reader accepts the file without it
+    `columns`: column of the file by that of CONTRACT.md, such as ``q1``; only those that were found.
+    `units`: unit of ``t``, ``q``, ``qd`` and ``tau``.
+    `is_guessed`: whether words of the column names suggest it, and no reader accepts the file without it.
     """
 
     header: tuple[str, ...]
@@ -35,10 +32,7 @@ class ColumnMapping:
 def find_mapping(path: Path, robot: Robot | None = None, reading: Reading = SI) -> ColumnMapping:
     """The mapping by which a table is read; where none is, as much as its column names suggest.
 
-    Raises
-    ------
-    RecordingError
-        the header cannot be read, or the file is a log, which names its joints itself
+    Raises RecordingError where the header cannot be read, or the file is a log, which names its joints itself.
     """
     header = tuple(read_header(path))
     reading = reading.for_robot(robot)

@@ -21,19 +21,19 @@ from tauscope.errors import RecordingError
 from tauscope.recording.inflation import count_plausible_records, require_plausible_inflation
 from tauscope.recording.joint_state_log import JointStateLog, MessageHandler
 from tauscope.recording.joint_state_topic import Choice
-from tauscope.recording.mcap_chunk import (
+from tauscope.recording.mcap_index import (
     MESSAGE,
     RECORD,
     UNREADABLE,
     DamageError,
     MessageSink,
     find_handler,
+    read_by_index,
     unpack_chunk,
 )
-from tauscope.recording.mcap_index import read_by_index
 from tauscope.recording.recording import Recording
 from tauscope.recording.row_check import MINIMUM_ROWS
-from tauscope.recording.words import reason
+from tauscope.robot.messages import reason
 
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 
@@ -45,8 +45,7 @@ _COPY_BYTES = 2**20
 class Salvage:
     """What was read of a file that may be damaged.
 
-    damage : str or None
-        why reading stopped, None where the file is whole
+    `damage`: why reading stopped, None where the file is whole.
     """
 
     recording: Recording
@@ -56,10 +55,7 @@ class Salvage:
 def read_mcap(path: Path, choice: Choice) -> Recording:
     """Read the joint states of an MCAP file.
 
-    Raises
-    ------
-    RecordingError
-        the file is truncated or damaged, or holds no usable joint states
+    Raises RecordingError where the file is truncated or damaged, or holds no usable joint states.
     """
     log = JointStateLog(choice)
     add_mcap(path, choice.file, log)
@@ -67,13 +63,7 @@ def read_mcap(path: Path, choice: Choice) -> Recording:
 
 
 def add_mcap(path: Path, name: str, log: JointStateLog) -> None:
-    """Add the messages of one whole file to a log.
-
-    Raises
-    ------
-    RecordingError
-        the file is truncated or damaged
-    """
+    """Add the messages of one whole file to a log. Raises RecordingError where the file is truncated or damaged."""
     damage = _read_whole(path, log)
     if damage is not None:
         samples = log.samples
@@ -83,13 +73,7 @@ def add_mcap(path: Path, name: str, log: JointStateLog) -> None:
 
 
 def recover_mcap(path: Path, choice: Choice) -> Salvage:
-    """Read a damaged MCAP file up to the damage.
-
-    Raises
-    ------
-    RecordingError
-        nothing usable comes before the damage
-    """
+    """Read a damaged MCAP file up to the damage. Raises RecordingError where nothing usable comes before the damage."""
     log = JointStateLog(choice)
     damage = scan_mcap(path, log)
     if damage is not None and log.samples < MINIMUM_ROWS:
@@ -100,10 +84,7 @@ def recover_mcap(path: Path, choice: Choice) -> Salvage:
 def scan_mcap(path: Path, sink: MessageSink) -> str | None:
     """Hand the messages of an MCAP file over, in the order of the file, up to its end or its first damage.
 
-    Returns
-    -------
-    str or None
-        why reading stopped before the file's end, None where it is whole
+    Returns str or None: why reading stopped before the file's end, None where it is whole.
     """
     with path.open("rb") as file:
         try:

@@ -6,24 +6,76 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
-from typing import BinaryIO
+from typing import BinaryIO, Protocol
 
+import zstandard
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, ChunkIndex, Schema, Statistics
+from mcap.records import Channel, Chunk, ChunkIndex, Schema, Statistics
+from mcap.stream_reader import get_chunk_data_stream
 
-from tauscope.recording.inflation import require_plausible_inflation
+from tauscope.recording.inflation import HELD_BYTES, LARGEST_RATIO, require_plausible_inflation
 from tauscope.recording.joint_state_log import MessageHandler
-from tauscope.recording.mcap_chunk import (
-    MESSAGE,
-    RECORD,
-    UNREADABLE,
-    DamageError,
-    MessageSink,
-    find_handler,
-    unpack_chunk,
+from tauscope.robot.messages import reason
+
+RECORD = struct.Struct("<BQ")
+"""Opcode and length of a record."""
+
+MESSAGE = struct.Struct("<HIQQ")
+"""Channel, sequence, log time and publish time, in front of a message's bytes."""
+
+UNREADABLE = (
+    McapError,
+    ValueError,
+    struct.error,
+    RuntimeError,
+    EOFError,
+    MemoryError,
+    OverflowError,
+    zstandard.ZstdError,
 )
-from tauscope.recording.words import reason
+"""Errors that damaged records raise."""
+
+_LARGEST_CHUNK_BYTES = 2**28
+
+
+class DamageError(Exception):
+    """The container cannot be read further; the message completes "file: "."""
+
+
+class MessageSink(Protocol):
+    """Receiver of the messages of an MCAP file."""
+
+    def handler(self, topic: str, type_name: str, encoding: str, schema: bytes = b"") -> MessageHandler | None:
+        """The taker of a topic's messages, None where there is none."""
+        ...
+
+
+def find_handler(sink: MessageSink, channel: Channel, schemas: Mapping[int, Schema]) -> MessageHandler | None:
+    """The taker of a channel's messages."""
+    schema = schemas.get(channel.schema_id)
+    name, data = ("", b"") if schema is None else (schema.name, schema.data)
+    return sink.handler(channel.topic, name, channel.message_encoding, data)
+
+
+def unpack_chunk(body: bytes) -> bytes:
+    """Records within a chunk, their checksum compared.
+
+    Raises ValueError where the chunk is damaged or implausibly large, among other errors of `UNREADABLE`.
+    """
+    chunk = Chunk.read(ReadDataStream(BytesIO(body)))
+    if chunk.compression not in ("", "zstd", "lz4"):
+        raise ValueError(f"unknown compression {chunk.compression[:20]!r}")
+    declared = [chunk.uncompressed_size]
+    if chunk.compression == "zstd":
+        # The frame states its own size and the decompressor believes it: look before it allocates.
+        declared.append(max(zstandard.frame_content_size(chunk.data), 0))
+    if max(declared) > min(_LARGEST_CHUNK_BYTES, max(HELD_BYTES, LARGEST_RATIO * len(body))):
+        raise ValueError("implausible chunk size")
+    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
+    return stream.read(size)
+
 
 SEEK_BYTES = 2**15
 """Distance of wanted messages above which each is read by itself [bytes]: reading so far takes longer than a seek."""
@@ -69,15 +121,9 @@ class _Part:
 def read_by_index(file: BinaryIO, size: int, sink: MessageSink) -> bool:
     """Hand the wanted messages over in the order of the file.
 
-    Returns
-    -------
-    bool
-        False, and nothing was handed over, where the file has no sound index or most of it is wanted
+    Raises DamageError where a chunk is not as the index says.
 
-    Raises
-    ------
-    DamageError
-        a chunk is not as the index says
+    Returns bool: False, and nothing was handed over, where the file has no sound index or most of it is wanted.
     """
     try:
         summary = _read_summary(file, size)

@@ -22,8 +22,7 @@ _CLIPPED_SAMPLES = 10
 class StepMeasures:
     """Steps of the clock; the percentiles are those of at most a million evenly chosen steps.
 
-    minimum, percentile_1, median, percentile_99, maximum : float
-        length of a step [s]
+    `minimum`, `percentile_1`, `median`, `percentile_99`, `maximum`: length of a step [s].
     """
 
     minimum: float
@@ -37,12 +36,9 @@ class StepMeasures:
 class JointMeasures:
     """One joint's channels.
 
-    position, effort : (float, float)
-        least and greatest value, NaN where every sample was missed
-    first_wrap : float or None
-        time of the first of them [s]
-    clipped : tuple of (float, int)
-        levels at which the effort stays, and number of samples
+    `position`, `effort`: (float, float), least and greatest value, NaN where every sample was missed.
+    `first_wrap`: time of the first of them [s].
+    `clipped`: tuple of (float, int), levels at which the effort stays, and number of samples.
     """
 
     position: tuple[float, float]
@@ -57,10 +53,8 @@ class JointMeasures:
 class Gaps:
     """Steps of the clock beyond 1.9 medians: one lost sample of a regular clock is one.
 
-    longest : float
-        the longest of them [s], 0 without gaps
-    longest_at : float or None
-        time at which it begins [s]
+    `longest`: the longest of them [s], 0 without gaps.
+    `longest_at`: time at which it begins [s].
     """
 
     count: int
@@ -72,8 +66,7 @@ class Gaps:
 class RowMeasures:
     """All figures but the gaps.
 
-    duration : float
-        from the first to the last sample [s]
+    `duration`: from the first to the last sample [s].
     """
 
     duration: float

@@ -3,24 +3,22 @@
 import tokenize
 import zipfile
 import zlib
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tauscope.errors import RecordingError
-from tauscope.recording.clocks import SplitClock
-from tauscope.recording.columns import find_layout, require_joint_count
+from tauscope.recording.column_batches import ROWS_AT_ONCE, Batch, read_batches
+from tauscope.recording.columns import ColumnLayout
 from tauscope.recording.inflation import HELD_BYTES, require_plausible_inflation
-from tauscope.recording.intake import RowIntake
 from tauscope.recording.recording import Array, Recording
-from tauscope.recording.table import SPOOL_ABOVE_BYTES
 from tauscope.recording.units import SI, Reading
-from tauscope.recording.words import listed, reason
+from tauscope.robot.messages import listed, reason
 
 ZIP_MAGIC = b"PK\x03\x04"
 
-_ROWS_AT_ONCE = 2**16
 _MOST_COLUMNS = 10_000
 _UNREADABLE = (
     zipfile.BadZipFile,
@@ -37,50 +35,23 @@ _UNREADABLE = (
 """Errors that damaged archives raise; NumPy reads the header of an array as Python."""
 
 
-def read_npz(
-    path: Path,
-    name: str,
-    joint_count: int | None = None,
-    spool_above_bytes: int = SPOOL_ABOVE_BYTES,
-    reading: Reading = SI,
-) -> Recording:
+def read_npz(path: Path, name: str, joint_count: int | None = None, reading: Reading = SI) -> Recording:
     """Read an archive; columns of an array are named ``qpos[0]``, ``qpos[1]``, ….
 
-    Parameters
-    ----------
-    joint_count : int or None
-        joints that the recording must have; None where any number is welcome
-    spool_above_bytes : int
-        size above which the rows go to a temporary file [bytes]
-
-    Raises
-    ------
-    RecordingError
-        the archive is damaged, is none of NumPy's, or names the row and column at fault
+    Raises RecordingError where the archive is damaged, is none of NumPy's, or names the row and column at fault.
     """
     columns = _read_columns(path, name)
-    header = list(columns)
-    reading, layout = find_layout(header, reading, name)
-    require_joint_count(layout.joint_count, joint_count, name)
-    block = np.column_stack([columns[header[index]] for index in layout.source])
-    if layout.nanoseconds is not None:
-        block[:, 0] = SplitClock().join(block[:, 0], columns[header[layout.nanoseconds]])
-    if layout.counts_rows:
-        block[:, 0] = np.arange(len(block))
-    intake = RowIntake(name, layout.names, layout.effort_kind, reading, len(block), spool_above_bytes)
-    for start in range(0, len(block), _ROWS_AT_ONCE):
-        intake.add(block[start : start + _ROWS_AT_ONCE], lambda row, start=start: f"row {start + row}")
-    return intake.finish(layout.joint_count, layout.ignored, layout.notes)
+    rows = len(next(iter(columns.values())))
+
+    def open_batches(_layout: ColumnLayout, _wanted: Sequence[str]) -> Iterator[Batch]:
+        for start in range(0, rows, ROWS_AT_ONCE):
+            yield lambda column, start=start: columns[column][start : start + ROWS_AT_ONCE]
+
+    return read_batches(name, list(columns), rows, open_batches, joint_count=joint_count, reading=reading)
 
 
 def read_npz_header(path: Path, name: str) -> list[str]:
-    """Names of an archive's columns.
-
-    Raises
-    ------
-    RecordingError
-        the archive is damaged, or is none of NumPy's
-    """
+    """Names of an archive's columns. Raises RecordingError where the archive is damaged, or is none of NumPy's."""
     return list(_read_columns(path, name))
 
 

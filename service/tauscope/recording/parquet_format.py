@@ -1,8 +1,10 @@
 """Recordings as Parquet, by pyarrow, which comes with the extra ``tauscope[parquet]``."""
 
+import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -10,21 +12,94 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from tauscope.errors import RecordingError
-from tauscope.recording.clocks import EpisodeClock, SplitClock
-from tauscope.recording.columns import ColumnLayout, find_layout, require_joint_count
+from tauscope.recording.column_batches import ROWS_AT_ONCE, Batch, read_batches
+from tauscope.recording.columns import ColumnLayout
 from tauscope.recording.inflation import require_plausible_inflation
-from tauscope.recording.intake import RowIntake
-from tauscope.recording.parquet_columns import FileColumn, take_column, unfold_columns
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
-from tauscope.recording.units import SECONDS, SI, Reading
-from tauscope.recording.words import printable, reason
+from tauscope.recording.units import SI, Reading
+from tauscope.robot.messages import printable, reason
+
+_LARGEST_INFO_BYTES = 2**22
+_MOST_ELEMENTS = 1000
+_FOLDERS_UP = 3
+"""A LeRobot data set keeps ``data/chunk-000/FILE.parquet`` beside ``meta/info.json``."""
+
+
+@dataclass(frozen=True)
+class FileColumn:
+    """A column of numbers: a whole one, or one element of a list column."""
+
+    column: str
+    element: int | None = None
+
+
+def unfold_columns(arrow: Any, file: Any, path: Path, name: str) -> dict[str, FileColumn]:
+    """Every column by its name, elements of lists as ``observation.state[0]`` or ``observation.state[elbow.pos]``.
+
+    Raises RecordingError where two columns have one name.
+    """
+    found: dict[str, FileColumn] = {}
+    schema, elements = file.schema_arrow, _element_names(path)
+    for column in map(str, schema.names):
+        if column in found:
+            raise RecordingError(f"{name}: column {column} appears twice; rename or delete one")
+        if not _is_list(arrow, schema.field(column).type):
+            found[column] = FileColumn(column)
+            continue
+        width = _width(arrow, file, column)
+        names = elements.get(column, ())
+        names = names if len(names) == width else [str(index) for index in range(width)]
+        found |= {f"{column}[{element}]": FileColumn(column, index) for index, element in enumerate(names)}
+    return found
+
+
+def take_column(arrow: Any, batch: Any, wanted: FileColumn) -> Any:
+    """A column of a batch, or one element of its lists."""
+    column = batch.column(wanted.column)
+    return column if wanted.element is None else arrow.compute.list_element(column, wanted.element)
+
+
+def _is_list(arrow: Any, kind: Any) -> bool:
+    """Whether a column holds lists of numbers."""
+    types = arrow.types
+    is_list = types.is_list(kind) or types.is_fixed_size_list(kind) or types.is_large_list(kind)
+    return is_list and (types.is_floating(kind.value_type) or types.is_integer(kind.value_type))
+
+
+def _width(arrow: Any, file: Any, column: str) -> int:
+    """Elements of the first list; a later one that is shorter is refused as it is read."""
+    for batch in file.iter_batches(batch_size=1, columns=[column]):
+        length = arrow.compute.list_value_length(batch.column(0))[0].as_py()
+        if length is not None:
+            return min(length, _MOST_ELEMENTS)
+    return 0
+
+
+def _element_names(path: Path) -> Mapping[str, Sequence[str]]:
+    """Names of list elements by column, where a data set's ``meta/info.json`` is near; none where it is not."""
+    folders = list(path.absolute().parents)[:_FOLDERS_UP]
+    info = next((file for folder in folders if (file := folder / "meta" / "info.json").is_file()), None)
+    if info is None or info.stat().st_size > _LARGEST_INFO_BYTES:
+        return {}
+    try:
+        features = json.loads(info.read_text(encoding="utf-8"))["features"]
+        return {column: _names(feature.get("names")) for column, feature in features.items()}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return {}
+
+
+def _names(names: Any) -> Sequence[str]:
+    """Names of a feature: a list, or a mapping with one list."""
+    while isinstance(names, dict):
+        names = next(iter(names.values()), None)
+    is_named = isinstance(names, list) and all(isinstance(name, str) for name in names)
+    return names if is_named and len(set(names)) == len(names) else ()
+
 
 PARQUET_MAGIC = b"PAR1"
 
 _NUMBER_TYPE = re.compile(r"u?int(8|16|32|64)|halffloat|float|double")
-_ROWS_AT_ONCE = 2**16
-_EPISODE = "episode_index"
 
 
 def read_parquet(
@@ -36,65 +111,59 @@ def read_parquet(
 ) -> Recording:
     """Read a Parquet recording batch by batch; null is a missed sample.
 
-    Parameters
-    ----------
-    joint_count : int or None
-        joints that the recording must have; None where any number is welcome
-    spool_above_bytes : int
-        size above which the rows go to a temporary file [bytes]
-
-    Raises
-    ------
-    RecordingError
-        pyarrow is not installed, the file is damaged, or names the row and column at fault
-    RecordingMismatchError
-        the file has another number of joints
+    Raises RecordingError where pyarrow is not installed, the file is damaged, or names the row and column at fault.
+    Raises RecordingMismatchError where the file has another number of joints.
     """
     arrow = _arrow(name)
     with path.open("rb") as stream, _arrow_errors(arrow, name):
         file = arrow.parquet.ParquetFile(stream, page_checksum_verification=True)
         found = unfold_columns(arrow, file, path, name)
-        header = list(found)
-        reading, layout = find_layout(header, reading, name)
-        require_joint_count(layout.joint_count, joint_count, name)
-        wanted = [found[header[index]] for index in layout.source]
-        nanoseconds = None if layout.nanoseconds is None else found[header[layout.nanoseconds]]
-        split = SplitClock()
-        _require_numbers(file.schema_arrow, wanted, layout, name)
-        unpacked_bytes = file.metadata.num_rows * len(layout.names) * 8
-        require_plausible_inflation(path.stat().st_size, unpacked_bytes, name)
-        rows, first_stamp = file.metadata.num_rows, None
-        intake = RowIntake(name, layout.names, layout.effort_kind, reading, rows, spool_above_bytes)
-        episodes = EpisodeClock(SECONDS.get(reading.units.get("t", "s"), 1.0)) if _EPISODE in found else None
-        read = sorted(
-            {column.column for column in (*wanted, nanoseconds or wanted[0])} | ({_EPISODE} if episodes else set())
+        rows = file.metadata.num_rows
+
+        def open_batches(layout: ColumnLayout, wanted: Sequence[str]) -> Iterator[Batch]:
+            columns = [found[column] for column in wanted]
+            _require_numbers(file.schema_arrow, columns[: len(layout.names)], layout, name)
+            require_plausible_inflation(path.stat().st_size, rows * len(layout.names) * 8, name)
+            read = sorted({column.column for column in columns})
+            batches = file.iter_batches(batch_size=ROWS_AT_ONCE, columns=read, use_threads=False)
+            return _take_batches(arrow, batches, found, columns[0])
+
+        return read_batches(
+            name,
+            list(found),
+            rows,
+            open_batches,
+            joint_count=joint_count,
+            spool_above_bytes=spool_above_bytes,
+            reading=reading,
+            first_row=1,
+            has_episodes=True,
         )
-        for batch in file.iter_batches(batch_size=_ROWS_AT_ONCE, columns=read, use_threads=False):
-            first = len(intake) + 1
-            columns = [take_column(arrow, batch, column) for column in wanted]
-            if _is_stamp(columns[0].type):
-                stamps = columns[0].cast("timestamp[ns]", safe=False).cast("int64")
-                first_stamp = next((stamp.as_py() for stamp in stamps), 0) if first_stamp is None else first_stamp
-                time = arrow.compute.subtract(stamps, first_stamp or 0)
-                columns[0] = arrow.compute.multiply(time.cast("float64"), 1e-9)
-            block = np.column_stack([_numbers(column) for column in columns])
-            if nanoseconds is not None:
-                block[:, 0] = split.join(block[:, 0], _numbers(take_column(arrow, batch, nanoseconds)))
-            if layout.counts_rows:
-                block[:, 0] = np.arange(len(block)) + len(intake)
-            elif episodes is not None:
-                block[:, 0] = episodes.shift(block[:, 0], _numbers(batch.column(_EPISODE)))
-            intake.add(block, lambda row, first=first: f"row {first + row}")
-    return intake.finish(layout.joint_count, layout.ignored, (*layout.notes, *(episodes.notes if episodes else ())))
+
+
+def _take_batches(
+    arrow: Any, batches: Iterable[Any], found: Mapping[str, FileColumn], time: FileColumn
+) -> Iterator[Batch]:
+    """Batches by column; dates with time become seconds since the first one."""
+    first_stamp: Any = None
+    for batch in batches:
+        stamps = take_column(arrow, batch, time)
+        if _is_stamp(stamps.type):
+            stamps = stamps.cast("timestamp[ns]", safe=False).cast("int64")
+            first_stamp = next((stamp.as_py() for stamp in stamps), 0) if first_stamp is None else first_stamp
+            since = arrow.compute.subtract(stamps, first_stamp or 0)
+            stamps = arrow.compute.multiply(since.cast("float64"), 1e-9)
+
+        def take(column: str, batch: Any = batch, stamps: Any = stamps) -> Array:
+            return _numbers(stamps if found[column] == time else take_column(arrow, batch, found[column]))
+
+        yield take
 
 
 def read_parquet_header(path: Path, name: str) -> list[str]:
     """Names of a file's columns, lists unfolded.
 
-    Raises
-    ------
-    RecordingError
-        pyarrow is not installed, or the file is damaged
+    Raises RecordingError where pyarrow is not installed, or the file is damaged.
     """
     arrow = _arrow(name)
     with path.open("rb") as stream, _arrow_errors(arrow, name):
@@ -104,17 +173,14 @@ def read_parquet_header(path: Path, name: str) -> list[str]:
 def write_parquet(recording: Recording, file: BinaryIO) -> None:
     """Write a recording as Parquet, float64 columns, checksums on every page.
 
-    Raises
-    ------
-    RecordingError
-        pyarrow is not installed
+    Raises RecordingError where pyarrow is not installed.
     """
     arrow = _arrow(recording.name)
     table = recording.table
     schema = arrow.schema([(name, arrow.float64()) for name in table.names])
     with arrow.parquet.ParquetWriter(file, schema, compression="zstd", write_page_checksum=True) as writer:
-        for start in range(0, len(table), _ROWS_AT_ONCE):
-            block = table.rows(start, min(start + _ROWS_AT_ONCE, len(table)))
+        for start in range(0, len(table), ROWS_AT_ONCE):
+            block = table.rows(start, min(start + ROWS_AT_ONCE, len(table)))
             columns = [arrow.array(np.ascontiguousarray(column)) for column in block.T]
             writer.write_batch(arrow.record_batch(columns, schema=schema))
 

@@ -19,15 +19,9 @@ Value = int | bytes
 def decode_foxglove_protobuf(schema: bytes) -> Callable[[bytes], JointState]:
     """The decoder of a log's messages.
 
-    Parameters
-    ----------
-    schema : bytes
-        FileDescriptorSet of the type; empty for the numbers that Foxglove publishes
+    Raises ValueError where the schema cannot be read; so does the decoder where a message is no JointStates.
 
-    Raises
-    ------
-    ValueError
-        the schema cannot be read; so does the decoder where a message is no JointStates
+    `schema`: FileDescriptorSet of the type; empty for the numbers that Foxglove publishes.
     """
     numbers = _field_numbers(schema)
     states, state = numbers.get("JointStates", _STATES), numbers.get("JointState", _STATE)

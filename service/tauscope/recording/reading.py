@@ -16,7 +16,7 @@ from tauscope.recording.recording import Recording
 from tauscope.recording.ros1_bag import ROS1_MAGIC, read_ros1_bag
 from tauscope.recording.rosbag2_format import SQLITE_MAGIC, read_database, read_rosbag2
 from tauscope.recording.units import SI, Reading
-from tauscope.recording.words import printable
+from tauscope.robot.messages import printable
 
 _LONGEST_PATH = 4096
 _MAGIC_BYTES = 16
@@ -42,17 +42,10 @@ def read_recording(
 ) -> Recording:
     """Read a recording: CSV, Parquet, MCAP, a ROS 1 bag, or a rosbag2 folder or database; told apart by content.
 
-    Parameters
-    ----------
-    joint_count : int or None
-        joints that the recording must have; None where any number is welcome, or as many as `joint_names`
+    Raises RecordingError where the file cannot be read or breaks a rule; the message names the place. Raises
+    RecordingMismatchError where the recording has other joints than asked for.
 
-    Raises
-    ------
-    RecordingError
-        the file cannot be read or breaks a rule; the message names the place
-    RecordingMismatchError
-        the recording has other joints than asked for
+    `joint_count`: joints that the recording must have; None where any number is welcome, or as many as `joint_names`.
     """
     path, name = Path(path), printable(str(path), _LONGEST_PATH)
     names = tuple(joint_names) if joint_names is not None else None
@@ -71,10 +64,7 @@ def read_recording(
 def read_header(path: Path) -> list[str]:
     """Names of the columns of a CSV or Parquet file; numbers from 1 where there are none.
 
-    Raises
-    ------
-    RecordingError
-        the file cannot be read, or is a log, which names its joints itself
+    Raises RecordingError where the file cannot be read, or is a log, which names its joints itself.
     """
     name = printable(str(path), _LONGEST_PATH)
     try:
@@ -94,10 +84,7 @@ def read_header(path: Path) -> list[str]:
 def first_bytes(path: Path, name: str) -> bytes:
     """The first bytes of a regular file, by which formats are told apart.
 
-    Raises
-    ------
-    RecordingError
-        it is not a regular file
+    Raises RecordingError where it is not a regular file.
     """
     if not path.exists():
         raise FileNotFoundError(errno.ENOENT, "no such file")

@@ -20,12 +20,9 @@ __all__ = ["Array", "EffortKind", "Recording", "Samples", "Table"]
 class Recording:
     """One continuous motion as it was measured.
 
-    notes : tuple of ResultWarning
-        warnings without its name
-    effort_std : tuple of float
-        relative standard error of each joint's effort as a whole; empty where it was measured
-    is_examined : bool
-        whether units and samples were looked at, so that they need not be again
+    `notes`: warnings without its name.
+    `effort_std`: relative standard error of each joint's effort as a whole; empty where it was measured.
+    `is_examined`: whether units and samples were looked at, so that they need not be again.
     """
 
     name: str
@@ -53,17 +50,8 @@ class Recording:
     def samples(self, start: int = 0, stop: int | None = None) -> Samples:
         """Samples start:stop, as read-only views of the table where its columns allow.
 
-        Parameters
-        ----------
-        start : int
-            first sample, counted from 0
-        stop : int or None
-            the one after the last; None for the end
-
-        Returns
-        -------
-        Samples
-            the columns that the recording has; None for the others
+        `start`: first sample, counted from 0; `stop`: the one after the last; None for the end. Returns Samples: the
+        columns that the recording has; None for the others.
         """
         first, last, _ = slice(start, stop).indices(len(self.table))
         block = self.table.rows(first, max(first, last))
@@ -88,22 +76,11 @@ class Recording:
     def joint_torque(self, effort: Array, robot: Robot) -> Array:
         """Turn recorded efforts into joint torque: τ = sign · k · effort, with k = 1 where torque was recorded.
 
-        Parameters
-        ----------
-        effort : (N, n) float64
-            `Samples.effort` of this recording [Nm or N, or drive units]
+        Raises RecordingMismatchError where the efforts have another number of joints than the robot. Raises
+        RecordingError where commands were recorded, and no actuator has made torque of them.
 
-        Returns
-        -------
-        (N, n) float64
-            joint torque [Nm or N]
-
-        Raises
-        ------
-        RecordingMismatchError
-            the efforts have another number of joints than the robot
-        RecordingError
-            commands were recorded, and no actuator has made torque of them
+        `effort`: (N, n), `Samples.effort` of this recording [Nm or N, or drive units]. Returns (N, n), joint torque [Nm
+        or N].
         """
         if self.effort_kind is EffortKind.COMMAND:
             raise RecordingError(
@@ -139,37 +116,20 @@ class Recording:
     ) -> "Recording":
         """Make a recording of arrays, held to the same rules as a file.
 
-        Parameters
-        ----------
-        time : (N,) float64
-            strictly increasing [s]
-        position : (N, n) float64
-            q [rad or m]
-        effort : (N, n) float64
-            τ [Nm or N], or drive units
-        velocity : (N, n) float64 or None
-            qd [rad/s or m/s]
-        acceleration : (N, n) float64 or None
-            qdd [rad/s² or m/s²]
-        reference : (N, n) float64 or None
-            commanded position [rad or m]
-        effort_command : (N, n) float64 or None
-            commanded effort [Nm or N, or drive units]
-        temperature : (N, n) float64 or None
-            motor or joint temperature [°C]
-        link_position : (N, n) float64 or None
-            position behind the transmission [rad or m]
-        voltage : (N, n) float64 or None
-            supply of the joint's bridge [V]
-        gain : (N, n) float64 or None
-            gain kp in force, in the unit of the robot file's actuator
-        period : (N,) float64 or None
-            index of the repeated excitation period, NaN outside the repeated part
+        Raises RecordingError, which names the argument, the row (counted from 0, as NumPy does) and the joint at fault.
 
-        Raises
-        ------
-        RecordingError
-            names the argument, the row (counted from 0, as NumPy does) and the joint at fault
+        `time`: (N,), strictly increasing [s].
+        `position`: (N, n), q [rad or m].
+        `effort`: (N, n), τ [Nm or N], or drive units.
+        `velocity`: (N, n), qd [rad/s or m/s].
+        `acceleration`: (N, n), qdd [rad/s² or m/s²].
+        `reference`: (N, n), commanded position [rad or m].
+        `effort_command`: (N, n), commanded effort [Nm or N, or drive units].
+        `temperature`: (N, n), motor or joint temperature [°C].
+        `link_position`: (N, n), position behind the transmission [rad or m].
+        `voltage`: (N, n), supply of the joint's bridge [V].
+        `gain`: (N, n), gain kp in force, in the unit of the robot file's actuator.
+        `period`: (N,), index of the repeated excitation period, NaN outside the repeated part.
         """
         groups = {
             "qd": velocity,

@@ -14,7 +14,7 @@ from tauscope.recording.inflation import HELD_BYTES, LARGEST_RATIO, require_plau
 from tauscope.recording.joint_state_log import JointStateLog
 from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.recording import Recording
-from tauscope.recording.words import reason
+from tauscope.robot.messages import reason
 
 ROS1_MAGIC = b"#ROSBAG V2.0"
 
@@ -26,10 +26,8 @@ _LARGEST_HEADER_BYTES = 2**16
 def read_ros1_bag(path: Path, choice: Choice) -> Recording:
     """Read the joint states of a ROS 1 bag; only chunks that hold messages of their topics are read.
 
-    Raises
-    ------
-    RecordingError
-        rosbags is not installed, the bag is damaged or not indexed, or there are no usable joint states
+    Raises RecordingError where rosbags is not installed, the bag is damaged or not indexed, or there are no usable
+    joint states.
     """
     name = choice.file
     try:

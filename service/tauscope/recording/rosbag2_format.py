@@ -10,12 +10,12 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from tauscope.errors import RecordingError
+from tauscope.recording.inflation import decompress_file
 from tauscope.recording.joint_state_log import JointStateLog
 from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.mcap_format import add_mcap
-from tauscope.recording.message_compression import decompress_file
 from tauscope.recording.recording import Recording
-from tauscope.recording.words import printable, reason
+from tauscope.robot.messages import printable, reason
 
 SQLITE_MAGIC = b"SQLite format 3\0"
 METADATA = "metadata.yaml"
@@ -26,10 +26,7 @@ _SQLITE_HEADER_BYTES = 100
 def read_rosbag2(folder: Path, choice: Choice) -> Recording:
     """Read the joint states of a rosbag2 folder, its files in the order in which they were recorded.
 
-    Raises
-    ------
-    RecordingError
-        a file is missing or damaged, or there are no usable joint states
+    Raises RecordingError where a file is missing or damaged, or there are no usable joint states.
     """
     log = JointStateLog(choice)
     for file in _files(folder, choice.file):
@@ -60,10 +57,7 @@ def _add_file(path: Path, name: str, log: JointStateLog) -> None:
 def read_database(path: Path, choice: Choice) -> Recording:
     """Read the joint states of one rosbag2 SQLite file.
 
-    Raises
-    ------
-    RecordingError
-        the file is damaged, or there are no usable joint states
+    Raises RecordingError where the file is damaged, or there are no usable joint states.
     """
     log = JointStateLog(choice)
     _add_database(path, choice.file, log)

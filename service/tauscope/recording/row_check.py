@@ -18,7 +18,6 @@ class RowCheck:
     """
 
     def __init__(self, file: str, names: tuple[str, ...]) -> None:
-        """Prepare for the first block."""
         self._file = file
         self._names = names
         self._period = names.index("period") if "period" in names else None
@@ -26,15 +25,9 @@ class RowCheck:
     def __call__(self, block: Array, place: Callable[[int], str]) -> None:
         """Check the next block.
 
-        Parameters
-        ----------
-        block : (rows, columns) float64
-            the rows
+        Raises RecordingError, which names the row and the column at fault.
 
-        Raises
-        ------
-        RecordingError
-            names the row and the column at fault
+        `block`: (rows, columns), the rows.
         """
         if not len(block):
             return
@@ -63,17 +56,9 @@ class RowCheck:
 def require_rising(time: Array, previous: float, file: str, place: Callable[[int], str]) -> None:
     """Refuse time that does not rise from row to row.
 
-    Parameters
-    ----------
-    time : (rows,) float64
-        stamps [s]
-    previous : float
-        the stamp before them [s]
+    Raises RecordingError, which names the row.
 
-    Raises
-    ------
-    RecordingError
-        names the row
+    `time`: (rows,), stamps [s]; `previous`: the stamp before them [s].
     """
     is_up = np.diff(time, prepend=previous) > 0
     if is_up.all():
@@ -88,13 +73,7 @@ def require_rising(time: Array, previous: float, file: str, place: Callable[[int
 
 
 def require_rows(count: int, file: str) -> None:
-    """Refuse a file that holds next to nothing.
-
-    Raises
-    ------
-    RecordingError
-        fewer than `MINIMUM_ROWS` samples
-    """
+    """Refuse a file that holds next to nothing. Raises RecordingError: fewer than `MINIMUM_ROWS` samples."""
     if count < MINIMUM_ROWS:
         found = "no sample" if count == 0 else "only 1 sample" if count == 1 else f"only {count} samples"
         raise RecordingError(f"{file}: holds {found}; at least {MINIMUM_ROWS} are needed")

@@ -22,17 +22,14 @@ class EffortKind(StrEnum):
 class Samples:
     """A stretch of a recording as it was measured; NaN marks a sample that was missed.
 
-    time : (N,) float64
-        strictly increasing [s]
-    position : (N, n) float64
-        q [rad or m]
-    effort : (N, n) float64
-        τ [Nm or N], or drive units (current), or commanded positions, as `Recording.effort_kind` says, sign and
-        constant not yet applied
-    velocity, acceleration, reference, effort_command, temperature, link_position, voltage, gain : (N, n) float64, None
-        the optional columns qd, qdd, qref, taucmd, temp, qlink, volt, kp; a joint without such a column is NaN
-    period : (N,) float64 or None
-        index of the repeated excitation period, NaN outside the repeated part
+    `time`: (N,), strictly increasing [s].
+    `position`: (N, n), q [rad or m].
+    `effort`: (N, n), τ [Nm or N], or drive units (current), or commanded positions, as `Recording.effort_kind` says,
+        sign and constant not yet applied.
+    `velocity`, `acceleration`, `reference`, `effort_command`, `temperature`, `link_position`, `voltage`, `gain`: (N,
+        n) or None, the optional columns qd, qdd, qref, taucmd, temp, qlink, volt, kp; a joint without such a column is
+        NaN.
+    `period`: (N,), index of the repeated excitation period, NaN outside the repeated part.
     """
 
     time: Array

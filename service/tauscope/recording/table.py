@@ -19,13 +19,7 @@ class MemoryTable:
     """Rows in memory."""
 
     def __init__(self, names: tuple[str, ...], data: Array) -> None:
-        """Keep `data` as it is, without a copy.
-
-        Parameters
-        ----------
-        data : (N, columns) float64
-            the rows; made read-only
-        """
+        """Keep `data` as it is, without a copy. `data`: (N, columns), the rows; made read-only."""
         self._names = names
         self._data = data
         self._data.flags.writeable = False
@@ -51,7 +45,6 @@ class SpooledTable:
     """
 
     def __init__(self, names: tuple[str, ...]) -> None:
-        """Open an empty spool."""
         self._names = names
         self._row_bytes = 8 * len(names)
         self._length = 0
@@ -67,13 +60,7 @@ class SpooledTable:
         return self._length
 
     def append(self, block: Array) -> None:
-        """Write rows behind the last one.
-
-        Parameters
-        ----------
-        block : (rows, columns) float64
-            the rows
-        """
+        """Write rows behind the last one. `block`: (rows, columns), the rows."""
         self._file.write(np.ascontiguousarray(block).data)
         self._file.flush()
         self._length += len(block)
@@ -101,10 +88,7 @@ class TableBuilder:
     ) -> None:
         """Prepare an empty table.
 
-        Parameters
-        ----------
-        spool_above_bytes : int
-            size of the rows above which they go to a temporary file [bytes]
+        `spool_above_bytes`: size of the rows above which they go to a temporary file [bytes].
         """
         self._names = names
         self._limit_rows = spool_above_bytes // (8 * len(names))
@@ -121,15 +105,9 @@ class TableBuilder:
     def append(self, block: Array) -> None:
         """Add rows behind the last one.
 
-        Parameters
-        ----------
-        block : (rows, columns) float64
-            the rows; copied
+        Raises RecordingError where the temporary folder has no room left.
 
-        Raises
-        ------
-        RecordingError
-            the temporary folder has no room left
+        `block`: (rows, columns), the rows; copied.
         """
         length = self._length + len(block)
         if self._spool is None and length > self._limit_rows:

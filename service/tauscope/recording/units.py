@@ -30,20 +30,14 @@ _FOLLOWERS: Mapping[str, tuple[str, ...]] = {"q": ("q", "qref", "qlink"), "qd": 
 class Reading:
     """How a file is to be read.
 
-    units : mapping of str to str
-        unit of ``t``, ``q``, ``qd``, ``tau``, or of one joint's column, ``q3``; SI where none is stated
-    rate_hz : float or None
-        samples a second where t counts samples [Hz]
-    joint_types : tuple of JointType or None
-        of the robot, where it is known: degrees are of revolute joints only, mm of prismatic ones
-    joint_names : tuple of str or None
-        of the robot, where it is known
-    prefers_torque : bool
-        whether currents are of no use, because no torque constant is known
+    `units`: unit of ``t``, ``q``, ``qd``, ``tau``, or of one joint's column, ``q3``; SI where none is stated.
+    `rate_hz`: samples a second where t counts samples [Hz].
+    `joint_types`: of the robot, where it is known: degrees are of revolute joints only, mm of prismatic ones.
+    `joint_names`: of the robot, where it is known.
+    `prefers_torque`: whether currents are of no use, because no torque constant is known.
     columns, decimal, delimiter, topic
         as in `RecordingLayout`
-    is_usual : bool
-        whether the columns are those of the robot file: recordings that Tauscope made have their own
+    `is_usual`: whether the columns are those of the robot file: recordings that Tauscope made have their own.
     """
 
     units: Mapping[str, str] = field(default_factory=dict)
@@ -61,10 +55,7 @@ class Reading:
     def for_robot(self, robot: Robot | None) -> "Reading":
         """The same reading, with the units of the robot file where this one states none.
 
-        Raises
-        ------
-        RecordingError
-            a unit is not known, or the rate is missing
+        Raises RecordingError where a unit is not known, or the rate is missing.
         """
         layout = RecordingLayout() if robot is None else robot.recording
         columns = layout.columns if self.columns is None else self.columns
@@ -102,12 +93,9 @@ SI = Reading()
 class Conversion:
     """Turns rows of a file into SI.
 
-    names : tuple of str
-        columns after the conversion: torque that is current becomes i1…
-    factor : (columns,) float64
-        multiplies each column
-    from_first : bool
-        whether time counts from the first row: a large count has no room for small parts of a second
+    `names`: columns after the conversion: torque that is current becomes i1….
+    `factor`: (columns,), multiplies each column.
+    `from_first`: whether time counts from the first row: a large count has no room for small parts of a second.
     """
 
     names: tuple[str, ...]
@@ -144,13 +132,7 @@ def preset_units(columns: Mapping[str, Source] | str | None) -> Mapping[str, str
 
 
 def parse_units(text: str) -> dict[str, str]:
-    """Units as a command line writes them: ``q=deg,t=ms``.
-
-    Raises
-    ------
-    ValueError
-        naming the part that is no assignment
-    """
+    """Units as a command line writes them: ``q=deg,t=ms``. Raises ValueError naming the part that is no assignment."""
     units: dict[str, str] = {}
     for part in filter(None, (part.strip() for part in text.split(","))):
         column, sign, unit = (piece.strip() for piece in part.partition("="))

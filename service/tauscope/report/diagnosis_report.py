@@ -10,15 +10,6 @@ from tauscope.diagnosis.documents.plots import DiagnosisPlots, diagnosis_plots
 from tauscope.diagnosis.documents.result import FindingEntry
 from tauscope.diagnosis.next_experiment import PlannedExperiment
 from tauscope.number_text import chance, counted, significant
-from tauscope.report.csv_text import csv_text
-from tauscope.report.diagnosis_tables import (
-    detectable_table,
-    difference_table,
-    headroom_table,
-    located_table,
-    residual_table,
-    shift_table,
-)
 from tauscope.report.diagnosis_words import (
     MOST_FINDINGS,
     cautions,
@@ -31,15 +22,21 @@ from tauscope.report.diagnosis_words import (
     place_title,
     summary_sentences,
 )
-from tauscope.report.heat_map import heat_map, heat_table
-from tauscope.report.motion_figure import motion_figure
+from tauscope.report.figures import difference_figure, heat_map, heat_table, motion_figure, shift_figure
 from tauscope.report.page import Card, Drawing, Fold, KeyFigure, Numbers, Page, Part, Section, render
-from tauscope.report.proof_figure import proof_figure
 from tauscope.report.provenance import Provenance
-from tauscope.report.quantities import torque_unit
-from tauscope.report.shift_figure import difference_figure, shift_figure
-from tauscope.report.tables import input_table
-from tauscope.report.words import noise_words
+from tauscope.report.table import csv_text
+from tauscope.report.tables import (
+    detectable_table,
+    difference_table,
+    headroom_table,
+    input_table,
+    located_table,
+    residual_table,
+    shift_table,
+)
+from tauscope.report.torque_figure import proof_figure
+from tauscope.report.words import noise_words, torque_unit
 from tauscope.robot import JointType
 
 

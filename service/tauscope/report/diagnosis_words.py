@@ -8,8 +8,7 @@ from tauscope.diagnosis.documents.result import FindingEntry, MismatchEntry
 from tauscope.diagnosis.documents.statement import DEVIATIONS, change_text
 from tauscope.diagnosis.model.held_out_change import SHOWN
 from tauscope.number_text import ABSENT, counted, percent, significant, with_uncertainty
-from tauscope.report.quantities import state_unit, torque_unit
-from tauscope.report.words import noise_ratio
+from tauscope.report.words import noise_ratio, state_unit, torque_unit
 from tauscope.robot import JointType
 
 VERDICTS = {
@@ -41,13 +40,7 @@ def effect_title(effect: str) -> str:
 
 
 def place_title(joint: str | None) -> str:
-    """Where an effect is.
-
-    Parameters
-    ----------
-    joint : str or None
-        name of the joint; None for the whole arm
-    """
+    """Where an effect is. `joint`: name of the joint; None for the whole arm."""
     return "of the whole arm" if joint is None else f"at {joint}"
 
 
@@ -83,13 +76,7 @@ def summary_sentences(document: DiagnosisDocument) -> Iterator[str]:
 
 
 def _residual_change(document: DiagnosisDocument, joint: int) -> str:
-    """How one joint's residual changes.
-
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    """
+    """How one joint's residual changes. `joint`: joint index, from 0."""
     before, after = (significant(ratios[joint], 3) for ratios in noise_ratios(document)[:2])
     return f"the residual of {document.joints[joint]} goes from {before} to {after} times the sensor noise"
 

@@ -24,16 +24,12 @@ BEYOND = 1.15
 class FrictionCurve:
     """τ_f(v) = τ_s A(K_v v) + τ_sc A(δ v) + τ_v v + offset of one joint.
 
-    velocity : (G,) float64
-        v, increasing, densest about zero [rad/s or m/s]
-    torque : (G,) float64
-        τ_f [Nm or N]
-    std : (G,) float64
-        its standard error, from the covariance of all its coefficients and shape constants [Nm or N]
-    seen : (float, float)
-        least and greatest velocity in the recordings [rad/s or m/s]
-    bin_velocity, bin_torque : (B,) float64
-        mean velocity, and mean of measured torque less the rigid body's, in velocity bins
+    `velocity`: (G,), v, increasing, densest about zero [rad/s or m/s].
+    `torque`: (G,), τ_f [Nm or N].
+    `std`: (G,), its standard error, from the covariance of all its coefficients and shape constants [Nm or N].
+    `seen`: (float, float), least and greatest velocity in the recordings [rad/s or m/s].
+    `bin_velocity`, `bin_torque`: (B,), mean velocity, and mean of measured torque less the rigid body's, in velocity
+        bins.
     """
 
     velocity: Array
@@ -51,20 +47,14 @@ class FrictionCurve:
 
 
 def friction_curve(identification: Identification, series: Sequence[TorqueSeries], joint: int) -> FrictionCurve:
-    """The curve of one joint.
-
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    """
+    """The curve of one joint. `joint`: joint index, from 0."""
     speed = np.concatenate([one.velocity[:, joint] for one in series])
     residual = np.concatenate([one.residual[:, joint] for one in series])
     seen = (float(speed.min()), float(speed.max()))
     largest = BEYOND * max(abs(seen[0]), abs(seen[1]), np.finfo(float).tiny)
     velocity = largest * np.linspace(-1.0, 1.0, GRID_POINTS) ** 3
     torque = _torque(identification, joint, velocity)
-    bins = _binned(speed, residual + _torque(identification, joint, speed))
+    bins = _bin(speed, residual + _torque(identification, joint, speed))
     return FrictionCurve(velocity, torque, _std(identification, joint, velocity), seen, *bins)
 
 
@@ -102,7 +92,7 @@ def _std(identification: Identification, joint: int, velocity: Array) -> Array:
     return np.sqrt(np.maximum(np.einsum("ig,ij,jg->g", stacked, covariance, stacked), 0.0))
 
 
-def _binned(velocity: Array, torque: Array) -> tuple[Array, Array]:
+def _bin(velocity: Array, torque: Array) -> tuple[Array, Array]:
     """Means in bins that are narrow about zero velocity, where friction changes most."""
     measured = np.isfinite(torque)
     velocity, torque = velocity[measured], torque[measured]

@@ -9,9 +9,8 @@ from pydantic import Field
 from tauscope.identification import Identification
 from tauscope.recording import Recording
 from tauscope.recording.recording import Array
-from tauscope.report.decimation import envelope_indices
 from tauscope.report.friction_curve import friction_curve
-from tauscope.report.series import TorqueSeries, torque_series
+from tauscope.report.series import TorqueSeries, envelope_indices, torque_series
 from tauscope.robot import JointType
 from tauscope.strict_model import ResultModel
 

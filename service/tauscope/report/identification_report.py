@@ -8,15 +8,12 @@ from markupsafe import Markup
 from tauscope.identification import Identification, IdentificationDocument, document
 from tauscope.number_text import counted, percent, significant
 from tauscope.recording import Recording
-from tauscope.report.csv_text import csv_text
+from tauscope.report.figures import friction_figure, parameter_figure, residual_figure
 from tauscope.report.friction_curve import friction_curve
-from tauscope.report.friction_figure import friction_figure
 from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Section, render
-from tauscope.report.parameter_figure import parameter_figure
 from tauscope.report.provenance import Provenance
-from tauscope.report.quantities import torque_unit, velocity_unit
-from tauscope.report.residual_figure import residual_figure
 from tauscope.report.series import TorqueSeries, torque_series
+from tauscope.report.table import csv_text
 from tauscope.report.tables import (
     base_parameter_table,
     conditioning_table,
@@ -27,7 +24,16 @@ from tauscope.report.tables import (
     rotor_table,
 )
 from tauscope.report.torque_figure import torque_columns, torque_figure
-from tauscope.report.words import band_words, cautions, fit_sentences, masked_samples, noise_ratio, noise_words
+from tauscope.report.words import (
+    band_words,
+    cautions,
+    fit_sentences,
+    masked_samples,
+    noise_ratio,
+    noise_words,
+    torque_unit,
+    velocity_unit,
+)
 
 MOST_SERIES = 6
 """Recordings that the friction curves are compared with."""
@@ -43,10 +49,7 @@ def identification_report(
 ) -> str:
     """A self-contained HTML page on an identification.
 
-    Raises
-    ------
-    RecordingError
-        where a recording cannot be conditioned again
+    Raises RecordingError where a recording cannot be conditioned again.
     """
     result = document(identification)
     train = [torque_series(identification, recording) for recording in recordings[:MOST_SERIES]]

@@ -31,12 +31,9 @@ class Numbers:
 class Card:
     """One thing of several that are ranked.
 
-    rank : int
-        from 1
-    probability : float
-        from 0 to 1
-    facts : sequence of (str, str)
-        what is known about it
+    `rank`: from 1.
+    `probability`: from 0 to 1.
+    `facts`: sequence of (str, str), what is known about it.
     """
 
     rank: int

@@ -18,8 +18,7 @@ LIBRARIES = ("tauscope", "numpy", "scipy", "clarabel")
 class InputFile:
     """One file that was read.
 
-    sha256 : str
-        of its bytes, in hexadecimal
+    `sha256`: of its bytes, in hexadecimal.
     """
 
     role: str
@@ -32,8 +31,7 @@ class InputFile:
 class Provenance:
     """Where a result comes from.
 
-    versions : tuple of (str, str)
-        name and version of what computed it
+    `versions`: tuple of (str, str), name and version of what computed it.
     """
 
     command: tuple[str, ...]
@@ -56,13 +54,7 @@ def installed_version(package: str) -> str:
 
 
 def input_files(role: str, path: str) -> Iterator[InputFile]:
-    """The file of a path, or the files in it where it is a folder.
-
-    Raises
-    ------
-    RecordingError
-        where it cannot be read
-    """
+    """The file of a path, or the files in it where it is a folder. Raises RecordingError where it cannot be read."""
     source = Path(path)
     try:
         files = sorted(entry for entry in source.iterdir() if entry.is_file()) if source.is_dir() else [source]

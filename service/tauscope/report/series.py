@@ -2,15 +2,38 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tauscope.identification import Identification
 from tauscope.identification.dataset import Dataset, PreparedMotion
 from tauscope.recording import Recording
 from tauscope.recording.conditioning import Conditioner
 from tauscope.recording.recording import Array
+
+
+def envelope_indices(values: Array, most: int) -> NDArray[np.intp]:
+    """Samples that keep a curve's look: the least and the greatest of each of most/2 equal buckets, in order of time.
+
+    No peak is lost. NaN are passed over, but a bucket that holds nothing else keeps one of them, so that the gap shows.
+
+    `values`: (N,), the curve. Returns (M,) intp, increasing indices, M ≤ max(most, 2).
+    """
+    count = len(values)
+    if count <= most:
+        return np.arange(count)
+    edges = np.linspace(0, count, max(most // 2, 1) + 1).astype(np.intp)
+    kept: list[int] = []
+    for start, stop in pairwise(edges):
+        bucket = values[start:stop]
+        if np.isnan(bucket).all():
+            kept.append(int(start))
+        else:
+            kept += sorted({int(start + np.nanargmin(bucket)), int(start + np.nanargmax(bucket))})
+    return np.array(kept, dtype=np.intp)
+
 
 MOST_PIECES = 8
 """Pieces of a recording that are conditioned in search of the longest."""
@@ -20,14 +43,10 @@ MOST_PIECES = 8
 class TorqueSeries:
     """One continuous piece of a recording beside what the model says.
 
-    time : (N,) float64
-        [s]
-    velocity : (N, n) float64
-        smoothed q̇ [rad/s or m/s]
-    measured : (N, n) float64
-        measured torque, NaN where none was measured [Nm or N]
-    predicted : (N, n) float64
-        torque of the model [Nm or N]
+    `time`: (N,) [s].
+    `velocity`: (N, n), smoothed q̇ [rad/s or m/s].
+    `measured`: (N, n), measured torque, NaN where none was measured [Nm or N].
+    `predicted`: (N, n), torque of the model [Nm or N].
     """
 
     recording: str

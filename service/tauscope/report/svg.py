@@ -82,10 +82,10 @@ def draw_svg(name: str, height_inches: float, draw: Callable[[Figure], None]) ->
         draw(figure)
         text = io.StringIO()
         canvas.print_svg(text, metadata={"Date": None})
-    return _for_page(text.getvalue(), name)
+    return _adapt_to_page(text.getvalue(), name)
 
 
-def _for_page(svg: str, name: str) -> str:
+def _adapt_to_page(svg: str, name: str) -> str:
     """What a drawing needs to be part of a page: its own ids, the page's colours and fonts, short numbers."""
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
@@ -96,14 +96,14 @@ def _for_page(svg: str, name: str) -> str:
     svg = re.sub(r'<svg [^>]*?viewBox="([^"]*)"[^>]*>', r'<svg viewBox="\1">', svg, count=1)
     svg = re.sub(r' id="', f' id="{name}-', svg)
     svg = re.sub(r'(href="#|url\(#)', rf"\g<1>{name}-", svg)
-    svg = re.sub(r' d="([^"]*)"', lambda path: f' d="{_shortened(path[1])}"', svg)
+    svg = re.sub(r' d="([^"]*)"', lambda path: f' d="{_shorten(path[1])}"', svg)
     svg = svg.replace("font-family: 'DejaVu Sans'", "font-family: var(--sans)")
     for colour, variable in VARIABLES.items():
         svg = svg.replace(colour, f"var({variable})")
     return re.sub(r">\s+<", "><", svg).strip()
 
 
-def _shortened(path: str) -> str:
+def _shorten(path: str) -> str:
     """Path data to a hundredth of a point, white space folded."""
     rounded = re.sub(r"-?\d+\.\d+", lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), path)
     return " ".join(rounded.split())

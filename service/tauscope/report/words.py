@@ -1,10 +1,37 @@
 """What a result says, in sentences."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from tauscope.identification import IdentificationDocument
 from tauscope.number_text import percent, significant
-from tauscope.recording.words import listed
+from tauscope.robot import JointType
+from tauscope.robot.messages import listed
+
+
+def torque_unit(joint_type: JointType) -> str:
+    """Unit of what drives a joint."""
+    return "N" if joint_type is JointType.PRISMATIC else "Nm"
+
+
+def velocity_unit(joint_type: JointType) -> str:
+    """Unit of a joint's velocity."""
+    return "m/s" if joint_type is JointType.PRISMATIC else "rad/s"
+
+
+def state_unit(variable: str, joint_type: JointType) -> str:
+    """Unit of a variable that a residual may depend on."""
+    position = "m" if joint_type is JointType.PRISMATIC else "rad"
+    units = {"velocity": f"{position}/s", "position": position, "acceleration": f"{position}/s²", "time": "s"}
+    return {**units, "load": torque_unit(joint_type), "temperature": "°C", "motor_position": "rad"}.get(variable, "")
+
+
+def base_parameter_unit(terms: Iterable[str]) -> str:
+    """Unit of a combination of standard parameters: that of its first, whose coefficient is one."""
+    first = next(iter(terms))
+    if first.startswith("I"):
+        return "kg m²"
+    return "kg m" if first.startswith("ms") else "kg"
+
 
 AT_NOISE = 1.1
 """A residual of at most this many times the noise holds nothing but noise."""
@@ -72,12 +99,7 @@ def masked_samples(document: IdentificationDocument) -> int:
 def noise_ratio(rms: float, noise_std: float) -> float:
     """Residual in units of the noise.
 
-    Parameters
-    ----------
-    rms : float
-        root mean square of the residual [Nm or N]
-    noise_std : float
-        standard deviation of the noise [Nm or N]
+    `rms`: root mean square of the residual [Nm or N]; `noise_std`: standard deviation of the noise [Nm or N].
     """
     return rms / noise_std if noise_std > 0.0 else float("inf")
 

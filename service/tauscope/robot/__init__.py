@@ -3,10 +3,10 @@
 from tauscope.robot.actuator import SERVOS, Actuator, Servo
 from tauscope.robot.chain import Chain
 from tauscope.robot.check import JointSummary, RobotReport, check_robot
-from tauscope.robot.denavit_hartenberg import DenavitHartenbergRow, modified_segments, standard_segments
-from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.kinematics import homogeneous, link_placements
+from tauscope.robot.messages import Finding, Severity
 from tauscope.robot.physical import find_defect, nearest_body, pseudo_inertia
+from tauscope.robot.placement import DenavitHartenbergRow, modified_segments, standard_segments
 from tauscope.robot.recording_layout import (
     PRESETS,
     RecordingLayout,

@@ -16,14 +16,11 @@ GainUnit = Literal["register", "Nm_per_rad"]
 class Servo:
     """Register conversion of a servo family.
 
-    duty_per_rad : float
-        duty of the bridge per unit of the P register and rad of position error [1/rad]
-    max_duty : float
-        largest duty that the firmware gives, 0 to 1
-    dead_band : float
-        position error below which the bridge is off [rad]
-    torque_per_volt : float or None
-        stall torque over supply voltage in the data sheet [Nm/V]; None where the family has several motors
+    `duty_per_rad`: duty of the bridge per unit of the P register and rad of position error [1/rad].
+    `max_duty`: largest duty that the firmware gives, 0 to 1.
+    `dead_band`: position error below which the bridge is off [rad].
+    `torque_per_volt`: stall torque over supply voltage in the data sheet [Nm/V]; None where the family has several
+        motors.
     """
 
     duty_per_rad: float
@@ -61,30 +58,19 @@ class Actuator:
     Position: torque = κ clip(kp (qref - q), ±max_duty V) - kd q̇ - κ k_e q̇, in the units of `unit`.
     Velocity: kp acts on q̇ref - q̇.
 
-    kp : float
-        register value, or Nm/rad, N/m; of a velocity loop Nm s/rad, N s/m
-    kd : float
-        torque per velocity [Nm s/rad or N s/m]; a register's D has no documented unit and acts as viscous friction
-    servo : str or None
-        register conversion, one of `SERVOS`
-    supply_voltage : float or None
-        of the bridge [V]; a column ``volt`` goes before it
-    torque_per_volt : float or None
-        stall torque per volt across the bridge, κ [Nm/V]
-    max_duty : float or None
-        largest share of the supply that the firmware gives, 0 to 1; None: the servo's own
-    back_emf : float
-        k_e at the joint [V s/rad]
-    dead_band : float or None
-        position error below which the bridge is off [rad]; None: the servo's own
-    delay : float or None
-        from the recorded command to its torque [s]; None: estimated
-    rate_hz : float or None
-        rate at which the loop takes commands [Hz]; None: with every sample
-    temperature_slope : float
-        relative loss of torque per volt with the recorded temperature, κ / (1 + slope (T - 25 °C)) [1/K]
-    scale_std : float or None
-        relative standard error of the torque per position error; None: that of a data sheet, or zero in SI
+    `kp`: register value, or Nm/rad, N/m; of a velocity loop Nm s/rad, N s/m.
+    `kd`: torque per velocity [Nm s/rad or N s/m]; a register's D has no documented unit and acts as viscous friction.
+    `servo`: register conversion, one of `SERVOS`.
+    `supply_voltage`: of the bridge [V]; a column ``volt`` goes before it.
+    `torque_per_volt`: stall torque per volt across the bridge, κ [Nm/V].
+    `max_duty`: largest share of the supply that the firmware gives, 0 to 1; None: the servo's own.
+    `back_emf`: k_e at the joint [V s/rad].
+    `dead_band`: position error below which the bridge is off [rad]; None: the servo's own.
+    `delay`: from the recorded command to its torque [s]; None: estimated.
+    `rate_hz`: rate at which the loop takes commands [Hz]; None: with every sample.
+    `temperature_slope`: relative loss of torque per volt with the recorded temperature, κ / (1 + slope (T - 25 °C))
+        [1/K].
+    `scale_std`: relative standard error of the torque per position error; None: that of a data sheet, or zero in SI.
     """
 
     kind: ActuatorKind
@@ -149,18 +135,12 @@ class Actuator:
     ) -> Values:
         """Torque at the joint.
 
-        Parameters
-        ----------
-        error : float or (N,) float64
-            command less motion: of position [rad or m], of a velocity loop of velocity [rad/s or m/s]
-        velocity : float or (N,) float64
-            q̇ [rad/s or m/s]
-        voltage : float or (N,) float64 or None
-            supply [V]; None: as stated
-        kp : float or (N,) float64 or None
-            gain in force; None: as stated
-        temperature : float or (N,) float64 or None
-            of the motor [°C]; None or NaN: 25
+        `error`: float or (N,), command less motion: of position [rad or m], of a velocity loop of velocity [rad/s or
+            m/s].
+        `velocity`: float or (N,), q̇ [rad/s or m/s].
+        `voltage`: float or (N,), supply [V]; None: as stated.
+        `kp`: float or (N,), gain in force; None: as stated.
+        `temperature`: float or (N,), of the motor [°C]; None or NaN: 25.
         """
         dead = self.conversion.dead_band if self.dead_band is None and self.unit == "register" else self.dead_band
         gain = self.kp if kp is None else kp

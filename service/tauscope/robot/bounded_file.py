@@ -10,15 +10,9 @@ from tauscope.robot.messages import one_line
 def read_bounded(path: Path, limit: int) -> bytes:
     """All bytes of a regular file of at most `limit` bytes.
 
-    Parameters
-    ----------
-    limit : int
-        largest size that is accepted [bytes]
+    Raises RobotFileError if the file is missing, not a regular file, empty, too large or not readable.
 
-    Raises
-    ------
-    RobotFileError
-        if the file is missing, not a regular file, empty, too large or not readable
+    `limit`: largest size that is accepted [bytes].
     """
     try:
         mode = path.stat().st_mode
@@ -46,13 +40,7 @@ def _first_bytes(path: Path, count: int) -> bytes:
 
 
 def decode_utf8(data: bytes, label: str) -> str:
-    """Text of UTF-8 bytes, without a byte order mark.
-
-    Raises
-    ------
-    RobotFileError
-        if the bytes are not UTF-8
-    """
+    """Text of UTF-8 bytes, without a byte order mark. Raises RobotFileError if the bytes are not UTF-8."""
     try:
         return data.decode("utf-8").removeprefix("\ufeff")
     except UnicodeDecodeError as error:

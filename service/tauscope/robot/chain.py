@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.actuator import Actuator
-from tauscope.robot.finding import Finding
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import Finding, one_line, shown
 from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Repair, Segment
 
 MOST_NAMES = 4
@@ -21,24 +20,15 @@ MOST_NAMES = 4
 class Chain:
     """Joints, segments and bodies from the base to the tip.
 
-    segment_names : tuple of str
-        the file's joint of each segment
-    segments : tuple of Segment
-        one a joint, and one for each joint that follows another
-    links : tuple of LinkInertia, or None
-        one a segment, about the link frame; zero for a link without inertia, None where no link has one
-    friction : tuple of FrictionCoefficients, or None
-        one a joint; None where no joint states it
-    rotor_inertia : tuple of float, or None
-        one a joint [kg m² or kg]; None where no joint states it
-    link_names : tuple of tuple of str
-        links of the file that make up each link
-    branches : tuple of LinkInertia
-        the part of each link that an export leaves where the file has it
-    actuators : tuple of Actuator or None
-        one a joint; None where the file has none
-    gravity : (3,) float64, or None
-        in the base frame [m/s²]; None where the file states none
+    `segment_names`: the file's joint of each segment.
+    `segments`: one a joint, and one for each joint that follows another.
+    `links`: one a segment, about the link frame; zero for a link without inertia, None where no link has one.
+    `friction`: one a joint; None where no joint states it.
+    `rotor_inertia`: one a joint [kg m² or kg]; None where no joint states it.
+    `link_names`: links of the file that make up each link.
+    `branches`: the part of each link that an export leaves where the file has it.
+    `actuators`: one a joint; None where the file has none.
+    `gravity`: (3,),, in the base frame [m/s²]; None where the file states none.
     """
 
     base: str
@@ -74,12 +64,8 @@ def default_ends_note(label: str, kind: str, base: str, tip: str, joints: Sequen
 def rigid_branch_note(label: str, joints: Sequence[str], mass: float, following: Sequence[str] = ()) -> ResultWarning:
     """Which joints beside the chain count as rigid, and what they carry.
 
-    Parameters
-    ----------
-    mass : float
-        of all bodies that these joints move [kg]
-    following : sequence of str
-        those of them that would follow a joint of the chain
+    `mass`: of all bodies that these joints move [kg]; `following`: those of them that would follow a joint of the
+    chain.
     """
     more = f" and {len(joints) - MOST_NAMES} more" if len(joints) > MOST_NAMES else ""
     names = ", ".join(map(shown, joints[:MOST_NAMES])) + more

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.kinematics import homogeneous
+from tauscope.robot.messages import Finding, Severity
 from tauscope.robot.robot import Joint, JointLimits, JointType, Robot, Segment
 from tauscope.robot.robot_file import read_robot
 
@@ -19,12 +19,9 @@ EARTH = (9.7, 9.9)
 class JointSummary:
     """One joint in the report.
 
-    number : int
-        from 1, base first
-    origin : tuple of three float
-        origin of the link frame at q = 0, in the frame of the link before [m]
-    mass : float or None
-        of the link that the joint carries, as the model believes [kg]
+    `number`: from 1, base first.
+    `origin`: origin of the link frame at q = 0, in the frame of the link before [m].
+    `mass`: of the link that the joint carries, as the model believes [kg].
     """
 
     number: int
@@ -45,12 +42,9 @@ class JointSummary:
 class RobotReport:
     """A robot file at a glance.
 
-    joints : tuple of JointSummary
-        base first
-    gravity : tuple of three float
-        in the base frame [m/s²]
-    total_mass : float or None
-        of all moving links, as the model believes [kg]; None without a model
+    `joints`: base first.
+    `gravity`: in the base frame [m/s²].
+    `total_mass`: of all moving links, as the model believes [kg]; None without a model.
     """
 
     name: str
@@ -64,10 +58,7 @@ class RobotReport:
 def check_robot(path: Path | str) -> RobotReport:
     """The report on a robot file; links that no body can be are among its findings.
 
-    Raises
-    ------
-    RobotFileError
-        if the file or its URDF cannot be read or is not valid
+    Raises RobotFileError if the file or its URDF cannot be read or is not valid.
     """
     robot = read_robot(path)
     rank = list(Severity)

@@ -36,14 +36,10 @@ Columns = Annotated[Source, BeforeValidator(check_source)]
 class DenavitHartenbergRowDocument(Document):
     """One row of ``dh`` or ``mdh``.
 
-    theta : float
-        θ [rad]
-    d : float
-        along z [m]
-    a : float
-        along x [m]
-    alpha : float
-        α [rad]
+    `theta`: θ [rad].
+    `d`: along z [m].
+    `a`: along x [m].
+    `alpha`: α [rad].
     """
 
     theta: Number
@@ -56,10 +52,8 @@ class DenavitHartenbergRowDocument(Document):
 class CouplingDocument(Document):
     """The joint that a segment follows.
 
-    joint : int
-        index of the joint, from 0
-    offset : float
-        position of the segment where the joint is at zero [rad or m]
+    `joint`: index of the joint, from 0.
+    `offset`: position of the segment where the joint is at zero [rad or m].
     """
 
     joint: Annotated[int, Field(ge=0, lt=MOST_JOINTS, strict=True)]
@@ -100,14 +94,10 @@ class KinematicsDocument(Document):
 class LimitsDocument(Document):
     """What a joint may do.
 
-    position : list of two float, or None
-        lowest and highest position [rad or m]
-    velocity : float or None
-        largest speed [rad/s or m/s]
-    acceleration : float or None
-        largest acceleration [rad/s² or m/s²]
-    torque : float or None
-        largest torque [Nm] or force [N]
+    `position`: lowest and highest position [rad or m].
+    `velocity`: largest speed [rad/s or m/s].
+    `acceleration`: largest acceleration [rad/s² or m/s²].
+    `torque`: largest torque [Nm] or force [N].
     """
 
     position: Range | None = None
@@ -119,10 +109,8 @@ class LimitsDocument(Document):
 class FrictionShapeDocument(Document):
     """Shape constants of the friction curve.
 
-    k_v : float or None
-        K_v of equation (8) [s/rad or s/m]
-    delta : float or None
-        δ of equation (7) [s/rad or s/m]
+    `k_v`: K_v of equation (8) [s/rad or s/m].
+    `delta`: δ of equation (7) [s/rad or s/m].
     """
 
     k_v: Positive | None = None
@@ -132,28 +120,17 @@ class FrictionShapeDocument(Document):
 class ActuatorDocument(Document):
     """The drive of a joint, as `Actuator` has it.
 
-    kp : float or None
-        of the loop, in `unit`
-    kd : float
-        torque per velocity [Nm s/rad or N s/m], or a register value
-    supply_voltage : float or None
-        [V]
-    torque_per_volt : float or None
-        [Nm/V or N/V]
-    max_duty : float or None
-        share of the supply, 0 to 1
-    back_emf : float
-        [V s/rad or V s/m]
-    dead_band : float or None
-        [rad or m]
-    delay : float or None
-        [s]; None: estimated
-    rate_hz : float or None
-        [Hz]
-    temperature_slope : float
-        relative loss of torque per volt [1/K]
-    scale_std : float or None
-        relative standard error of the torque's scale
+    `kp`: of the loop, in `unit`.
+    `kd`: torque per velocity [Nm s/rad or N s/m], or a register value.
+    `supply_voltage`: [V].
+    `torque_per_volt`: [Nm/V or N/V].
+    `max_duty`: share of the supply, 0 to 1.
+    `back_emf`: [V s/rad or V s/m].
+    `dead_band`: [rad or m].
+    `delay`: [s]; None: estimated.
+    `rate_hz`: [Hz].
+    `temperature_slope`: relative loss of torque per volt [1/K].
+    `scale_std`: relative standard error of the torque's scale.
     """
 
     kind: Annotated[ActuatorKind, choice("kind", get_args(ActuatorKind))]
@@ -197,8 +174,7 @@ class JointDocument(Document):
 class InertiaDocument(Document):
     """The six entries of an inertia matrix about the link frame's origin.
 
-    xx, yy, zz, xy, xz, yz : float
-        entries [kg m²]
+    `xx`, `yy`, `zz`, `xy`, `xz`, `yz`: entries [kg m²].
     """
 
     xx: Number
@@ -212,12 +188,9 @@ class InertiaDocument(Document):
 class LinkDocument(Document):
     """Inertial parameters of one link.
 
-    mass : float
-        m [kg]
-    first_moment : list of three float
-        m s [kg m]
-    inertia : InertiaDocument
-        about the link frame's origin [kg m²]
+    `mass`: m [kg].
+    `first_moment`: m s [kg m].
+    `inertia`: about the link frame's origin [kg m²].
     """
 
     mass: Number
@@ -228,12 +201,9 @@ class LinkDocument(Document):
 class FrictionDocument(Document):
     """Friction coefficients of one joint.
 
-    stiction : float
-        τ_s [Nm or N]
-    stribeck : float
-        τ_sc [Nm or N]
-    viscous : float
-        τ_v [Nm s/rad or N s/m]
+    `stiction`: τ_s [Nm or N].
+    `stribeck`: τ_sc [Nm or N].
+    `viscous`: τ_v [Nm s/rad or N s/m].
     """
 
     stiction: Number
@@ -244,8 +214,7 @@ class FrictionDocument(Document):
 class ModelDocument(Document):
     """What the user's simulation believes.
 
-    rotor_inertia : list of float, or None
-        reflected to the joint, one a joint [kg m² or kg]
+    `rotor_inertia`: reflected to the joint, one a joint [kg m² or kg].
     """
 
     links: list[LinkDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
@@ -256,8 +225,7 @@ class ModelDocument(Document):
 class RecordingDocument(Document):
     """How the arm's recordings are written.
 
-    rate_hz : float or None
-        samples a second where t counts samples [Hz]
+    `rate_hz`: samples a second where t counts samples [Hz].
     """
 
     columns: dict[Name, Columns] | Name | None = None
@@ -290,10 +258,8 @@ class RecordingDocument(Document):
 class RobotDocument(Document):
     """The whole robot file.
 
-    gravity : list of three float, or None
-        in the base frame [m/s²]; None: the gravity of the MJCF, else [0, 0, -9.81]
-    locked : dict of str to float
-        position of joints that do not move [rad or m]
+    `gravity`: in the base frame [m/s²]; None: the gravity of the MJCF, else [0, 0, -9.81].
+    `locked`: position of joints that do not move [rad or m].
     """
 
     name: Name
@@ -325,8 +291,7 @@ class RobotDocument(Document):
 class PlacementDocument(Document):
     """A fixed rigid displacement x ↦ R x + p.
 
-    translation : list of three float
-        p [m]
+    `translation`: p [m].
     """
 
     rotation: Rotation

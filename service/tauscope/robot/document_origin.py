@@ -47,24 +47,18 @@ class DocumentOrigin:
         return RobotFileError(one_line(f"{self.where(place)}: {text}"))
 
     def validated(self, kind: type[DocumentType]) -> DocumentType:
-        """The data as a validated document.
-
-        Raises
-        ------
-        RobotFileError
-            naming the first entry that is not valid
-        """
+        """The data as a validated document. Raises RobotFileError naming the first entry that is not valid."""
         if not isinstance(self.data, Mapping):
             raise self.error((), f"must be a mapping with name and kinematics, but is {shown(self.data)}")
         try:
             return kind.model_validate(self.data)
         except ValidationError as error:
             details = error.errors(include_url=False)
-        place, text = self._worded(details[0])
+        place, text = self._word(details[0])
         more = f" (the first of {len(details)} errors)" if len(details) > 1 else ""
         raise self.error(place, text + more)
 
-    def _worded(self, detail: ErrorDetails) -> tuple[Place, str]:
+    def _word(self, detail: ErrorDetails) -> tuple[Place, str]:
         """Place and words of one of pydantic's errors."""
         place: Place = tuple(detail["loc"])
         key = detail.get("ctx", {}).get("key")

@@ -14,22 +14,10 @@ Array = NDArray[np.float64]
 def link_placements(chain: Robot | Sequence[Segment], q: Array) -> Array:
     """Every link frame seen from the base: T_j = T_{j-1} · before_j · motion_z(q_j) · after_j.
 
-    Parameters
-    ----------
-    chain : Robot or sequence of Segment
-        the arm, or its segments, base first
-    q : (N, n) float64
-        joint position [rad or m]
+    Raises RecordingMismatchError if `q` has not one column a joint.
 
-    Returns
-    -------
-    (N, m, 4, 4) float64
-        homogeneous transforms; [:, j] is link frame j + 1 in the base frame [m]
-
-    Raises
-    ------
-    RecordingMismatchError
-        if `q` has not one column a joint
+    `chain`: the arm, or its segments, base first; `q`: (N, n), joint position [rad or m]. Returns (N, m, 4, 4),
+    homogeneous transforms; [:, j] is link frame j + 1 in the base frame [m].
     """
     segments = chain.segments if isinstance(chain, Robot) else tuple(chain)
     position = np.asarray(q, dtype=np.float64)
@@ -49,13 +37,7 @@ def link_placements(chain: Robot | Sequence[Segment], q: Array) -> Array:
 
 
 def homogeneous(placement: Placement) -> Array:
-    """The homogeneous transform [[R, p], [0, 1]], shape (4, 4).
-
-    Parameters
-    ----------
-    placement : Placement
-        R and p [m]
-    """
+    """The homogeneous transform [[R, p], [0, 1]], shape (4, 4). `placement`: R and p [m]."""
     transform = np.eye(4)
     transform[:3, :3] = placement.rotation
     transform[:3, 3] = placement.translation

@@ -1,8 +1,49 @@
-"""One-line messages: safe to print whatever the user's file holds."""
+"""Messages about a user's files: findings, and foreign text made fit for one line."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
+from enum import StrEnum
 from itertools import islice
+
+_LISTED_NAMES = 12
+_LONGEST_NAME = 60
+
+
+def printable(text: str, longest: int = 200) -> str:
+    """Text without control characters and line breaks, cut where it is long."""
+    kept = text if len(text) <= longest else text[:longest] + "…"
+    return kept if kept.isprintable() else "".join(mark if mark.isprintable() else "?" for mark in kept)
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names of columns, joints or topics, cut where they are many."""
+    words = [printable(name, _LONGEST_NAME) for name in names[:_LISTED_NAMES]]
+    more = f" and {len(names) - _LISTED_NAMES} more" if len(names) > _LISTED_NAMES else ""
+    return ", ".join(words) + more
+
+
+def reason(error: Exception) -> str:
+    """The first line of what an error says, or its kind where it says nothing."""
+    return printable((str(error).splitlines() or [""])[0]) or type(error).__name__
+
+
+class Severity(StrEnum):
+    """How much a finding matters: an error refuses, a warning may spoil results, the rest is good to know."""
+
+    ERROR = "error"
+    WARNING = "warning"
+    INFO = "info"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One remark on a robot."""
+
+    severity: Severity
+    where: str
+    text: str
+
 
 LONGEST_VALUE = 60
 LONGEST_MESSAGE = 600

@@ -34,16 +34,13 @@ def pseudo_inertia(link: LinkInertia) -> Array:
 def find_defect(link: LinkInertia, tolerance: float = ROUNDING) -> str | None:
     """Why no rigid body has these parameters; None where a body can have them.
 
-    Parameters
-    ----------
-    tolerance : float
-        violation that is allowed, relative to the largest entry of the inertia
+    `tolerance`: violation that is allowed, relative to the largest entry of the inertia.
     """
     offset = float(np.linalg.norm(link.first_moment))
     if link.mass < 0.0:
         return f"mass {link.mass:g} kg is negative"
     if link.mass == 0.0 and offset > 0.0:
-        return f"mass is zero but the first moment is {_listed(link.first_moment)} kg m"
+        return f"mass is zero but the first moment is {_list(link.first_moment)} kg m"
     scale = float(np.max(np.abs(link.inertia)))
     allowed = tolerance * scale + SMALLEST
     if offset == 0.0:
@@ -53,7 +50,7 @@ def find_defect(link: LinkInertia, tolerance: float = ROUNDING) -> str | None:
         # A point mass m at distance d has the moment m d² = h²/m; far beyond the entries given, it might overflow.
         return (
             f"inertia is not positive semidefinite about the centre of mass: mass {link.mass:g} kg with first moment "
-            f"{_listed(link.first_moment)} kg m alone makes {offset / link.mass * offset:g} kg m² "
+            f"{_list(link.first_moment)} kg m alone makes {offset / link.mass * offset:g} kg m² "
             f"about the frame's origin, where the largest entry is {scale:g} kg m²"
         )
     return about_origin or _principal_defect(about_centre(link), allowed, "about the centre of mass")
@@ -89,9 +86,9 @@ def repair_text(stated: LinkInertia, body: LinkInertia) -> str | None:
     if np.array_equal(stated.first_moment, body.first_moment):
         about, inertias = "centre of mass", [about_centre(stated), about_centre(body)]
     else:
-        changes.append(f"first moment {_listed(stated.first_moment)} → {_listed(body.first_moment)} kg m")
+        changes.append(f"first moment {_list(stated.first_moment)} → {_list(body.first_moment)} kg m")
         about, inertias = "frame's origin", [stated.inertia, body.inertia]
-    before, after = (_listed(_principal_moments(inertia)) for inertia in inertias)
+    before, after = (_list(_principal_moments(inertia)) for inertia in inertias)
     if before != after:
         changes.append(f"principal moments {before} → {after} kg m² about the {about}")
     return f"{defect}; the nearest body is used: {', '.join(changes)}"
@@ -100,10 +97,7 @@ def repair_text(stated: LinkInertia, body: LinkInertia) -> str | None:
 def about_centre(link: LinkInertia) -> Array:
     """Inertia about the centre of mass: I_c = I - (hᵀh 1 - h hᵀ)/m, equation (5) reversed; I itself without mass.
 
-    Returns
-    -------
-    (3, 3) float64
-        I_c [kg m²]
+    Returns (3, 3), I_c [kg m²].
     """
     if link.mass == 0.0:
         return link.inertia
@@ -143,6 +137,6 @@ def _principal_moments(inertia: Array) -> Array:
     return np.where(np.abs(moments) > ROUND_OFF * np.max(np.abs(moments)), moments, 0.0)
 
 
-def _listed(vector: Array) -> str:
+def _list(vector: Array) -> str:
     """A vector as text."""
     return "[" + ", ".join(f"{value:g}" for value in vector) + "]"

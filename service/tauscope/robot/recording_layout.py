@@ -37,16 +37,11 @@ _GROUPS = "t, q, tau, i, qd, qdd, qref, taucmd, temp, qlink, volt, kp, period"
 class RecordingLayout:
     """Columns, units and separators of a recording.
 
-    columns : mapping of str to Source, name of a preset, or None
-        where the columns of CONTRACT.md are found, by column (``q3``) or for all joints (``q``)
-    units : mapping of str to str
-        unit of ``t``, ``q``, ``qd``, ``tau``, or of one joint's column, ``q3``
-    rate_hz : float or None
-        samples a second where t counts samples [Hz]
-    decimal, delimiter : str or None
-        None where the file shows them
-    topic : str or None
-        of a log with several topics
+    `columns`: where the columns of CONTRACT.md are found, by column (``q3``) or for all joints (``q``).
+    `units`: unit of ``t``, ``q``, ``qd``, ``tau``, or of one joint's column, ``q3``.
+    `rate_hz`: samples a second where t counts samples [Hz].
+    `decimal`, `delimiter`: None where the file shows them.
+    `topic`: of a log with several topics.
     """
 
     units: Mapping[str, str] = field(default_factory=dict)
@@ -60,10 +55,7 @@ class RecordingLayout:
 def find_fault(units: Mapping[str, str], rate_hz: float | None) -> tuple[str, str] | None:
     """The column, or ``rate_hz``, whose unit cannot be used, and the reason; None where all can be.
 
-    Parameters
-    ----------
-    rate_hz : float or None
-        samples a second [Hz]
+    `rate_hz`: samples a second [Hz].
     """
     for column, unit in units.items():
         match = _COLUMN.fullmatch(column)

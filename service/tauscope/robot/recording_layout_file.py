@@ -20,12 +20,8 @@ INLINE = "{"
 def read_layout(text: str) -> RecordingLayout:
     """The layout that a preset, a file or a mapping in YAML's flow style names.
 
-    A file holds the block, with or without the key ``recording``, or the columns alone.
-
-    Raises
-    ------
-    RobotFileError
-        it is neither a preset nor a file, or not valid
+    A file holds the block, with or without the key ``recording``, or the columns alone. Raises RobotFileError where it
+    is neither a preset nor a file, or not valid.
     """
     if text in PRESETS:
         return RecordingLayout(columns=text)
@@ -39,13 +35,7 @@ def read_layout(text: str) -> RecordingLayout:
 
 
 def parse_layout(text: str, label: str) -> RecordingLayout:
-    """The layout of YAML text.
-
-    Raises
-    ------
-    RobotFileError
-        it is not valid; the message names line and key
-    """
+    """The layout of YAML text. Raises RobotFileError where it is not valid; the message names line and key."""
     content = read_yaml(text, label)
     return layout_from_dict(content.data, label, content.lines)
 
@@ -53,10 +43,7 @@ def parse_layout(text: str, label: str) -> RecordingLayout:
 def layout_from_dict(data: Any, label: str = "columns", lines: Mapping[Place, int] | None = None) -> RecordingLayout:
     """The layout of plain data: the block ``recording``, that block in a mapping, or its columns alone.
 
-    Raises
-    ------
-    RobotFileError
-        it is not valid
+    Raises RobotFileError where it is not valid.
     """
     lines = lines or {}
     if not isinstance(data, Mapping):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.actuator import Actuator
-from tauscope.robot.finding import Finding
+from tauscope.robot.messages import Finding
 from tauscope.robot.recording_layout import RecordingLayout
 
 STANDARD_PARAMETERS = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "m", "msx", "msy", "msz")
@@ -29,14 +29,10 @@ class JointType(StrEnum):
 class JointLimits:
     """What a joint may do; None where nothing is stated.
 
-    position : tuple of two float, or None
-        lowest and highest position [rad or m]
-    velocity : float or None
-        largest speed [rad/s or m/s]
-    acceleration : float or None
-        largest acceleration [rad/s² or m/s²]
-    torque : float or None
-        largest torque [Nm] or force [N]
+    `position`: lowest and highest position [rad or m].
+    `velocity`: largest speed [rad/s or m/s].
+    `acceleration`: largest acceleration [rad/s² or m/s²].
+    `torque`: largest torque [Nm] or force [N].
     """
 
     position: tuple[float, float] | None = None
@@ -49,10 +45,8 @@ class JointLimits:
 class FrictionShape:
     """Shape constants of the friction curve (7), (8); None where the data shall tell.
 
-    k_v : float or None
-        steepness K_v of the sign's smooth stand-in, equation (8) [s/rad or s/m]
-    delta : float or None
-        steepness δ of the Stribeck part, equation (7) [s/rad or s/m]
+    `k_v`: steepness K_v of the sign's smooth stand-in, equation (8) [s/rad or s/m].
+    `delta`: steepness δ of the Stribeck part, equation (7) [s/rad or s/m].
     """
 
     k_v: float | None = None
@@ -63,12 +57,9 @@ class FrictionShape:
 class Joint:
     """One joint: its name, its limits and what turns a recorded drive signal into joint torque.
 
-    gear_ratio : float or None
-        motor turns per joint turn; None where not stated
-    has_torque_constant : bool
-        whether the robot file states the constant; 1 stands where it does not
-    actuator : Actuator or None
-        of the robot file, else of the user's MJCF
+    `gear_ratio`: motor turns per joint turn; None where not stated.
+    `has_torque_constant`: whether the robot file states the constant; 1 stands where it does not.
+    `actuator`: of the robot file, else of the user's MJCF.
     """
 
     name: str
@@ -87,10 +78,8 @@ class Joint:
 class Placement:
     """A fixed rigid displacement x ↦ R x + p.
 
-    rotation : (3, 3) float64
-        R, orthonormal, right-handed
-    translation : (3,) float64
-        p [m]
+    `rotation`: (3, 3), R, orthonormal, right-handed.
+    `translation`: (3,), p [m].
     """
 
     rotation: NDArray[np.float64] = field(default_factory=lambda: np.eye(3))
@@ -101,12 +90,9 @@ class Placement:
 class Coupling:
     """A segment that follows a joint: its own position is multiplier · q_joint + offset.
 
-    joint : int
-        index of the joint, from 0
-    multiplier : float
-        turn or slide of the segment per turn or slide of the joint
-    offset : float
-        position of the segment at q_joint = 0 [rad or m]
+    `joint`: index of the joint, from 0.
+    `multiplier`: turn or slide of the segment per turn or slide of the joint.
+    `offset`: position of the segment at q_joint = 0 [rad or m].
     """
 
     joint: int
@@ -122,8 +108,7 @@ class Segment:
     `after`, modified DH into `before`; a URDF puts the axis' orientation into both, so that the link frame stays the
     URDF's own.
 
-    coupling : Coupling or None
-        None where the segment is the next joint's own
+    `coupling`: None where the segment is the next joint's own.
     """
 
     type: JointType
@@ -145,12 +130,9 @@ def segment_couplings(segments: Iterable[Segment]) -> tuple[Coupling, ...]:
 class LinkInertia:
     """Inertial parameters of one link, in its link frame.
 
-    mass : float
-        m [kg]
-    first_moment : (3,) float64
-        m s [kg m]
-    inertia : (3, 3) float64
-        about the link frame's origin, the paper's equation (5) [kg m²]
+    `mass`: m [kg].
+    `first_moment`: (3,), m s [kg m].
+    `inertia`: (3, 3), about the link frame's origin, the paper's equation (5) [kg m²].
     """
 
     mass: float
@@ -164,13 +146,7 @@ class LinkInertia:
 
     @staticmethod
     def from_vector(vector: NDArray[np.float64]) -> "LinkInertia":
-        """The link of ten standard parameters.
-
-        Parameters
-        ----------
-        vector : (10,) float64
-            in the order of `STANDARD_PARAMETERS`
-        """
+        """The link of ten standard parameters. `vector`: (10,), in the order of `STANDARD_PARAMETERS`."""
         xx, yy, zz, xy, xz, yz, mass, *first_moment = (float(value) for value in vector)
         inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         return LinkInertia(mass, np.array(first_moment), inertia)
@@ -180,10 +156,8 @@ class LinkInertia:
 class Repair:
     """Stated inertial parameters that no body has, and the nearest body, which the model holds instead.
 
-    link : int
-        index of the link that the body belongs to, from 0
-    before, after : LinkInertia
-        of the body, in the frame of that link
+    `link`: index of the link that the body belongs to, from 0.
+    `before`, `after`: of the body, in the frame of that link.
     """
 
     link: int
@@ -198,12 +172,9 @@ class Repair:
 class FrictionCoefficients:
     """Friction of one joint, the seed paper's equation (7).
 
-    stiction : float
-        τ_s [Nm or N]
-    stribeck : float
-        τ_sc, the Coulomb level less the stiction [Nm or N]
-    viscous : float
-        τ_v [Nm s/rad or N s/m]
+    `stiction`: τ_s [Nm or N].
+    `stribeck`: τ_sc, the Coulomb level less the stiction [Nm or N].
+    `viscous`: τ_v [Nm s/rad or N s/m].
     """
 
     stiction: float = 0.0
@@ -215,12 +186,9 @@ class FrictionCoefficients:
 class Model:
     """What the user's simulation believes; None where the robot file says nothing.
 
-    links : tuple of LinkInertia, or None
-        one a segment
-    friction : tuple of FrictionCoefficients, or None
-        one a joint
-    rotor_inertia : tuple of float, or None
-        reflected to the joint, one a joint [kg m² or kg]
+    `links`: one a segment.
+    `friction`: one a joint.
+    `rotor_inertia`: reflected to the joint, one a joint [kg m² or kg].
     """
 
     links: tuple[LinkInertia, ...] | None = None
@@ -232,19 +200,13 @@ class Model:
 class Robot:
     """A robot arm as its robot file describes it.
 
-    joints : tuple of Joint
-        base first
-    segments : tuple of Segment
-        base first; one a joint, and one for each joint that follows another
-    gravity : (3,) float64
-        acceleration of gravity in the base frame [m/s²]
-    segment_names : tuple of str
-        joint of the URDF or MJCF that each segment is; empty without such a file, as are the next two
-    link_names : tuple of tuple of str
-        links of that file that make up each link
-    branches : tuple of LinkInertia
-        the part of each link that an export leaves where the file has it: of a URDF the bodies on joints beside the
-        chain, of an MJCF all but the body of the joint
+    `joints`: base first.
+    `segments`: base first; one a joint, and one for each joint that follows another.
+    `gravity`: (3,), acceleration of gravity in the base frame [m/s²].
+    `segment_names`: joint of the URDF or MJCF that each segment is; empty without such a file, as are the next two.
+    `link_names`: links of that file that make up each link.
+    `branches`: the part of each link that an export leaves where the file has it: of a URDF the bodies on joints beside
+        the chain, of an MJCF all but the body of the joint.
     """
 
     name: str
@@ -312,13 +274,7 @@ class Robot:
         return tuple(name if link in own else f"{name} at link {link + 1}" for link, name in enumerate(names))
 
     def joint_of_link(self, link: int) -> Joint:
-        """The joint that moves a link.
-
-        Parameters
-        ----------
-        link : int
-            index of the link, from 0
-        """
+        """The joint that moves a link. `link`: index of the link, from 0."""
         return self.joints[self.couplings[link].joint]
 
     @property

@@ -1,14 +1,17 @@
 """A validated document to a Robot."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib.metadata import entry_points
 from pathlib import Path
+from typing import Protocol, cast
 
 import numpy as np
 
+from tauscope.errors import RobotFileError
+from tauscope.extras import require_extra
 from tauscope.robot.actuator import Actuator
 from tauscope.robot.chain import Chain
-from tauscope.robot.denavit_hartenberg import DenavitHartenbergRow, modified_segments, standard_segments
 from tauscope.robot.document import (
     ActuatorDocument,
     JointDocument,
@@ -21,10 +24,9 @@ from tauscope.robot.document import (
     SegmentDocument,
 )
 from tauscope.robot.document_origin import DocumentOrigin
-from tauscope.robot.finding import Finding, Severity
-from tauscope.robot.messages import shown
-from tauscope.robot.mjcf import read_mjcf_chain
+from tauscope.robot.messages import Finding, Severity, shown
 from tauscope.robot.physical import nearest_body, repair_text
+from tauscope.robot.placement import DenavitHartenbergRow, modified_segments, standard_segments
 from tauscope.robot.recording_layout import RecordingLayout
 from tauscope.robot.robot import (
     Coupling,
@@ -42,6 +44,51 @@ from tauscope.robot.robot import (
     segment_couplings,
 )
 from tauscope.robot.urdf import read_urdf_chain
+
+ENTRY_POINT_GROUP = "tauscope.mjcf"
+
+
+class MjcfReader(Protocol):
+    """Compiles an MJCF and reads the chain between two of its bodies."""
+
+    def __call__(
+        self,
+        data: bytes,
+        label: str,
+        path: Path | None,
+        base: str | None,
+        tip: str | None,
+        locked: Mapping[str, float],
+    ) -> Chain:
+        """The chain from body `base` to body `tip`.
+
+        Raises RobotFileError if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip.
+        """
+        ...
+
+
+def read_mjcf_chain(
+    data: bytes,
+    label: str,
+    path: Path | None = None,
+    base: str | None = None,
+    tip: str | None = None,
+    locked: Mapping[str, float] | None = None,
+) -> Chain:
+    """The chain from body `base` to body `tip` of an MJCF; by default from the root to the deepest body.
+
+    Raises RobotFileError if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip. Raises
+    MissingExtraError where MuJoCo is not installed.
+
+    `path`: where the file lies, for the files that it names; None for text without files beside it; `locked`: position
+    of joints that do not move [rad or m].
+    """
+    for entry in entry_points(group=ENTRY_POINT_GROUP):
+        with require_extra(f"{label}: reading an MJCF"):
+            reader = cast("MjcfReader", entry.load())
+        return reader(data, label, path, base, tip, locked or {})
+    raise RobotFileError(f"{label}: no reader of MJCF is registered; install tauscope again")
+
 
 EARTH = np.array([0.0, 0.0, -9.81])
 """Gravity in the base frame where nothing is stated [m/s²]."""
@@ -83,10 +130,7 @@ class _Kinematics:
 def build_robot(document: RobotDocument, origin: DocumentOrigin, file_source: FileSource) -> Robot:
     """The robot of a document; a link of its model that no body can be is replaced by the nearest body.
 
-    Raises
-    ------
-    RobotFileError
-        if parts of the document do not fit each other, or the URDF is not valid
+    Raises RobotFileError if parts of the document do not fit each other, or the URDF is not valid.
     """
     kinematics = _kinematics(document, origin, file_source)
     chain = kinematics.chain

@@ -21,29 +21,22 @@ def robot_from_dict(
 ) -> Robot:
     """The robot of plain data: the robot file's form, or that of `robot_to_dict`.
 
-    No file is opened: a URDF that the data name is taken from `urdf_files`.
-
-    Raises
-    ------
-    RobotFileError
-        if the data are not valid; one line naming the JSON path and joint
+    No file is opened: a URDF that the data name is taken from `urdf_files`. Raises RobotFileError if the data are not
+    valid; one line naming the JSON path and joint.
     """
     origin = DocumentOrigin(label, data)
     document = origin.validated(PlainRobotDocument)
-    return build_robot(document, origin, _given(origin, urdf_files or {}))
+    return build_robot(document, origin, _find_given(origin, urdf_files or {}))
 
 
 def robot_from_yaml(data: bytes, label: str = "robot", urdf_files: Mapping[str, bytes] | None = None) -> Robot:
     """The robot of an uploaded robot file; as `robot_from_dict` this opens no file.
 
-    Raises
-    ------
-    RobotFileError
-        if the robot file or its URDF is not valid; one line naming line, place and joint
+    Raises RobotFileError if the robot file or its URDF is not valid; one line naming line, place and joint.
     """
     document, origin = parse_robot_file(data, label)
     files = {Path(label).name: data} if is_xml(data) else urdf_files or {}
-    return build_robot(document, origin, _given(origin, files))
+    return build_robot(document, origin, _find_given(origin, files))
 
 
 def robot_to_dict(robot: Robot) -> dict[str, Any]:
@@ -59,10 +52,10 @@ def robot_to_dict(robot: Robot) -> dict[str, Any]:
         "joints": [_joint(joint) for joint in robot.joints],
     }
     recording = {key: value for key, value in asdict(robot.recording).items() if value} or None
-    return {**data, **_stated({"model": _model(robot.model) or None, "recording": recording})}
+    return {**data, **_drop_none({"model": _model(robot.model) or None, "recording": recording})}
 
 
-def _given(origin: DocumentOrigin, files: Mapping[str, bytes]) -> FileSource:
+def _find_given(origin: DocumentOrigin, files: Mapping[str, bytes]) -> FileSource:
     """Looks a file up among the given ones."""
 
     def look_up(kind: str, file: str) -> SourceFile:
@@ -83,7 +76,7 @@ def _segment(segment: Segment) -> dict[str, Any]:
     """A segment as a mapping."""
     coupling = None if segment.coupling is None else asdict(segment.coupling)
     placements = {"before": _placement(segment.before), "after": _placement(segment.after)}
-    return _stated({"type": segment.type.value, **placements, "coupling": coupling})
+    return _drop_none({"type": segment.type.value, **placements, "coupling": coupling})
 
 
 def _placement(placement: Placement) -> dict[str, Any]:
@@ -100,14 +93,15 @@ def _joint(joint: Joint) -> dict[str, Any]:
         "torque": joint.limits.torque,
     }
     is_stated = joint.has_torque_constant or joint.torque_constant != Joint.torque_constant
-    return _stated(
+    return _drop_none(
         {
             "name": joint.name,
-            "limits": _stated(limits) or None,
+            "limits": _drop_none(limits) or None,
             "gear_ratio": joint.gear_ratio,
             "torque_constant": joint.torque_constant if is_stated else None,
             "sign": joint.sign,
-            "friction_shape": _stated({"k_v": joint.friction_shape.k_v, "delta": joint.friction_shape.delta}) or None,
+            "friction_shape": _drop_none({"k_v": joint.friction_shape.k_v, "delta": joint.friction_shape.delta})
+            or None,
             "drive": None if joint.drive is None else dict(joint.drive),
             "actuator": None if joint.actuator is None else _actuator(joint.actuator),
         }
@@ -116,7 +110,7 @@ def _joint(joint: Joint) -> dict[str, Any]:
 
 def _actuator(actuator: Actuator) -> dict[str, Any]:
     """An actuator as a mapping."""
-    return _stated(asdict(actuator) | ({} if actuator.has_loop else {"kp": None}))
+    return _drop_none(asdict(actuator) | ({} if actuator.has_loop else {"kp": None}))
 
 
 def _model(model: Model) -> dict[str, Any]:
@@ -126,7 +120,7 @@ def _model(model: Model) -> dict[str, Any]:
     if model.friction is not None:
         friction = [{"stiction": f.stiction, "stribeck": f.stribeck, "viscous": f.viscous} for f in model.friction]
     rotors = None if model.rotor_inertia is None else list(model.rotor_inertia)
-    return _stated({"links": links, "friction": friction, "rotor_inertia": rotors})
+    return _drop_none({"links": links, "friction": friction, "rotor_inertia": rotors})
 
 
 def _link(link: LinkInertia) -> dict[str, Any]:
@@ -136,6 +130,6 @@ def _link(link: LinkInertia) -> dict[str, Any]:
     return {"mass": float(link.mass), "first_moment": link.first_moment.tolist(), "inertia": inertia}
 
 
-def _stated(mapping: Mapping[str, Any]) -> dict[str, Any]:
+def _drop_none(mapping: Mapping[str, Any]) -> dict[str, Any]:
     """The entries that are not None."""
     return {key: value for key, value in mapping.items() if value is not None}

@@ -25,10 +25,8 @@ KINEMATICS_OF_ROOT = {"robot": "urdf", "mujoco": "mjcf"}
 def read_robot(path: Path | str) -> Robot:
     """The robot that a robot file describes, or a URDF or MJCF by itself.
 
-    Raises
-    ------
-    RobotFileError
-        if the file or the one that it names cannot be read or is not valid; one line naming file, line, place and joint
+    Raises RobotFileError if the file or the one that it names cannot be read or is not valid; one line naming file,
+    line, place and joint.
     """
     source = Path(path)
     data = read_bounded(source, LARGEST_XML)
@@ -50,10 +48,7 @@ def read_robot(path: Path | str) -> Robot:
 def parse_robot_file(data: bytes, label: str) -> tuple[RobotDocument, DocumentOrigin]:
     """The validated document of a robot file's bytes, and where it came from.
 
-    Raises
-    ------
-    RobotFileError
-        if the bytes are not the YAML of a robot file, nor a URDF or MJCF
+    Raises RobotFileError if the bytes are not the YAML of a robot file, nor a URDF or MJCF.
     """
     if is_xml(data):
         origin = DocumentOrigin(label, describe_bare_file(data, label))
@@ -68,10 +63,7 @@ def parse_robot_file(data: bytes, label: str) -> tuple[RobotDocument, DocumentOr
 def describe_bare_file(data: bytes, label: str) -> dict[str, Any]:
     """The robot file that says the same as a URDF or MJCF by itself: base and tip by default.
 
-    Raises
-    ------
-    RobotFileError
-        if the file is neither
+    Raises RobotFileError if the file is neither.
     """
     root = parse_xml(data, label, [])
     kind, file = KINEMATICS_OF_ROOT.get(local_name(root)), Path(label).name

@@ -17,8 +17,7 @@ from tauscope.result_warning import ResultWarning
 from tauscope.robot.chain import Chain, default_ends_note, rigid_branch_note
 from tauscope.robot.document import MOST_JOINTS
 from tauscope.robot.document_fields import LARGEST_NUMBER
-from tauscope.robot.finding import Finding, Severity
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import Finding, Severity, nearest, one_line, shown
 from tauscope.robot.placement import compose, rotation_of_z_to
 from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
 from tauscope.robot.urdf_branches import MOVING, JointMotions, Master, joint_axis
@@ -45,15 +44,9 @@ def read_urdf_chain(
 ) -> Chain:
     """The chain from link `base` to link `tip`; by default from the root to the deepest leaf.
 
-    Parameters
-    ----------
-    locked : mapping of str to float, or None
-        position of joints that do not move [rad or m]
+    Raises RobotFileError if the URDF is not valid, or no chain of movable joints runs from base to tip.
 
-    Raises
-    ------
-    RobotFileError
-        if the URDF is not valid, or no chain of movable joints runs from base to tip
+    `locked`: position of joints that do not move [rad or m].
     """
     findings: list[Finding] = []
     tree = parse_urdf(data, label, findings)

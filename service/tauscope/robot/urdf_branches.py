@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tauscope.errors import RobotFileError
-from tauscope.robot.finding import Finding, Severity
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import Finding, Severity, nearest, one_line, shown
 from tauscope.robot.placement import rotation_about_z, rotation_of_z_to
 from tauscope.robot.robot import Coupling, Placement
 from tauscope.robot.urdf_element import number, only_child, urdf_error, vector, where
@@ -32,10 +31,7 @@ class Master:
 class JointMotions:
     """How the joints of a URDF move, where some of them are locked.
 
-    Parameters
-    ----------
-    locked : mapping of str to float
-        position by the name of a joint [rad or m]
+    `locked`: position by the name of a joint [rad or m].
     """
 
     def __init__(self, tree: UrdfTree, locked: Mapping[str, float], path: Iterable[UrdfJoint]) -> None:

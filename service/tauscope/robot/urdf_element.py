@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from tauscope.errors import RobotFileError
 from tauscope.robot.document_fields import LARGEST_NUMBER
-from tauscope.robot.finding import Finding, Severity
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import Finding, Severity, one_line, shown
 from tauscope.robot.placement import rotation_of_roll_pitch_yaw
 from tauscope.robot.robot import Placement
 
@@ -57,15 +56,9 @@ def only_child(label: str, element: Element, kind: str, findings: list[Finding])
 def number(label: str, element: Element, key: str, default: float | None = None) -> float:
     """A finite number in an attribute.
 
-    Parameters
-    ----------
-    default : float or None
-        value where the attribute is absent; None where it must be there
+    Raises RobotFileError if the attribute is missing or not a finite number.
 
-    Raises
-    ------
-    RobotFileError
-        if the attribute is missing or not a finite number
+    `default`: value where the attribute is absent; None where it must be there.
     """
     text = element.get(key)
     if text is None:
@@ -78,26 +71,17 @@ def number(label: str, element: Element, key: str, default: float | None = None)
 def bounded_number(label: str, element: Element, key: str) -> float:
     """A number in an attribute that must be there, of a size that SI quantities of an arm have.
 
-    Raises
-    ------
-    RobotFileError
-        if the attribute is missing, not a number or beyond 1e9
+    Raises RobotFileError if the attribute is missing, not a number or beyond 1e9.
     """
-    return _bounded(label, element, key, number(label, element, key))
+    return _require_bounded(label, element, key, number(label, element, key))
 
 
 def vector(label: str, element: Element | None, key: str, default: tuple[float, float, float]) -> NDArray[np.float64]:
     """Three numbers in an attribute, shape (3,).
 
-    Parameters
-    ----------
-    element : Element or None
-        the element; None where the whole element is absent
+    Raises RobotFileError if the attribute does not hold three numbers.
 
-    Raises
-    ------
-    RobotFileError
-        if the attribute does not hold three numbers
+    `element`: the element; None where the whole element is absent.
     """
     text = None if element is None else element.get(key)
     if text is None:
@@ -105,7 +89,7 @@ def vector(label: str, element: Element | None, key: str, default: tuple[float, 
     words = text.split()
     if len(words) != 3:
         raise urdf_error(label, element, f"{key}={shown(text)} must hold three numbers, but holds {len(words)}")
-    return np.array([_bounded(label, element, key, _real(label, element, key, word)) for word in words])
+    return np.array([_require_bounded(label, element, key, _real(label, element, key, word)) for word in words])
 
 
 def origin(label: str, element: Element, findings: list[Finding]) -> Placement:
@@ -125,7 +109,7 @@ def _real(label: str, element: Element, key: str, text: str) -> float:
     return value
 
 
-def _bounded(label: str, element: Element, key: str, value: float) -> float:
+def _require_bounded(label: str, element: Element, key: str, value: float) -> float:
     """A number of a size that SI quantities of an arm have."""
     if abs(value) > LARGEST_NUMBER:
         raise urdf_error(label, element, f"{key}={value:g} is beyond {LARGEST_NUMBER:g}; check the unit (SI)")

@@ -4,8 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from tauscope.robot.finding import Finding, Severity
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import Finding, Severity, one_line, shown
 from tauscope.robot.physical import nearest_body, repair_text
 from tauscope.robot.placement import compose
 from tauscope.robot.robot import LinkInertia, Placement, Repair
@@ -18,14 +17,8 @@ ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 def inertia_about_frame(mass: float, centre: Placement, inertia: np.ndarray) -> LinkInertia:
     """Inertial parameters about a link frame, equation (5): I' = R I Rᵀ + m (sᵀs 1 - s sᵀ).
 
-    Parameters
-    ----------
-    mass : float
-        m [kg]
-    centre : Placement
-        the centre-of-mass frame seen from the link frame: R and s [m]
-    inertia : (3, 3) float64
-        I about the centre of mass, in the centre-of-mass frame [kg m²]
+    `mass`: m [kg]; `centre`: the centre-of-mass frame seen from the link frame: R and s [m]; `inertia`: (3, 3), I about
+    the centre of mass, in the centre-of-mass frame [kg m²].
     """
     s, rotation = centre.translation, centre.rotation
     shifted = rotation @ inertia @ rotation.T + mass * (s @ s * np.eye(3) - np.outer(s, s))
@@ -37,24 +30,17 @@ def lumped_inertia(
 ) -> tuple[LinkInertia | None, list[Repair]]:
     """Sum of the inertials of the bodies that move with one link, or None where none of them has an `<inertial>`.
 
-    Parameters
-    ----------
-    link : int
-        index of the link, from 0
-    bodies : iterable of (Element, Placement)
-        link elements, with the placement of each in the frame of the link that they move with
+    Raises RobotFileError if an `<inertial>` is incomplete or not made of numbers.
 
-    Raises
-    ------
-    RobotFileError
-        if an `<inertial>` is incomplete or not made of numbers
+    `link`: index of the link, from 0; `bodies`: iterable of (Element, Placement), link elements, with the placement of
+    each in the frame of the link that they move with.
     """
     vectors, repairs = [], []
     for body, placement in bodies:
         element = only_child(label, body, "inertial", findings)
         if element is None:
             continue
-        stated = _stated_inertia(label, body, element, findings)
+        stated = _read_inertia(label, body, element, findings)
         centre = compose(placement, origin(label, element, findings))
         used = nearest_body(stated)
         before, after = (inertia_about_frame(each.mass, centre, each.inertia) for each in (stated, used))
@@ -79,7 +65,7 @@ def stated_mass(tree: UrdfTree, link: str) -> float:
     return total
 
 
-def _stated_inertia(label: str, body: Element, element: Element, findings: list[Finding]) -> LinkInertia:
+def _read_inertia(label: str, body: Element, element: Element, findings: list[Finding]) -> LinkInertia:
     """An `<inertial>` as it stands, about the centre of mass."""
     parts = {kind: only_child(label, element, kind, findings) for kind in ("mass", "inertia")}
     place = one_line(f"{where(label, element)} of link {shown(body.get('name'))}")

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tauscope.robot.document_fields import LONGEST_NAME
-from tauscope.robot.finding import Finding, Severity
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import Finding, Severity, nearest, one_line, shown
 from tauscope.robot.urdf_element import EXPAND, Element, children, local_name, urdf_error, where
 from tauscope.robot.xml_text import parse_xml
 
@@ -38,10 +37,7 @@ class UrdfTree:
 def parse_urdf(data: bytes, label: str, findings: list[Finding]) -> UrdfTree:
     """Links and joints of URDF text.
 
-    Raises
-    ------
-    RobotFileError
-        if the text is not well-formed, holds a DOCTYPE, or its links and joints are no forest
+    Raises RobotFileError if the text is not well-formed, holds a DOCTYPE, or its links and joints are no forest.
     """
     root = parse_xml(data, label, findings)
     _refuse_xacro(root, label, findings)

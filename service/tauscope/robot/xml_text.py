@@ -10,8 +10,7 @@ import re
 from lxml import etree
 
 from tauscope.errors import RobotFileError
-from tauscope.robot.finding import Finding, Severity
-from tauscope.robot.messages import one_line
+from tauscope.robot.messages import Finding, Severity, one_line
 from tauscope.robot.urdf_element import Element
 
 LARGEST_XML = 16 * 1024 * 1024
@@ -36,10 +35,8 @@ def is_xml(data: bytes) -> bool:
 def parse_xml(data: bytes, label: str, findings: list[Finding]) -> Element:
     """The root element.
 
-    Raises
-    ------
-    RobotFileError
-        if the text is not well-formed or holds a DOCTYPE, which is refused before entities can be expanded
+    Raises RobotFileError if the text is not well-formed or holds a DOCTYPE, which is refused before entities can be
+    expanded.
     """
     text = decode_xml(data, label, findings)
     doctype = text.find("<!DOCTYPE")
@@ -73,10 +70,7 @@ def parse_xml(data: bytes, label: str, findings: list[Finding]) -> Element:
 def decode_xml(data: bytes, label: str, findings: list[Finding]) -> str:
     """Text of a file by its byte order mark, as UTF-8, as its declaration says, or else as Latin-1, with a finding.
 
-    Raises
-    ------
-    RobotFileError
-        if the bytes are no text
+    Raises RobotFileError if the bytes are no text.
     """
     declared = _DECLARATION.match(data[:200])
     marked = _marked_encoding(data)

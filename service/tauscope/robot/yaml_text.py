@@ -28,8 +28,7 @@ Place = tuple[str | int, ...]
 class YamlContent:
     """Plain data of a YAML document.
 
-    lines : dict of tuple to int
-        for each entry's place the line, from 1, on which it stands
+    `lines`: for each entry's place the line, from 1, on which it stands.
     """
 
     data: Any
@@ -67,10 +66,7 @@ class _BoundedComposer(Composer):
 def read_yaml(text: str, label: str) -> YamlContent:
     """Plain data of one YAML document.
 
-    Raises
-    ------
-    RobotFileError
-        if the text is not one well-formed YAML document of plain data
+    Raises RobotFileError if the text is not one well-formed YAML document of plain data.
     """
     root = _compose(text, label)
     if root is None:

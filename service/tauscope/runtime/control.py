@@ -62,7 +62,7 @@ def control(
         run = Run(task, record, Surroundings(folder, stops, keeper, recorder, report))
     except TauscopeError as error:
         stops.done()
-        record = _refused(record, error)
+        record = _refuse(record, error)
         keeper.keep(record)
         report(end_event(record))
     else:
@@ -82,7 +82,7 @@ def _task(order: RunOrder, folder: Path, make: Callable[..., Connection]) -> Run
     return RunTask(robot, trajectory, order.options, lambda: make(name, robot, settings, folder=folder))
 
 
-def _refused(record: RunRecord, error: TauscopeError) -> RunRecord:
+def _refuse(record: RunRecord, error: TauscopeError) -> RunRecord:
     """The record of a run that could not begin."""
     problem = RunProblem(code=error.code, detail=str(error))
     return record.moved(RunState.STOPPING, problem=problem).moved(RunState.FAILED)

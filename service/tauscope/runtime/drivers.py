@@ -71,13 +71,7 @@ else:
 
 @cache
 def find_driver(name: str) -> Driver:
-    """The driver of a name.
-
-    Raises
-    ------
-    AcquisitionError
-        there is no such driver, or it cannot be loaded
-    """
+    """The driver of a name. Raises AcquisitionError where there is no such driver, or it cannot be loaded."""
     entry = _entries().get(name)
     if entry is None:
         raise AcquisitionError(f"there is no backend {shown(name)}; {nearest(name, _entries())}")
@@ -97,13 +91,7 @@ def bus_drivers() -> Mapping[str, BusDriver]:
 
 
 def find_bus(name: str) -> BusDriver:
-    """The driver of a field bus.
-
-    Raises
-    ------
-    AcquisitionError
-        there is no such bus
-    """
+    """The driver of a field bus. Raises AcquisitionError where there is no such bus."""
     known = bus_drivers()
     if name not in known:
         raise AcquisitionError(f"there is no field bus {shown(name)}; {nearest(name, known)}")
@@ -113,10 +101,7 @@ def find_bus(name: str) -> BusDriver:
 def select_bus(robot: Robot) -> BusDriver:
     """The driver of the field bus that a robot file's ``drive`` blocks speak of.
 
-    Raises
-    ------
-    AcquisitionError
-        none of them, or several
+    Raises AcquisitionError: none of them, or several.
     """
     blocks = [joint.drive or {} for joint in robot.joints]
     meant = [bus for bus in bus_drivers().values() if any(map(bus.is_meant, blocks))]
@@ -135,19 +120,10 @@ def select_bus(robot: Robot) -> BusDriver:
 def make_backend(name: str, robot: Robot, settings: Mapping[str, Any], *, folder: Path | None = None) -> Connection:
     """The backend of a name, not connected yet; moves nothing.
 
-    Parameters
-    ----------
-    settings : mapping
-        the driver's own
-    folder : Path or None
-        for files of the driver's own
+    Raises AcquisitionError where there is no such backend, or a setting or a ``drive`` block is not valid. Raises
+    MissingExtraError where the backend's optional dependencies are not installed.
 
-    Raises
-    ------
-    AcquisitionError
-        there is no such backend, or a setting or a ``drive`` block is not valid
-    MissingExtraError
-        the backend's optional dependencies are not installed
+    `settings`: the driver's own; `folder`: for files of the driver's own.
     """
     driver = find_driver(name)
     for key in settings:
@@ -163,10 +139,7 @@ def to_drive_joints(
 ) -> tuple[DriveJoint, ...]:
     """The joints as a driver sees them: files beside the robot file, on the bus of the settings where they name one.
 
-    Raises
-    ------
-    AcquisitionError
-        the driver is of a bus, and a joint has no ``drive`` block
+    Raises AcquisitionError where the driver is of a bus, and a joint has no ``drive`` block.
     """
     joints = [_to_drive_joint(driver, robot, joint) for joint in robot.joints]
     if isinstance(driver, BusDriver):
@@ -202,10 +175,7 @@ def _to_drive_joint(driver: Driver, robot: Robot, joint: Joint) -> DriveJoint:
 def translate_driver_errors() -> Iterator[None]:
     """Turn what a driver refuses into an error of Tauscope's, in the same words.
 
-    Raises
-    ------
-    AcquisitionError
-        in place of `DriverError`
+    Raises AcquisitionError in place of `DriverError`.
     """
     try:
         yield

@@ -45,10 +45,8 @@ class Rule(StrEnum):
 class Violation:
     """One find_objection.
 
-    joint : str or None
-        name of the joint; None where it concerns the whole arm
-    value : float or None
-        what was found, in the rule's unit; None where it is no number
+    `joint`: name of the joint; None where it concerns the whole arm.
+    `value`: what was found, in the rule's unit; None where it is no number.
     """
 
     rule: Rule
@@ -88,20 +86,13 @@ _ROOM = 1.05
 class GuardLimits:
     """Limits of every joint; infinite where there is none.
 
-    position_low, position_high : (n,) float64
-        range of the targets [rad or m]
-    velocity : (n,) float64
-        largest speed of the targets [rad/s or m/s]
-    acceleration : (n,) float64
-        deceleration on which braking can count [rad/s² or m/s²]
-    torque : (n,) float64
-        largest commanded torque [Nm or N]
-    following : (n,) float64
-        largest distance between target and arm [rad or m]
-    position_margin : (n,) float64
-        how far outside the range the arm itself may be found [rad or m]
-    temperature_c : float
-        hottest motor [°C]
+    `position_low`, `position_high`: (n,), range of the targets [rad or m].
+    `velocity`: (n,), largest speed of the targets [rad/s or m/s].
+    `acceleration`: (n,), deceleration on which braking can count [rad/s² or m/s²].
+    `torque`: (n,), largest commanded torque [Nm or N].
+    `following`: (n,), largest distance between target and arm [rad or m].
+    `position_margin`: (n,), how far outside the range the arm itself may be found [rad or m].
+    `temperature_c`: hottest motor [°C].
     """
 
     joints: tuple[str, ...]
@@ -137,16 +128,10 @@ def guard_limits(
 ) -> GuardLimits:
     """The limits of a run: the robot file's where it states them, else a careful default or what the motion needs.
 
-    Parameters
-    ----------
-    low, high : (n,) float64
-        range of the motion's positions [rad or m]
-    speed : (n,) float64
-        the motion's largest speed [rad/s or m/s]
-    following : float or None
-        following error allowed at every joint; the defaults where None [rad or m]
-    temperature_c : float
-        hottest motor [°C]
+    `low`, `high`: (n,), range of the motion's positions [rad or m].
+    `speed`: (n,), the motion's largest speed [rad/s or m/s].
+    `following`: following error allowed at every joint; the defaults where None [rad or m].
+    `temperature_c`: hottest motor [°C].
     """
     limits, joints = motion_limits(robot), robot.joints
     has_range = np.array([joint.limits.position is not None for joint in joints])
@@ -195,16 +180,10 @@ class Guard:
     ) -> None:
         """Prepare for the first command.
 
-        Parameters
-        ----------
-        period_s : float
-            nominal time between commands [s]
-        watchdog_s : float
-            time without a command after which the device stops by itself [s]
-        enabled_ns : int
-            when the arm was enabled, which started that time [ns]
-        stale_s : float
-            time after which a joint that does not answer counts as lost, if that is sooner [s]
+        `period_s`: nominal time between commands [s].
+        `watchdog_s`: time without a command after which the device stops by itself [s].
+        `enabled_ns`: when the arm was enabled, which started that time [ns].
+        `stale_s`: time after which a joint that does not answer counts as lost, if that is sooner [s].
         """
         self.stale = np.zeros(len(limits.joints), dtype=np.int64)
         self._limits = limits
@@ -222,17 +201,9 @@ class Guard:
     def check(self, state: ArmState, setpoint: Setpoint, now_ns: int, due_ns: int) -> Violation | None:
         """Judge a command before it is sent.
 
-        Parameters
-        ----------
-        now_ns : int
-            the present instant by the backend's clock [ns]
-        due_ns : int
-            when the command was to be sent; commands' speeds are judged by these instants, not by jitter [ns]
-
-        Returns
-        -------
-        Violation or None
-            None where the command may be sent
+        `now_ns`: the present instant by the backend's clock [ns].
+        `due_ns`: when the command was to be sent; commands' speeds are judged by these instants, not by jitter [ns].
+        Returns Violation or None: None where the command may be sent.
         """
         if self._violation is None:
             with np.errstate(all="ignore"):  # absurd commands overflow, and are refused

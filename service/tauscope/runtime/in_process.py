@@ -32,11 +32,7 @@ def run_trajectory(
     """Run a motion in this process and return when it is over.
 
     A run in real time belongs into a process of its own (`tauscope.runtime.RunProcess`), which does nothing else.
-
-    Raises
-    ------
-    AcquisitionError
-        the folder holds a run, or cannot be written to
+    Raises AcquisitionError where the folder holds a run, or cannot be written to.
     """
     options = options or RunOptions()
     prepare_folder(folder)
@@ -49,13 +45,7 @@ def run_trajectory(
 
 
 def prepare_folder(folder: Path) -> None:
-    """Make a run's folder.
-
-    Raises
-    ------
-    AcquisitionError
-        it does, or it cannot be made
-    """
+    """Make a run's folder. Raises AcquisitionError where it does, or it cannot be made."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -68,10 +58,7 @@ def prepare_folder(folder: Path) -> None:
 def open_recorder(path: Path, header: JournalHeader, stops: Stops, is_real_time: bool) -> Recorder:
     """Open a journal in the way that suits the arm's time.
 
-    Raises
-    ------
-    AcquisitionError
-        the journal cannot be created
+    Raises AcquisitionError where the journal cannot be created.
     """
     if not is_real_time:
         return DirectRecorder(path, header)

@@ -22,7 +22,6 @@ class GuardedArm:
     """An arm that can only be commanded through its guard; nothing else calls `Backend.exchange`."""
 
     def __init__(self, backend: Backend, guard: Guard, state: ArmState) -> None:
-        """Take over an arm that has just been enabled."""
         self._backend, self._guard = backend, guard
         self.state = state
 
@@ -34,17 +33,10 @@ class GuardedArm:
     def exchange(self, setpoint: Setpoint, due_ns: int) -> ArmState:
         """Send a command that the guard passes, and read the arm.
 
-        Parameters
-        ----------
-        due_ns : int
-            when it was to be sent [ns]
+        Raises GuardViolationError where the guard objects; nothing was sent. Raises DriverError where the backend
+        cannot.
 
-        Raises
-        ------
-        GuardViolationError
-            the guard objects; nothing was sent
-        DriverError
-            the backend cannot
+        `due_ns`: when it was to be sent [ns].
         """
         violation = self._guard.check(self.state, setpoint, self._backend.clock.now_ns(), due_ns)
         if violation is not None:
@@ -57,14 +49,10 @@ class GuardedArm:
 class Cycles:
     """What the loop does to each cycle, and what it keeps of all of them.
 
-    control : TorqueControl or None
-        closes the loop in torque mode; None where the drives do
-    worst_following : (n,) float64
-        largest distance of arm and target so far [rad or m]
-    late : (n,) int64
-        readings whose instant is not known
-    kept : int
-        samples of the motion, with an answer of every joint
+    `control`: closes the loop in torque mode; None where the drives do.
+    `worst_following`: (n,), largest distance of arm and target so far [rad or m].
+    `late`: (n,) int64, readings whose instant is not known.
+    `kept`: samples of the motion, with an answer of every joint.
     """
 
     plan: Plan
@@ -107,14 +95,8 @@ class Cycles:
     def play(self) -> None:
         """Play the plan from its first cycle to its last.
 
-        Raises
-        ------
-        StopAskedError
-            it was asked to stop
-        GuardViolationError
-            the guard objected
-        DriverError
-            the backend gave up
+        Raises StopAskedError where it was asked to stop. Raises GuardViolationError where the guard objected. Raises
+        DriverError where the backend gave up.
         """
         plan, metronome = self.plan, self.metronome
         while metronome.wait():
@@ -140,6 +122,7 @@ class Cycles:
         row["phase"][0], row["period"][0] = plan.phase[cycle], plan.period[cycle]
         row["position"][0], row["velocity"][0] = state.position, state.velocity
         row["effort"][0], row["temperature"][0] = state.effort, state.temperature
+        row["voltage"][0] = np.nan if state.voltage is None else state.voltage
         row["reference"][0], row["reference_velocity"][0] = plan.position[cycle], plan.velocity[cycle]
         row["command"][0] = torque if self.control is not None else np.nan
         self.recorder.put(self._row)

@@ -78,13 +78,7 @@ class RunOptions(StrictModel, strict=False):
 
 
 def choose_rate_hz(options: RunOptions, capabilities: Capabilities) -> float:
-    """Cycles a second of a run.
-
-    Raises
-    ------
-    AcquisitionError
-        more is asked for than the bus allows
-    """
+    """Cycles a second of a run. Raises AcquisitionError where more is asked for than the bus allows."""
     largest = capabilities.largest_rate_hz
     if options.rate_hz is None:
         return min(DEFAULT_RATE_HZ, largest)
@@ -97,24 +91,17 @@ def choose_rate_hz(options: RunOptions, capabilities: Capabilities) -> float:
     return options.rate_hz
 
 
-def chosen_stop_policy(
+def choose_stop_policy(
     options: RunOptions, joints: Sequence[Joint], capabilities: Capabilities | None = None
 ) -> StopPolicy:
     """How the arm is stopped: as the run says, else as the robot file's drives say, else under power where it is.
 
-    An arm that is released is held first.
+    An arm that is released is held first. Raises AcquisitionError where the robot file states no policy, or several; or
+    the device cannot do it by itself.
 
-    Parameters
-    ----------
-    capabilities : Capabilities or None
-        what the device can do by itself; None where it is not known yet
-
-    Raises
-    ------
-    AcquisitionError
-        the robot file states no policy, or several; or the device cannot do it by itself
+    `capabilities`: what the device can do by itself; None where it is not known yet.
     """
-    wanted = options.stop_policy or _stated_policy(joints)
+    wanted = options.stop_policy or _read_policy(joints)
     policy = StopPolicy.HOLD if wanted == RELEASE else StopPolicy(wanted)
     if capabilities is not None and policy not in (able := capabilities.policies_in(options.mode)):
         raise AcquisitionError(
@@ -127,14 +114,12 @@ def chosen_stop_policy(
 def is_released(options: RunOptions, joints: Sequence[Joint]) -> bool:
     """Whether the arm is let go once it stands still at the end of its motion.
 
-    Raises
-    ------
-    AcquisitionError
-        it is asked for, and the robot file does not state that the arm is safe without torque
+    Raises AcquisitionError where it is asked for, and the robot file does not state that the arm is safe without
+    torque.
     """
     if options.stop_policy not in (None, RELEASE):
         return False
-    is_stated = _stated_policy(joints) == RELEASE
+    is_stated = _read_policy(joints) == RELEASE
     if options.stop_policy == RELEASE and not is_stated:
         raise AcquisitionError(
             "stop policy release: the robot file does not state that the arm is safe without torque; state "
@@ -143,7 +128,7 @@ def is_released(options: RunOptions, joints: Sequence[Joint]) -> bool:
     return is_stated
 
 
-def _stated_policy(joints: Sequence[Joint]) -> str:
+def _read_policy(joints: Sequence[Joint]) -> str:
     stated: dict[str, str] = {}
     for joint in joints:
         value: Any = (joint.drive or {}).get("stop_policy")
@@ -180,24 +165,12 @@ class RunOrder(StrictModel):
 
 
 def write_order(folder: Path, order: RunOrder) -> None:
-    """Write ``order.json``.
-
-    Raises
-    ------
-    OSError
-        the disk does not take it
-    """
+    """Write ``order.json``. Raises OSError where the disk does not take it."""
     write_atomically(folder / ORDER_FILE, order.model_dump_json(indent=1).encode())
 
 
 def read_order(folder: Path) -> RunOrder:
-    """Read ``order.json``.
-
-    Raises
-    ------
-    AcquisitionError
-        there is none, or it is not valid
-    """
+    """Read ``order.json``. Raises AcquisitionError where there is none, or it is not valid."""
     path = folder / ORDER_FILE
     try:
         return RunOrder.model_validate_json(path.read_bytes())

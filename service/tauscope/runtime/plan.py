@@ -26,15 +26,8 @@ def predict_torque(robot: Robot, position: Array, velocity: Array, acceleration:
 
     Friction is left out where its coefficients or its shape are not stated.
 
-    Parameters
-    ----------
-    position, velocity, acceleration : (N, n) float64
-        the motion [rad or m, and per s, per s²]
-
-    Returns
-    -------
-    (N, n) float64 or None
-        [Nm or N]
+    `position`, `velocity`, `acceleration`: (N, n), the motion [rad or m, and per s, per s²]. Returns (N, n) or None [Nm
+    or N].
     """
     parameters = _parameters(robot)
     if parameters is None:
@@ -50,15 +43,8 @@ def predict_torque(robot: Robot, position: Array, velocity: Array, acceleration:
 def compute_inertia(robot: Robot, position: Array) -> tuple[Array, int] | None:
     """Joint-space inertia H along a motion; None where the robot file has no model.
 
-    Parameters
-    ----------
-    position : (N, n) float64
-        the motion [rad or m]
-
-    Returns
-    -------
-    (K, n, n) float64 and int, or None
-        H at every s-th posture, and s: so many that memory stays small [kg m², kg m, kg]
+    `position`: (N, n), the motion [rad or m]. Returns (K, n, n) and int, or None, H at every s-th posture, and s: so
+    many that memory stays small [kg m², kg m, kg].
     """
     parameters = _parameters(robot)
     if parameters is None:
@@ -84,18 +70,12 @@ _ROUNDING = 1e-9
 class Plan:
     """Targets of every cycle, from where the arm stands to the end of the motion.
 
-    rate_hz : float
-        cycles a second [Hz]
-    period_ns : int
-        time between cycles [ns]
-    position, velocity : (N, n) float64
-        targets [rad or m, and per s]
-    torque : (N, n) float64
-        what the model predicts, within the torque limits; zero where there is no model [Nm or N]
-    period : (N,) float64
-        index of the excitation period, NaN outside the repeated part
-    phase : (N,) int64
-        ramp or motion, as in `tauscope.recording.journal_rows.Phase`
+    `rate_hz`: cycles a second [Hz].
+    `period_ns`: time between cycles [ns].
+    `position`, `velocity`: (N, n), targets [rad or m, and per s].
+    `torque`: (N, n), what the model predicts, within the torque limits; zero where there is no model [Nm or N].
+    `period`: (N,), index of the excitation period, NaN outside the repeated part.
+    `phase`: (N,) int64, ramp or motion, as in `tauscope.recording.journal_rows.Phase`.
     """
 
     rate_hz: float
@@ -133,15 +113,9 @@ def make_plan(
 ) -> Plan:
     """Plan a run: a minimum-jerk ramp from where the arm stands, a pause, and the motion, all within the limits.
 
-    Parameters
-    ----------
-    start : (n,) float64
-        where the arm stands [rad or m]
+    Raises AcquisitionError where the motion does not fit the arm or its limits, or the arm stands outside them.
 
-    Raises
-    ------
-    AcquisitionError
-        the motion does not fit the arm or its limits, or the arm stands outside them
+    `start`: (n,), where the arm stands [rad or m].
     """
     _require_fitting(robot, trajectory, start, capabilities)
     rate_hz = choose_rate_hz(options, capabilities)

@@ -21,10 +21,7 @@ def child_environment() -> dict[str, str]:
 def read_process_start(pid: int) -> int | None:
     """When a process was started, in the kernel's ticks; with its number it names a process for good.
 
-    Returns
-    -------
-    int or None
-        None where there is no such process
+    Returns int or None: None where there is no such process.
     """
     try:
         status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
@@ -44,13 +41,7 @@ class RunLock:
     """Holds a run's folder for this process."""
 
     def __init__(self, folder: Path) -> None:
-        """Take the folder.
-
-        Raises
-        ------
-        AcquisitionError
-            another process holds it
-        """
+        """Take the folder. Raises AcquisitionError where another process holds it."""
         self._descriptor = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -66,15 +57,7 @@ class RunLock:
 def wait_for_lock(folder: Path, patience_s: float) -> RunLock | None:
     """Take a folder as soon as nobody holds it.
 
-    Parameters
-    ----------
-    patience_s : float
-        how long to wait [s]
-
-    Returns
-    -------
-    RunLock or None
-        None where it is still held
+    `patience_s`: how long to wait [s]. Returns RunLock or None: None where it is still held.
     """
     deadline = time.monotonic() + patience_s
     while True:

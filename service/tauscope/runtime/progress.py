@@ -43,10 +43,10 @@ def progress_event(cycles: Cycles, state: RunState, recent: int) -> dict[str, An
         "time_s": round((cycles.metronome.index + 1) / plan.rate_hz, 3),
         "duration_s": round(plan.cycles / plan.rate_hz, 3),
         "target": [round(float(value), 5) for value in target],
-        "position": _measured(cycles.arm.state.position),
-        "effort": _measured(cycles.arm.state.effort),
-        "position_range": [_measured(limits.position_low), _measured(limits.position_high)],
-        "torque_limit": _measured(limits.torque),
+        "position": _null_unmeasured(cycles.arm.state.position),
+        "effort": _null_unmeasured(cycles.arm.state.effort),
+        "position_range": [_null_unmeasured(limits.position_low), _null_unmeasured(limits.position_high)],
+        "torque_limit": _null_unmeasured(limits.torque),
         "following_error": [float(value) for value in cycles.worst_following],
         "following_share": round(float((cycles.worst_following / limits.following).max()), 4),
         "position_room": [float(value) for value in room],
@@ -57,7 +57,7 @@ def progress_event(cycles: Cycles, state: RunState, recent: int) -> dict[str, An
     }
 
 
-def _measured(values: NDArray[np.float64]) -> list[float | None]:
+def _null_unmeasured(values: NDArray[np.float64]) -> list[float | None]:
     """Numbers as plain data: what was not measured, or has no limit, is None."""
     return [round(float(value), 5) if np.isfinite(value) else None for value in values]
 

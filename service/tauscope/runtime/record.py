@@ -45,10 +45,7 @@ class ProcessName(StrictModel):
 def write_process(folder: Path, pid: int) -> None:
     """Keep which process was started for a run, as soon as it was: it may never come to say so itself.
 
-    Raises
-    ------
-    OSError
-        the disk does not take it
+    Raises OSError where the disk does not take it.
     """
     write_atomically(folder / PROCESS_FILE, ProcessName.of(pid).model_dump_json().encode())
 
@@ -135,13 +132,7 @@ class RunRecord(StrictModel):
     recording: RecordingFiles | None = Field(default=None, description="what the run left behind")
 
     def moved(self, state: RunState, now: datetime | None = None, **changes: object) -> "RunRecord":
-        """The record after a transition.
-
-        Raises
-        ------
-        ValueError
-            if that state may not follow: a fault of the caller's
-        """
+        """The record after a transition. Raises ValueError if that state may not follow: a fault of the caller's."""
         if not may_follow(self.state, state):
             raise ValueError(f"a run that is {self.state} cannot become {state}")
         history = (*self.history, Transition(state=state, at=now or datetime.now(UTC)))
@@ -156,24 +147,12 @@ def new_record(robot: str, backend: str, mode: str, now: datetime | None = None)
 
 
 def write_record(folder: Path, record: RunRecord) -> None:
-    """Write ``run.json``, whole or not at all.
-
-    Raises
-    ------
-    OSError
-        the disk does not take it
-    """
+    """Write ``run.json``, whole or not at all. Raises OSError where the disk does not take it."""
     write_atomically(folder / RUN_FILE, record.model_dump_json(indent=1).encode())
 
 
 def read_record(folder: Path) -> RunRecord:
-    """Read ``run.json``.
-
-    Raises
-    ------
-    AcquisitionError
-        there is none, or it is damaged
-    """
+    """Read ``run.json``. Raises AcquisitionError where there is none, or it is damaged."""
     path = folder / RUN_FILE
     try:
         return RunRecord.model_validate_json(path.read_bytes())
@@ -195,7 +174,6 @@ class RecordKeeper:
     """Writes the newest record; records that are overtaken while the disk is busy are left out."""
 
     def __init__(self, folder: Path) -> None:
-        """Start the thread."""
         self._folder = folder
         self._newest: RunRecord | None = None
         self._problem: str | None = None
@@ -214,15 +192,7 @@ class RecordKeeper:
     def close(self, patience_s: float = FLUSH_S) -> str | None:
         """Wait for the last record to reach the disk.
 
-        Parameters
-        ----------
-        patience_s : float
-            how long [s]
-
-        Returns
-        -------
-        str or None
-            why it did not, None where it did
+        `patience_s`: how long [s]. Returns str or None: why it did not, None where it did.
         """
         with self._changed:
             self._is_closed = True

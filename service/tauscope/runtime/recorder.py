@@ -49,23 +49,11 @@ class Recorder(Protocol):
         ...
 
     def put(self, row: NDArray[np.void]) -> None:
-        """Take a cycle.
-
-        Parameters
-        ----------
-        row : (1,) of `journal_row_type`
-            the cycle; copied
-        """
+        """Take a cycle. `row`: (1,) of `journal_row_type`, the cycle; copied."""
         ...
 
     def event(self, time_ns: int, event: Mapping[str, Any]) -> None:
-        """Take an event.
-
-        Parameters
-        ----------
-        time_ns : int
-            when, by the clock of the rows [ns]
-        """
+        """Take an event. `time_ns`: when, by the clock of the rows [ns]."""
         ...
 
     def close(self) -> str | None:
@@ -77,13 +65,7 @@ class DirectRecorder:
     """Writes the journal itself: in virtual time nobody is late."""
 
     def __init__(self, path: Path, header: JournalHeader) -> None:
-        """Open the journal.
-
-        Raises
-        ------
-        AcquisitionError
-            the journal cannot be created
-        """
+        """Open the journal. Raises AcquisitionError where the journal cannot be created."""
         self._path = path
         try:
             self._writer = JournalWriter(path, header)
@@ -94,26 +76,14 @@ class DirectRecorder:
         self.lost = 0
 
     def put(self, row: NDArray[np.void]) -> None:
-        """Take a cycle.
-
-        Parameters
-        ----------
-        row : (1,) of `journal_row_type`
-            the cycle; copied
-        """
+        """Take a cycle. `row`: (1,) of `journal_row_type`, the cycle; copied."""
         self._rows[self._count] = row[0]
         self._count += 1
         if self._count == len(self._rows):
             self._write()
 
     def event(self, time_ns: int, event: Mapping[str, Any]) -> None:
-        """Take an event.
-
-        Parameters
-        ----------
-        time_ns : int
-            when, by the clock of the rows [ns]
-        """
+        """Take an event. `time_ns`: when, by the clock of the rows [ns]."""
         self._write()
         self._writer.write_event(time_ns, event)
 
@@ -169,13 +139,7 @@ class RecorderProcess:
         self._row = np.frombuffer(self._buffer, np.uint8, row_bytes, FRAME.size)
 
     def wait_until_open(self, stops: Stops) -> None:
-        """Wait until the journal is open.
-
-        Raises
-        ------
-        AcquisitionError
-            the journal cannot be created
-        """
+        """Wait until the journal is open. Raises AcquisitionError where the journal cannot be created."""
         deadline = time.monotonic() + OPENING_S
         poll = select.poll()
         poll.register(self._said, select.POLLIN | select.POLLHUP)
@@ -188,24 +152,12 @@ class RecorderProcess:
             raise _cannot_open(self._path, str(answer.get("problem") or "its writer ended"))
 
     def put(self, row: NDArray[np.void]) -> None:
-        """Take a cycle.
-
-        Parameters
-        ----------
-        row : (1,) of `journal_row_type`
-            the cycle; copied
-        """
+        """Take a cycle. `row`: (1,) of `journal_row_type`, the cycle; copied."""
         self._row[:] = row.view(np.uint8)
         self._send(self._buffer)
 
     def event(self, time_ns: int, event: Mapping[str, Any]) -> None:
-        """Take an event.
-
-        Parameters
-        ----------
-        time_ns : int
-            when, by the clock of the rows [ns]
-        """
+        """Take an event. `time_ns`: when, by the clock of the rows [ns]."""
         content = event_frame(time_ns, dict(event))
         if len(content) <= _LARGEST_FRAME:
             self._send(content)

@@ -46,17 +46,10 @@ _WITHOUT_POWER = (RunState.CREATED, RunState.CONNECTING)
 def recover_runs(folder: Path, *, patience_s: float = PATIENCE_S) -> tuple[RunRecord, ...]:
     """Show every run that nobody carries out any more as interrupted, and save what its journal holds.
 
-    A run whose owner lives is left to its owner. Nothing is ever moved by this.
+    A run whose owner lives is left to its owner. Nothing is ever moved by this. Raises AcquisitionError where a record
+    is damaged, or cannot be written.
 
-    Parameters
-    ----------
-    patience_s : float
-        time that a control process whose owner is gone gets to stop its arm [s]
-
-    Raises
-    ------
-    AcquisitionError
-        a record is damaged, or cannot be written
+    `patience_s`: time that a control process whose owner is gone gets to stop its arm [s].
     """
     runs = sorted(path.parent for path in folder.glob(f"*/{RUN_FILE}"))
     recovered = (recover_run(run, patience_s=patience_s) for run in runs)
@@ -68,20 +61,10 @@ def recover_run(
 ) -> RunRecord | None:
     """Show a run as interrupted if nobody carries it out any more, or as stopped where that kept it from beginning.
 
-    Parameters
-    ----------
-    patience_s : float
-        time that a control process whose owner is gone gets to stop its arm [s]
+    Raises AcquisitionError where the record is damaged, or cannot be written.
 
-    Returns
-    -------
-    RunRecord or None
-        the new record; None where the run has ended by itself or goes on
-
-    Raises
-    ------
-    AcquisitionError
-        the record is damaged, or cannot be written
+    `patience_s`: time that a control process whose owner is gone gets to stop its arm [s]. Returns RunRecord or None:
+    the new record; None where the run has ended by itself or goes on.
     """
     record = read_record(folder)
     if record.state.is_end or (not is_own and record.owner is not None and record.owner.is_alive):
@@ -99,8 +82,8 @@ def recover_run(
         if record.state.is_end:
             return None
         if was_asked_to_stop and record.state is RunState.CREATED:
-            return _written(folder, record.moved(RunState.STOPPING).moved(RunState.STOPPED))
-        return _interrupted(folder, record)
+            return _write(folder, record.moved(RunState.STOPPING).moved(RunState.STOPPED))
+        return _interrupt(folder, record)
     finally:
         lock.release()
 
@@ -115,7 +98,7 @@ def _see_to_its_end(control: ProcessName, patience_s: float) -> None:
         time.sleep(_POLL_S)
 
 
-def _interrupted(folder: Path, record: RunRecord) -> RunRecord:
+def _interrupt(folder: Path, record: RunRecord) -> RunRecord:
     """Save what there is and write the end of a run whose process is gone."""
     recording = None
     journal = folder / JOURNAL_FILE
@@ -124,10 +107,10 @@ def _interrupted(folder: Path, record: RunRecord) -> RunRecord:
         recording = save_recording(folder, is_whole=False, lost_rows=UNKNOWN_LOSS)
     detail = _NEVER_MOVED if record.state in _WITHOUT_POWER and recording is None else _GONE
     problem = record.problem or RunProblem(code=INTERRUPTED, detail=detail)
-    return _written(folder, record.moved(RunState.INTERRUPTED, problem=problem, recording=recording))
+    return _write(folder, record.moved(RunState.INTERRUPTED, problem=problem, recording=recording))
 
 
-def _written(folder: Path, record: RunRecord) -> RunRecord:
+def _write(folder: Path, record: RunRecord) -> RunRecord:
     """Keep a record."""
     try:
         write_record(folder, record)

@@ -25,10 +25,7 @@ _LOOK_S = 0.05
 def release_settled(backend: Backend, state: ArmState) -> ArmState:
     """Hold an arm until it stands still, then let go of it; one that moves, or is not seen, stays held.
 
-    Parameters
-    ----------
-    state : ArmState
-        of an arm that was just stopped to hold
+    `state`: of an arm that was just stopped to hold.
     """
     clock = backend.clock
     begin_ns = since_ns = clock.now_ns()
@@ -46,13 +43,7 @@ def release_settled(backend: Backend, state: ArmState) -> ArmState:
 
 
 def release(backend_name: str, robot: Robot, settings: Mapping[str, Any]) -> None:
-    """Take the torque off an arm.
-
-    Raises
-    ------
-    AcquisitionError
-        a drive is not reached, or is under power still
-    """
+    """Take the torque off an arm. Raises AcquisitionError where a drive is not reached, or is under power still."""
     backend = make_backend(backend_name, robot, settings).backend
     with translate_driver_errors():
         backend.connect()

@@ -10,7 +10,7 @@ from tauscope.recording.journal_rows import Phase
 from tauscope.robot.messages import one_line
 from tauscope.runtime.guard import Guard, GuardViolationError
 from tauscope.runtime.loop import Cycles, GuardedArm
-from tauscope.runtime.options import RELEASE, chosen_stop_policy, is_released
+from tauscope.runtime.options import RELEASE, choose_stop_policy, is_released
 from tauscope.runtime.plan import Plan
 from tauscope.runtime.progress import ProgressReporter, end_event, state_event
 from tauscope.runtime.record import JOURNAL_FILE, RunProblem, RunRecord, Transition
@@ -33,7 +33,7 @@ class Run:
         """Prepare; nothing happens before `execute`."""
         self.record = record
         self._task, self._around = task, around
-        self._policy = chosen_stop_policy(task.options, task.robot.joints)
+        self._policy = choose_stop_policy(task.options, task.robot.joints)
         self._backend: Backend | None = None
         self._recorder: Recorder | None = None
         self._cycles: Cycles | None = None

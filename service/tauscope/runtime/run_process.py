@@ -42,13 +42,7 @@ class RunProcess:
         beats_by_itself: bool = True,
         command: Sequence[str] | None = None,
     ) -> None:
-        """Start the process.
-
-        Raises
-        ------
-        AcquisitionError
-            the folder holds a run or cannot be written to
-        """
+        """Start the process. Raises AcquisitionError where the folder holds a run or cannot be written to."""
         self.folder = folder
         self._report, self._beats_by_itself = report, beats_by_itself
         self._beat_s = order.options.heartbeat_s / BEATS_A_HEARTBEAT
@@ -105,17 +99,10 @@ class RunProcess:
     def wait(self, timeout_s: float | None = None) -> RunRecord:
         """Wait for the end of the run.
 
-        Parameters
-        ----------
-        timeout_s : float or None
-            how long; for good where None [s]
+        Raises TimeoutError where it has not ended by then. Raises AcquisitionError where its record cannot be read or
+        written.
 
-        Raises
-        ------
-        TimeoutError
-            it has not ended by then
-        AcquisitionError
-            its record cannot be read or written
+        `timeout_s`: how long; for good where None [s].
         """
         if not self._has_ended.wait(timeout_s):
             raise TimeoutError(f"{self.folder}: the run has not ended within {timeout_s:g} s")

@@ -133,13 +133,7 @@ class ManualStop:
 
 
 def raise_if_requested(stops: Stops) -> None:
-    """Break out of a run that was asked to stop.
-
-    Raises
-    ------
-    StopAskedError
-        there is one
-    """
+    """Break out of a run that was asked to stop. Raises StopAskedError where there is one."""
     if stops.requested is not None:
         stops.acknowledge()
         raise StopAskedError(stops.requested)

@@ -38,10 +38,7 @@ class StopListener:
     def __init__(self, command_pipe: int, stop_file: Path, heartbeat_s: float) -> None:
         """Start to listen.
 
-        Parameters
-        ----------
-        heartbeat_s : float
-            silence on the pipe after which the owner counts as gone, in real time [s]
+        `heartbeat_s`: silence on the pipe after which the owner counts as gone, in real time [s].
         """
         self.requested: StopRequest | None = None
         self.is_real_time = False

@@ -12,7 +12,7 @@ from tauscope.errors import AcquisitionError
 from tauscope.recording.journal_rows import JournalHeader
 from tauscope.robot import Robot
 from tauscope.runtime.drivers import Connection
-from tauscope.runtime.options import RunOptions, chosen_stop_policy
+from tauscope.runtime.options import RunOptions, choose_stop_policy
 from tauscope.runtime.plan import Plan, make_plan
 from tauscope.runtime.progress import Report
 from tauscope.runtime.record import RunRecord
@@ -61,13 +61,11 @@ LEAST_CYCLES_A_WATCHDOG = 2
 def prepare(task: RunTask, backend: Backend, state: ArmState) -> Plan:
     """Plan a run for the arm as it was found, or refuse it: no torque is on yet.
 
-    Raises
-    ------
-    AcquisitionError
-        the backend cannot do what was asked for, a drive reports a fault, or the motion does not fit
+    Raises AcquisitionError where the backend cannot do what was asked for, a drive reports a fault, or the motion does
+    not fit.
     """
     options, capabilities = task.options, backend.capabilities
-    chosen_stop_policy(options, task.robot.joints, capabilities)
+    choose_stop_policy(options, task.robot.joints, capabilities)
     if options.mode not in capabilities.modes:
         can = ", ".join(sorted(capabilities.modes))
         raise AcquisitionError(f"mode {options.mode}: this arm's drives cannot do that; choose {can}")

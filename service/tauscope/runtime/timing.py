@@ -127,15 +127,7 @@ class Metronome:
     """Absolute deadlines at a constant rate; one that was slept through is left out and counted, never made up."""
 
     def __init__(self, clock: Clock, start_ns: int, period_ns: int, cycles: int) -> None:
-        """Set the first deadline.
-
-        Parameters
-        ----------
-        start_ns : int
-            first deadline [ns]
-        period_ns : int
-            time between deadlines [ns]
-        """
+        """Set the first deadline. `start_ns`: first deadline [ns]; `period_ns`: time between deadlines [ns]."""
         self._clock, self._start, self._period, self._cycles = clock, start_ns, period_ns, cycles
         self._lateness: NDArray[np.int64] = np.zeros(cycles, dtype=np.int64)
         self._next = 0
@@ -148,10 +140,7 @@ class Metronome:
     def wait(self) -> bool:
         """Wait for the next deadline that is not a whole period past, and say in `index` which it is.
 
-        Returns
-        -------
-        bool
-            False where there is none left
+        Returns bool: False where there is none left.
         """
         if self._next >= self._cycles:
             return False
@@ -169,13 +158,7 @@ class Metronome:
         return True
 
     def timing(self, stale: NDArray[np.int64]) -> Timing:
-        """The account so far.
-
-        Parameters
-        ----------
-        stale : (n,) int64
-            readings that each joint did not answer
-        """
+        """The account so far. `stale`: (n,) int64, readings that each joint did not answer."""
         late_us = self._lateness[: self.played] * 1e-3
         span_s = self.index * self._period * 1e-9
         bins = np.searchsorted(_HISTOGRAM_EDGES_US, late_us, side="right")
@@ -196,13 +179,7 @@ class Metronome:
 
 
 def lateness_percentiles(lateness_us: NDArray[np.floating]) -> dict[str, float]:
-    """Median, tail and largest value, by name; empty where there is no value.
-
-    Parameters
-    ----------
-    lateness_us : (N,) float64
-        [µs]
-    """
+    """Median, tail and largest value, by name; empty where there is no value. `lateness_us`: (N,) [µs]."""
     if not len(lateness_us):
         return {}
     values = np.percentile(lateness_us, list(_PERCENTILES.values()))

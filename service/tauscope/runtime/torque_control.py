@@ -27,12 +27,7 @@ class TorqueControl:
     def __init__(self, plan: Plan, inertia: Array, stride: int, bandwidth_rad_s: float) -> None:
         """Set the gains.
 
-        Parameters
-        ----------
-        inertia : (K, n, n) float64
-            H at every `stride`-th cycle of the plan [kg m², kg m, kg]
-        bandwidth_rad_s : float
-            ω [rad/s]
+        `inertia`: (K, n, n), H at every `stride`-th cycle of the plan [kg m², kg m, kg]; `bandwidth_rad_s`: ω [rad/s].
         """
         largest = np.diagonal(inertia, axis1=1, axis2=2).max(axis=0)
         self._inertia, self._stride = inertia + _LEAST_INERTIA * np.diag(largest), stride
@@ -46,14 +41,14 @@ class TorqueControl:
 
     def torque(self, cycle: int, state: ArmState) -> Array:
         """Torque for a cycle [Nm or N], shape (n,)."""
-        position, velocity = self._observed(state)
+        position, velocity = self._observe(state)
         plan = self._plan
         wanted = self._proportional * (plan.position[cycle] - position)
         wanted += self._derivative * (plan.velocity[cycle] - velocity)
         torque = plan.torque[cycle] + self._inertia[cycle // self._stride] @ wanted
         return np.clip(torque, -plan.limits.torque, plan.limits.torque)
 
-    def _observed(self, state: ArmState) -> tuple[Array, Array]:
+    def _observe(self, state: ArmState) -> tuple[Array, Array]:
         """Position and velocity; velocity from positions, smoothed, where the drive reports none."""
         previous = state.position if self._position is None else self._position
         position = np.where(state.fresh, state.position, previous)
@@ -68,15 +63,9 @@ class TorqueControl:
 def torque_control(robot: Robot, plan: Plan, bandwidth_rad_s: float) -> TorqueControl:
     """The loop for an arm whose model is known.
 
-    Parameters
-    ----------
-    bandwidth_rad_s : float
-        ω [rad/s]
+    Raises AcquisitionError where the robot file has no model to take the gains from, or the rate is too low.
 
-    Raises
-    ------
-    AcquisitionError
-        the robot file has no model to take the gains from, or the rate is too low
+    `bandwidth_rad_s`: ω [rad/s].
     """
     found = compute_inertia(robot, plan.position)
     if found is None:

@@ -104,7 +104,6 @@ class ProblemError(HTTPException):
         errors: Sequence[FieldError] | None = None,
         headers: Mapping[str, str] | None = None,
     ) -> None:
-        """Make the exception."""
         super().__init__(KINDS[code].status, detail, headers)
         self.code = code
         self.errors = None if errors is None else list(errors)
@@ -162,7 +161,7 @@ def problem_responses(*codes: str) -> dict[int | str, dict[str, Any]]:
     responses: dict[int | str, dict[str, Any]] = {}
     for code in codes:
         kind = KINDS[code]
-        example = make_problem(code, f"{kind.title}.", "/api/v1/…").model_dump(exclude_none=True)
+        example = make_problem(code, "…", "/api/v1/…").model_dump(exclude_none=True)
         answer = responses.setdefault(
             int(kind.status),
             {

@@ -75,8 +75,7 @@ class Request(CampaignOptions):
 class Result:
     """What came of it.
 
-    recordings : tuple of Path
-        the training recording, and the held-out one where there is one
+    `recordings`: the training recording, and the held-out one where there is one.
     """
 
     recordings: tuple[Path, ...]
@@ -100,12 +99,8 @@ class Result:
 def perform(request: Request, files: Files, progress: Progress) -> Result:
     """Design, run, identify and, where it is wanted, diagnose.
 
-    Motions and recordings are kept in the target `campaign` of the files, a folder.
-
-    Raises
-    ------
-    TauscopeError
-        where a step has no result
+    Motions and recordings are kept in the target `campaign` of the files, a folder. Raises TauscopeError where a step
+    has no result.
     """
     folder = files.target("campaign")
     assert folder is not None  # noqa: S101 - a campaign has a folder

@@ -74,13 +74,7 @@ class ExcitationDesignOptions(StrictModel):
     )
 
     def to_options(self) -> ExcitationOptions:
-        """The options as the design takes them.
-
-        Raises
-        ------
-        ExcitationError
-            if a box is none
-        """
+        """The options as the design takes them. Raises ExcitationError if a box is none."""
         boxes = tuple(Box(np.array(box.low), np.array(box.high)) for box in self.boxes)
         return ExcitationOptions(
             period_s=self.duration_s,
@@ -132,10 +126,7 @@ class Result:
 def perform(request: Request, files: Files, progress: Progress) -> Result:
     """Read the robot and design its motion.
 
-    Raises
-    ------
-    TauscopeError
-        where the robot file is not valid, or no motion keeps the limits
+    Raises TauscopeError where the robot file is not valid, or no motion keeps the limits.
     """
     progress("read robot")
     robot = read_robot(files.find("robot", request.robot))

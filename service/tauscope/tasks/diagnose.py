@@ -1,7 +1,7 @@
 """Diagnose: what an arm's model leaves out."""
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import Literal
 
 from pydantic import Field
@@ -17,29 +17,27 @@ from tauscope.diagnosis import (
     document,
 )
 from tauscope.diagnosis.documents.plots import diagnosis_plots
-from tauscope.diagnosis.extended_model.saved import model_document
+from tauscope.diagnosis.extended_model import model_document
 from tauscope.diagnosis.next_experiment import PlannedExperiment, planned_experiment
 from tauscope.errors import ExcitationError, IdentificationError
 from tauscope.export.formats import CODE_FILES, EXPORT_FILES, ExportFormat, make_export
-from tauscope.export.model import Origin, of_diagnosis
+from tauscope.export.model import of_diagnosis
 from tauscope.export.model_file import identified_document, model_file, read_extended_model
 from tauscope.export.simulation_files import improved_robot, scenario_text
 from tauscope.identification import Options
 from tauscope.recording import Recording
-from tauscope.report.provenance import Provenance
 from tauscope.robot import read_robot
-from tauscope.strict_model import StrictModel
 from tauscope.tasks.identify import CutoffFrequency
 from tauscope.tasks.task import (
     Files,
     Outputs,
     Progress,
     ReadingOptions,
+    TaskRequest,
+    TaskResult,
     command_words,
     json_text,
-    model_origin,
     read_recordings,
-    record_provenance,
 )
 from tauscope.trajectory import trajectory_json
 from tauscope.trajectory.csv_format import trajectory_csv
@@ -67,7 +65,7 @@ class DiagnosisOptions(ReadingOptions):
     )
 
 
-class Request(StrictModel):
+class Request(TaskRequest):
     """What is to be diagnosed, by the names of its files."""
 
     robot: str = Field(description="robot file")
@@ -78,14 +76,9 @@ class Request(StrictModel):
     options: DiagnosisOptions = Field(default=DiagnosisOptions(), description="how it is diagnosed")
 
     @property
-    def compared(self) -> dict[str, tuple[str, ...]]:
-        """Files that the recordings are compared with, by role."""
-        return {"simulated": self.simulated, "model": () if self.model is None else (self.model,)}
-
-    @property
     def command(self) -> tuple[str, ...]:
         """The command line that does the same."""
-        compared = tuple(name for names in self.compared.values() for name in names)
+        compared = (*self.simulated, *self.inputs["model"])
         return command_words(
             "diagnose",
             self.robot,
@@ -99,16 +92,12 @@ class Request(StrictModel):
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class Result(TaskResult):
     """What came of it.
 
-    refusal : ExcitationError or None
-        why the next motion cannot be planned within the robot's limits
+    `refusal`: why the next motion cannot be planned within the robot's limits.
     """
 
-    request: Request
-    files: Files
-    recordings: tuple[Recording, ...]
     held_out: tuple[Recording, ...]
     diagnosis: Diagnosis
     document: DiagnosisDocument
@@ -133,29 +122,18 @@ class Result:
             made["trajectory.csv"] = lambda: trajectory_csv(trajectory, DEFAULT_RATE_HZ)
         return Outputs(made)
 
-    @cached_property
-    def provenance(self) -> Provenance:
-        """What the result was made from, and when."""
-        request = self.request
-        given = {"recordings": request.recordings, "held_out": request.held_out, **request.compared}
-        return record_provenance(self.files, request.command, self.diagnosis.robot, given)
-
     def _improved_robot(self) -> str:
         source = self.files.find("robot", self.request.robot)
         target = self.files.target("improved-robot.yaml")
         return improved_robot(self.diagnosis, source, source if target is None else target)
 
     def _export(self, export_format: ExportFormat) -> bytes:
-        return make_export(export_format, of_diagnosis(self.diagnosis, self._origin))
+        return make_export(export_format, of_diagnosis(self.diagnosis, self.origin))
 
     def _model(self) -> str:
         found = self.diagnosis
         plain = identified_document(found.identification) if found.findings else None
-        return json_text(model_file(model_document(found), found.robot, self._origin, plain))
-
-    @property
-    def _origin(self) -> Origin:
-        return model_origin(self.diagnosis.robot, self.recordings, self.provenance)
+        return json_text(model_file(model_document(found), found.robot, self.origin, plain))
 
     def _report(self) -> str:
         from tauscope.report.diagnosis_report import diagnosis_report
@@ -164,13 +142,7 @@ class Result:
 
 
 def perform(request: Request, files: Files, progress: Progress) -> Result:
-    """Read the files and diagnose the arm.
-
-    Raises
-    ------
-    TauscopeError
-        where the data or the robot cannot answer
-    """
+    """Read the files and diagnose the arm. Raises TauscopeError where the data or the robot cannot answer."""
     if request.options.against == "saved" and request.model is None:
         raise IdentificationError("against saved: no model was given; give one, or compare with something else")
     if request.options.headroom:
@@ -210,4 +182,4 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     target = files.target("trajectory.json") or files.target("trajectory.csv")
     name = None if planned is None or target is None else str(target)
     told = document(found, planned, name, headroom)
-    return Result(request, files, recordings, held_out, found, told, planned, refusal)
+    return Result(request, files, found.robot, recordings, held_out, found, told, planned, refusal)

@@ -1,14 +1,14 @@
 """Identify: the parameters of an arm from its recordings."""
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from tauscope.actuation import make_efforts
 from tauscope.export.formats import EXPORT_FILES, ExportFormat, make_export
-from tauscope.export.model import Origin, of_identification
+from tauscope.export.model import of_identification
 from tauscope.export.model_file import identified_document, model_file
 from tauscope.identification import (
     Estimator,
@@ -19,19 +19,17 @@ from tauscope.identification import (
     identify,
 )
 from tauscope.recording import Recording
-from tauscope.report.provenance import Provenance
-from tauscope.robot import Robot, read_robot
-from tauscope.strict_model import StrictModel
+from tauscope.robot import read_robot
 from tauscope.tasks.task import (
     Files,
     Outputs,
     Progress,
     ReadingOptions,
+    TaskRequest,
+    TaskResult,
     command_words,
     json_text,
-    model_origin,
     read_recordings,
-    record_provenance,
 )
 
 CutoffFrequency = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -52,7 +50,7 @@ class IdentificationOptions(ReadingOptions):
     )
 
 
-class Request(StrictModel):
+class Request(TaskRequest):
     """What is to be identified, by the names of its files."""
 
     robot: str = Field(description="robot file")
@@ -78,13 +76,9 @@ class Request(StrictModel):
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class Result(TaskResult):
     """What came of it."""
 
-    request: Request
-    files: Files
-    robot: Robot
-    recordings: tuple[Recording, ...]
     held_out: tuple[Recording, ...]
     identification: Identification
     document: IdentificationDocument
@@ -95,12 +89,6 @@ class Result:
         exports = {file.output: partial(self._export, kind) for kind, file in EXPORT_FILES.items()}
         documents = {"plots.json": self._plots, "report.html": self._report, "model.json": self._model}
         return Outputs({**documents, "result.json": partial(json_text, self.document), **exports})
-
-    @cached_property
-    def provenance(self) -> Provenance:
-        """What the result was made from, and when."""
-        given = {"recordings": self.request.recordings, "held_out": self.request.held_out}
-        return record_provenance(self.files, self.request.command, self.robot, given)
 
     def _plots(self) -> str:
         from tauscope.report.identification_plots import identification_plots
@@ -113,24 +101,14 @@ class Result:
         return identification_report(self.identification, self.recordings, self.held_out, self.provenance)
 
     def _export(self, export_format: ExportFormat) -> bytes:
-        return make_export(export_format, of_identification(self.identification, self._origin))
+        return make_export(export_format, of_identification(self.identification, self.origin))
 
     def _model(self) -> str:
-        return json_text(model_file(identified_document(self.identification), self.robot, self._origin))
-
-    @property
-    def _origin(self) -> Origin:
-        return model_origin(self.robot, self.recordings, self.provenance)
+        return json_text(model_file(identified_document(self.identification), self.robot, self.origin))
 
 
 def perform(request: Request, files: Files, progress: Progress) -> Result:
-    """Read the files and identify the arm.
-
-    Raises
-    ------
-    TauscopeError
-        where the data or the robot cannot answer
-    """
+    """Read the files and identify the arm. Raises TauscopeError where the data or the robot cannot answer."""
     progress("read robot and recordings")
     robot = read_robot(files.find("robot", request.robot))
     recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)

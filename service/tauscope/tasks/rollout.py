@@ -1,29 +1,27 @@
 """Rollout: how far the simulated arm strays from the real one under the same commands."""
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 
 from pydantic import Field
 
 from tauscope.closed_loop import Rollout, RolloutDocument, roll_out
 from tauscope.export.model_file import read_export_models
-from tauscope.recording import Recording
-from tauscope.report.provenance import Provenance
 from tauscope.robot import read_robot
-from tauscope.strict_model import StrictModel
 from tauscope.tasks.task import (
     Files,
     Outputs,
     Progress,
     ReadingOptions,
+    TaskRequest,
+    TaskResult,
     command_words,
     json_text,
     read_recordings,
-    record_provenance,
 )
 
 
-class Request(StrictModel):
+class Request(TaskRequest):
     """What is to be rolled out, by the names of its files."""
 
     robot: str = Field(description="robot file")
@@ -42,12 +40,9 @@ class Request(StrictModel):
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class Result(TaskResult):
     """What came of it."""
 
-    request: Request
-    files: Files
-    recordings: tuple[Recording, ...]
     rollout: Rollout
     document: RolloutDocument
 
@@ -56,14 +51,6 @@ class Result:
         """``result.json`` and ``report.html``."""
         return Outputs({"result.json": partial(json_text, self.document), "report.html": self._report})
 
-    @cached_property
-    def provenance(self) -> Provenance:
-        """What the result was made from, and when."""
-        request = self.request
-        model = () if request.model is None else (request.model,)
-        given = {"recordings": request.recordings, "refine": request.refine, "model": model}
-        return record_provenance(self.files, request.command, self.rollout.robot, given)
-
     def _report(self) -> str:
         from tauscope.closed_loop.page import rollout_page
 
@@ -71,17 +58,11 @@ class Result:
 
 
 def perform(request: Request, files: Files, progress: Progress) -> Result:
-    """Read the files and simulate.
-
-    Raises
-    ------
-    TauscopeError
-        where the data, the robot or the model cannot answer
-    """
+    """Read the files and simulate. Raises TauscopeError where the data, the robot or the model cannot answer."""
     progress("read robot and recordings")
     robot = read_robot(files.find("robot", request.robot))
     exports = () if request.model is None else read_export_models(files.find("model", request.model))
     recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)
     training = read_recordings(files, "refine", request.refine, robot, request.options)
     found = roll_out(robot, recordings, exports, progress, training)
-    return Result(request, files, recordings, found, found.document)
+    return Result(request, files, found.robot, recordings, found, found.document)

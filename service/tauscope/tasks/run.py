@@ -79,12 +79,7 @@ class Result:
 def perform(request: Request, files: Files, progress: Progress) -> Result:
     """Design where no motion is given, run to the end; Ctrl-C stops the arm and is waited for.
 
-    The run's folder is the target `run` of the files.
-
-    Raises
-    ------
-    TauscopeError
-        where the run cannot start
+    The run's folder is the target `run` of the files. Raises TauscopeError where the run cannot start.
     """
     folder = files.target("run")
     assert folder is not None  # noqa: S101 - a run has a folder
@@ -117,12 +112,7 @@ def start(
 ) -> RunProcess:
     """Start the control process of a run.
 
-    Raises
-    ------
-    RobotFileError
-        if the robot file is not valid
-    AcquisitionError
-        if the process cannot be started
+    Raises RobotFileError if the robot file is not valid. Raises AcquisitionError if the process cannot be started.
     """
     robot_file, backend = files.find("robot", request.robot), request.backend
     settings: dict[str, Any] = {

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -18,8 +19,29 @@ from tauscope.robot import RecordingLayout, Robot, find_column_fault, find_fault
 from tauscope.robot.messages import one_line
 from tauscope.strict_model import StrictModel
 
-ROLES = {"recordings": "recording", "held_out": "held out", "simulated": "compared with", "model": "compared with"}
-"""What each list of a request is called in a report."""
+ROLES = {
+    "recordings": "recording",
+    "held_out": "held out",
+    "refine": "refined by",
+    "simulated": "compared with",
+    "model": "compared with",
+}
+"""Name of each input of a request in a report."""
+
+
+class TaskRequest(StrictModel):
+    """A request that names recordings, and perhaps a model."""
+
+    @property
+    def command(self) -> tuple[str, ...]:
+        """The command line that does the same."""
+        raise NotImplementedError
+
+    @property
+    def inputs(self) -> dict[str, tuple[str, ...]]:
+        """Names of its files by role, without the robot file."""
+        named = {role: getattr(self, role, None) or () for role in ROLES}
+        return {role: (names,) if isinstance(names, str) else names for role, names in named.items()}
 
 
 class ReadingOptions(StrictModel):
@@ -112,13 +134,7 @@ class Progress(Protocol):
     """Hears which step goes on; may raise to end the task."""
 
     def __call__(self, step: str, percent: float | None = None, figures: Mapping[str, Any] = {}, /) -> None:
-        """Hear of a step, or of how far it is.
-
-        Parameters
-        ----------
-        percent : float or None
-            how much is done; None at the beginning of a step
-        """
+        """Hear of a step, or of how far it is. `percent`: how much is done; None at the beginning of a step."""
         ...
 
 
@@ -164,7 +180,6 @@ class Outputs(Mapping[str, bytes]):
     """
 
     def __init__(self, make: Mapping[str, Callable[[], str | bytes]]) -> None:
-        """Take what makes each of them."""
         self._make = make
 
     def __getitem__(self, name: str) -> bytes:
@@ -210,51 +225,50 @@ def _open(path: Path, robot: Robot, reading: Reading) -> Recording:
         raise RecordingMismatchError(one_line("; ".join([str(error), *chosen]))) from error
 
 
-def record_provenance(
-    files: Files, command: Sequence[str], robot: Robot, inputs: Mapping[str, Sequence[str]]
-) -> Provenance:
-    """Hash all inputs and note the versions.
-
-    Parameters
-    ----------
-    inputs : mapping of str to sequence of str
-        names of the request by role
-
-    Raises
-    ------
-    RecordingError
-        where a file cannot be read any more
-    """
+def record_provenance(files: Files, request: TaskRequest, robot: Robot) -> Provenance:
+    """Hash all inputs and note the versions. Raises RecordingError where a file cannot be read any more."""
     paths = list(robot.files)
-    paths += [(ROLES[role], files.find(role, name)) for role, names in inputs.items() for name in names]
+    paths += [(ROLES[role], files.find(role, name)) for role, names in request.inputs.items() for name in names]
     hashed = [
         InputFile(role, files.show(Path(file.path)), file.size_bytes, file.sha256)
         for role, path in paths
         for file in input_files(role, str(path))
     ]
-    return Provenance(tuple(command), tuple(hashed), versions(), datetime.now(UTC))
+    return Provenance(request.command, tuple(hashed), versions(), datetime.now(UTC))
 
 
-def model_origin(robot: Robot, recordings: Sequence[Recording], provenance: Provenance) -> Origin:
-    """Where a model comes from, for its exports; its effort is current where any recording holds current."""
-    holds_current = any(recording.effort_kind is EffortKind.CURRENT for recording in recordings)
-    sources = (RecordingSource(entry.path, entry.sha256) for entry in provenance.inputs if entry.role == "recording")
-    return Origin(
-        sources=tuple(sources),
-        effort_kind=EffortKind.CURRENT if holds_current else EffortKind.TORQUE,
-        created=provenance.created,
-        urdf=None if robot.urdf is None else robot.urdf.read_bytes(),
-        is_mjcf=robot.mjcf is not None,
-    )
+@dataclass(frozen=True, eq=False)
+class TaskResult:
+    """What came of a task that reads recordings."""
+
+    request: Any
+    files: Files
+    robot: Robot
+    recordings: tuple[Recording, ...]
+
+    @cached_property
+    def provenance(self) -> Provenance:
+        """What the result was made from, and when."""
+        return record_provenance(self.files, self.request, self.robot)
+
+    @property
+    def origin(self) -> Origin:
+        """Where a model comes from, for its exports; its effort is current where any recording holds current."""
+        holds_current = any(recording.effort_kind is EffortKind.CURRENT for recording in self.recordings)
+        entries, robot = self.provenance.inputs, self.robot
+        return Origin(
+            sources=tuple(RecordingSource(entry.path, entry.sha256) for entry in entries if entry.role == "recording"),
+            effort_kind=EffortKind.CURRENT if holds_current else EffortKind.TORQUE,
+            created=self.provenance.created,
+            urdf=None if robot.urdf is None else robot.urdf.read_bytes(),
+            is_mjcf=robot.mjcf is not None,
+        )
 
 
 def command_words(verb: str, robot: str, **options: Any) -> tuple[str, ...]:
     """The command line that does the same, with every option spelled out; outputs are left to whoever repeats it.
 
-    Parameters
-    ----------
-    **options
-        by the name of the option; `recordings` has none, an empty tuple is left out
+    `**options`: by the name of the option; `recordings` has none, an empty tuple is left out.
     """
     words = ["tauscope", verb, robot]
     for name, value in options.items():

@@ -38,10 +38,7 @@ PIECE_ROWS = 10_000
 def trajectory_csv(trajectory: Trajectory, rate_hz: float) -> str:
     """A trajectory as CSV text: t, q1…, qd1…, qdd1…, period; shortest digits that read back as they were.
 
-    Parameters
-    ----------
-    rate_hz : float
-        samples a second [Hz]
+    `rate_hz`: samples a second [Hz].
     """
     starts = range(0, trajectory.count_samples(rate_hz), PIECE_ROWS)
     return "".join(write_trajectory_rows(trajectory, rate_hz, start) for start in starts)
@@ -50,10 +47,7 @@ def trajectory_csv(trajectory: Trajectory, rate_hz: float) -> str:
 def write_trajectory_rows(trajectory: Trajectory, rate_hz: float, start: int) -> str:
     """`PIECE_ROWS` rows of the text from row `start` on; the header goes before the first ones.
 
-    Parameters
-    ----------
-    rate_hz : float
-        samples a second [Hz]
+    `rate_hz`: samples a second [Hz].
     """
     stop = min(start + PIECE_ROWS, trajectory.count_samples(rate_hz))
     samples = trajectory.evaluate(np.arange(start, stop) / rate_hz)
@@ -71,12 +65,7 @@ def parse_trajectory_csv(text: str, name: str, robot: str, joints: tuple[str, ..
     """The trajectory of a CSV file.
 
     Velocity and acceleration that the file lacks come from a quintic spline through the positions that rests at both
-    ends.
-
-    Raises
-    ------
-    ExcitationError
-        naming the file, the line and the column
+    ends. Raises ExcitationError naming the file, the line and the column.
     """
     numbers, columns, lines = _read_numbers(text, name)
     count = len(joints)

@@ -135,13 +135,7 @@ def trajectory_document(trajectory: Trajectory) -> TrajectoryDocument:
 
 
 def trajectory_of(document: TrajectoryDocument) -> Trajectory:
-    """The trajectory that a document describes.
-
-    Raises
-    ------
-    ExcitationError
-        naming the key
-    """
+    """The trajectory that a document describes. Raises ExcitationError naming the key."""
     joints = len(document.joints)
     segments = tuple(_segment_of(entry, joints, f"segments[{place}]") for place, entry in enumerate(document.segments))
     design = document.design
@@ -201,10 +195,10 @@ def _segment_of(entry: FourierEntry | PathEntry | MoveEntry | SampledEntry, join
     if isinstance(entry, MoveEntry):
         start, end = (_array(getattr(entry, name), (joints,), f"{key}.{name}") for name in ("start", "end"))
         return MoveSegment(start, end, entry.duration_s)
-    return _sampled_of(entry, joints, key)
+    return _make_sampled(entry, joints, key)
 
 
-def _sampled_of(entry: SampledEntry, joints: int, key: str) -> SampledSegment:
+def _make_sampled(entry: SampledEntry, joints: int, key: str) -> SampledSegment:
     count = len(entry.time)
     names = ("position", "velocity", "acceleration")
     position, velocity, acceleration = (_array(getattr(entry, n), (count, joints), f"{key}.{n}") for n in names)

@@ -25,10 +25,7 @@ DEFAULT_RATE_HZ = 500.0
 def read_trajectory(path: str | Path, robot: Robot) -> Trajectory:
     """Read a trajectory for a robot: JSON (``.json``) or CSV (anything else).
 
-    Raises
-    ------
-    ExcitationError
-        naming the file and the key, or the line and the column
+    Raises ExcitationError naming the file and the key, or the line and the column.
     """
     path = Path(path)
     try:
@@ -42,13 +39,7 @@ def read_trajectory(path: str | Path, robot: Robot) -> Trajectory:
 
 
 def parse_trajectory_json(text: str | bytes, name: str, robot: Robot) -> Trajectory:
-    """The trajectory of a JSON document.
-
-    Raises
-    ------
-    ExcitationError
-        naming the key
-    """
+    """The trajectory of a JSON document. Raises ExcitationError naming the key."""
     try:
         document = _document(text)
     except ValidationError as error:
@@ -73,15 +64,9 @@ def trajectory_json(trajectory: Trajectory) -> str:
 def write_trajectory(trajectory: Trajectory, path: str | Path, *, rate_hz: float = DEFAULT_RATE_HZ) -> None:
     """Write a trajectory: JSON (``.json``) or CSV (``.csv``).
 
-    Parameters
-    ----------
-    rate_hz : float
-        samples a second of a CSV file [Hz]
+    Raises ExcitationError for another suffix, or where the file cannot be written.
 
-    Raises
-    ------
-    ExcitationError
-        for another suffix, or where the file cannot be written
+    `rate_hz`: samples a second of a CSV file [Hz].
     """
     path = Path(path)
     suffix = path.suffix.lower()

@@ -17,8 +17,7 @@ LEAST_HARMONICS = 2
 class MotionSamples:
     """A motion at given instants.
 
-    position, velocity, acceleration : (N, n) float64
-        q, q̇, q̈ [rad or m, and per s, per s²]
+    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈ [rad or m, and per s, per s²].
     """
 
     position: Array
@@ -32,14 +31,10 @@ class FourierSeries:
 
         q̇_i(t) = Σ_l a_l cos(ω_f l t) + b_l sin(ω_f l t)
 
-    period_s : float
-        fundamental period T [s]
-    centre : (n,) float64
-        mean position [rad or m]
-    cosine : (n, M) float64
-        a_l, velocity amplitude of the cosine of harmonic l [rad/s or m/s]
-    sine : (n, M) float64
-        b_l, velocity amplitude of the sine of harmonic l [rad/s or m/s]
+    `period_s`: fundamental period T [s].
+    `centre`: (n,), mean position [rad or m].
+    `cosine`: (n, M), a_l, velocity amplitude of the cosine of harmonic l [rad/s or m/s].
+    `sine`: (n, M), b_l, velocity amplitude of the sine of harmonic l [rad/s or m/s].
     """
 
     period_s: float
@@ -74,13 +69,7 @@ class FourierSeries:
         return 2.0 * np.pi / self.period_s * np.arange(1.0, self.harmonics + 1.0)
 
     def evaluate(self, time: Array) -> MotionSamples:
-        """Exact position, velocity and acceleration.
-
-        Parameters
-        ----------
-        time : (N,) float64
-            instants since the start of a period [s]
-        """
+        """Exact position, velocity and acceleration. `time`: (N,), instants since the start of a period [s]."""
         omega = self.frequencies
         phase = np.multiply.outer(time, omega)
         cosine, sine = np.cos(phase), np.sin(phase)

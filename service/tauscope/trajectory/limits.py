@@ -23,14 +23,10 @@ DEFAULT_ACCELERATION = {JointType.REVOLUTE: 4.0, JointType.PRISMATIC: 1.0}
 class MotionLimits:
     """Limits of every joint.
 
-    position_low, position_high : (n,) float64
-        range of the position [rad or m]
-    velocity : (n,) float64
-        largest speed [rad/s or m/s]
-    acceleration : (n,) float64
-        largest acceleration [rad/s² or m/s²]
-    torque : (n,) float64
-        largest torque, infinite where none is stated [Nm or N]
+    `position_low`, `position_high`: (n,), range of the position [rad or m].
+    `velocity`: (n,), largest speed [rad/s or m/s].
+    `acceleration`: (n,), largest acceleration [rad/s² or m/s²].
+    `torque`: (n,), largest torque, infinite where none is stated [Nm or N].
     """
 
     position_low: Array

@@ -36,22 +36,13 @@ class Segment(Protocol):
         ...
 
     def evaluate(self, time: Array) -> MotionSamples:
-        """Exact position, velocity and acceleration.
-
-        Parameters
-        ----------
-        time : (N,) float64
-            instants since its start [s]
-        """
+        """Exact position, velocity and acceleration. `time`: (N,), instants since its start [s]."""
         ...
 
     def period(self, time: Array) -> Array:
         """Index of the repeated excitation period, NaN where the motion is no part of it, shape (N,).
 
-        Parameters
-        ----------
-        time : (N,) float64
-            instants since its start [s]
+        `time`: (N,), instants since its start [s].
         """
         ...
 
@@ -60,8 +51,7 @@ class Segment(Protocol):
 class FourierSegment:
     """Whole periods of a Fourier series.
 
-    first_period : int or None
-        index of the first repeat in a recording's column `period`; None where it is not to be counted
+    `first_period`: index of the first repeat in a recording's column `period`; None where it is not to be counted.
     """
 
     series: FourierSeries
@@ -79,23 +69,11 @@ class FourierSegment:
         return self.repeats * self.series.period_s
 
     def evaluate(self, time: Array) -> MotionSamples:
-        """Exact position, velocity and acceleration.
-
-        Parameters
-        ----------
-        time : (N,) float64
-            instants since its start [s]
-        """
+        """Exact position, velocity and acceleration. `time`: (N,), instants since its start [s]."""
         return self.series.evaluate(time)
 
     def period(self, time: Array) -> Array:
-        """Index of the repeat, shape (N,).
-
-        Parameters
-        ----------
-        time : (N,) float64
-            instants since its start [s]
-        """
+        """Index of the repeat, shape (N,). `time`: (N,), instants since its start [s]."""
         if self.first_period is None:
             return np.full(len(time), np.nan)
         # Rounding of the instants must not put the first sample of a period into the one before.
@@ -107,10 +85,8 @@ class FourierSegment:
 class MoveSegment:
     """A straight minimum-jerk move from posture to posture: q = q_0 + (q_1 - q_0)(10 s³ - 15 s⁴ + 6 s⁵), s = t/T.
 
-    start, end : (n,) float64
-        postures [rad or m]
-    duration_s : float
-        T [s]
+    `start`, `end`: (n,), postures [rad or m].
+    `duration_s`: T [s].
     """
 
     start: Array
@@ -123,13 +99,7 @@ class MoveSegment:
         return len(self.start)
 
     def evaluate(self, time: Array) -> MotionSamples:
-        """Exact position, velocity and acceleration.
-
-        Parameters
-        ----------
-        time : (N,) float64
-            instants since its start [s]
-        """
+        """Exact position, velocity and acceleration. `time`: (N,), instants since its start [s]."""
         progress, rate, bend = minimum_jerk(time, self.duration_s)
         way = self.end - self.start
         # The last sample is the end itself, not the end but for rounding.
@@ -138,13 +108,7 @@ class MoveSegment:
         return MotionSamples(position, rate[:, None] * way, bend[:, None] * way)
 
     def period(self, time: Array) -> Array:
-        """NaN: no part of the repeated excitation, shape (N,).
-
-        Parameters
-        ----------
-        time : (N,) float64
-            instants since its start [s]
-        """
+        """NaN: no part of the repeated excitation, shape (N,). `time`: (N,), instants since its start [s]."""
         return np.full(len(time), np.nan)
 
 
@@ -154,10 +118,8 @@ class PathSegment:
 
     It visits only postures that the series visits: where that keeps clear of obstacles, so does this.
 
-    from_s, to_s : float
-        instants of the series at which it begins and ends [s]
-    duration_s : float
-        how long it takes [s]
+    `from_s`, `to_s`: instants of the series at which it begins and ends [s].
+    `duration_s`: how long it takes [s].
     """
 
     series: FourierSeries
@@ -173,10 +135,7 @@ class PathSegment:
     def evaluate(self, time: Array) -> MotionSamples:
         """Exact position, velocity and acceleration: q̇ = F' σ̇, q̈ = F'' σ̇² + F' σ̈.
 
-        Parameters
-        ----------
-        time : (N,) float64
-            instants since its start [s]
+        `time`: (N,), instants since its start [s].
         """
         progress, rate, bend = minimum_jerk(time, self.duration_s)
         way = self.to_s - self.from_s
@@ -186,13 +145,7 @@ class PathSegment:
         return MotionSamples(path.position, path.velocity * pace, path.acceleration * pace**2 + path.velocity * change)
 
     def period(self, time: Array) -> Array:
-        """NaN: no part of the repeated excitation, shape (N,).
-
-        Parameters
-        ----------
-        time : (N,) float64
-            instants since its start [s]
-        """
+        """NaN: no part of the repeated excitation, shape (N,). `time`: (N,), instants since its start [s]."""
         return np.full(len(time), np.nan)
 
 
@@ -200,10 +153,8 @@ class PathSegment:
 class SampledSegment:
     """A motion given by samples, between them the quintic that meets position, velocity and acceleration at both.
 
-    time : (K,) float64
-        instants of the samples, from 0, increasing [s]
-    label : (K,) float64 or None
-        index of the repeated excitation period from each sample on, NaN outside; None where there is none
+    `time`: (K,), instants of the samples, from 0, increasing [s].
+    `label`: (K,), index of the repeated excitation period from each sample on, NaN outside; None where there is none.
     """
 
     time: Array
@@ -228,10 +179,7 @@ class SampledSegment:
     def evaluate(self, time: Array) -> MotionSamples:
         """Position, velocity and acceleration of the interpolating quintics; the samples themselves at their instants.
 
-        Parameters
-        ----------
-        time : (N,) float64
-            instants since its start [s]
+        `time`: (N,), instants since its start [s].
         """
         left = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.time) - 2)
         width = (self.time[left + 1] - self.time[left])[:, None]
@@ -245,13 +193,7 @@ class SampledSegment:
         return MotionSamples(*orders)
 
     def period(self, time: Array) -> Array:
-        """The label of the sample before each instant, shape (N,).
-
-        Parameters
-        ----------
-        time : (N,) float64
-            instants since its start [s]
-        """
+        """The label of the sample before each instant, shape (N,). `time`: (N,), instants since its start [s]."""
         if self.label is None:
             return np.full(len(time), np.nan)
         slack = 1e-9 * max(self.duration_s, 1.0)
@@ -261,17 +203,8 @@ class SampledSegment:
 def minimum_jerk(time: Array, duration_s: float) -> tuple[Array, Array, Array]:
     """Progress 10 s³ - 15 s⁴ + 6 s⁵ of a move from 0 to 1 and its first two derivatives, s = t/T.
 
-    Parameters
-    ----------
-    time : (N,) float64
-        instants since its start [s]
-    duration_s : float
-        T [s]
-
-    Returns
-    -------
-    tuple of (N,) float64
-        progress [1], its rate [1/s] and the rate's rate [1/s²]
+    `time`: (N,), instants since its start [s]; `duration_s`: T [s]. Returns tuple of (N,), progress [1], its rate [1/s]
+    and the rate's rate [1/s²].
     """
     s = np.clip(time / duration_s, 0.0, 1.0)
     progress = s**3 * (10.0 + s * (6.0 * s - 15.0))

@@ -44,12 +44,9 @@ MOST_SAMPLES = 50_000_000
 class TrajectorySamples:
     """A trajectory at given instants.
 
-    time : (N,) float64
-        instants since the start [s]
-    position, velocity, acceleration : (N, n) float64
-        q, q̇, q̈ [rad or m, and per s, per s²]
-    period : (N,) float64
-        index of the repeated excitation period, counted from 0; NaN outside the repeated part
+    `time`: (N,), instants since the start [s].
+    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈ [rad or m, and per s, per s²].
+    `period`: (N,), index of the repeated excitation period, counted from 0; NaN outside the repeated part.
     """
 
     time: Array
@@ -63,9 +60,8 @@ class TrajectorySamples:
 class DesignRecord:
     """How a trajectory was made and what it is good for.
 
-    margins : mapping of str to tuple of float or None
-        for each kind of limit (``position``, ``velocity``, ``acceleration``, ``torque``) the part of the limit that is
-        left, one a joint; None where there is no limit
+    `margins`: for each kind of limit (``position``, ``velocity``, ``acceleration``, ``torque``) the part of the limit
+        that is left, one a joint; None where there is no limit.
     """
 
     criterion: str
@@ -79,10 +75,8 @@ class DesignRecord:
 class Trajectory:
     """A motion of all joints, piece after piece, twice continuously differentiable, at rest at both ends.
 
-    limits : MotionLimits or None
-        limits that it was made to keep; None where nobody knows
-    design : DesignRecord or None
-        how it was made; None for a motion from elsewhere
+    `limits`: limits that it was made to keep; None where nobody knows.
+    `design`: how it was made; None for a motion from elsewhere.
     """
 
     robot: str
@@ -134,30 +128,17 @@ class Trajectory:
     def samples(self, rate_hz: float) -> TrajectorySamples:
         """The trajectory at a constant rate, from its start to its end.
 
-        Parameters
-        ----------
-        rate_hz : float
-            samples a second [Hz]
+        Raises ExcitationError for a rate that is not positive, or absurd.
 
-        Returns
-        -------
-        TrajectorySamples
-            instants k / rate from 0 to the first one at which the motion has ended
-
-        Raises
-        ------
-        ExcitationError
-            for a rate that is not positive, or absurd
+        `rate_hz`: samples a second [Hz]. Returns TrajectorySamples: instants k / rate from 0 to the first one at which
+        the motion has ended.
         """
         return self.evaluate(np.arange(self.count_samples(rate_hz)) / rate_hz)
 
     def count_samples(self, rate_hz: float) -> int:
         """How many samples it has at a constant rate [1/s].
 
-        Raises
-        ------
-        ExcitationError
-            for a rate that is not positive, or absurd
+        Raises ExcitationError for a rate that is not positive, or absurd.
         """
         if not (np.isfinite(rate_hz) and rate_hz > 0.0):
             raise ExcitationError(f"the sampling rate is {rate_hz} Hz; give a positive number")
@@ -171,10 +152,7 @@ class Trajectory:
     def evaluate(self, time: Array) -> TrajectorySamples:
         """The trajectory at given instants; before its start and after its end it stands still.
 
-        Parameters
-        ----------
-        time : (N,) float64
-            ascending instants since the start [s]
+        `time`: (N,), ascending instants since the start [s].
         """
         shape = (len(time), self.joint_count)
         result = TrajectorySamples(time, np.empty(shape), np.empty(shape), np.empty(shape), np.full(len(time), np.nan))
@@ -200,17 +178,9 @@ def ramp(start: Array, end: Array, limits: MotionLimits, *, fraction: float = RA
     """A straight minimum-jerk move between postures within the limits of velocity and acceleration.
 
     Its duration is known before it runs, and it stays between the two postures: where both are within the position
-    limits, so is all of it.
+    limits, so is all of it. Raises ExcitationError for a posture that is not finite or has another number of joints.
 
-    Parameters
-    ----------
-    start, end : (n,) float64
-        postures [rad or m]
-
-    Raises
-    ------
-    ExcitationError
-        for a posture that is not finite or has another number of joints
+    `start`, `end`: (n,), postures [rad or m].
     """
     start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     joints = len(limits.velocity)
@@ -226,10 +196,7 @@ def ramp(start: Array, end: Array, limits: MotionLimits, *, fraction: float = RA
 def whole_steps(duration_s: float) -> float:
     """A duration rounded up to `TIME_STEP_S`, so that what follows begins at a sample of all usual rates.
 
-    Parameters
-    ----------
-    duration_s : float
-        shortest duration [s]
+    `duration_s`: shortest duration [s].
     """
     steps_a_second = round(1.0 / TIME_STEP_S)
     return float(np.ceil(duration_s * steps_a_second - 1e-9) / steps_a_second)

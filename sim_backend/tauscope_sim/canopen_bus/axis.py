@@ -17,14 +17,11 @@ class AxisMode(Enum):
 class AxisDemand:
     """What a drive wants of its joint until the next demand.
 
-    position : float
-        target where the mode is position [rad or m]
-    torque : float
-        target where the mode is torque [Nm or N]
-    torque_cap : float
-        most that it exerts; nothing where it is released [Nm or N]
-    interpolation_s : float
-        time in which it goes from one target to the next, where the mode is position; 0 where nobody told it [s]
+    `position`: target where the mode is position [rad or m].
+    `torque`: target where the mode is torque [Nm or N].
+    `torque_cap`: most that it exerts; nothing where it is released [Nm or N].
+    `interpolation_s`: time in which it goes from one target to the next, where the mode is position; 0 where nobody
+        told it [s].
     """
 
     mode: AxisMode
@@ -38,12 +35,9 @@ class AxisDemand:
 class AxisMeasurement:
     """What a drive's sensors tell of its joint.
 
-    position : float
-        [rad or m]
-    velocity : float
-        [rad/s or m/s]
-    torque : float
-        [Nm or N]
+    `position`: [rad or m].
+    `velocity`: [rad/s or m/s].
+    `torque`: [Nm or N].
     """
 
     position: float
@@ -55,8 +49,7 @@ class AxisMeasurement:
 class AxisScale:
     """Counts and per mille of an emulated drive.
 
-    rated_torque_mnm : int
-        object 0x6076, at the motor shaft [mNm]
+    `rated_torque_mnm`: object 0x6076, at the motor shaft [mNm].
     """
 
     counts_per_radian: float

@@ -7,11 +7,9 @@ from collections.abc import Iterator
 
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile
 from tauscope_sim.canopen_bus.axis import AxisDemand, AxisMeasurement, AxisMode, AxisScale
-from tauscope_sim.canopen_bus.device_sheet import apply_sheet
-from tauscope_sim.canopen_bus.object_dictionary import Abort, AbortError, ObjectDictionary
+from tauscope_sim.canopen_bus.object_dictionary import Abort, AbortError, ObjectDictionary, answer_request, apply_sheet
 from tauscope_sim.canopen_bus.power_state import PowerState, PowerStateMachine
 from tauscope_sim.canopen_bus.process_data import ProcessData
-from tauscope_sim.canopen_bus.sdo_server import answer_request
 
 Frame = tuple[int, bytes]
 
@@ -40,13 +38,7 @@ class EmulatedDrive:
     """A drive with its node on the bus."""
 
     def __init__(self, node_id: int, scale: AxisScale, file: DeviceFile | None = None) -> None:
-        """Power up.
-
-        Parameters
-        ----------
-        file : DeviceFile or None
-            whose objects it has; all that a master may need where None
-        """
+        """Power up. `file`: whose objects it has; all that a master may need where None."""
         self.node_id = node_id
         self.scale = scale
         self._file = file
@@ -68,13 +60,7 @@ class EmulatedDrive:
         self._outbox: list[Frame] = [(0x700 + self.node_id, b"\0")]
 
     def receive(self, frame: Frame, now_s: float) -> list[Frame]:
-        """Answers to a frame of the bus.
-
-        Parameters
-        ----------
-        now_s : float
-            when it came [s]
-        """
+        """Answers to a frame of the bus. `now_s`: when it came [s]."""
         identifier, payload = frame
         if identifier == _NMT and len(payload) == 2 and payload[1] in (0, self.node_id):
             self._follow_network(payload[0])
@@ -92,10 +78,7 @@ class EmulatedDrive:
     def tick(self, now_s: float) -> list[Frame]:
         """What the drive sends by itself by an instant: boot-up, heartbeat, emergencies.
 
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
+        `now_s`: present instant [s].
         """
         self._watch_master(now_s)
         frames, self._outbox = self._outbox, []

@@ -45,14 +45,8 @@ class DrivenArm:
     ) -> None:
         """Everything at rest.
 
-        Parameters
-        ----------
-        position : (n,) float64
-            where it stands [rad or m]
-        period_s : float
-            of the drives' loops [s]
-        torque_noise : float
-            standard deviation of what they measure of the torque [Nm or N]
+        `position`: (n,), where it stands [rad or m]; `period_s`: of the drives' loops [s]; `torque_noise`: standard
+        deviation of what they measure of the torque [Nm or N].
         """
         count = robot.joint_count
         self.torque = np.zeros(count)
@@ -81,13 +75,7 @@ class DrivenArm:
         return self._plant.motor_motion
 
     def take_targets(self, time_s: float) -> None:
-        """Let the drives take over the targets that SYNC made valid.
-
-        Parameters
-        ----------
-        time_s : float
-            when SYNC came [s]
-        """
+        """Let the drives take over the targets that SYNC made valid. `time_s`: when SYNC came [s]."""
         demands = self._demands()
         for (mode, _), (joints, target) in self._targets.items():
             if mode is AxisMode.POSITION:

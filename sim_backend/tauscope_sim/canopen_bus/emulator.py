@@ -1,15 +1,27 @@
 """Drives, the arm that they move, the wire and the adapter: everything but the port."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
-from tauscope_sim.canopen_bus.drive import EmulatedDrive
+from tauscope_sim.canopen_bus.drive import EmulatedDrive, Frame
 from tauscope_sim.canopen_bus.driven_arm import DrivenArm
-from tauscope_sim.canopen_bus.line import Line
 from tauscope_sim.canopen_bus.power_state import PowerState
 from tauscope_sim.canopen_bus.wire import Wire
 from tauscope_sim.emulation.device_clock import MOST_STEPS, STEP_S, DeviceClock
 from tauscope_sim.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault, faults_from
+
+
+class Line(Protocol):
+    """Turns what a master sends into frames, and frames into what it reads."""
+
+    def take(self, data: bytes) -> tuple[list[Frame], bytes]:
+        """Frames for the bus, and what the adapter answers by itself."""
+        ...
+
+    def text(self, frame: Frame) -> bytes:
+        """A frame of the bus as the host reads it."""
+        ...
+
 
 _TICKS_PER_MEASUREMENT = 10
 """While nobody asks: a drive that has stopped has to see that it stands."""
@@ -26,12 +38,7 @@ class CanEmulator:
     ) -> None:
         """Everything at rest.
 
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        bit_rate : float
-            of the bus; infinite where frames shall arrive at once [bit/s]
+        `now_s`: present instant [s]; `bit_rate`: of the bus; infinite where frames shall arrive at once [bit/s].
         """
         self.drives = tuple(drives)
         self.driven = driven
@@ -55,13 +62,7 @@ class CanEmulator:
         return self.now_s if self._answers else self._wire.next_arrival_s
 
     def hears(self, baud: int) -> bool:
-        """Any rate: an adapter on USB takes no notice of it.
-
-        Parameters
-        ----------
-        baud : int
-            of the master's port [bit/s]
-        """
+        """Any rate: an adapter on USB takes no notice of it. `baud`: of the master's port [bit/s]."""
         return baud > 0
 
     def receive(self, data: bytes, now_s: float) -> None:
@@ -70,10 +71,7 @@ class CanEmulator:
         Drives hear it before they catch up: it may have waited while this process slept, and its sleep is no silence of
         the master. SYNC is different: they sample when it comes, and the time of interpolation is counted from then.
 
-        Parameters
-        ----------
-        now_s : float
-            when [s]
+        `now_s`: when [s].
         """
         frames, answers = self._line.take(data)
         self._answers += answers
@@ -94,21 +92,12 @@ class CanEmulator:
     def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
         """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
 
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
+        `now_s`: present instant [s].
         """
         self._clock.catch_up(now_s, self._step, most_steps)
 
     def due(self, now_s: float) -> bytes:
-        """Text that has reached the host by now.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """Text that has reached the host by now. `now_s`: present instant [s]."""
         text, self._answers = self._answers, b""
         return text + b"".join(map(self._line.text, self._wire.arrived(now_s)))
 
@@ -130,11 +119,8 @@ class CanEmulator:
     def answer(self, request: dict[str, Any]) -> dict[str, int] | None:
         """Do what a test asks.
 
-        Parameters
-        ----------
-        request : dict
-            ``{"inject": [fault, …]}``, ``{"get": [node, [index, subindex]]}``, ``{"put": [node, [index, subindex],
-            value]}``, ``{"stand": bool}`` (put the stand under it, or take it away), or nothing of these
+        `request`: ``{"inject": [fault, …]}``, ``{"get": [node, [index, subindex]]}``, ``{"put": [node, [index,
+        subindex], value]}``, ``{"stand": bool}`` (put the stand under it, or take it away), or nothing of these.
         """
         if "inject" in request:
             self.schedule.add(faults_from(request["inject"], self.now_s))

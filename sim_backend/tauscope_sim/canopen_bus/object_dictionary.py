@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
 
+from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile
+
 
 class Abort(IntEnum):
     """Abort codes of SDO transfers, CiA 301."""
@@ -48,8 +50,7 @@ class Entry:
 class ObjectDictionary:
     """All entries, by index and subindex.
 
-    entries : dict
-        of (index, subindex) to Entry
+    `entries`: of (index, subindex) to Entry.
     """
 
     entries: dict[tuple[int, int], Entry] = field(default_factory=dict)
@@ -65,13 +66,7 @@ class ObjectDictionary:
         writable: bool = True,
         hook: WriteHook | None = None,
     ) -> Entry:
-        """Add an entry.
-
-        Parameters
-        ----------
-        size : int
-            1, 2 or 4 [bytes]
-        """
+        """Add an entry. `size`: 1, 2 or 4 [bytes]."""
         entry = self.entries[index, subindex] = Entry(size, value, signed, writable, hook)
         return entry
 
@@ -90,13 +85,7 @@ class ObjectDictionary:
         entry.value = min(max(value, low), high)
 
     def read(self, index: int, subindex: int) -> bytes:
-        """Value of an entry as a master gets it, little end first.
-
-        Raises
-        ------
-        AbortError
-            there is no such entry
-        """
+        """Value of an entry as a master gets it, little end first. Raises AbortError where there is no such entry."""
         self._visible(index, subindex)
         return self.encode(index, subindex)
 
@@ -108,10 +97,8 @@ class ObjectDictionary:
     def write(self, index: int, subindex: int, data: bytes) -> None:
         """A master's write.
 
-        Raises
-        ------
-        AbortError
-            there is no such entry, it is not writable, the length is wrong, or the drive refuses the value
+        Raises AbortError where there is no such entry, it is not writable, the length is wrong, or the drive refuses
+        the value.
         """
         entry = self._visible(index, subindex)
         if not entry.writable:
@@ -142,3 +129,77 @@ class ObjectDictionary:
         """What a master is told that asks for an entry that does not exist."""
         known = any(place[0] == index and entry.is_visible for place, entry in self.entries.items())
         return AbortError(Abort.NO_SUBINDEX if known else Abort.NO_OBJECT)
+
+
+_UPLOAD = 0x40
+_DOWNLOAD = 0x20
+_DOWNLOAD_DONE = 0x60
+_ABORT = 0x80
+_COMMAND = 0xE0
+
+
+def answer_request(dictionary: ObjectDictionary, request: bytes) -> bytes | None:
+    """Answer to a request; None where the frame is no request."""
+    if len(request) != 8 or request[0] & _COMMAND == _ABORT:
+        return None
+    index, subindex = int.from_bytes(request[1:3], "little"), request[3]
+    try:
+        return _answer(dictionary, request, index, subindex)
+    except AbortError as refusal:
+        return bytes([_ABORT]) + request[1:4] + int(refusal.code).to_bytes(4, "little")
+
+
+def _answer(dictionary: ObjectDictionary, request: bytes, index: int, subindex: int) -> bytes:
+    """Answer to an upload or an expedited download."""
+    command = request[0] & _COMMAND
+    if command == _UPLOAD:
+        data = dictionary.read(index, subindex)
+        head = 0x43 | (4 - len(data)) << 2
+        return bytes([head]) + request[1:4] + data.ljust(4, b"\0")
+    is_expedited = request[0] & 0x02
+    if command != _DOWNLOAD or not is_expedited:
+        raise AbortError(Abort.UNKNOWN_COMMAND)
+    has_size = request[0] & 0x01
+    size = 4 - (request[0] >> 2 & 0x03) if has_size else 4
+    dictionary.write(index, subindex, request[4 : 4 + size])
+    return bytes([_DOWNLOAD_DONE]) + request[1:4] + bytes(4)
+
+
+_SIZES = {
+    **{name: (size, False) for name, size in (("BOOLEAN", 1), ("UNSIGNED8", 1), ("UNSIGNED16", 2), ("UNSIGNED32", 4))},
+    **{name: (size, True) for name, size in (("INTEGER8", 1), ("INTEGER16", 2), ("INTEGER32", 4))},
+}
+"""Bytes of a data type, and whether it is signed; longer ones are left out."""
+
+_PROCESS_DATA = range(0x1400, 0x1C00)
+_IDENTITY = 0x1018
+_STATED = (0x6076, 0x6502)
+"""Objects whose value is the maker's; what the drive measures or is told is the emulator's own."""
+
+
+def apply_sheet(dictionary: ObjectDictionary, file: DeviceFile) -> None:
+    """Hide the entries that a file does not have, add those that it has, and let its access rights hold."""
+    for place, entry in dictionary.entries.items():
+        entry.is_visible = place in file.objects
+    for (index, subindex), described in file.objects.items():
+        size, signed = _SIZES.get(described.type_name, (0, False))
+        if not size:
+            continue
+        entry = dictionary.entries.get((index, subindex))
+        is_own = entry is not None
+        if entry is None:
+            entry = dictionary.add(index, subindex, size)
+        entry.bytes, entry.signed, entry.writable = size, signed, "w" in described.access
+        value = _value(described)
+        if value is not None and (not is_own or index in _PROCESS_DATA or (index in _STATED and value)):
+            dictionary.put(index, value, subindex)
+    for subindex, number in enumerate((file.vendor, file.product, file.revision), 1):
+        if dictionary.has(_IDENTITY, subindex) and number is not None:
+            dictionary.put(_IDENTITY, number, subindex)
+
+
+def _value(described: DescribedObject) -> int | None:
+    """Value of a DCF, else as delivered."""
+    if described.value is None:
+        return described.default
+    return int.from_bytes(described.value, "little", signed=described.type_name.startswith("INTEGER"))

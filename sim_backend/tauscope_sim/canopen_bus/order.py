@@ -10,11 +10,10 @@ from typing import Any, ClassVar
 from tauscope.robot import read_robot
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
 from tauscope_sim.canopen_bus.axis import AxisScale
-from tauscope_sim.canopen_bus.can_socket import CanSocket, SocketLine
 from tauscope_sim.canopen_bus.drive import EmulatedDrive
 from tauscope_sim.canopen_bus.driven_arm import DrivenArm
 from tauscope_sim.canopen_bus.emulator import CanEmulator
-from tauscope_sim.canopen_bus.serial_line import SerialLine
+from tauscope_sim.canopen_bus.lines import CanSocket, SerialLine, SocketLine
 from tauscope_sim.emulation.device_clock import STEP_S
 from tauscope_sim.emulation.emulator import Port
 from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal
@@ -28,14 +27,10 @@ _SOCKET = "socketcan:"
 class CanOrder:
     """What to emulate.
 
-    start : tuple of float
-        where the joints stand [rad or m]
-    rated_torque_mnm : tuple of int
-        object 0x6076 of each drive, at the motor shaft [mNm]
-    torque_noise : float
-        standard deviation of what the drives measure of the torque [Nm or N]
-    bit_rate : int
-        of the bus [bit/s]
+    `start`: where the joints stand [rad or m].
+    `rated_torque_mnm`: object 0x6076 of each drive, at the motor shaft [mNm].
+    `torque_noise`: standard deviation of what the drives measure of the torque [Nm or N].
+    `bit_rate`: of the bus [bit/s].
     """
 
     module: ClassVar[str] = "tauscope_sim.canopen_bus"
@@ -67,13 +62,7 @@ class CanOrder:
         return PseudoTerminal(self.port) if self._interface is None else CanSocket(self._interface)
 
     def build(self, now_s: float) -> CanEmulator:
-        """The emulator.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """The emulator. `now_s`: present instant [s]."""
         robot = read_robot(Path(self.robot))
         scenario = Scenario() if self.scenario is None else read_scenario(Path(self.scenario), robot)
         drives = []

@@ -41,7 +41,7 @@ class PowerStateMachine:
         elif not word & _NO_QUICK_STOP:
             self.quick_stop()
         else:
-            self.state = self._stepped(bool(word & _SWITCH_ON), bool(word & _ENABLE))
+            self.state = self._step(bool(word & _SWITCH_ON), bool(word & _ENABLE))
 
     def quick_stop(self) -> None:
         """Stop quickly: transition 11 from operation, 7 and 10 from below it."""
@@ -64,7 +64,7 @@ class PowerStateMachine:
         if self.state is not PowerState.FAULT:
             self.state = PowerState.SWITCH_ON_DISABLED
 
-    def _stepped(self, switch_on: bool, enable: bool) -> PowerState:
+    def _step(self, switch_on: bool, enable: bool) -> PowerState:
         """State after a controlword with voltage and without quick stop."""
         match self.state, switch_on, enable:
             case PowerState.SWITCH_ON_DISABLED, False, _:

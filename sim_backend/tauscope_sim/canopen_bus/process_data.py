@@ -32,7 +32,6 @@ class ProcessData:
     """The PDOs of one node; RPDOs wait for SYNC, TPDOs are sampled at it."""
 
     def __init__(self, dictionary: ObjectDictionary, node_id: int) -> None:
-        """Add the parameters of all PDOs, which are off at power-up."""
         self._dictionary = dictionary
         self._waiting: dict[int, bytes] = {}
         self._syncs = 0

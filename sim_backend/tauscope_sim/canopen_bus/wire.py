@@ -19,13 +19,7 @@ class Wire:
     """
 
     def __init__(self, bit_rate: float) -> None:
-        """Idle.
-
-        Parameters
-        ----------
-        bit_rate : float
-            infinite where frames arrive at once [bit/s]
-        """
+        """Idle. `bit_rate`: infinite where frames arrive at once [bit/s]."""
         self._bit_s = 1.0 / bit_rate
         self._free_s = 0.0
         self._count = 0
@@ -35,12 +29,7 @@ class Wire:
     def carry(self, frames: list[Frame], now_s: float) -> None:
         """Send frames of the drives to the adapter.
 
-        Parameters
-        ----------
-        frames : list of (int, bytes)
-            that want to be sent now
-        now_s : float
-            present instant [s]
+        `frames`: list of (int, bytes), that want to be sent now; `now_s`: present instant [s].
         """
         for frame in sorted(frames):
             self._free_s = max(now_s, self._free_s) + self.duration_s(frame)
@@ -49,23 +38,11 @@ class Wire:
                 heapq.heappush(self._arriving, (arrival_s, self._count, frame))
 
     def occupy(self, frame: Frame, now_s: float) -> None:
-        """Let a frame of the master take its time.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """Let a frame of the master take its time. `now_s`: present instant [s]."""
         self._free_s = max(now_s, self._free_s) + self.duration_s(frame)
 
     def arrived(self, now_s: float) -> list[Frame]:
-        """Frames that have reached the adapter.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """Frames that have reached the adapter. `now_s`: present instant [s]."""
         frames = []
         while self._arriving and self._arriving[0][0] <= now_s:
             frames.append(heapq.heappop(self._arriving)[2])
@@ -77,13 +54,7 @@ class Wire:
         return self._arriving[0][0] if self._arriving else float("inf")
 
     def disturb(self, node_id: int, kind: FaultKind, count: int, seconds: float) -> None:
-        """Let something happen to the next process data of a node.
-
-        Parameters
-        ----------
-        seconds : float
-            how late [s]
-        """
+        """Let something happen to the next process data of a node. `seconds`: how late [s]."""
         self._faults[node_id] = (kind, count, seconds)
 
     def duration_s(self, frame: Frame) -> float:

@@ -13,8 +13,7 @@ from pathlib import Path
 from tauscope.errors import RobotFileError, TauscopeError
 from tauscope.robot import Robot, read_robot, robot_from_dict
 from tauscope_sim.device.device import SimulatedDevice
-from tauscope_sim.device.server import DeviceServer
-from tauscope_sim.device.trace import TraceWriter
+from tauscope_sim.device.server import DeviceServer, TraceWriter
 from tauscope_sim.own_process import take_precedence
 from tauscope_sim.scenario import Scenario
 from tauscope_sim.scenario_file import read_scenario

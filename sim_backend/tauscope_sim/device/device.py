@@ -11,9 +11,8 @@ from tauscope.robot.robot import Robot
 from tauscope_drivers import ArmState, Capabilities, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device.activity import COMMANDED, POWERED, Activity, commanded_by, stopped_by
-from tauscope_sim.device.disturbances import Disturbances
 from tauscope_sim.device.drives import Drives, Motion
-from tauscope_sim.device.faults import FaultCode, FaultLatch, Injection, device_fault
+from tauscope_sim.device.faults import Disturbances, FaultCode, FaultLatch, Injection, device_fault
 from tauscope_sim.device.limits import checked_limits, checked_setpoint, refused
 from tauscope_sim.device.mechanism import Mechanism
 from tauscope_sim.scenario import Scenario
@@ -54,19 +53,11 @@ class SimulatedDevice:
     drives stop it by its policy, with a fault, before it leaves its range or its speed limit; in position control they
     keep the target within both.
 
-    Parameters
-    ----------
-    start_position : (n,) float64 or None
-        where the arm stands; None is `tauscope_sim.device.posture.resting_posture` [rad or m]
-    start_ns : int
-        device time at which it begins to exist [ns]
+    `start_position`: (n,), where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m].
+    `start_ns`: device time at which it begins to exist [ns].
 
-    Raises
-    ------
-    RobotFileError
-        where the robot file lacks what a simulation needs
-    ScenarioError
-        where the scenario does not fit the arm
+    Raises RobotFileError where the robot file lacks what a simulation needs.
+    Raises ScenarioError where the scenario does not fit the arm.
     """
 
     def __init__(
@@ -115,10 +106,7 @@ class SimulatedDevice:
     def advance_to(self, time_ns: int) -> None:
         """Let time pass: every tick up to and at an instant is carried out.
 
-        Parameters
-        ----------
-        time_ns : int
-            device time; one that has passed changes nothing [ns]
+        `time_ns`: device time; one that has passed changes nothing [ns].
         """
         last = (time_ns - self._start_ns) // TICK_NS
         while self._tick <= last:
@@ -144,15 +132,9 @@ class SimulatedDevice:
     def enable(self, mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> None:
         """Take the arm under power where it stands.
 
-        Parameters
-        ----------
-        watchdog_s : float
-            time without setpoints after which it does [s]
+        Raises DriverError: ``refused`` or ``fault``.
 
-        Raises
-        ------
-        DriverError
-            ``refused`` or ``fault``
+        `watchdog_s`: time without setpoints after which it does [s].
         """
         if self._activity in COMMANDED:
             raise refused("the arm is enabled already; stop it before enabling it again")
@@ -169,15 +151,9 @@ class SimulatedDevice:
     def command(self, setpoint: Setpoint, sent_ns: int | None = None) -> None:
         """Take the host's setpoint, and feed the watchdog; drives that stopped by a fault do not follow it.
 
-        Parameters
-        ----------
-        sent_ns : int or None
-            when it was sent, by the device's clock; None for now [ns]
+        Raises DriverError: ``not-enabled`` or ``refused``.
 
-        Raises
-        ------
-        DriverError
-            ``not-enabled`` or ``refused``
+        `sent_ns`: when it was sent, by the device's clock; None for now [ns].
         """
         if self._enabling is None:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the arm is not enabled; enable it before sending setpoints")
@@ -203,13 +179,7 @@ class SimulatedDevice:
         self._enabling = None
 
     def acknowledge_faults(self) -> None:
-        """Clear the latched faults.
-
-        Raises
-        ------
-        DriverError
-            ``fault`` where the cause of one persists
-        """
+        """Clear the latched faults. Raises DriverError: ``fault`` where the cause of one persists."""
         self._latch.clear()
         self._look_for_faults()
         self._refuse_faults()
@@ -217,12 +187,7 @@ class SimulatedDevice:
     def put_back(self) -> None:
         """Carry the arm back to where it began and set its brakes: nobody's order to the drives, but a hand's work.
 
-        Faults and disturbances are gone afterwards.
-
-        Raises
-        ------
-        DriverError
-            ``refused`` while the arm is enabled
+        Faults and disturbances are gone afterwards. Raises DriverError: ``refused`` while the arm is enabled.
         """
         if self._activity in COMMANDED:
             raise refused("the arm is enabled; stop it before carrying it back")
@@ -233,13 +198,7 @@ class SimulatedDevice:
         self._mechanism.put_back(self._tick)
 
     def inject(self, injection: Injection) -> None:
-        """Make a disturbance happen.
-
-        Raises
-        ------
-        DriverError
-            ``refused``: no such joint
-        """
+        """Make a disturbance happen. Raises DriverError ``refused`` where no such joint."""
         if not 1 <= injection.joint <= self.capabilities.joint_count:
             raise refused(
                 f"joint {injection.joint}: the arm has {self.capabilities.joint_count} joints; name one of them"

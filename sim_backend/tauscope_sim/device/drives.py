@@ -23,10 +23,8 @@ _MARGIN = 2e-3
 class Motion:
     """What the drives' own loop sees of the motors.
 
-    position : (n,) float64
-        in joint units, with the encoders' slip [rad or m]
-    velocity : (n,) float64
-        likewise [rad/s or m/s]
+    `position`: (n,), in joint units, with the encoders' slip [rad or m].
+    `velocity`: (n,), likewise [rad/s or m/s].
     """
 
     position: Array
@@ -36,10 +34,7 @@ class Motion:
 class Drives:
     """Servo and target of all joints.
 
-    Parameters
-    ----------
-    tick_s : float
-        time between two ticks [s]
+    `tick_s`: time between two ticks [s].
     """
 
     def __init__(self, robot: Robot, scenario: Scenario, motion: Motion, tick_s: float) -> None:
@@ -63,13 +58,7 @@ class Drives:
         self._commanded_torque = None
 
     def command(self, activity: Activity, setpoint: Setpoint, arrival: float) -> None:
-        """Take a setpoint that is due.
-
-        Parameters
-        ----------
-        arrival : float
-            when it arrived [ticks]
-        """
+        """Take a setpoint that is due. `arrival`: when it arrived [ticks]."""
         if activity is Activity.TRACKING:
             self._target.follow(setpoint.position, setpoint.torque, arrival)
         else:
@@ -105,10 +94,8 @@ class Drives:
 
         A joint that could not be stopped any more within its range counts as outside already.
 
-        Returns
-        -------
-        tuple of FaultCode, int and str, or None
-            the fault, the joint's number counted from 1, and what happened
+        Returns tuple of FaultCode, int and str, or None: the fault, the joint's number counted from 1, and what
+        happened.
         """
         speed = np.abs(motion.velocity)
         if (speed > self._fastest).any():

@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tauscope_drivers import Fault
 
 
@@ -45,14 +48,10 @@ class Disturbance(StrEnum):
 class Injection:
     """One disturbance, for tests of what stands above the device.
 
-    joint : int
-        joint number, counted from 1
-    start_ns : int
-        device time at which it begins; one that has passed means now [ns]
-    duration_ns : int or None
-        how long it lasts; None for ever [ns]
-    size : float
-        rise of the temperature or slip of the encoder [K; rad or m]
+    `joint`: joint number, counted from 1.
+    `start_ns`: device time at which it begins; one that has passed means now [ns].
+    `duration_ns`: how long it lasts; None for ever [ns].
+    `size`: rise of the temperature or slip of the encoder [K; rad or m].
     """
 
     kind: Disturbance
@@ -62,23 +61,14 @@ class Injection:
     size: float = 0.0
 
     def active_at(self, time_ns: int) -> bool:
-        """Whether it acts at an instant.
-
-        Parameters
-        ----------
-        time_ns : int
-            device time [ns]
-        """
+        """Whether it acts at an instant. `time_ns`: device time [ns]."""
         return self.start_ns <= time_ns and (self.duration_ns is None or time_ns < self.start_ns + self.duration_ns)
 
 
 def device_fault(code: FaultCode, joint: int | None, detail: str) -> Fault:
     """The fault as the protocol of `drivers` states it.
 
-    Parameters
-    ----------
-    joint : int or None
-        joint number, counted from 1; None for the whole arm
+    `joint`: joint number, counted from 1; None for the whole arm.
     """
     return Fault(code.value, joint, detail, REMEDIES[code])
 
@@ -99,3 +89,57 @@ class FaultLatch:
         """Forget them all."""
         self._faults.clear()
         self.faults = ()
+
+
+Array = NDArray[np.float64]
+
+
+class Disturbances:
+    """What acts now."""
+
+    def __init__(self, joint_count: int) -> None:
+        self.slip: Array = np.zeros(joint_count)
+        """slip of the encoders so far [rad or m]"""
+        self.heat: Array = np.zeros(joint_count)
+        """rise of the motors' temperature [K]"""
+        self.lost: NDArray[np.bool_] = np.zeros(joint_count, dtype=np.bool_)
+        """joints that do not answer"""
+        self.overloaded: NDArray[np.bool_] = np.zeros(joint_count, dtype=np.bool_)
+        """joints whose drive reports an overload"""
+        self.any = False
+        """whether anything was ever injected"""
+        self._injections: list[Injection] = []
+
+    @property
+    def waiting(self) -> bool:
+        """Whether there is anything that begins or ends yet."""
+        return bool(self._injections)
+
+    def add(self, injection: Injection) -> None:
+        """Take note of a disturbance."""
+        self.any = True
+        self._injections.append(injection)
+
+    def update(self, time_ns: int) -> None:
+        """Renew what acts at an instant. `time_ns`: device time [ns]."""
+        if not self._injections:
+            return
+        for values in (self.heat, self.lost, self.overloaded):
+            values[:] = 0
+        for injection in [one for one in self._injections if one.active_at(time_ns)]:
+            joint = injection.joint - 1
+            if injection.kind is Disturbance.ENCODER_JUMP:
+                self.slip[joint] += injection.size
+                self._injections.remove(injection)
+            elif injection.kind is Disturbance.OVER_TEMPERATURE:
+                self.heat[joint] += injection.size
+            elif injection.kind is Disturbance.LOST_SAMPLE:
+                self.lost[joint] = True
+            else:
+                self.overloaded[joint] = True
+        self._injections = [one for one in self._injections if not _is_over(one, time_ns)]
+
+
+def _is_over(injection: Injection, time_ns: int) -> bool:
+    """Whether it will never act again."""
+    return injection.duration_ns is not None and time_ns >= injection.start_ns + injection.duration_ns

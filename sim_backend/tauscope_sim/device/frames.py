@@ -63,10 +63,7 @@ class FrameBuffer:
     def feed(self, data: bytes) -> list[Frame]:
         """Take what arrived and return the frames that are complete.
 
-        Raises
-        ------
-        BrokenFrameError
-            where the kind is unknown or the body longer than `LARGEST_BODY`
+        Raises BrokenFrameError where the kind is unknown or the body longer than `LARGEST_BODY`.
         """
         self._bytes += data
         frames: list[Frame] = []
@@ -77,12 +74,12 @@ class FrameBuffer:
             end = _HEADER.size + length
             if len(self._bytes) < end:
                 break
-            frames.append(Frame(_known(kind), sequence, bytes(self._bytes[_HEADER.size : end])))
+            frames.append(Frame(_find_kind(kind), sequence, bytes(self._bytes[_HEADER.size : end])))
             del self._bytes[:end]
         return frames
 
 
-def _known(kind: int) -> FrameKind:
+def _find_kind(kind: int) -> FrameKind:
     """The kind of a number."""
     try:
         return FrameKind(kind)

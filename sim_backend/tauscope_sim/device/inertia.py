@@ -60,9 +60,9 @@ class InertiaSchedule:
         matrix, load = self._bodies.mass_matrix(), self._bodies.bias
         if self._rigid:
             return matrix, matrix, load
-        return self._scaled(matrix, 1.0), self._scaled(matrix, STIFFNESS_EXCESS), load
+        return self._scale(matrix, 1.0), self._scale(matrix, STIFFNESS_EXCESS), load
 
-    def _scaled(self, matrix: Array, excess: float) -> Array:
+    def _scale(self, matrix: Array, excess: float) -> Array:
         """H with the rows and columns of compliant joints scaled down; it stays positive definite."""
         scale = np.sqrt(np.minimum(1.0, excess * self._largest / matrix.diagonal()))
         return matrix * np.multiply.outer(scale, scale)

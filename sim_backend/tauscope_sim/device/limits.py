@@ -15,15 +15,10 @@ ENABLE_MARGIN = 0.05
 def checked_limits(limits: DriveLimits, position: Array) -> DriveLimits:
     """The limits as the drives keep them, in arrays of their own.
 
-    Parameters
-    ----------
-    position : (n,) float64
-        where the arm stands [rad or m]
+    Raises DriverError ``refused``: wrong shapes, not-a-number, an empty range, no room to move, or an arm outside its
+    range.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: wrong shapes, not-a-number, an empty range, no room to move, or an arm outside its range
+    `position`: (n,), where the arm stands [rad or m].
     """
     count = len(position)
     arrays: dict[str, Array] = {}
@@ -46,10 +41,7 @@ def checked_limits(limits: DriveLimits, position: Array) -> DriveLimits:
 def checked_setpoint(setpoint: Setpoint, joint_count: int) -> Setpoint:
     """The setpoint in arrays of its own.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: wrong shapes, or a number that is not finite
+    Raises DriverError ``refused``: wrong shapes, or a number that is not finite.
     """
     arrays = []
     for name in ("position", "torque"):

@@ -1,32 +1,105 @@
 """The arm behind the drives, moved tick by tick, and the state at each tick that readings are taken from."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauscope.robot.robot import Robot
-from tauscope_sim.device.posture import resting_posture
-from tauscope_sim.device.readings import Readings, Sample
+from tauscope_sim.plant.rigid_bodies import RigidBodies
 from tauscope_sim.scenario import Scenario
 
 Array = NDArray[np.float64]
 
 
+LEAST_SHARE = 1e-3
+"""A joint whose inertia is below this share of what it has elsewhere stands in line with its links: steep friction on
+next to no inertia is no place to begin at."""
+
+POSTURES = 200
+REACH = 1.0
+"""Postures are looked for within so much of zero [rad or m]."""
+
+
+def resting_posture(robot: Robot) -> Array:
+    """Zero, or the end of each joint's range nearest to it; elsewhere where a joint has next to no inertia there.
+
+    Returns (n,), position [rad or m].
+    """
+    ranges = np.array([joint.limits.position or (-np.inf, np.inf) for joint in robot.joints])
+    nearest = np.clip(0.0, ranges[:, 0], ranges[:, 1])
+    # the same arm stands at the same place every time
+    near = np.random.default_rng(0).uniform(-REACH, REACH, (POSTURES, robot.joint_count))
+    postures = np.vstack([nearest, np.clip(nearest + near, ranges[:, 0], ranges[:, 1])])
+    bodies = RigidBodies(robot, np.zeros(robot.joint_count))
+    inertia = np.array([_inertia(bodies, posture) for posture in postures])
+    share = (inertia / inertia.max(axis=0)).min(axis=1)
+    return nearest if share[0] >= LEAST_SHARE else postures[np.argmax(share)]
+
+
+def _inertia(bodies: RigidBodies, posture: Array) -> Array:
+    """Each joint's inertia with the others held, (n,)."""
+    bodies.update(posture, np.zeros_like(posture))
+    return bodies.mass_matrix().diagonal().copy()
+
+
+VELOCITY_BANDWIDTH = 2.0 * np.pi * 20.0
+"""Bandwidth of the drives' velocity estimate: turns the encoder's error into that of the velocity [rad/s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """The true state that one reading is taken from.
+
+    `time_s`: instant, by the plant's clock [s].
+    `position`: (n,), of the motors, in joint units [rad or m].
+    `velocity`: (n,), likewise [rad/s or m/s].
+    `torque`: (n,), of the motors on the joint's side [Nm or N].
+    """
+
+    time_s: float
+    position: Array
+    velocity: Array
+    torque: Array
+
+
+class Readings:
+    """Readings of one arm; an instant has one reading, however often it is asked for.
+
+    Position and torque are what `Scenario.sensors` makes of them. Velocity is the drive's estimate: exact where the
+    encoder is, else with white noise as large as the encoder's error times `VELOCITY_BANDWIDTH`.
+
+    Raises ScenarioError where a sensor's effect contradicts the robot.
+    """
+
+    def __init__(self, scenario: Scenario, robot: Robot) -> None:
+        self._sensors = scenario.sensors(robot)
+        encoder_error = np.sqrt(np.square(scenario.position_noise_std) + np.square(scenario.encoder_step) / 12.0)
+        self._velocity_std = VELOCITY_BANDWIDTH * np.broadcast_to(encoder_error, (robot.joint_count,))
+        self._noisy = bool(self._velocity_std.any())
+        self._rng = np.random.default_rng([scenario.seed, 1])
+        self._sample: Sample | None = None
+        self._reading: tuple[Array, Array, Array] | None = None
+
+    def of(self, sample: Sample) -> tuple[Array, Array, Array]:
+        """Position, velocity and torque as the drives report them, each (n,)."""
+        if self._reading is None or sample is not self._sample:
+            position, torque = self._sensors.measure(sample.time_s, sample.position, sample.torque)
+            velocity = sample.velocity
+            if self._noisy:
+                velocity = velocity + self._velocity_std * self._rng.standard_normal(len(velocity))
+            self._sample, self._reading = sample, (position, velocity, torque)
+        return self._reading
+
+
 class Mechanism:
     """Plant and sensors.
 
-    Parameters
-    ----------
-    start_position : (n,) float64 or None
-        where the arm stands; None is `resting_posture` [rad or m]
-    tick_s : float
-        time between two ticks [s]
+    `start_position`: (n,), where the arm stands; None is `resting_posture` [rad or m].
+    `tick_s`: time between two ticks [s].
 
-    Raises
-    ------
-    RobotFileError
-        where the robot file lacks what a simulation needs
-    ScenarioError
-        where the scenario does not fit the arm
+    Raises RobotFileError where the robot file lacks what a simulation needs.
+    Raises ScenarioError where the scenario does not fit the arm.
     """
 
     def __init__(self, robot: Robot, scenario: Scenario, start_position: ArrayLike | None, tick_s: float) -> None:
@@ -49,16 +122,9 @@ class Mechanism:
         """Take the reading of a tick, then let the arm move until the next.
 
         The torque of a reading is the mean of those before and after the tick, which belongs to the tick's own instant.
+        Raises ScenarioError where the motion grows beyond all bounds; the arm is at rest then.
 
-        Parameters
-        ----------
-        torque : (n,) float64
-            of the drives from this tick on [Nm or N]
-
-        Raises
-        ------
-        ScenarioError
-            where the motion grows beyond all bounds; the arm is at rest then
+        `torque`: (n,), of the drives from this tick on [Nm or N].
         """
         self._take(0.5 * (self._torque + torque), tick)
         self._torque = torque

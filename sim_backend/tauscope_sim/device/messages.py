@@ -30,13 +30,7 @@ def encode_document(document: Mapping[str, Any]) -> bytes:
 
 
 def decode_document(body: bytes) -> dict[str, Any]:
-    """Plain data from JSON.
-
-    Raises
-    ------
-    BadMessageError
-        where it is not a JSON object
-    """
+    """Plain data from JSON. Raises BadMessageError where it is not a JSON object."""
     try:
         document = json.loads(body)
     except (ValueError, RecursionError) as error:
@@ -49,10 +43,7 @@ def decode_document(body: bytes) -> dict[str, Any]:
 def encode_setpoint(sent_ns: int, setpoint: Setpoint) -> bytes:
     """Instant, then position and torque, 2 n numbers.
 
-    Parameters
-    ----------
-    sent_ns : int
-        present instant of the machine's monotonic clock [ns]
+    `sent_ns`: present instant of the machine's monotonic clock [ns].
     """
     return _INSTANT.pack(sent_ns) + np.concatenate([setpoint.position, setpoint.torque]).astype("<f8").tobytes()
 
@@ -60,10 +51,7 @@ def encode_setpoint(sent_ns: int, setpoint: Setpoint) -> bytes:
 def decode_setpoint(body: bytes, joint_count: int) -> tuple[int, Setpoint]:
     """Instant and setpoint of an exchange; whether its numbers are finite is the device's matter.
 
-    Raises
-    ------
-    BadMessageError
-        where it holds another number of values
+    Raises BadMessageError where it holds another number of values.
     """
     if len(body) != _INSTANT.size + 16 * joint_count:
         raise BadMessageError(f"a setpoint of {len(body)} bytes for {joint_count} joints")
@@ -80,13 +68,7 @@ def encode_state(state: ArmState) -> bytes:
 
 
 def decode_state(body: bytes) -> ArmState:
-    """The reading that `encode_state` wrote.
-
-    Raises
-    ------
-    BadMessageError
-        where it does not hold a reading
-    """
+    """The reading that `encode_state` wrote. Raises BadMessageError where it does not hold a reading."""
     try:
         time_ns, count = _STATE_HEAD.unpack_from(body)
         numbers = np.frombuffer(body, "<f8", 4 * count, _STATE_HEAD.size).astype(np.float64).reshape(4, count)
@@ -106,13 +88,7 @@ def encode_error(error: DriverError) -> bytes:
 
 
 def decode_error(body: bytes) -> DriverError:
-    """The error that `encode_error` wrote.
-
-    Raises
-    ------
-    BadMessageError
-        where it does not hold one
-    """
+    """The error that `encode_error` wrote. Raises BadMessageError where it does not hold one."""
     document = decode_document(body)
     try:
         kind = DriverErrorKind(document["kind"])
@@ -122,13 +98,7 @@ def decode_error(body: bytes) -> DriverError:
 
 
 def encode_enable(mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> bytes:
-    """A request to enable; infinite limits go as text.
-
-    Parameters
-    ----------
-    watchdog_s : float
-        time of the watchdog [s]
-    """
+    """A request to enable; infinite limits go as text. `watchdog_s`: time of the watchdog [s]."""
     document = {
         "mode": mode.value,
         "stop_policy": stop_policy.value,
@@ -139,13 +109,7 @@ def encode_enable(mode: ControlMode, limits: DriveLimits, stop_policy: StopPolic
 
 
 def decode_enable(body: bytes) -> tuple[ControlMode, DriveLimits, StopPolicy, float]:
-    """The arguments of `encode_enable`.
-
-    Raises
-    ------
-    BadMessageError
-        where a field is missing or of the wrong kind
-    """
+    """The arguments of `encode_enable`. Raises BadMessageError where a field is missing or of the wrong kind."""
     document = decode_document(body)
     try:
         limits = DriveLimits(
@@ -163,13 +127,7 @@ def encode_stop(policy: StopPolicy) -> bytes:
 
 
 def decode_stop(body: bytes) -> StopPolicy:
-    """The policy of `encode_stop`.
-
-    Raises
-    ------
-    BadMessageError
-        where it names no policy
-    """
+    """The policy of `encode_stop`. Raises BadMessageError where it names no policy."""
     try:
         return StopPolicy(decode_document(body)["policy"])
     except (ValueError, KeyError) as error:
@@ -184,10 +142,7 @@ def encode_injection(injection: Injection) -> bytes:
 def decode_injection(body: bytes) -> Injection:
     """The disturbance that `encode_injection` wrote.
 
-    Raises
-    ------
-    BadMessageError
-        where a field is missing or of the wrong kind
+    Raises BadMessageError where a field is missing or of the wrong kind.
     """
     document = decode_document(body)
     try:

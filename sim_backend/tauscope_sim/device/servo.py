@@ -41,10 +41,7 @@ class Servo:
 
     The integral is slower where the transmission is compliant: there it works against the damping of the link.
 
-    Parameters
-    ----------
-    tick_s : float
-        time between two ticks [s]
+    `tick_s`: time between two ticks [s].
     """
 
     def __init__(self, robot: Robot, inertia: InertiaSchedule, tick_s: float) -> None:
@@ -65,13 +62,7 @@ class Servo:
         self._age = _TICKS_PER_STIFFNESS
 
     def set_torque_limit(self, limit: Array) -> None:
-        """Cap the torque below what the motors can give.
-
-        Parameters
-        ----------
-        limit : (n,) float64
-            cap; infinite where there is none [Nm or N]
-        """
+        """Cap the torque below what the motors can give. `limit`: (n,), cap; infinite where there is none [Nm or N]."""
         self._limit = np.minimum(limit, self._motor_limit)
 
     def begin(self) -> None:
@@ -82,26 +73,17 @@ class Servo:
     def absorb(self, feed_forward: Array) -> None:
         """Keep a feed-forward torque that is about to end, so that nothing jerks.
 
-        Parameters
-        ----------
-        feed_forward : (n,) float64
-            torque of the host [Nm or N]
+        `feed_forward`: (n,), torque of the host [Nm or N].
         """
         self._integral = self.capped(self._integral + feed_forward)
 
     def track(self, error: Array, error_rate: Array, feed_forward: Array | None, position: Array) -> Array:
         """Torque of the position loop, (n,) [Nm or N].
 
-        Parameters
-        ----------
-        error : (n,) float64
-            target less position [rad or m]
-        error_rate : (n,) float64
-            target velocity less velocity [rad/s or m/s]
-        feed_forward : (n,) float64 or None
-            torque of the host; None for none [Nm or N]
-        position : (n,) float64
-            q, for H(q) [rad or m]
+        `error`: (n,), target less position [rad or m].
+        `error_rate`: (n,), target velocity less velocity [rad/s or m/s].
+        `feed_forward`: (n,), torque of the host; None for none [Nm or N].
+        `position`: (n,), q, for H(q) [rad or m].
         """
         damping, stiffness, load = self._renew(position)
         proportional = stiffness.dot(_PROPORTIONAL * error) + self._stiffness * error
@@ -120,24 +102,13 @@ class Servo:
     def damp(self, position: Array, velocity: Array) -> Array:
         """Torque against motion, (n,) [Nm or N].
 
-        Parameters
-        ----------
-        position : (n,) float64
-            q, for H(q) [rad or m]
-        velocity : (n,) float64
-            q̇ [rad/s or m/s]
+        `position`: (n,), q, for H(q) [rad or m]; `velocity`: (n,), q̇ [rad/s or m/s].
         """
         damping, _, _ = self._renew(position)
         return self.capped(-DAMPING * damping.dot(velocity))
 
     def capped(self, torque: Array) -> Array:
-        """Torque within the limit, (n,) [Nm or N].
-
-        Parameters
-        ----------
-        torque : (n,) float64
-            wanted [Nm or N]
-        """
+        """Torque within the limit, (n,) [Nm or N]. `torque`: (n,), wanted [Nm or N]."""
         return np.minimum(np.maximum(torque, -self._limit), self._limit)
 
     def _renew(self, position: Array) -> tuple[Array, Array, Array]:

@@ -41,12 +41,9 @@ class SetpointSpline:
     While a setpoint is overdue the target goes on as it moved; cycles that the host skipped are filled in on a
     parabola. Time is counted in ticks.
 
-    Parameters
-    ----------
-    position : (n,) float64
-        where the target stands [rad or m]
-    period : float or None
-        time between setpoints, where the host has told it: a drive that knows it does not have to find it [ticks]
+    `position`: (n,), where the target stands [rad or m].
+    `period`: time between setpoints, where the host has told it: a drive that knows it does not have to find it
+        [ticks].
     """
 
     def __init__(self, position: Array, period: float | None = None) -> None:
@@ -61,15 +58,7 @@ class SetpointSpline:
         self._weights = np.empty((2, 4))
 
     def add(self, position: Array, arrival: float) -> None:
-        """Take a setpoint.
-
-        Parameters
-        ----------
-        position : (n,) float64
-            target of the host [rad or m]
-        arrival : float
-            when it arrived [ticks]
-        """
+        """Take a setpoint. `position`: (n,), target of the host [rad or m]; `arrival`: when it arrived [ticks]."""
         cycles = self._place_on_grid(arrival)
         older, before = self._points[2].copy(), self._points[3].copy()
         # parabola through the last two setpoints, at -1 and 0, and the new one
@@ -83,20 +72,14 @@ class SetpointSpline:
     def starved(self, time: float) -> bool:
         """Whether setpoints have failed to come for so long that the target should come to rest.
 
-        Parameters
-        ----------
-        time : float
-            instant [ticks]
+        `time`: instant [ticks].
         """
         return time - self._grid > _LATEST_PHASE * self._period
 
     def restart(self, position: Array) -> None:
         """Continue with setpoints from another place; the pace of the host is not forgotten.
 
-        Parameters
-        ----------
-        position : (n,) float64
-            where the target stands [rad or m]
+        `position`: (n,), where the target stands [rad or m].
         """
         self._points[:] = position
 

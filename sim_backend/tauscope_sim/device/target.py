@@ -38,18 +38,11 @@ class Target:
 
     Setpoints that move within the limits are followed exactly. One that leaps is approached with bounded acceleration.
 
-    Parameters
-    ----------
-    position : (n,) float64
-        where it begins [rad or m]
-    velocity : (n,) float64
-        how it moves there; zero for an arm at rest [rad/s or m/s]
-    acceleration : (n,) float64
-        with which it catches up with setpoints that leapt [rad/s² or m/s²]
-    tick_s : float
-        time between two ticks [s]
-    period : float or None
-        time between setpoints, where the host has told it [ticks]
+    `position`: (n,), where it begins [rad or m].
+    `velocity`: (n,), how it moves there; zero for an arm at rest [rad/s or m/s].
+    `acceleration`: (n,), with which it catches up with setpoints that leapt [rad/s² or m/s²].
+    `tick_s`: time between two ticks [s].
+    `period`: time between setpoints, where the host has told it [ticks].
     """
 
     def __init__(
@@ -77,12 +70,7 @@ class Target:
     def limit(self, low: Array, high: Array, fastest: Array) -> None:
         """Keep the target within limits from now on; a target that is outside the range may stay where it is.
 
-        Parameters
-        ----------
-        low, high : (n,) float64
-            range [rad or m]
-        fastest : (n,) float64
-            speed limit [rad/s or m/s]
+        `low`, `high`: (n,), range [rad or m]; `fastest`: (n,), speed limit [rad/s or m/s].
         """
         self._low, self._high = np.minimum(low, self.position), np.maximum(high, self.position)
         self._fastest = fastest
@@ -95,14 +83,8 @@ class Target:
     def follow(self, position: Array, feed_forward: Array | None, arrival: float) -> None:
         """Take a setpoint of the host.
 
-        Parameters
-        ----------
-        position : (n,) float64
-            as the host asks [rad or m]
-        feed_forward : (n,) float64 or None
-            torque that belongs to it; None for none [Nm or N]
-        arrival : float
-            when it arrived [ticks]
+        `position`: (n,), as the host asks [rad or m]; `feed_forward`: (n,), torque that belongs to it; None for none
+        [Nm or N]; `arrival`: when it arrived [ticks].
         """
         if self._braking:
             self._spline.restart(self._resting_point())

@@ -2,7 +2,6 @@
 
 from tauscope_sim.driver.device_process import DeviceProcess, start_device
 from tauscope_sim.driver.remote_arm import RemoteSimulatedArm
-from tauscope_sim.driver.simulated_arm import SimulatedArm
-from tauscope_sim.driver.virtual_clock import VirtualClock
+from tauscope_sim.driver.simulated_arm import SimulatedArm, VirtualClock
 
 __all__ = ["DeviceProcess", "RemoteSimulatedArm", "SimulatedArm", "VirtualClock", "start_device"]

@@ -57,17 +57,10 @@ def start_device(
 ) -> DeviceProcess:
     """Start a simulated arm in real time, in a session of its own: signals to the caller's group do not reach it.
 
-    Parameters
-    ----------
-    start_position : sequence of n float or None
-        where the arm stands; None is `tauscope_sim.device.posture.resting_posture` [rad or m]
-    linger_s : float
-        how long the process goes on without a host [s]
+    Raises DriverError ``cannot-connect`` where the process did not start, with its own message.
 
-    Raises
-    ------
-    DriverError
-        ``cannot-connect``: the process did not start, with its own message
+    `start_position`: where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m];
+    `linger_s`: how long the process goes on without a host [s].
     """
     socket, trace, log = folder / "device.sock", folder / "device.csv", folder / "device.log"
     if len(os.fsencode(socket)) > _LONGEST_SOCKET_PATH:

@@ -49,10 +49,7 @@ class RemoteSimulatedArm:
     The device keeps its own watchdog: it stops the arm when this process is killed, stopped or cut off. A reply that
     does not come in time leaves not-a-number in the state of that cycle; `ArmState.enabled` is then as last known.
 
-    Parameters
-    ----------
-    reply_timeout_s : float
-        how long one cycle waits for its reply [s]
+    `reply_timeout_s`: how long one cycle waits for its reply [s].
     """
 
     def __init__(self, path: Path, joint_count: int, *, reply_timeout_s: float = 0.02) -> None:
@@ -83,10 +80,8 @@ class RemoteSimulatedArm:
     def connect(self) -> ArmState:
         """Reach the device and read it.
 
-        Raises
-        ------
-        DriverError
-            ``cannot-connect`` where there is no device, another host has it, or it has another number of joints
+        Raises DriverError: ``cannot-connect`` where there is no device, another host has it, or it has another number
+        of joints.
         """
         if self._socket is not None:
             raise _cannot_connect("the arm is connected already; disconnect it first")
@@ -127,10 +122,7 @@ class RemoteSimulatedArm:
     ) -> ArmState:
         """Take the arm under power where it stands; see `drivers.Backend`.
 
-        Parameters
-        ----------
-        watchdog_s : float
-            time without `exchange` after which it does [s]
+        `watchdog_s`: time without `exchange` after which it does [s].
         """
         del cycle_s
         return self._state_after(FrameKind.ENABLE, encode_enable(mode, limits, stop_policy, watchdog_s))
@@ -141,18 +133,15 @@ class RemoteSimulatedArm:
         try:
             reply = self._request(FrameKind.EXCHANGE, body, self._reply_timeout_s)
         except TimeoutError:
-            return self._missed()
+            return self._miss()
         return self._state_of(reply)
 
     def stop(self, policy: StopPolicy) -> ArmState:
         """Stop the arm; where there is no connection the device has done so by itself, and nothing is known of it.
 
-        Raises
-        ------
-        DriverError
-            ``lost`` where the device does not confirm
+        Raises DriverError: ``lost`` where the device does not confirm.
         """
-        return self._missed() if self._socket is None else self._state_after(FrameKind.STOP, encode_stop(policy))
+        return self._miss() if self._socket is None else self._state_after(FrameKind.STOP, encode_stop(policy))
 
     def disconnect(self) -> None:
         """Let go of the device, which stops an arm that is still enabled by its own policy."""
@@ -188,11 +177,11 @@ class RemoteSimulatedArm:
         try:
             return self._request(kind, body)
         except TimeoutError as error:
-            raise self._lost(f"no reply within {_PATIENCE_S:g} s") from error
+            raise self._lose(f"no reply within {_PATIENCE_S:g} s") from error
 
     def _request(self, kind: FrameKind, body: bytes, timeout_s: float = _PATIENCE_S) -> Frame:
         """Send a request and wait for its reply; raises TimeoutError, and what the device refuses."""
-        connection = self._connected()
+        connection = self._require_connection()
         self._sequence = (self._sequence + 1) % 2**32
         deadline = time.monotonic() + timeout_s
         try:
@@ -204,12 +193,12 @@ class RemoteSimulatedArm:
         except TimeoutError:
             raise
         except (OSError, BrokenFrameError) as error:
-            raise self._lost(str(error)) from error
+            raise self._lose(str(error)) from error
         if reply.kind is FrameKind.ERROR:
             raise decode_error(reply.body)
         return reply
 
-    def _connected(self) -> socket.socket:
+    def _require_connection(self) -> socket.socket:
         """The connection; refuses where there is none."""
         if self._socket is None:
             raise DriverError(DriverErrorKind.NOT_CONNECTED, "the arm is not connected; connect it first")
@@ -233,16 +222,16 @@ class RemoteSimulatedArm:
         try:
             state = decode_state(reply.body)
         except BadMessageError as error:
-            raise self._lost(str(error)) from error
+            raise self._lose(str(error)) from error
         self._enabled = state.enabled
         return state
 
-    def _missed(self) -> ArmState:
+    def _miss(self) -> ArmState:
         """State of a cycle without an answer."""
         nothing = np.full(self._count, np.nan)
         return ArmState(self._clock.now_ns(), nothing, nothing, nothing, nothing, self._enabled)
 
-    def _lost(self, reason: str) -> DriverError:
+    def _lose(self, reason: str) -> DriverError:
         """Give the connection up."""
         self._close()
         return DriverError(

@@ -1,13 +1,40 @@
 """The simulated arm in virtual time: a whole run takes as long as it takes to compute."""
 
+from collections.abc import Callable
+
 from numpy.typing import ArrayLike
 
 from tauscope.robot.robot import Robot
 from tauscope_drivers import ArmState, Capabilities, Clock, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device import SimulatedDevice
-from tauscope_sim.driver.virtual_clock import VirtualClock
 from tauscope_sim.scenario import Scenario
+
+
+class VirtualClock:
+    """The clock of a simulated device; waiting carries the device forward.
+
+    `start_ns`: its first instant [ns].
+    `advance`: lets the device live up to an instant [ns].
+    """
+
+    def __init__(self, start_ns: int, advance: Callable[[int], None]) -> None:
+        self._now_ns = start_ns
+        self._advance = advance
+
+    def now_ns(self) -> int:
+        """The present instant [ns]."""
+        return self._now_ns
+
+    def wait_until_ns(self, deadline_ns: int) -> int:
+        """Let the device live up to a deadline, and return there; at once where it has passed.
+
+        `deadline_ns`: absolute instant [ns].
+        """
+        if deadline_ns > self._now_ns:
+            self._now_ns = deadline_ns
+            self._advance(deadline_ns)
+        return self._now_ns
 
 
 class SimulatedArm:
@@ -15,17 +42,10 @@ class SimulatedArm:
 
     The device lives as long as this object: it keeps its place, its stop and its faults while disconnected.
 
-    Parameters
-    ----------
-    start_position : (n,) float64 or None
-        where the arm stands; None is `tauscope_sim.device.posture.resting_posture` [rad or m]
+    `start_position`: (n,), where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m].
 
-    Raises
-    ------
-    RobotFileError
-        where the robot file lacks what a simulation needs
-    ScenarioError
-        where the scenario does not fit the arm
+    Raises RobotFileError where the robot file lacks what a simulation needs.
+    Raises ScenarioError where the scenario does not fit the arm.
     """
 
     def __init__(
@@ -48,13 +68,7 @@ class SimulatedArm:
         return self._clock
 
     def connect(self) -> ArmState:
-        """Reach the device and read it.
-
-        Raises
-        ------
-        DriverError
-            ``cannot-connect`` where it is connected already
-        """
+        """Reach the device and read it. Raises DriverError: ``cannot-connect`` where it is connected already."""
         if self._connected:
             raise DriverError(DriverErrorKind.CANNOT_CONNECT, "the arm is connected already; disconnect it first")
         self._connected = True
@@ -76,10 +90,7 @@ class SimulatedArm:
     ) -> ArmState:
         """Take the arm under power where it stands; see `drivers.Backend`.
 
-        Parameters
-        ----------
-        watchdog_s : float
-            time without `exchange` after which it does, in virtual time [s]
+        `watchdog_s`: time without `exchange` after which it does, in virtual time [s].
         """
         del cycle_s
         self._require_connection()

@@ -34,12 +34,7 @@ class MovedArm(Protocol):
     def advance(self, torque: Array, duration_s: float) -> None:
         """Move on under a constant torque.
 
-        Parameters
-        ----------
-        torque : (n,) float64
-            of the motors, at the joints [Nm or N]
-        duration_s : float
-            for how long [s]
+        `torque`: (n,), of the motors, at the joints [Nm or N]; `duration_s`: for how long [s].
         """
         ...
 
@@ -61,16 +56,10 @@ class Pendulums:
     ) -> None:
         """Place them at rest.
 
-        Parameters
-        ----------
-        position : (n,) float64
-            where they stand [rad]
-        inertia : float
-            J [kg m²]
-        damping : float
-            b [Nm s/rad]
-        weight : float
-            m g l [Nm]
+        `position`: (n,), where they stand [rad].
+        `inertia`: J [kg m²].
+        `damping`: b [Nm s/rad].
+        `weight`: m g l [Nm].
         """
         self._position = np.array(position, dtype=np.float64)
         self._velocity = np.zeros_like(self._position)
@@ -102,12 +91,7 @@ class Pendulums:
     def advance(self, torque: Array, duration_s: float) -> None:
         """Move on under a constant torque, by the semi-implicit Euler method.
 
-        Parameters
-        ----------
-        torque : (n,) float64
-            [Nm]
-        duration_s : float
-            for how long [s]
+        `torque`: (n,) [Nm]; `duration_s`: for how long [s].
         """
         load = self._damping * self._velocity + self._weight * np.sin(self._position)
         self._velocity += duration_s * (torque - load) / self._inertia

@@ -1,8 +1,8 @@
 """The bus of emulated servos: bytes of a master in, answers with the instants of their arrival out."""
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 
-from tauscope_sim.dynamixel_bus.answer_faults import AnswerFaults
 from tauscope_sim.dynamixel_bus.control_memory import WriteRefusedError
 from tauscope_sim.dynamixel_bus.framing import (
     BROADCAST_ID,
@@ -13,6 +13,32 @@ from tauscope_sim.dynamixel_bus.framing import (
 )
 from tauscope_sim.dynamixel_bus.servo import ENCODER, OVERHEATING, OVERLOAD, EmulatedServo
 from tauscope_sim.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault
+
+
+@dataclass
+class AnswerFaults:
+    """What is to happen to the next answers of one servo.
+
+    `kind`: None for nothing.
+    """
+
+    kind: FaultKind | None = None
+    count: int = 0
+    seconds: float = 0.0
+
+    def apply(self, frame: bytes, due_s: float) -> list[tuple[float, bytes]]:
+        """An answer as it arrives: not at all, once or twice. `due_s`: when it would arrive [s]."""
+        if self.kind is None or self.count <= 0:
+            return [(due_s, frame)]
+        self.count -= 1
+        if self.kind is FaultKind.LOSE:
+            return []
+        if self.kind is FaultKind.CORRUPT:
+            return [(due_s, frame[:-3] + bytes([frame[-3] ^ 0x10]) + frame[-2:])]
+        if self.kind is FaultKind.LATE:
+            return [(due_s + self.seconds, frame)]
+        return [(due_s, frame), (due_s, frame)]
+
 
 Delivery = tuple[float, bytes]
 """When bytes arrive at the master [s], and which."""
@@ -28,7 +54,6 @@ class EmulatedBus:
     """Servos on one line."""
 
     def __init__(self, servos: Sequence[EmulatedServo], *, fast_sync_read: bool = True, paced: bool = True) -> None:
-        """Connect servos."""
         self.servos = {servo.servo: servo for servo in servos}
         self.schedule = FaultSchedule()
         self._fast = fast_sync_read
@@ -56,10 +81,7 @@ class EmulatedBus:
     def hear(self, data: bytes, now_s: float) -> list[Instruction]:
         """Instructions in the bytes of a master; every servo that is there hears them, which contents its watchdog.
 
-        Parameters
-        ----------
-        now_s : float
-            when [s]
+        `now_s`: when [s].
         """
         instructions = self._parser.feed(data)
         if instructions:
@@ -68,13 +90,7 @@ class EmulatedBus:
         return instructions
 
     def answer(self, instructions: Iterable[Instruction], now_s: float) -> list[Delivery]:
-        """Carry instructions out and answer them.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """Carry instructions out and answer them. `now_s`: present instant [s]."""
         deliveries: list[Delivery] = []
         for instruction in instructions:
             end_s = max(now_s, self._free_s) + self._wire_s(instruction.length)
@@ -85,13 +101,7 @@ class EmulatedBus:
         return deliveries
 
     def run_faults(self, now_s: float) -> None:
-        """Let the faults happen that are due.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """Let the faults happen that are due. `now_s`: present instant [s]."""
         self.schedule.run(now_s, lambda fault: self._carry_out(fault, now_s))
 
     def _carry_out(self, fault: InjectedFault, now_s: float) -> None:
@@ -125,11 +135,11 @@ class EmulatedBus:
         """Servos that hear now, in the order of their IDs."""
         return [self.servos[key] for key in sorted(self.servos) if now_s >= self._away_until_s[key]]
 
-    def _addressed(self, instruction: Instruction, now_s: float) -> list[EmulatedServo]:
+    def _find_addressed(self, instruction: Instruction, now_s: float) -> list[EmulatedServo]:
         present = self._present(now_s)
         return [servo for servo in present if instruction.servo in (servo.servo, BROADCAST_ID)]
 
-    def _listed(self, servos: Sequence[int], now_s: float) -> list[EmulatedServo]:
+    def _find_present(self, servos: Sequence[int], now_s: float) -> list[EmulatedServo]:
         """Present ones of a list, in its order."""
         present = {servo.servo: servo for servo in self._present(now_s)}
         return [present[key] for key in servos if key in present]
@@ -153,13 +163,15 @@ class EmulatedBus:
         return deliveries
 
     def _ping(self, instruction: Instruction, end_s: float) -> list[Delivery]:
-        servos = self._addressed(instruction, end_s)
+        servos = self._find_addressed(instruction, end_s)
         return self._answers([(servo, 0, servo.memory.read(0, 2) + servo.memory.read(6, 1)) for servo in servos], end_s)
 
     def _read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         if instruction.servo == BROADCAST_ID or len(instruction.parameters) != 4:
             return []
-        servos = [servo for servo in self._addressed(instruction, end_s) if servo.memory.get("Status Return Level")]
+        servos = [
+            servo for servo in self._find_addressed(instruction, end_s) if servo.memory.get("Status Return Level")
+        ]
         return self._answers([self._value(servo, *_words(instruction.parameters)) for servo in servos], end_s)
 
     def _value(self, servo: EmulatedServo, address: int, length: int) -> tuple[EmulatedServo, int, bytes]:
@@ -174,7 +186,7 @@ class EmulatedBus:
         for servo in self._followers(instruction.servo, end_s):
             if servo.servo != instruction.servo:
                 self._write_quietly(servo, address, data)
-        for servo in self._addressed(instruction, end_s):
+        for servo in self._find_addressed(instruction, end_s):
             level, error = servo.memory.get("Status Return Level"), 0
             try:
                 (servo.write if instruction.code == WRITE else servo.register)(address, data)
@@ -186,7 +198,7 @@ class EmulatedBus:
 
     def _act(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         parts: list[tuple[EmulatedServo, int, bytes]] = []
-        for servo in self._addressed(instruction, end_s):
+        for servo in self._find_addressed(instruction, end_s):
             error = 0
             try:
                 servo.act()
@@ -196,7 +208,7 @@ class EmulatedBus:
         return [] if instruction.servo == BROADCAST_ID else self._answers(parts, end_s)
 
     def _reboot(self, instruction: Instruction, end_s: float) -> list[Delivery]:
-        servos = self._addressed(instruction, end_s)
+        servos = self._find_addressed(instruction, end_s)
         heard = [] if instruction.servo == BROADCAST_ID else servos
         answers = self._answers([(servo, 0, b"") for servo in heard], end_s)
         for servo in servos:
@@ -205,7 +217,7 @@ class EmulatedBus:
 
     def _clear(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         parts: list[tuple[EmulatedServo, int, bytes]] = []
-        for servo in self._addressed(instruction, end_s):
+        for servo in self._find_addressed(instruction, end_s):
             error = 0
             try:
                 servo.clear(instruction.parameters)
@@ -215,12 +227,12 @@ class EmulatedBus:
         return [] if instruction.servo == BROADCAST_ID else self._answers(parts, end_s)
 
     def _refuse(self, instruction: Instruction, end_s: float) -> list[Delivery]:
-        servos = [] if instruction.servo == BROADCAST_ID else self._addressed(instruction, end_s)
+        servos = [] if instruction.servo == BROADCAST_ID else self._find_addressed(instruction, end_s)
         return self._answers([(servo, _UNKNOWN_INSTRUCTION, b"") for servo in servos], end_s)
 
     def _sync_read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         address, length = _words(instruction.parameters)
-        servos = self._listed(instruction.parameters[4:], end_s)
+        servos = self._find_present(instruction.parameters[4:], end_s)
         return self._answers([self._value(servo, address, length) for servo in servos], end_s)
 
     def _fast_sync_read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
@@ -255,7 +267,7 @@ class EmulatedBus:
         data = instruction.parameters
         parts: list[tuple[EmulatedServo, int, bytes]] = []
         for start in range(0, len(data) - 4, 5):
-            for servo in self._listed(data[start : start + 1], end_s):
+            for servo in self._find_present(data[start : start + 1], end_s):
                 parts.append(self._value(servo, *_words(data[start + 1 : start + 5])))
         return self._answers(parts, end_s)
 

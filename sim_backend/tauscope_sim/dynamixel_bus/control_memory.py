@@ -34,7 +34,6 @@ class ControlMemory:
     """Items by name, bytes by address."""
 
     def __init__(self, specification: ServoSpecification) -> None:
-        """As delivered, with what the specification says otherwise."""
         self._specification = specification
         table = ControlTable.getControlTable(specification.model_number)
         self.items = {name: (item.address, item.size) for name, item in table.items() if "Indirect" not in name}
@@ -81,13 +80,7 @@ class ControlMemory:
         return found
 
     def write(self, address: int, data: bytes) -> list[str]:
-        """Write whole items as a master does.
-
-        Raises
-        ------
-        WriteRefusedError
-            nothing was written
-        """
+        """Write whole items as a master does. Raises WriteRefusedError where nothing was written."""
         wanted: list[tuple[str, int]] = []
         start = 0
         while start < len(data):

@@ -24,12 +24,8 @@ class DynamixelEmulator:
     ) -> None:
         """Everything at rest. The arm stands on a stand until all its servos have had torque once.
 
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        latency_s : float
-            how much later than over the wire an answer reaches the master: the latency of an adapter [s]
+        `now_s`: present instant [s]; `latency_s`: how much later than over the wire an answer reaches the master: the
+        latency of an adapter [s].
         """
         self.bus = bus
         self.arm = arm
@@ -54,13 +50,7 @@ class DynamixelEmulator:
         return self._clock.now_s
 
     def hears(self, baud: int) -> bool:
-        """Whether a master that has set this baud rate is understood.
-
-        Parameters
-        ----------
-        baud : int
-            of the master's port [bit/s]
-        """
+        """Whether a master that has set this baud rate is understood. `baud`: of the master's port [bit/s]."""
         return baud in self._bauds
 
     def receive(self, data: bytes, now_s: float) -> None:
@@ -69,10 +59,7 @@ class DynamixelEmulator:
         They are heard before the device catches up with the clock: they may have waited while this process slept, and
         its sleep is no silence of the master.
 
-        Parameters
-        ----------
-        now_s : float
-            when [s]
+        `now_s`: when [s].
         """
         instructions = self.bus.hear(data, now_s)
         self._clock.catch_up(now_s, self._step, ALL_STEPS)
@@ -83,13 +70,7 @@ class DynamixelEmulator:
             heapq.heappush(self._outgoing, (due_s + self._latency_s, self._count, frame))
 
     def due(self, now_s: float) -> bytes:
-        """Bytes that have reached the master by now.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """Bytes that have reached the master by now. `now_s`: present instant [s]."""
         arrived = b""
         while self._outgoing and self._outgoing[0][0] <= now_s:
             arrived += heapq.heappop(self._outgoing)[2]
@@ -103,10 +84,7 @@ class DynamixelEmulator:
     def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
         """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
 
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
+        `now_s`: present instant [s].
         """
         self._clock.catch_up(now_s, self._step, most_steps)
 
@@ -130,11 +108,8 @@ class DynamixelEmulator:
     def answer(self, request: dict[str, Any]) -> dict[str, int] | None:
         """Do what a test asks.
 
-        Parameters
-        ----------
-        request : dict
-            ``{"inject": [fault, …]}``, ``{"get": [servo, item]}``, ``{"put": [servo, item, value]}``, ``{"stand":
-            bool}`` (put the stand under it, or take it away), or nothing of these
+        `request`: ``{"inject": [fault, …]}``, ``{"get": [servo, item]}``, ``{"put": [servo, item, value]}``,
+        ``{"stand": bool}`` (put the stand under it, or take it away), or nothing of these.
         """
         if "inject" in request:
             self.bus.schedule.add(faults_from(request["inject"], self.now_s))

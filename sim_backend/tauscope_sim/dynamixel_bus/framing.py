@@ -18,8 +18,7 @@ _library = Protocol2PacketHandler()
 class Instruction:
     """What a master asks.
 
-    length : int
-        of the frame on the wire [bytes]
+    `length`: of the frame on the wire [bytes].
     """
 
     servo: int
@@ -40,10 +39,7 @@ def status_frame(servo: int, error: int, data: bytes) -> bytes:
 def fast_status_frame(answers: list[tuple[int, int, bytes]], servos: int, length: int) -> bytes:
     """The common packet of a Fast Sync Read, cut off after the last answer; it is never stuffed.
 
-    Parameters
-    ----------
-    length : int
-        data of each [bytes]
+    `length`: data of each [bytes].
     """
     total = 1 + servos * (length + 4)
     frame = bytearray([*_HEADER, BROADCAST_ID, total & 0xFF, total >> 8, _STATUS])
@@ -57,7 +53,6 @@ class InstructionParser:
     """Finds instructions in what a master sends; answers of other servos are passed over."""
 
     def __init__(self) -> None:
-        """Begin with nothing."""
         self._buffer = bytearray()
 
     def feed(self, received: bytes) -> list[Instruction]:
@@ -88,11 +83,11 @@ class InstructionParser:
 
 
 def _instruction(frame: list[int]) -> Instruction:
-    body = _without_stuffing(frame[7:-2])
+    body = _remove_stuffing(frame[7:-2])
     return Instruction(frame[4], body[0], bytes(body[1:]), len(frame))
 
 
-def _without_stuffing(stuffed: list[int]) -> list[int]:
+def _remove_stuffing(stuffed: list[int]) -> list[int]:
     """Byte by byte: FD after FF FF FD is left out."""
     plain: list[int] = []
     skipped = False

@@ -17,12 +17,9 @@ from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal
 class DynamixelOrder:
     """What to emulate.
 
-    start : tuple of float
-        where the joints stand [rad or m]
-    weight : float
-        m g l of the pendulums [Nm]
-    latency_s : float
-        latency of the adapter [s]
+    `start`: where the joints stand [rad or m].
+    `weight`: m g l of the pendulums [Nm].
+    `latency_s`: latency of the adapter [s].
     """
 
     module: ClassVar[str] = "tauscope_sim.dynamixel_bus"
@@ -56,13 +53,7 @@ class DynamixelOrder:
         return PseudoTerminal(self.port)
 
     def build(self, now_s: float) -> DynamixelEmulator:
-        """The emulator.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """The emulator. `now_s`: present instant [s]."""
         arm = self._arm()
         servos = [EmulatedServo(servo, seed=joint) for joint, servo in enumerate(self.servos)]
         bus = EmulatedBus(servos, fast_sync_read=self.fast_sync_read, paced=self.paced and not self.stepped)

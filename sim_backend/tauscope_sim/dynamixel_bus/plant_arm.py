@@ -26,13 +26,7 @@ class PlantArm:
     """
 
     def __init__(self, robot: Robot, scenario: Scenario, position: ArrayLike) -> None:
-        """Place the arm at rest.
-
-        Parameters
-        ----------
-        position : (n,) float64
-            where it stands [rad or m]
-        """
+        """Place the arm at rest. `position`: (n,), where it stands [rad or m]."""
         self._plant = scenario.plant(robot)
         self._plant.place(position)
         self._inertia = InertiaSchedule(robot, scenario.effects)
@@ -56,10 +50,10 @@ class PlantArm:
         tracking = np.array([demand.tracks for demand in demands])
         if tracking.any():
             goal = np.array([demand.position for demand in demands])
-            wanted = np.where(tracking, self._tracked(np.where(tracking, goal - self._position, 0.0)), wanted)
+            wanted = np.where(tracking, self._track(np.where(tracking, goal - self._position, 0.0)), wanted)
         return np.clip(wanted, -cap, cap)
 
-    def _tracked(self, error: Array) -> Array:
+    def _track(self, error: Array) -> Array:
         """Torque of the position loops."""
         if self._age == 0:
             matrix, _, load = self._inertia.at(self._position)
@@ -68,15 +62,7 @@ class PlantArm:
         return self._own_inertia * (BANDWIDTH**2 * error - 2.0 * BANDWIDTH * self._velocity) + self._load
 
     def advance(self, torque: Array, duration_s: float) -> None:
-        """Move on under a constant torque.
-
-        Parameters
-        ----------
-        torque : (n,) float64
-            [Nm or N]
-        duration_s : float
-            for how long [s]
-        """
+        """Move on under a constant torque. `torque`: (n,) [Nm or N]; `duration_s`: for how long [s]."""
         self._plant.advance(torque, duration_s)
         self._look()
 

@@ -33,7 +33,6 @@ class EmulatedServo:
     """A servo on the bus and at its joint."""
 
     def __init__(self, specification: ServoSpecification, *, seed: int = 0) -> None:
-        """Power up."""
         self.specification = specification
         self.memory = ControlMemory(specification)
         self.encoder_offset_counts = 0
@@ -82,22 +81,13 @@ class EmulatedServo:
         return self.memory.get("Return Delay Time") * 2e-6
 
     def hear(self, now_s: float) -> None:
-        """An instruction went over the bus: the watchdog begins anew.
-
-        Parameters
-        ----------
-        now_s : float
-            when [s]
-        """
+        """An instruction went over the bus: the watchdog begins anew. `now_s`: when [s]."""
         self._heard_s = now_s
 
     def write(self, address: int, data: bytes) -> None:
         """Write to the control table and do what that means.
 
-        Raises
-        ------
-        WriteRefusedError
-            the servo does not take it
+        Raises WriteRefusedError where the servo does not take it.
         """
         memory, had_torque, was_latched = self.memory, self.has_torque, self.memory.is_latched
         written = memory.write(address, data)
@@ -120,13 +110,7 @@ class EmulatedServo:
         self.memory.put("Registered Instruction", 1)
 
     def act(self) -> None:
-        """Carry out the write that was kept.
-
-        Raises
-        ------
-        WriteRefusedError
-            none was kept, or it is refused
-        """
+        """Carry out the write that was kept. Raises WriteRefusedError where none was kept, or it is refused."""
         if self._registered is None:
             raise WriteRefusedError(2)
         registered, self._registered = self._registered, None
@@ -136,10 +120,7 @@ class EmulatedServo:
     def clear(self, what: bytes) -> None:
         """Carry out the instruction Clear: an error of the Y series, where its cause is gone.
 
-        Raises
-        ------
-        WriteRefusedError
-            the error stays, or this servo knows no such thing
+        Raises WriteRefusedError where the error stays, or this servo knows no such thing.
         """
         code = self.memory.get("Error Code")
         is_hot = self.memory.get("Present Motor Temperature") > self.memory.get("Motor Temperature Limit")
@@ -171,14 +152,7 @@ class EmulatedServo:
     def demand(self, position: float, now_s: float, duration_s: float) -> Demand:
         """What the servo wants of its joint for the next stretch of time.
 
-        Parameters
-        ----------
-        position : float
-            of the joint [rad or m]
-        now_s : float
-            present instant [s]
-        duration_s : float
-            since the last call [s]
+        `position`: of the joint [rad or m]; `now_s`: present instant [s]; `duration_s`: since the last call [s].
         """
         if not self.has_torque:
             self._heard_s = now_s
@@ -192,14 +166,7 @@ class EmulatedServo:
     def take_motion(self, position: float, velocity: float, torque: float) -> None:
         """See the joint, and the torque that the servo exerts on it.
 
-        Parameters
-        ----------
-        position : float
-            [rad or m]
-        velocity : float
-            [rad/s or m/s]
-        torque : float
-            [Nm or N]
+        `position`: [rad or m]; `velocity`: [rad/s or m/s]; `torque`: [Nm or N].
         """
         # Torque is that of the period that ends here; position and velocity are taken at its middle too.
         before, speed_before = self._motion or (position, velocity)
@@ -210,10 +177,7 @@ class EmulatedServo:
     def sense(self, now_s: float, part: float = 1.0) -> None:
         """Show the present measurement in the control table: position, velocity and current of one instant.
 
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
+        `now_s`: present instant [s].
         """
         older, newer = self._means(0), self._means(1)
         position, velocity, current = ((1.0 - part) * old + part * new for old, new in zip(older, newer, strict=True))

@@ -12,14 +12,10 @@ CURRENT_MODE, POSITION_MODE, EXTENDED_MODE, CURRENT_BASED_MODE = 0, 3, 4, 5
 class Demand:
     """What a servo wants of its joint until its loop runs again.
 
-    position : float
-        target [rad or m]
-    speed : float
-        of the target [rad/s or m/s]
-    torque : float
-        where it does not track [Nm or N]
-    cap : float
-        most that it exerts [Nm or N]
+    `position`: target [rad or m].
+    `speed`: of the target [rad/s or m/s].
+    `torque`: where it does not track [Nm or N].
+    `cap`: most that it exerts [Nm or N].
     """
 
     tracks: bool
@@ -37,7 +33,6 @@ class ServoLoop:
     """Goals to demands: a target that moves no faster than Profile Velocity, or plain current."""
 
     def __init__(self, specification: ServoSpecification, memory: ControlMemory) -> None:
-        """At rest."""
         self._specification = specification
         self._memory = memory
         self._target: float | None = None
@@ -48,13 +43,7 @@ class ServoLoop:
         self._target = self._held = None
 
     def hold(self, position: float) -> None:
-        """Stop here until `release` or `resume`.
-
-        Parameters
-        ----------
-        position : float
-            where it stands [rad or m]
-        """
+        """Stop here until `release` or `resume`. `position`: where it stands [rad or m]."""
         self._held = position
 
     def resume(self) -> None:
@@ -64,12 +53,7 @@ class ServoLoop:
     def demand(self, position: float, duration_s: float) -> Demand:
         """What the servo wants now.
 
-        Parameters
-        ----------
-        position : float
-            of the joint, as the encoder sees it [rad or m]
-        duration_s : float
-            since the last demand [s]
+        `position`: of the joint, as the encoder sees it [rad or m]; `duration_s`: since the last demand [s].
         """
         memory, unit = self._memory, abs(self._specification.torque_per_unit)
         limit = memory.get("Current Limit")

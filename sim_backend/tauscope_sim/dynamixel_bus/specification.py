@@ -7,18 +7,12 @@ from dataclasses import dataclass, field, replace
 class ModelFigures:
     """What distinguishes one model of servo from another.
 
-    velocity_unit : float
-        one unit of Present Velocity [rad/s]
-    milliampere : float
-        one unit of Present Current [mA]
-    current_limit : int
-        largest Goal Current [units]
-    velocity_limit : int
-        [units]
-    pwm_limit : int
-        [units]
-    goal_current_caps_position : bool
-        whether Goal Current is the cap of mode 3 (P, Y); in mode 5 it always is
+    `velocity_unit`: one unit of Present Velocity [rad/s].
+    `milliampere`: one unit of Present Current [mA].
+    `current_limit`: largest Goal Current [units].
+    `velocity_limit`: [units].
+    `pwm_limit`: [units].
+    `goal_current_caps_position`: whether Goal Current is the cap of mode 3 (P, Y); in mode 5 it always is.
     """
 
     counts_per_turn: int
@@ -87,14 +81,10 @@ MODELS: dict[int, ModelFigures] = {
 class ServoSpecification:
     """One emulated servo and the joint that it moves.
 
-    baud : int
-        [bit/s]
-    torque_per_milliampere : float
-        at the joint [Nm/mA or N/mA]
-    reduction : float
-        turns of the horn per turn of the joint
-    current_noise_ma : float
-        standard deviation of what Present Current reads while there is torque [mA]
+    `baud`: [bit/s].
+    `torque_per_milliampere`: at the joint [Nm/mA or N/mA].
+    `reduction`: turns of the horn per turn of the joint.
+    `current_noise_ma`: standard deviation of what Present Current reads while there is torque [mA].
     """
 
     servo: int

@@ -1,4 +1,4 @@
-"""Concealed physics: every effect id of the catalogue that forward physics or sensors can have, one file an effect."""
+"""Concealed physics: every effect id of the catalogue that forward physics or sensors can have."""
 
 from collections.abc import Iterator, Mapping
 from importlib import import_module
@@ -6,7 +6,7 @@ from pkgutil import iter_modules
 from types import MappingProxyType
 
 from tauscope_sim.effects.effect import Effect, ScenarioEntry
-from tauscope_sim.effects.sensor_effect import Channel, SensorEffect
+from tauscope_sim.effects.sensor_effects import Channel, SensorEffect
 
 
 def _entries() -> Iterator[type[ScenarioEntry]]:

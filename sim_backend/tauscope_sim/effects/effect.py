@@ -1,5 +1,7 @@
 """What every concealed effect of the plant has in common; the hooks of which each overrides those that it needs."""
 
+from collections.abc import Callable
+from enum import StrEnum
 from typing import ClassVar
 
 import numpy as np
@@ -10,7 +12,7 @@ from tauscope.robot.document_fields import Document, Positive
 from tauscope.robot.robot import Joint, Robot
 from tauscope_sim.effects.fields import JointNumber
 from tauscope_sim.plant.coordinates import Coordinates
-from tauscope_sim.plant.term import Term, Transmission
+from tauscope_sim.plant.term import Forces, Moment, Slopes, Term, Transmission
 
 Array = NDArray[np.float64]
 
@@ -22,13 +24,7 @@ class ScenarioEntry(Document):
     """id of CONTRACT.md, the entry's key ``effect``"""
 
     def check(self, robot: Robot) -> None:
-        """Refuse an entry that this robot cannot have.
-
-        Raises
-        ------
-        ScenarioError
-            naming effect and key
-        """
+        """Refuse an entry that this robot cannot have. Raises ScenarioError naming effect and key."""
         joint = getattr(self, "joint", None)
         if joint is not None and joint > robot.joint_count:
             raise self.refused("joint", f"is {joint}, but the arm has {robot.joint_count} joints")
@@ -64,8 +60,7 @@ class Effect(ScenarioEntry):
 class JointEffect(Effect):
     """An effect of one joint.
 
-    joint : int
-        its number, counted from 1
+    `joint`: its number, counted from 1.
     """
 
     joint: JointNumber
@@ -83,10 +78,8 @@ class JointEffect(Effect):
 class SmoothSignEffect(JointEffect):
     """An effect of one joint in which A(v) = (2/π) arctan(K_v v) stands for the sign of velocity.
 
-    joint : int
-        its number, counted from 1
-    k_v : float or None
-        K_v; that of the joint's friction_shape where None [s/rad or s/m]
+    `joint`: its number, counted from 1.
+    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
     """
 
     k_v: Positive | None = None
@@ -102,3 +95,66 @@ class SmoothSignEffect(JointEffect):
         if k_v is None:
             raise self.refused("k_v", "is missing, and the robot file states none for this joint; state k_v [s/rad]")
         return k_v
+
+
+Law = tuple[Callable[[float, float], float], Callable[[float, float], tuple[float, float]]]
+"""τ(q, v) [Nm or N], and its derivatives with respect to q and v."""
+
+
+class Side(StrEnum):
+    """Where in the joint a torque acts."""
+
+    FRICTION = "friction"
+    """on the motor's side, as friction that heats the joint"""
+    MOTOR = "motor"
+    """on the motor's side"""
+    LINK = "link"
+    """on the link's side: part of the load that the transmission carries"""
+
+
+class JointLaw(JointEffect):
+    """An effect τ(q, v) of one joint; q and v are the motor's, or the link's where it acts on that side.
+
+    `joint`: its number, counted from 1.
+    """
+
+    side: ClassVar[Side] = Side.MOTOR
+
+    def law(self, robot: Robot) -> Law:
+        """τ(q, v) and its derivatives."""
+        raise NotImplementedError
+
+    def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
+        """The law as a term of the equations of motion."""
+        place = self.index if self.side is Side.LINK else coordinates.motor(self.index)
+        return (_LawTerm(self.index, place, self.side, self.law(robot)),)
+
+
+class FrictionLaw(SmoothSignEffect, JointLaw):
+    """A friction law τ(q, v) of one joint that uses A(v).
+
+    `joint`: its number, counted from 1.
+    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
+    """
+
+    side: ClassVar[Side] = Side.FRICTION
+
+
+class _LawTerm(Term):
+    """A law at its place."""
+
+    def __init__(self, joint: int, place: int, side: Side, law: Law) -> None:
+        self._joint, self._place, self._side = joint, place, side.value
+        self._torque, self._slopes = law
+
+    def act(self, moment: Moment, forces: Forces) -> None:
+        """Add τ(q, v)."""
+        torque = self._torque(moment.position[self._place], moment.velocity[self._place])
+        getattr(forces, self._side)[self._joint] += torque
+
+    def linearise(self, moment: Moment, slopes: Slopes) -> None:
+        """Add dτ/dq and dτ/dv."""
+        place = self._place
+        by_position, by_velocity = self._slopes(moment.position[place], moment.velocity[place])
+        slopes.by_position[place, place] += by_position
+        slopes.by_velocity[place, place] += by_velocity

@@ -28,18 +28,12 @@ Array = NDArray[np.float64]
 class ExternalContact(Effect):
     """Force at the tool, or torque at one joint, while t₀ ≤ t < t₀ + T.
 
-    force : list of float or None
-        F [N]
-    offset : list of float
-        contact point in the last link's frame [m]
-    joint : int or None
-        joint, counted from 1
-    torque : float or None
-        c [Nm or N]
-    start : float
-        t₀ [s]
-    duration : float
-        T [s]
+    `force`: F [N].
+    `offset`: contact point in the last link's frame [m].
+    `joint`: joint, counted from 1.
+    `torque`: c [Nm or N].
+    `start`: t₀ [s].
+    `duration`: T [s].
     """
 
     effect_id: ClassVar[str] = "external_contact"

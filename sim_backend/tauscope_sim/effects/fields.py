@@ -39,7 +39,7 @@ def _seed(value: Any) -> int:
     return value
 
 
-def _listed(value: Any) -> Any:
+def _list(value: Any) -> Any:
     """A list, also where a single number is written."""
     if isinstance(value, list | tuple):
         if not value:
@@ -51,8 +51,8 @@ def _listed(value: Any) -> Any:
 NotNegative = Annotated[Number, AfterValidator(_not_negative)]
 Exponent = Annotated[Number, AfterValidator(_exponent)]
 JointNumber = Annotated[int, BeforeValidator(_whole)]
-Numbers = Annotated[list[Number], BeforeValidator(_listed)]
-NotNegativeNumbers = Annotated[list[NotNegative], BeforeValidator(_listed)]
+Numbers = Annotated[list[Number], BeforeValidator(_list)]
+NotNegativeNumbers = Annotated[list[NotNegative], BeforeValidator(_list)]
 Seed = Annotated[int, BeforeValidator(_seed)]
 
 

@@ -32,18 +32,12 @@ LARGEST_EXPONENT = 20.0
 class FrictionDrift(JointEffect):
     """Static friction times e^{c ϑ}, with ϑ from dissipated heat.
 
-    joint : int
-        its number, counted from 1
-    thermal_resistance : float
-        R [K/W]
-    time_constant : float
-        T [s]
-    coulomb_per_kelvin : float
-        c_c [1/K]
-    viscous_per_kelvin : float
-        c_v [1/K]
-    initial_temperature : float
-        of the joint when the arm is placed [°C]
+    `joint`: its number, counted from 1.
+    `thermal_resistance`: R [K/W].
+    `time_constant`: T [s].
+    `coulomb_per_kelvin`: c_c [1/K].
+    `viscous_per_kelvin`: c_v [1/K].
+    `initial_temperature`: of the joint when the arm is placed [°C].
     """
 
     effect_id: ClassVar[str] = "friction_drift"

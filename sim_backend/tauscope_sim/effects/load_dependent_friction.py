@@ -18,12 +18,9 @@ from tauscope_sim.plant.term import Forces, Moment, Slopes, Term
 class LoadDependentFriction(SmoothSignEffect):
     """τ = μ |L| A(v).
 
-    joint : int
-        its number, counted from 1
-    k_v : float or None
-        K_v; that of the joint's friction_shape where None [s/rad or s/m]
-    mu : float
-        μ [Nm/Nm]
+    `joint`: its number, counted from 1.
+    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
+    `mu`: μ [Nm/Nm].
     """
 
     effect_id: ClassVar[str] = "load_dependent_friction"

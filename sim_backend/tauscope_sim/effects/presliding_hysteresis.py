@@ -30,12 +30,9 @@ Array = NDArray[np.float64]
 class PreslidingHysteresis(JointEffect):
     """Dahl's or the LuGre model in place of the joint's Coulomb friction.
 
-    joint : int
-        its number, counted from 1
-    distance : float
-        x_s, over which friction builds up [rad or m]
-    damping : float
-        σ₁ of the LuGre model [Nm s/rad or N s/m]
+    `joint`: its number, counted from 1.
+    `distance`: x_s, over which friction builds up [rad or m].
+    `damping`: σ₁ of the LuGre model [Nm s/rad or N s/m].
     """
 
     effect_id: ClassVar[str] = "presliding_hysteresis"

@@ -19,18 +19,11 @@ ALL_STEPS = ceil(LONGEST_CATCH_UP_S / STEP_S)
 class DeviceClock:
     """How far devices have come; what a machine that stood still made them miss is lost, and told.
 
-    lost_s : float
-        time that was never stepped through [s]
+    `lost_s`: time that was never stepped through [s].
     """
 
     def __init__(self, now_s: float) -> None:
-        """Begin.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """Begin. `now_s`: present instant [s]."""
         self.tick = round(now_s / STEP_S)
         self.lost_s = 0.0
 
@@ -42,10 +35,7 @@ class DeviceClock:
     def catch_up(self, now_s: float, step: Callable[[], None], most_steps: int = MOST_STEPS) -> None:
         """Take the steps that are due: not all at once where there are many, so that a master is heard in between.
 
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
+        `now_s`: present instant [s].
         """
         if now_s - self.now_s > LONGEST_CATCH_UP_S:
             self.lost_s += now_s - self.now_s - LONGEST_CATCH_UP_S

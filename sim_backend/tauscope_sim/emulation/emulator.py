@@ -19,43 +19,22 @@ class Emulator(Protocol):
         ...
 
     def hears(self, baud: int) -> bool:
-        """Whether a master that has set this baud rate is understood.
-
-        Parameters
-        ----------
-        baud : int
-            of the master's port [bit/s]
-        """
+        """Whether a master that has set this baud rate is understood. `baud`: of the master's port [bit/s]."""
         ...
 
     def receive(self, data: bytes, now_s: float) -> None:
-        """Take bytes of the master.
-
-        Parameters
-        ----------
-        now_s : float
-            when [s]
-        """
+        """Take bytes of the master. `now_s`: when [s]."""
         ...
 
     def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
         """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
 
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
+        `now_s`: present instant [s].
         """
         ...
 
     def due(self, now_s: float) -> bytes:
-        """Bytes that have reached the master by now.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """Bytes that have reached the master by now. `now_s`: present instant [s]."""
         ...
 
     def describe(self) -> dict[str, Any]:
@@ -122,11 +101,5 @@ class EmulatorOrder(Protocol):
         ...
 
     def build(self, now_s: float) -> Emulator:
-        """The emulator.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """The emulator. `now_s`: present instant [s]."""
         ...

@@ -36,10 +36,9 @@ class FaultKind(StrEnum):
 class InjectedFault:
     """One fault.
 
-    at_s : float
-        when, by the emulator's clock, and in what a test asks for counted from then; at once where that has passed [s]
-    seconds : float
-        how late, or how long [s]
+    `at_s`: when, by the emulator's clock, and in what a test asks for counted from then; at once where that has passed
+        [s].
+    `seconds`: how late, or how long [s].
     """
 
     kind: FaultKind
@@ -51,13 +50,7 @@ class InjectedFault:
 
 
 def faults_from(documents: Iterable[dict[str, Any]], now_s: float) -> list[InjectedFault]:
-    """Faults that a test asks for, by the emulator's clock.
-
-    Parameters
-    ----------
-    now_s : float
-        present instant [s]
-    """
+    """Faults that a test asks for, by the emulator's clock. `now_s`: present instant [s]."""
     return [
         InjectedFault(**{**document, "kind": FaultKind(document["kind"]), "at_s": now_s + document["at_s"]})
         for document in documents
@@ -75,7 +68,6 @@ class FaultSchedule:
     """Faults in the order of their instants."""
 
     def __init__(self) -> None:
-        """No fault."""
         self._queue: list[_Scheduled] = []
         self._number = 0
 
@@ -86,12 +78,6 @@ class FaultSchedule:
             heapq.heappush(self._queue, _Scheduled(fault.at_s, self._number, fault))
 
     def run(self, now_s: float, carry_out: Callable[[InjectedFault], None]) -> None:
-        """Carry out what is due.
-
-        Parameters
-        ----------
-        now_s : float
-            present instant [s]
-        """
+        """Carry out what is due. `now_s`: present instant [s]."""
         while self._queue and self._queue[0].at_s <= now_s:
             carry_out(heapq.heappop(self._queue).fault)

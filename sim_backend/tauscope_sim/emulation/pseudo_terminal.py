@@ -18,7 +18,6 @@ class PseudoTerminal:
     """
 
     def __init__(self, link: str) -> None:
-        """Open one in raw mode."""
         self._near, far = os.openpty()
         tty.setraw(far)
         self._link = link

@@ -6,14 +6,77 @@ import os
 import select
 import socket
 import sys
+import threading
 import time
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
-from tauscope_sim.emulation.arrivals import Arrivals
 from tauscope_sim.emulation.device_clock import MOST_STEPS
-from tauscope_sim.emulation.emulator import EmulatorOrder
+from tauscope_sim.emulation.emulator import EmulatorOrder, Port
 from tauscope_sim.own_process import take_precedence
+
+_SWITCH_S = 5e-5
+"""How long the thread waits for the interpreter at most [s]."""
+
+_AWAY_S = 0.001
+"""How often it is looked for a master that is not there [s]."""
+
+_NICE = -20
+"""No real-time priority: what carries bytes through a pseudo terminal is a thread of the kernel without one."""
+
+
+class Arrivals:
+    """Bytes that a port has received, each piece with its instant, as long as the ``with`` block lasts."""
+
+    def __init__(self, port: Port) -> None:
+        self._port = port
+        self._pieces: list[tuple[bytes, int]] = []
+        self._lock = threading.Lock()
+        self._wake = os.eventfd(0, os.EFD_NONBLOCK)
+        self._end = os.eventfd(0)
+        self._thread = threading.Thread(target=self._receive, daemon=True)
+
+    def __enter__(self) -> Self:
+        sys.setswitchinterval(_SWITCH_S)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        os.eventfd_write(self._end, 1)
+        self._thread.join()
+        os.close(self._wake)
+        os.close(self._end)
+
+    def fileno(self) -> int:
+        """Descriptor to wait on."""
+        return self._wake
+
+    def take(self) -> tuple[list[tuple[bytes, int]], int]:
+        """What came since the last call, the oldest first, and the instant before which nothing more has come."""
+        with contextlib.suppress(BlockingIOError):
+            os.eventfd_read(self._wake)
+        with self._lock:
+            pieces, self._pieces = self._pieces, []
+            return pieces, time.monotonic_ns()
+
+    def _receive(self) -> None:
+        """Wait, note the instant, read."""
+        with contextlib.suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)
+        while self._end not in select.select([self._port, self._end], [], [])[0]:
+            with self._lock:
+                now_ns = time.monotonic_ns()
+                received = self._port.read()
+                if received:
+                    self._pieces.append((received, now_ns))
+            if received:
+                os.eventfd_write(self._wake, 1)
+            elif received is None and select.select([self._end], [], [], _AWAY_S)[0]:
+                return
+
 
 _PERIOD_S = 0.001
 _TRACE_PERIOD_S = 0.002
@@ -29,7 +92,6 @@ class EmulatorServer:
     """Runs an emulator until its standard input ends, against the machine's clock or one that a test moves on."""
 
     def __init__(self, order: EmulatorOrder) -> None:
-        """Open everything."""
         self._order = order
         self._port = order.open_port()
         self._tests = _listen(order.control)
@@ -96,7 +158,7 @@ class EmulatorServer:
         By the machine's clock no answer waits for more than the step that is under way: a master takes what comes much
         later than usual for no sample.
         """
-        pieces, now_s = self._received()
+        pieces, now_s = self._receive()
         for piece, arrival_s in pieces:
             if self._emulator.hears(self._port.baud):
                 self._emulator.receive(piece, arrival_s)
@@ -110,7 +172,7 @@ class EmulatorServer:
         if arrived := self._emulator.due(self._now_s + (_AT_ONCE_S if self._order.stepped else 0.0)):
             self._port.write(arrived)
 
-    def _received(self) -> tuple[list[tuple[bytes, float]], float]:
+    def _receive(self) -> tuple[list[tuple[bytes, float]], float]:
         """What the master sent since the last call, each piece with its instant, and until when that is all [s]."""
         if self._arrivals is not None:
             pieces, until_ns = self._arrivals.take()

@@ -7,13 +7,7 @@ from tauscope.errors import NotFoundError
 
 
 def example_robot(name: str) -> Path:
-    """Path of a robot file that comes with Tauscope.
-
-    Raises
-    ------
-    NotFoundError
-        where there is no example of that name
-    """
+    """Path of a robot file that comes with Tauscope. Raises NotFoundError where there is no example of that name."""
     folder = Path(str(files(__name__)))
     known = {path.stem: path for path in sorted(folder.glob("*.yaml"))}
     if name not in known:

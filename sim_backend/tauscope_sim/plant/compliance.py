@@ -15,15 +15,9 @@ Array = NDArray[np.float64]
 def compliant_transmissions(effects: Sequence[PhysicalEffect], rotor_inertia: Array) -> dict[int, Transmission]:
     """Compliant transmissions by joint, counted from 0.
 
-    Parameters
-    ----------
-    rotor_inertia : (n,) float64
-        that effects give to the motors of rigid joints [kg m² or kg]
+    Raises ScenarioError where two effects make the same joint compliant, or both give it a rotor.
 
-    Raises
-    ------
-    ScenarioError
-        where two effects make the same joint compliant, or both give it a rotor
+    `rotor_inertia`: (n,), that effects give to the motors of rigid joints [kg m² or kg].
     """
     found: dict[int, Transmission] = {}
     for transmission in (effect.transmission() for effect in effects):
@@ -47,10 +41,7 @@ def compliant_transmissions(effects: Sequence[PhysicalEffect], rotor_inertia: Ar
 class Compliance:
     """All compliant transmissions of an arm.
 
-    Parameters
-    ----------
-    transmissions : mapping of int to Transmission
-        by joint, counted from 0
+    `transmissions`: by joint, counted from 0.
     """
 
     def __init__(self, transmissions: Mapping[int, Transmission], coordinates: Coordinates) -> None:
@@ -76,10 +67,7 @@ class Compliance:
     def twist_at_rest(self, load: list[float]) -> list[float]:
         """Twist of each compliant joint at rest [rad or m].
 
-        Parameters
-        ----------
-        load : list of float
-            torque that the links need, one a joint [Nm or N]
+        `load`: torque that the links need, one a joint [Nm or N].
         """
         return [part.twist_at_rest(load[joint]) for joint, _, part in self._parts]
 

@@ -11,8 +11,7 @@ class Coordinates:
     joints stand behind the links: N = n + number of compliant joints. All in joint units: a motor's angle is divided by
     its gear ratio.
 
-    compliant : tuple of int
-        joints whose transmission gives way, counted from 0, ascending
+    `compliant`: joints whose transmission gives way, counted from 0, ascending.
     """
 
     joint_count: int
@@ -24,13 +23,7 @@ class Coordinates:
         return self.joint_count + len(self.compliant)
 
     def motor(self, joint: int) -> int:
-        """Place of a joint's motor.
-
-        Parameters
-        ----------
-        joint : int
-            counted from 0
-        """
+        """Place of a joint's motor. `joint`: counted from 0."""
         if joint in self.compliant:
             return self.joint_count + self.compliant.index(joint)
         return joint

@@ -2,17 +2,67 @@
 
 from collections.abc import Sequence
 from functools import reduce
+from math import atan, pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.robot.robot import Robot
+from tauscope.robot.robot import FrictionCoefficients, FrictionShape, Robot
+from tauscope_sim.friction import shape_constants
 from tauscope_sim.plant.compliance import Compliance, compliant_transmissions
 from tauscope_sim.plant.coordinates import Coordinates
 from tauscope_sim.plant.loads import loaded_accelerations
 from tauscope_sim.plant.rigid_bodies import RigidBodies
-from tauscope_sim.plant.static_friction import StaticFriction
 from tauscope_sim.plant.term import Forces, Moment, PhysicalEffect, Slopes, Term
+
+_SCALE = 2.0 / pi
+
+
+class _Law(NamedTuple):
+    """Friction of one joint: its number from 0, the place of its motor, levels times 2/π, steepnesses, τ_v."""
+
+    joint: int
+    place: int
+    stiction: float
+    k_v: float
+    stribeck: float
+    delta: float
+    viscous: float
+
+
+class StaticFriction(Term):
+    """Friction τ_f = τ_s (2/π) arctan(K_v v) + τ_sc (2/π) arctan(δ v) + τ_v v of every joint, v the motor's velocity.
+
+    Raises RobotFileError where a shape constant that is needed is missing.
+    """
+
+    def __init__(
+        self,
+        friction: Sequence[FrictionCoefficients],
+        friction_shape: Sequence[FrictionShape],
+        coordinates: Coordinates,
+    ) -> None:
+        constants = shape_constants(friction, friction_shape)
+        self._laws = [
+            _Law(joint, coordinates.motor(joint), one.stiction * _SCALE, k_v, one.stribeck * _SCALE, delta, one.viscous)
+            for joint, (one, (k_v, delta)) in enumerate(zip(friction, constants, strict=True))
+        ]
+
+    def act(self, moment: Moment, forces: Forces) -> None:
+        """Add τ_f."""
+        velocity, friction = moment.velocity, forces.friction
+        for joint, place, stiction, k_v, stribeck, delta, viscous in self._laws:
+            v = velocity[place]
+            friction[joint] += stiction * atan(k_v * v) + stribeck * atan(delta * v) + viscous * v
+
+    def linearise(self, moment: Moment, slopes: Slopes) -> None:
+        """Add dτ_f/dv."""
+        for _, place, stiction, k_v, stribeck, delta, viscous in self._laws:
+            x, y = k_v * moment.velocity[place], delta * moment.velocity[place]
+            slope = stiction * k_v / (1.0 + x * x) + stribeck * delta / (1.0 + y * y) + viscous
+            slopes.by_velocity[place, place] += slope
+
 
 Array = NDArray[np.float64]
 
@@ -25,12 +75,8 @@ class EquationsOfMotion:
 
         H(q) q̈ + h + c + link = T,      J θ̈ + friction + motor + T (1 + g) + |T| f = u.
 
-    Raises
-    ------
-    RobotFileError
-        where the robot file lacks what the simulation needs
-    ScenarioError
-        where effects contradict one another
+    Raises RobotFileError where the robot file lacks what the simulation needs.
+    Raises ScenarioError where effects contradict one another.
     """
 
     def __init__(self, robot: Robot, effects: Sequence[PhysicalEffect]) -> None:
@@ -63,24 +109,12 @@ class EquationsOfMotion:
         return [state for term in self._terms for state in term.initial_states()]
 
     def begin(self, time: float) -> None:
-        """Let the terms take note that an interval without events begins.
-
-        Parameters
-        ----------
-        time : float
-            its first instant [s]
-        """
+        """Let the terms take note that an interval without events begins. `time`: its first instant [s]."""
         for term in self._terms:
             term.begin(time, self.bodies)
 
     def temperature(self, states: list[float], ambient: float) -> Array:
-        """Temperature of the joints, (n,) [°C].
-
-        Parameters
-        ----------
-        ambient : float
-            temperature of joints that no term heats [°C]
-        """
+        """Temperature of the joints, (n,) [°C]. `ambient`: temperature of joints that no term heats [°C]."""
         temperature = np.full(self.coordinates.joint_count, ambient)
         for term in self._heating:
             term.report_temperature(states, temperature)
@@ -89,12 +123,7 @@ class EquationsOfMotion:
     def evaluate(self, time: float, vector: list[float], drive: list[float]) -> list[float]:
         """Rate of change of y = [p, v, z], 2N + m numbers.
 
-        Parameters
-        ----------
-        time : float
-            t [s]
-        drive : list of float
-            u, torque of the drives on the joint's side, one a joint [Nm or N]
+        `time`: t [s]; `drive`: u, torque of the drives on the joint's side, one a joint [Nm or N].
         """
         size = self._size
         link_side = self._sum_forces(time, vector)
@@ -131,10 +160,7 @@ class EquationsOfMotion:
     def load_at(self, time: float, vector: list[float]) -> list[float]:
         """Torque h + c + link that links need from their transmissions when they do not accelerate [Nm or N].
 
-        Parameters
-        ----------
-        time : float
-            t [s]
+        `time`: t [s].
         """
         return self._sum_forces(time, vector)
 

@@ -26,7 +26,8 @@ def loaded_accelerations(
 
     The signs are corrected until they agree with the L that they lead to. H - J is positive definite and 1 + D is
     positive, so the matrix is regular with a positive determinant for every pattern of signs: there is exactly one
-    solution, without a lag of one step.
+    solution, without a lag of one step. Raises ScenarioError where a transmission would lose more than `LARGEST_GAIN`
+    of its load.
 
     Parameters
     ----------
@@ -51,11 +52,6 @@ def loaded_accelerations(
         L [Nm or N]
     matrix : (n, n) float64
         H + D (H - J) at the solution [kg m² or kg]
-
-    Raises
-    ------
-    ScenarioError
-        where a transmission would lose more than `LARGEST_GAIN` of its load
     """
     worst = int(np.argmax(np.abs(gain) + np.abs(friction)))
     if not abs(gain[worst]) + abs(friction[worst]) <= LARGEST_GAIN:

@@ -11,10 +11,55 @@ from tauscope.errors import ScenarioError
 from tauscope.robot.robot import Robot
 from tauscope_sim.plant.equations import EquationsOfMotion
 from tauscope_sim.plant.rosenbrock import RosenbrockStep
-from tauscope_sim.plant.settling import settled
 from tauscope_sim.plant.term import AMBIENT, PhysicalEffect
 
 Array = NDArray[np.float64]
+
+
+MOST_ITERATIONS = 200
+"""The twist shrinks by the ratio of gravity's gradient to stiffness each time; a few rounds are usual."""
+
+SETTLED = 1e-13
+"""Change of a link's position that ends the iteration [rad or m]."""
+
+
+def settled(equations: EquationsOfMotion, motor_position: Array) -> Array:
+    """State of an arm at rest with q_j = θ_j - twist_j(load_j(q)), found by iteration.
+
+    Raises ScenarioError where a transmission is too soft to carry its link.
+
+    `motor_position`: (n,), θ [rad or m]. Returns (2N + m,), y: positions, zero velocities, the effects' initial states.
+    """
+    compliant = list(equations.coordinates.compliant)
+    position = np.concatenate([motor_position, motor_position[compliant]])
+    vector = np.concatenate([position, np.zeros_like(position), equations.initial_states()])
+    low, high = np.full(len(compliant), -np.inf), np.full(len(compliant), np.inf)
+    change = np.zeros(len(compliant))
+    for _ in range(MOST_ITERATIONS if compliant else 0):
+        load, place = equations.load_at(0.0, vector.tolist()), vector[compliant]
+        hanging = motor_position[compliant] - equations.compliance.twist_at_rest(load)
+        low, high = _narrow(low, high, place, hanging)
+        # a link that balances inside its backlash wishes itself from tooth to tooth: it is between the two
+        between = (hanging <= low) | (hanging >= high)
+        following = hanging.copy()
+        following[between] = 0.5 * (low[between] + high[between])
+        change = following - place
+        vector[compliant] = following
+        if np.all(np.abs(change) < SETTLED):
+            return vector
+    if not compliant:
+        return vector
+    joint = compliant[int(np.argmax(np.abs(change)))] + 1
+    raise ScenarioError(f"joint {joint}: its transmission is too soft to carry the arm; give it more stiffness")
+
+
+def _narrow(low: Array, high: Array, place: Array, hanging: Array) -> tuple[Array, Array]:
+    """Bounds of every link's place at rest; one that other links' moves have made wrong is given up."""
+    up, down = hanging > place, hanging < place
+    low, high = np.where(up, place, low), np.where(down, place, high)
+    crossed = low >= high
+    return np.where(crossed & down, -np.inf, low), np.where(crossed & up, np.inf, high)
+
 
 STEP = 5e-4
 """Longest step of the integration where none is asked for [s]."""
@@ -30,18 +75,12 @@ SHORTEST_PART = 2.0**-12
 class PlantState:
     """Where the plant is, in joint units; every array a copy.
 
-    time : float
-        since the arm was placed [s]
-    motor_position : (n,) float64
-        of the motors, divided by the gear ratio [rad or m]
-    motor_velocity : (n,) float64
-        likewise [rad/s or m/s]
-    link_position : (n,) float64
-        q; the motor's own where the transmission is rigid [rad or m]
-    link_velocity : (n,) float64
-        q̇ [rad/s or m/s]
-    temperature : (n,) float64
-        of the joints [°C]
+    `time`: since the arm was placed [s].
+    `motor_position`: (n,), of the motors, divided by the gear ratio [rad or m].
+    `motor_velocity`: (n,), likewise [rad/s or m/s].
+    `link_position`: (n,), q; the motor's own where the transmission is rigid [rad or m].
+    `link_velocity`: (n,), q̇ [rad/s or m/s].
+    `temperature`: (n,), of the joints [°C].
     """
 
     time: float
@@ -59,17 +98,10 @@ class Plant:
     estimated error is below `TOLERANCE` × (step_s / `STEP`)²: halving `step_s` halves every sub-step, and the result
     converges with the square of `step_s`. No step crosses an instant at which an effect begins or ends.
 
-    Parameters
-    ----------
-    step_s : float
-        longest step of the integration [s]
+    `step_s`: longest step of the integration [s].
 
-    Raises
-    ------
-    RobotFileError
-        where the robot file lacks what the simulation needs
-    ScenarioError
-        where effects contradict one another or the robot
+    Raises RobotFileError where the robot file lacks what the simulation needs.
+    Raises ScenarioError where effects contradict one another or the robot.
     """
 
     def __init__(self, robot: Robot, effects: Sequence[PhysicalEffect] = (), *, step_s: float = STEP) -> None:
@@ -93,7 +125,7 @@ class Plant:
     @property
     def motor_motion(self) -> tuple[Array, Array]:
         """Position and velocity of the motors, in joint units, each (n,) [rad or m, rad/s or m/s]."""
-        return self._of_motors(0), self._of_motors(self._coordinates.size)
+        return self._number_motors(0), self._number_motors(self._coordinates.size)
 
     @property
     def state(self) -> PlantState:
@@ -101,8 +133,8 @@ class Plant:
         count, size = self.joint_count, self._coordinates.size
         return PlantState(
             time=self._time,
-            motor_position=self._of_motors(0),
-            motor_velocity=self._of_motors(size),
+            motor_position=self._number_motors(0),
+            motor_velocity=self._number_motors(size),
             link_position=np.array(self._vector[:count]),
             link_velocity=np.array(self._vector[size : size + count]),
             temperature=self._equations.temperature(self._vector[2 * size :], AMBIENT),
@@ -111,15 +143,9 @@ class Plant:
     def place(self, position: ArrayLike) -> None:
         """Start afresh at time zero: motors at rest in a place, compliant links hanging still, effects as when new.
 
-        Parameters
-        ----------
-        position : (n,) float64
-            of the motors, in joint units [rad or m]
+        Raises ScenarioError where that is no place, or a transmission is too soft to carry its link.
 
-        Raises
-        ------
-        ScenarioError
-            where that is no place, or a transmission is too soft to carry its link
+        `position`: (n,), of the motors, in joint units [rad or m].
         """
         motors = np.asarray(position, dtype=np.float64)
         if motors.shape != (self.joint_count,) or not np.all(np.isfinite(motors)):
@@ -134,17 +160,9 @@ class Plant:
     def advance(self, motor_torque: ArrayLike, duration_s: float) -> None:
         """Let time pass under constant torque.
 
-        Parameters
-        ----------
-        motor_torque : (n,) float64
-            of the drives, on the joint's side of the gear [Nm or N]
-        duration_s : float
-            how long [s]
+        Raises ScenarioError where the duration is negative, or the motion grows beyond all bounds.
 
-        Raises
-        ------
-        ScenarioError
-            where the duration is negative, or the motion grows beyond all bounds
+        `motor_torque`: (n,), of the drives, on the joint's side of the gear [Nm or N]; `duration_s`: how long [s].
         """
         if not duration_s >= 0.0:
             raise ScenarioError(f"duration_s is {duration_s}; time passes forwards only")
@@ -187,7 +205,7 @@ class Plant:
             self._time = end if part == remaining else self._time + part
             self._part = min(max(part * _change(attempt.error), self._shortest), self._longest)
 
-    def _of_motors(self, first: int) -> Array:
+    def _number_motors(self, first: int) -> Array:
         """Numbers of the motors among the coordinates that begin at a place of the vector, (n,)."""
         return np.array([self._vector[first + place] for place in self._motors])
 

@@ -18,10 +18,7 @@ class RigidBodies:
 
     Where segments follow joints, q_segments = A q + b, and H = Aᵀ H_segments A, h + c = Aᵀ (h + c)_segments.
 
-    Parameters
-    ----------
-    rotor_inertia : (n,) float64
-        reflected inertia of the motors of rigid joints, added to the diagonal of H [kg m² or kg]
+    `rotor_inertia`: (n,), reflected inertia of the motors of rigid joints, added to the diagonal of H [kg m² or kg].
     """
 
     def __init__(self, robot: Robot, rotor_inertia: Array) -> None:
@@ -45,15 +42,7 @@ class RigidBodies:
         self._right_side = np.empty((1, count))
 
     def update(self, position: Array | list[float], velocity: Array | list[float]) -> None:
-        """Move the links.
-
-        Parameters
-        ----------
-        position : (n,) float64
-            q [rad or m]
-        velocity : (n,) float64
-            q̇ [rad/s or m/s]
-        """
+        """Move the links. `position`: (n,), q [rad or m]; `velocity`: (n,), q̇ [rad/s or m/s]."""
         self._position[:] = self._ratios @ position + self._offsets if self._is_coupled else position
         self._velocity[:] = self._ratios @ velocity if self._is_coupled else velocity
         mujoco.mj_fwdPosition(self._model, self._data)
@@ -72,10 +61,7 @@ class RigidBodies:
     def accelerations(self, torque: Array | list[float]) -> Array:
         """Solve H(q) q̈ = τ, shape (n,): a view that the next call overwrites [rad/s² or m/s²].
 
-        Parameters
-        ----------
-        torque : (n,) float64
-            τ [Nm or N]
+        `torque`: (n,), τ [Nm or N].
         """
         if self._is_coupled:
             return np.asarray(np.linalg.solve(self.mass_matrix(), torque), dtype=np.float64)
@@ -86,10 +72,7 @@ class RigidBodies:
     def tool_jacobian(self, offset: Array) -> Array:
         """Jacobian of a point that moves with the last link, in base axes, shape (3, n) [m/rad or 1].
 
-        Parameters
-        ----------
-        offset : (3,) float64
-            the point in the last link's frame [m]
+        `offset`: (3,), the point in the last link's frame [m].
         """
         tool = len(self._position)
         point = self._data.xpos[tool] + self._data.xmat[tool].reshape(3, 3) @ offset
@@ -100,11 +83,8 @@ class RigidBodies:
     def carry(self, carrier: object, payload: Array | None) -> None:
         """Change what the last link carries; it takes the payload over at its own speed, without an impact.
 
-        Parameters
-        ----------
-        payload : (10,) float64 or None
-            standard parameters in the last link's frame, in the order of `tauscope.robot.robot.STANDARD_PARAMETERS`;
-            None drops it
+        `payload`: (10,), standard parameters in the last link's frame, in the order of
+        `tauscope.robot.robot.STANDARD_PARAMETERS`; None drops it.
         """
         self._carried.pop(id(carrier), None)
         if payload is not None:

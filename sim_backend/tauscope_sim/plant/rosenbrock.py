@@ -59,12 +59,7 @@ class RosenbrockStep:
     def begin(self, time: float, vector: list[float], drive: list[float]) -> None:
         """Evaluate and linearise where steps shall start; a step may then be tried with several lengths.
 
-        Parameters
-        ----------
-        time : float
-            t [s]
-        drive : list of float
-            torque of the drives, one a joint, constant during the step [Nm or N]
+        `time`: t [s]; `drive`: torque of the drives, one a joint, constant during the step [Nm or N].
         """
         size = self._size
         self._time, self._vector, self._drive = time, vector, drive
@@ -81,13 +76,7 @@ class RosenbrockStep:
         self._passing = [1.0 + abs(value) / UNIT for value in vector[size:]]
 
     def attempt(self, step: float, tolerance: float) -> Attempt:
-        """Take the step and estimate its error.
-
-        Parameters
-        ----------
-        step : float
-            h [s]
-        """
+        """Take the step and estimate its error. `step`: h [s]."""
         scale = GAMMA * step
         solution = self._solution(scale)
         first = self._solve(solution, scale, self._rate)

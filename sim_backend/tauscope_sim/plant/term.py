@@ -102,10 +102,7 @@ class Term:
     def begin(self, time: float, bodies: RigidBodies) -> None:
         """Take note that an interval without events begins.
 
-        Parameters
-        ----------
-        time : float
-            its first instant: the placing of the arm, or one of `event_times` [s]
+        `time`: its first instant: the placing of the arm, or one of `event_times` [s].
         """
 
     def act(self, moment: Moment, forces: Forces) -> None:
@@ -118,13 +115,7 @@ class Term:
         """Write the rates of the term's own internal states."""
 
     def report_temperature(self, states: list[float], temperature: Array) -> None:
-        """Write the temperature of the joints that the term heats.
-
-        Parameters
-        ----------
-        temperature : (n,) float64
-            of all joints [°C]
-        """
+        """Write the temperature of the joints that the term heats. `temperature`: (n,), of all joints [°C]."""
 
 
 class Transmission(Protocol):
@@ -143,35 +134,19 @@ class Transmission(Protocol):
     def torque(self, twist: float, twist_rate: float) -> float:
         """Torque that the link receives [Nm or N].
 
-        Parameters
-        ----------
-        twist : float
-            motor position less link position [rad or m]
-        twist_rate : float
-            its rate [rad/s or m/s]
+        `twist`: motor position less link position [rad or m]; `twist_rate`: its rate [rad/s or m/s].
         """
         ...
 
     def torque_slopes(self, twist: float, twist_rate: float) -> tuple[float, float]:
         """Derivatives of the torque with respect to twist [Nm/rad] and its rate [Nm s/rad].
 
-        Parameters
-        ----------
-        twist : float
-            motor position less link position [rad or m]
-        twist_rate : float
-            its rate [rad/s or m/s]
+        `twist`: motor position less link position [rad or m]; `twist_rate`: its rate [rad/s or m/s].
         """
         ...
 
     def twist_at_rest(self, torque: float) -> float:
-        """Twist at which a resting joint transmits a torque [rad or m].
-
-        Parameters
-        ----------
-        torque : float
-            that the link needs [Nm or N]
-        """
+        """Twist at which a resting joint transmits a torque [rad or m]. `torque`: that the link needs [Nm or N]."""
         ...
 
 

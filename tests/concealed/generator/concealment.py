@@ -18,8 +18,7 @@ from concealed.generator.strength import Reference, Sight, sight_of
 from concealed.generator.unknown import UNKNOWN
 from tauscope.errors import ScenarioError
 from tauscope.robot import Robot
-from tauscope_sim.effects.backlash import Backlash
-from tauscope_sim.effects.joint_elasticity import JointElasticity
+from tauscope_sim.effects.elastic_transmissions import Backlash, JointElasticity
 
 Array = NDArray[np.float64]
 

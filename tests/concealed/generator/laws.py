@@ -17,22 +17,18 @@ from concealed.generator.rates import FINE, RATE_HZ
 from concealed.generator.transmissions import transmission_torque
 from tauscope.robot import Robot
 from tauscope_sim.effects import Effect
-from tauscope_sim.effects.backlash import Backlash
-from tauscope_sim.effects.base_tilt import BaseTilt
+from tauscope_sim.effects.carried_bodies import Payload, PayloadChange, RotorInertia
+from tauscope_sim.effects.effect import JointLaw
+from tauscope_sim.effects.elastic_transmissions import Backlash, JointElasticity
 from tauscope_sim.effects.external_contact import ExternalContact
 from tauscope_sim.effects.friction_coupling import FrictionCoupling
 from tauscope_sim.effects.friction_drift import FrictionDrift
-from tauscope_sim.effects.joint_elasticity import JointElasticity
-from tauscope_sim.effects.joint_law import JointLaw
-from tauscope_sim.effects.kinematic_error import KinematicError
+from tauscope_sim.effects.geometry_errors import BaseTilt, KinematicError
 from tauscope_sim.effects.load_dependent_friction import LoadDependentFriction
-from tauscope_sim.effects.payload import Payload
-from tauscope_sim.effects.payload_change import PayloadChange
+from tauscope_sim.effects.periodic_torques import TorqueRipple
 from tauscope_sim.effects.presliding_hysteresis import PreslidingHysteresis
-from tauscope_sim.effects.rotor_inertia import RotorInertia
-from tauscope_sim.effects.torque_ripple import TorqueRipple
-from tauscope_sim.inverse_dynamics import rigid_body_torque
 from tauscope_sim.model import build_model
+from tauscope_sim.recording import rigid_body_torque
 
 Array = NDArray[np.float64]
 

@@ -23,8 +23,8 @@ from concealed.generator.sensing import sensed
 from tauscope.dynamics import base_parameters, smooth_sign, smooth_sign_slope, torque_regressor
 from tauscope.robot import Robot
 from tauscope_sim.friction import static_friction_torque
-from tauscope_sim.inverse_dynamics import rigid_body_torque
 from tauscope_sim.model import build_model
+from tauscope_sim.recording import rigid_body_torque
 
 Array = NDArray[np.float64]
 

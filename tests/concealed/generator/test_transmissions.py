@@ -11,11 +11,11 @@ from concealed.generator.forward import _played, physical
 from concealed.generator.motions import Motion
 from concealed.generator.rates import FINE, RATE_HZ
 from concealed.generator.transmissions import LinkEquation, follow, transmission_torque
-from tauscope_sim.effects.joint_elasticity import JointElasticity
+from tauscope_sim.effects.elastic_transmissions import JointElasticity
 from tauscope_sim.friction import static_friction_torque
-from tauscope_sim.inverse_dynamics import rigid_body_torque
 from tauscope_sim.model import build_model
 from tauscope_sim.motion import random_fourier_motion
+from tauscope_sim.recording import rigid_body_torque
 
 pytestmark = pytest.mark.slow
 

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from concealed.generator.rates import FINE, RATE_HZ
 from tauscope.robot import Robot
-from tauscope_sim.inverse_dynamics import rigid_body_torque
 from tauscope_sim.model import build_model
 from tauscope_sim.plant.term import Transmission
+from tauscope_sim.recording import rigid_body_torque
 
 Array = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ from concealed.real.concealing.passage import with_effort
 from tauscope.recording import Recording
 from tauscope.robot import Model, Robot
 from tauscope.robot.robot import LinkInertia
-from tauscope_sim.effects.payload import Payload
-from tauscope_sim.inverse_dynamics import rigid_body_torque
+from tauscope_sim.effects.carried_bodies import Payload
 from tauscope_sim.model import build_model
+from tauscope_sim.recording import rigid_body_torque
 
 Array = NDArray[np.float64]
 Edit = Callable[[Robot, Recording], Recording]

@@ -30,7 +30,7 @@ def hide(bus: EmulatedBus, *indices: int, node: int = 2) -> None:
         entry.is_visible &= index not in indices
 
 
-def enabled(bus: EmulatedBus, mode: ControlMode = ControlMode.POSITION, limits: DriveLimits = LIMITS) -> CanopenArm:
+def enable_arm(bus: EmulatedBus, mode: ControlMode = ControlMode.POSITION, limits: DriveLimits = LIMITS) -> CanopenArm:
     arm = CanopenArm(bus.joints(), patience_s=0.1)
     arm.connect()
     try:
@@ -44,7 +44,7 @@ def enabled(bus: EmulatedBus, mode: ControlMode = ControlMode.POSITION, limits: 
 def test_each_absent_object_is_told_once_with_its_joints(bus: EmulatedBus) -> None:
     hide(bus, 0x6072, 0x607D)
     hide(bus, 0x6072, node=3)
-    arm = enabled(bus)
+    arm = enable_arm(bus)
     assert arm.capabilities.remarks == (
         "joint 2, 3: has no Max torque (0x6072:00): Tauscope stops the arm where the measured torque exceeds the "
         "joint's limit",
@@ -57,7 +57,7 @@ def test_each_absent_object_is_told_once_with_its_joints(bus: EmulatedBus) -> No
 def test_torque_beyond_the_limit_stops_an_arm_whose_drive_has_no_limit(bus: EmulatedBus) -> None:
     low = DriveLimits(LIMITS.position_low, LIMITS.position_high, LIMITS.velocity, np.full(3, 0.5 * MEASURED_NM))
     hide(bus, 0x6072)
-    arm = enabled(bus, limits=low)
+    arm = enable_arm(bus, limits=low)
     faults = [fault for _ in range(PERSISTENCE) for fault in arm.exchange(STAY).faults]
     assert {(fault.code, fault.joint) for fault in faults} == {("over-torque", 2)}
     arm.stop(StopPolicy.HOLD)
@@ -68,7 +68,7 @@ def test_torque_beyond_the_limit_stops_an_arm_whose_drive_has_no_limit(bus: Emul
 def test_a_drive_that_lets_go_at_a_quick_stop_is_held_by_its_targets(bus: EmulatedBus) -> None:
     hide(bus, 0x605A)
     bus.drives[1].power.quick_stop_stays = False
-    arm = enabled(bus)
+    arm = enable_arm(bus)
     bus.drives[0].fail(0x4310)
     while not arm.exchange(STAY).faults:
         pass
@@ -86,7 +86,7 @@ def test_such_a_drive_is_refused_in_torque_mode_with_a_stop_that_holds(bus: Emul
     hide(bus, 0x605A)
     bus.drives[1].power.quick_stop_stays = False
     with pytest.raises(DriverError, match=r"joint 2 .* cannot hold in torque mode; run in position mode") as refusal:
-        enabled(bus, ControlMode.TORQUE)
+        enable_arm(bus, ControlMode.TORQUE)
     assert refusal.value.kind is DriverErrorKind.REFUSED
     assert all(drive.power.state is PowerState.SWITCH_ON_DISABLED for drive in bus.drives)
 
@@ -95,10 +95,10 @@ def test_a_drive_that_would_go_on_without_its_host_is_refused(bus: EmulatedBus) 
     entry = bus.drives[1].dictionary.entries[0x6007, 0]
     entry.value, entry.writable = 0, False
     with pytest.raises(DriverError, match=r"joint 2 .*stays 0: it goes on when the host is gone"):
-        enabled(bus)
+        enable_arm(bus)
     hide(bus, 0x1016)
     with pytest.raises(DriverError, match=r"joint 2 .*it would not notice that the host is gone"):
-        enabled(bus)
+        enable_arm(bus)
 
 
 def fix_mapping(bus: EmulatedBus, mapping: int, *entries: int) -> None:
@@ -113,7 +113,7 @@ def fix_mapping(bus: EmulatedBus, mapping: int, *entries: int) -> None:
 def test_fixed_mappings_are_found_out_and_used(bus: EmulatedBus) -> None:
     fix_mapping(bus, 0x1600, 0x60400010, 0x60600008)
     fix_mapping(bus, 0x1A00, 0x60410010, 0x60640020)
-    arm = enabled(bus)
+    arm = enable_arm(bus)
     state = arm.exchange(Setpoint(np.array(START) + 0.001, np.zeros(3)))
     assert state.fresh.all()
     assert np.isfinite(state.effort).all()
@@ -126,13 +126,13 @@ def test_fixed_mappings_without_a_target_are_refused(bus: EmulatedBus) -> None:
     for number in range(4):
         fix_mapping(bus, 0x1600 + number, 0x60400010)
     with pytest.raises(DriverError, match=r"joint 2 .*Target position \(0x607A:00\) is in none of its PDOs"):
-        enabled(bus)
+        enable_arm(bus)
 
 
 def test_an_abort_is_told_by_its_meaning(bus: EmulatedBus) -> None:
     bus.drives[1].dictionary.entries[0x6060, 0].writable = False
     with pytest.raises(DriverError) as refusal:
-        enabled(bus)
+        enable_arm(bus)
     assert "Modes of operation (0x6060:00) = 8 cannot be written: the drive lets it be read only" in str(refusal.value)
     assert "wiring" not in str(refusal.value)
 
@@ -151,7 +151,7 @@ def test_targets_of_a_stop_come_to_rest() -> None:
 def test_a_drive_that_does_not_show_its_mode_is_told(bus: EmulatedBus) -> None:
     bus.drives[1].dictionary.entries[0x6060, 0].hook = None
     bus.drives[1].dictionary.put(0x6061, 1)
-    arm = enabled(bus)
+    arm = enable_arm(bus)
     assert arm.capabilities.remarks == (
         "joint 2: Modes of operation display (0x6061:00) shows 1, not 8: it may not have changed its mode",
     )

@@ -1,6 +1,6 @@
 """An answer is late by what it took longer than is usual, whatever that is."""
 
-from tauscope_drivers.answer_time import REMEMBERED, AnswerTime
+from tauscope_drivers.clock import REMEMBERED, AnswerTime
 
 
 def test_the_first_answer_is_not_late_and_a_slow_adapter_is_not_either() -> None:

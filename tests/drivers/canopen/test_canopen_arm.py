@@ -36,7 +36,9 @@ def arm(bus: EmulatedBus) -> Iterator[CanopenArm]:
     driver.disconnect()
 
 
-def enabled(arm: CanopenArm, mode: ControlMode = ControlMode.POSITION, watchdog_s: float = LONG_WATCHDOG_S) -> ArmState:
+def enable_arm(
+    arm: CanopenArm, mode: ControlMode = ControlMode.POSITION, watchdog_s: float = LONG_WATCHDOG_S
+) -> ArmState:
     return arm.enable(mode, LIMITS, StopPolicy.HOLD, watchdog_s)
 
 
@@ -56,13 +58,13 @@ def test_connecting_reads_the_arm_and_moves_nothing(bus: EmulatedBus, arm: Canop
 
 def test_enabling_never_moves_the_arm_whatever_target_is_left_over(bus: EmulatedBus, arm: CanopenArm) -> None:
     assert all(drive.dictionary.get(0x607A) == 0x100000 for drive in bus.drives)
-    state = enabled(arm)
+    state = enable_arm(arm)
     assert state.enabled.all()
     assert max(bus.furthest) <= COUNT
 
 
 def test_targets_are_followed_and_read_at_one_instant(bus: EmulatedBus, arm: CanopenArm) -> None:
-    state = enabled(arm)
+    state = enable_arm(arm)
     for step in range(50):
         arm.clock.wait_until_ns(state.time_ns + 5_000_000)
         wanted = np.array(START) + 0.002 * step
@@ -92,7 +94,7 @@ def test_a_cycle_that_a_drive_does_not_take_is_refused_before_it_has_power(bus: 
 
 
 def test_torque_mode_takes_torque_within_the_cap(bus: EmulatedBus, arm: CanopenArm) -> None:
-    enabled(arm, ControlMode.TORQUE)
+    enable_arm(arm, ControlMode.TORQUE)
     arm.exchange(Setpoint(np.zeros(3), np.array([5.0, -5.0, 30.0])))
     arm.exchange(Setpoint(np.zeros(3), np.array([5.0, -5.0, 30.0])))
     demands = [drive.demand() for drive in bus.drives]
@@ -110,13 +112,13 @@ def test_a_runaway_that_was_caught_is_not_forgotten_by_reconnecting(bus: Emulate
     arm.disconnect()
     assert found in [(fault.code, fault.joint) for fault in arm.connect().faults]
     with pytest.raises(DriverError, match="acknowledge it first"):
-        enabled(arm)
+        enable_arm(arm)
     assert not arm.acknowledge_faults().faults
-    assert enabled(arm).enabled.all()
+    assert enable_arm(arm).enabled.all()
 
 
 def test_a_target_that_is_no_number_is_refused_and_nothing_is_sent(bus: EmulatedBus, arm: CanopenArm) -> None:
-    enabled(arm)
+    enable_arm(arm)
     seen: list[int] = []
     bus.swallows = lambda message: seen.append(message.arbitration_id) or False
     with pytest.raises(DriverError, match="nothing was sent") as refusal:
@@ -126,33 +128,33 @@ def test_a_target_that_is_no_number_is_refused_and_nothing_is_sent(bus: Emulated
 
 
 def test_a_silent_host_lets_the_drives_hold_by_themselves(bus: EmulatedBus, arm: CanopenArm) -> None:
-    enabled(arm, watchdog_s=WATCHDOG_S)
+    enable_arm(arm, watchdog_s=WATCHDOG_S)
     assert eventually(lambda: all(state is PowerState.QUICK_STOP_ACTIVE for state in states(bus)))
     state = arm.exchange(Setpoint(np.zeros(3), np.zeros(3)))
     np.testing.assert_allclose(state.position, START, atol=COUNT)
     assert [(fault.code, fault.joint) for fault in state.faults] == [("watchdog", None)]
     arm.stop(StopPolicy.HOLD)
     with pytest.raises(DriverError, match="acknowledge it first"):
-        enabled(arm)
+        enable_arm(arm)
     arm.acknowledge_faults()
     assert all(state is PowerState.QUICK_STOP_ACTIVE for state in states(bus)), "an arm that holds must not be dropped"
-    assert enabled(arm).enabled.all()
+    assert enable_arm(arm).enabled.all()
 
 
 def test_a_fault_is_told_and_reset_only_on_the_operators_word(bus: EmulatedBus, arm: CanopenArm) -> None:
-    enabled(arm)
+    enable_arm(arm)
     bus.drives[1].fail(0x4310)
     assert eventually(lambda: _faults(arm) == [("over-temperature", 2)])
     arm.stop(StopPolicy.HOLD)
     assert bus.drives[1].power.state is PowerState.FAULT
     with pytest.raises(DriverError, match="drive too hot"):
-        enabled(arm)
+        enable_arm(arm)
     arm.acknowledge_faults()
-    assert enabled(arm).enabled.all()
+    assert enable_arm(arm).enabled.all()
 
 
 def test_a_drive_that_does_not_answer_leaves_nan_and_nothing_old(bus: EmulatedBus, arm: CanopenArm) -> None:
-    enabled(arm)
+    enable_arm(arm)
     silent = bus.drives[2].process_data
     silent.synchronise = list
     state = arm.exchange(Setpoint(np.array(START), np.zeros(3)))
@@ -161,7 +163,7 @@ def test_a_drive_that_does_not_answer_leaves_nan_and_nothing_old(bus: EmulatedBu
 
 
 def test_a_stop_holds_and_needs_no_cycles_any_more(bus: EmulatedBus, arm: CanopenArm) -> None:
-    enabled(arm, watchdog_s=WATCHDOG_S)
+    enable_arm(arm, watchdog_s=WATCHDOG_S)
     arm.stop(StopPolicy.HOLD)
     arm.stop(StopPolicy.HOLD)
     assert all(state is PowerState.QUICK_STOP_ACTIVE for state in states(bus))
@@ -169,7 +171,7 @@ def test_a_stop_holds_and_needs_no_cycles_any_more(bus: EmulatedBus, arm: Canope
 
 
 def test_letting_go_takes_the_voltage_away(bus: EmulatedBus, arm: CanopenArm) -> None:
-    enabled(arm)
+    enable_arm(arm)
     arm.stop(StopPolicy.TORQUE_OFF)
     assert all(state is PowerState.SWITCH_ON_DISABLED for state in states(bus))
 
@@ -187,7 +189,7 @@ def _faults(arm: CanopenArm) -> list[tuple[str, int | None]]:
 
 
 def test_a_lost_answer_neither_drops_the_arm_nor_is_replaced_by_an_old_one(bus: EmulatedBus, arm: CanopenArm) -> None:
-    enabled(arm)
+    enable_arm(arm)
     for cycle in range(40):
         bus.deaf = cycle % 3 == 1
         state = arm.exchange(Setpoint(np.array(START), np.zeros(3)))
@@ -201,7 +203,7 @@ def test_a_lost_answer_neither_drops_the_arm_nor_is_replaced_by_an_old_one(bus: 
 
 
 def test_a_drive_that_is_gone_does_not_keep_the_others_from_being_stopped(bus: EmulatedBus, arm: CanopenArm) -> None:
-    enabled(arm)
+    enable_arm(arm)
     node_id = 2
     bus.swallows = lambda message: message.arbitration_id in (0x200 + node_id, 0x600 + node_id)
     state = arm.stop(StopPolicy.HOLD)

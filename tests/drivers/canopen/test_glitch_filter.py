@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauscope_drivers.canopen.glitch_filter import GlitchFilter
+from tauscope_drivers.canopen.node import GlitchFilter
 
 CYCLE_NS = 5_000_000
 LIMIT = 2.0

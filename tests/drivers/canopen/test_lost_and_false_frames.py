@@ -33,7 +33,7 @@ def arm(bus: EmulatedBus) -> Iterator[CanopenArm]:
     arm.disconnect()
 
 
-def enabled(arm: CanopenArm, mode: ControlMode = ControlMode.POSITION, watchdog_s: float = 1.0) -> ArmState:
+def enable_arm(arm: CanopenArm, mode: ControlMode = ControlMode.POSITION, watchdog_s: float = 1.0) -> ArmState:
     arm.connect()
     return arm.enable(mode, LIMITS, StopPolicy.HOLD, watchdog_s, 0.01)
 
@@ -57,11 +57,11 @@ def test_an_arm_that_is_enabled_is_seen_whole_though_answers_are_lost(
         return (heard - 1) // DRIVES % 3 == first
 
     bus.swallows = every_third
-    assert enabled(arm).fresh.all()
+    assert enable_arm(arm).fresh.all()
 
 
 def test_a_drive_that_does_not_hear_the_stop_of_another_is_told_again(bus: EmulatedBus, arm: CanopenArm) -> None:
-    enabled(arm)
+    enable_arm(arm)
     heard = 0
 
     def first_stop(message: can.Message) -> bool:
@@ -79,7 +79,7 @@ def test_a_drive_that_does_not_hear_the_stop_of_another_is_told_again(bus: Emula
 
 
 def test_nobody_waits_for_drives_that_have_stopped_by_themselves(bus: EmulatedBus, arm: CanopenArm) -> None:
-    enabled(arm, watchdog_s=0.1)
+    enable_arm(arm, watchdog_s=0.1)
     assert eventually(lambda: states(bus) == [PowerState.QUICK_STOP_ACTIVE] * 3)
     heard = 0
 
@@ -98,7 +98,7 @@ def test_a_position_that_cannot_be_is_missing_once_and_believed_when_it_stays(
     bus: EmulatedBus, arm: CanopenArm
 ) -> None:
     """In torque mode no joint of this bus goes after its target; 2 rad/s allow 0.06 rad in a cycle of 10 ms."""
-    state = enabled(arm, ControlMode.TORQUE)
+    state = enable_arm(arm, ControlMode.TORQUE)
 
     def next_state() -> ArmState:
         arm.clock.wait_until_ns(state.time_ns + 10_000_000)

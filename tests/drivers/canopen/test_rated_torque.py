@@ -2,7 +2,7 @@
 
 import pytest
 
-from tauscope_drivers.canopen.rated_torque import read_rated_torque
+from tauscope_drivers.canopen.units import read_rated_torque
 
 EPOS4 = 512_871
 """Of a real drive of 0.513 Nm, which states µNm."""

@@ -12,9 +12,9 @@ from hypothesis.extra.numpy import arrays
 from tauscope_drivers.dynamixel.configuration import ServoConfiguration
 from tauscope_drivers.dynamixel.control_table import encode_items
 from tauscope_drivers.dynamixel.group import paced_goals
-from tauscope_drivers.dynamixel.pacing import GoalPace
 from tauscope_drivers.dynamixel.packets import encode_sync_write
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
+from tauscope_drivers.goal_pace import GoalPace
 
 CYCLE_S = 0.005
 PH54, XM430, YM070 = 2020, 1020, 4030

@@ -57,7 +57,7 @@ def lagged(velocity: np.ndarray) -> np.ndarray:
     return np.asarray(signal.lfilter([0.466], [1.0, -0.534], velocity, axis=0))
 
 
-def coloured() -> np.ndarray:
+def colour_noise() -> np.ndarray:
     """Noise below 80 Hz alone: as loud in the band as the positions', all but silent where noise is looked for."""
     sections = signal.butter(4, 80.0, fs=RATE, output="sos")
     return np.asarray(signal.sosfiltfilt(sections, white(1e-2, seed=9), axis=0))
@@ -77,7 +77,7 @@ REFUSED: dict[str, Change] = {
     ),
     "resonance that the positions do not show": lambda v: v + 0.02 * np.sin(2 * np.pi * 4.7 * TIME)[:, None],
     "vibration at the edge of the band": lambda v: v + 0.02 * np.sin(2 * np.pi * 20.0 * TIME)[:, None] + white(1e-4),
-    "noise that was filtered": lambda v: v + coloured(),
+    "noise that was filtered": lambda v: v + colour_noise(),
     "constant": np.zeros_like,
 }
 

@@ -36,10 +36,10 @@ def read(path: Path, layout: RecordingLayout, joints: Sequence[str] | None = Non
 
 def guess_of(message: str) -> RecordingLayout:
     """The mapping that a refusal prints, pasted."""
-    return pasted(message[message.index("recording: {") :])
+    return paste_layout(message[message.index("recording: {") :])
 
 
-def pasted(text: str) -> RecordingLayout:
+def paste_layout(text: str) -> RecordingLayout:
     path = Path("/nonexistent")
     assert not path.exists()
     return layout_from_dict(_yaml(text))

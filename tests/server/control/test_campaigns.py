@@ -20,12 +20,11 @@ from tauscope.server.control.device_claims import BusyError, DeviceClaims
 from tauscope.server.control.run import RunWorkspace
 from tauscope.server.control.run_manager import RunManager
 from tauscope.server.control.run_supervisor import StartControl
-from tauscope.server.queue.diagnosis import DiagnosisWorkspace
+from tauscope.server.queue.analyses import DiagnosisWorkspace, IdentificationWorkspace
 from tauscope.server.queue.excitation import ExcitationWorkspace
-from tauscope.server.queue.identification import IdentificationWorkspace
+from tauscope.server.queue.job_folder import Workspace
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.record import JobProblem, JobRecord, JobState
-from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.tasks.campaign import HeldOutMotion

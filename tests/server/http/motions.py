@@ -5,10 +5,35 @@ from typing import Any
 
 import numpy as np
 
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.trajectory import MoveSegment, Trajectory, trajectory_json
 
-ROBOT: dict[str, Any] = EXAMPLE_ROBOT
+ROBOT: dict[str, Any] = {
+    "name": "two-joint-arm",
+    "kinematics": {
+        "dh": [
+            {"theta": 0.0, "d": 0.3, "a": 0.0, "alpha": 1.5707963267948966},
+            {"theta": 0.0, "d": 0.0, "a": 0.5, "alpha": 0.0},
+        ]
+    },
+    "joints": [
+        {"name": "joint1", "limits": {"position": [-2.9, 2.9], "velocity": 2.0}},
+        {"name": "joint2", "limits": {"position": [-2.9, 2.9], "velocity": 2.0}},
+    ],
+    "model": {
+        "links": [
+            {
+                "mass": 2.0,
+                "first_moment": [0.0, 0.0, 0.0],
+                "inertia": {"xx": 0.02, "yy": 0.02, "zz": 0.02, "xy": 0.0, "xz": 0.0, "yz": 0.0},
+            },
+            {
+                "mass": 1.0,
+                "first_moment": [-0.25, 0.0, 0.0],
+                "inertia": {"xx": 0.01, "yy": 0.09, "zz": 0.09, "xy": 0.0, "xz": 0.0, "yz": 0.0},
+            },
+        ]
+    },
+}
 ROBOT_FILE = json.dumps(ROBOT).encode()
 
 

@@ -67,6 +67,21 @@ def test_evidence_of_a_model_in_use_is_not_removed(paper: TestClient) -> None:
     assert_problem(paper.delete(f"{RECORDINGS}/a.csv"), "in-use", 409)
 
 
+def test_a_robot_of_a_model_in_use_is_not_removed(paper: TestClient) -> None:
+    active, _ = models(paper)
+    robot = paper.get(f"{IDENTIFICATIONS}/{active['id']}/robot").json()
+    (file,) = robot["files"]
+    content = file["content"].encode()
+    kept, other = (
+        paper.post("/api/v1/robots", files={"robot": (file["name"], each)}).json()
+        for each in (content, content + b"\n# another version\n")
+    )
+    detail = assert_problem(paper.delete(kept["link"]), "in-use", 409)["detail"]
+    assert f"model {active['id']} is in use" in detail
+    assert paper.delete(other["link"]).status_code == 204
+    assert [each["version"] for each in paper.get("/api/v1/robots").json()["versions"]] == [kept["version"]]
+
+
 def test_a_model_waits_for_its_campaign_and_is_judged_by_its_diagnosis(
     paper: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:

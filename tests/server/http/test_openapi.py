@@ -66,6 +66,25 @@ def test_every_reference_leads_somewhere(document: dict[str, Any]) -> None:
     assert not {"HTTPValidationError", "ValidationError"} & set(document["components"]["schemas"])
 
 
+def test_every_schema_has_an_address_of_its_own(client: TestClient, document: dict[str, Any]) -> None:
+    """The document leaves out formats of files, and words on answers: these addresses have both."""
+    addresses = set(re.findall(r'"/docs/schemas/(\w+)"', json.dumps(document)))
+    assert {"IdentificationDocument", "DiagnosisDocument", "TrajectoryDocument"} <= addresses
+    open_, seen = addresses | {"RunAnswer", "DiagnosisRequest"}, set[str]()
+    while open_:
+        name = open_.pop()
+        answer = client.get(f"/docs/schemas/{name}")
+        assert answer.status_code == 200, name
+        assert answer.headers["content-type"].startswith("application/schema+json")
+        for each in answer.json().get("properties", {}).values():
+            assert each["description"], name
+        seen.add(name)
+        open_ |= set(re.findall(r'"\$ref": "([^"]+)"', answer.text)) - seen
+    assert len(seen) > len(addresses)
+    problem = assert_problem(client.get("/docs/schemas/DiagnosisDocumen"), "not-found", 404)
+    assert "DiagnosisDocument" in problem["detail"]
+
+
 def test_every_operation_says_what_it_does_and_which_problems_it_has(document: dict[str, Any]) -> None:
     for name, operation in operations(document):
         assert operation["summary"], name

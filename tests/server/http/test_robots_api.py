@@ -131,3 +131,45 @@ def test_a_large_document(client: TestClient) -> None:
     robot = {"name": "r", "kinematics": {"dh": []}, "x": "y" * 4 * 2**20}
     answer = client.post(CHECK, json={"robot": robot})
     assert_problem(answer, "limit-exceeded", 413)
+
+
+ROBOTS = "/api/v1/robots"
+
+
+def test_the_same_content_is_one_version(client: TestClient, paper_robot: bytes) -> None:
+    first = client.post(ROBOTS, files={"robot": ("arm.yaml", paper_robot)})
+    again = client.post(ROBOTS, files={"robot": ("arm.yaml", paper_robot)})
+    other = client.post(ROBOTS, files={"robot": ("arm.yaml", paper_robot + b"# another\n")})
+    assert (first.status_code, again.status_code, other.status_code) == (201, 200, 201)
+    assert first.json() == again.json()
+    assert first.json()["name"] == other.json()["name"] == "paper-arm"
+    versions = [each["version"] for each in client.get(ROBOTS).json()["versions"]]
+    assert {first.json()["version"], other.json()["version"]} <= set(versions)
+    assert len(set(versions)) == len(versions)
+    shown = client.get(first.headers["Location"]).json()
+    assert shown["files"] == [{"name": "arm.yaml", "content": paper_robot.decode()}]
+    assert len(shown["report"]["joints"]) == 3
+
+
+def test_a_kept_robot_with_its_urdf_is_used_by_its_version(client: TestClient) -> None:
+    files = {"robot": ("robot.yaml", URDF_ROBOT), "urdf": ("arm.urdf", URDF)}
+    kept = client.post(ROBOTS, files=files).json()
+    job = client.post("/api/v1/excitations", json={"robot": {"version": kept["version"]}})
+    assert job.status_code == 202, job.text
+    # The job has a copy of its own.
+    assert client.delete(kept["link"]).status_code == 204
+    robot = client.get(f"{job.headers['location']}/robot").json()
+    assert [each["name"] for each in robot["files"]] == ["arm.urdf", "robot.yaml"]
+
+
+def test_what_is_not_kept(client: TestClient) -> None:
+    nobody = "0" * 32
+    for answer in (client.get(f"{ROBOTS}/versions/{nobody}"), client.delete(f"{ROBOTS}/versions/{nobody}")):
+        assert "GET /api/v1/robots lists them" in assert_problem(answer, "not-found", 404)["detail"]
+    answer = client.post("/api/v1/excitations", json={"robot": {"version": nobody}})
+    assert_problem(answer, "not-found", 404)
+    answer = client.post("/api/v1/excitations", json={"robot": {"version": "../../x"}})
+    assert_problem(answer, "not-found", 404)
+    assert_problem(client.get(f"{ROBOTS}/versions/..%2fx"), "not-found", 404)
+    refused = client.post(ROBOTS, files={"robot": ("arm.yaml", b"name: nothing\n")})
+    assert_problem(refused, "robot-file", 422)

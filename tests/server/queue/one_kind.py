@@ -3,9 +3,9 @@
 from concurrent.futures import Executor
 from pathlib import Path
 
+from tauscope.server.queue.job_folder import Workspace
 from tauscope.server.queue.queue import JobKind, JobQueue, Work
 from tauscope.server.queue.record import JobState
-from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.items import ItemStore
 
 

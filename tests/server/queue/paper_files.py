@@ -7,8 +7,7 @@ import numpy as np
 from shared_data import REPOSITORY
 from tauscope.robot import read_robot
 from tauscope_sim.motion import random_fourier_motion
-from tauscope_sim.recording import simulate_recording
-from tauscope_sim.recording_csv import write_recording_csv
+from tauscope_sim.recording import simulate_recording, write_recording_csv
 
 PAPER_ROBOT = REPOSITORY / "sim_backend" / "tauscope_sim" / "examples" / "paper_arm.yaml"
 

@@ -8,7 +8,7 @@ import pytest
 from server.queue.paper_files import PAPER_ROBOT, write_recording
 from tauscope.export.formats import EXPORT_FILES, ExportFormat
 from tauscope.identification import IdentificationDocument
-from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace, run_identification
+from tauscope.server.queue.analyses import IdentificationOrder, IdentificationWorkspace, run_identification
 from tauscope.server.queue.task_job import OrderedRecording
 from tauscope.server.store.files import hash_file
 from tauscope.tasks import identify as task

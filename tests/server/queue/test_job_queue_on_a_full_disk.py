@@ -7,9 +7,8 @@ import pytest
 
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.one_kind import make_queue, problem_of, state_of
+from tauscope.server.queue.job_folder import Workspace, do_work
 from tauscope.server.queue.record import JobProblem
-from tauscope.server.queue.work import do_work
-from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.items import ItemStore
 
 

@@ -79,7 +79,7 @@ def test_cancelled_work_ends_at_once_in_the_middle() -> None:
 def test_a_failure_says_where_it_happened(pool: WorkerPool) -> None:
     error = pool.submit(int, "many").exception(60)
     assert isinstance(error, ValueError)
-    assert "worker_process.py" in error.__notes__[0]
+    assert "worker_pool.py" in error.__notes__[0]
 
 
 def test_shutting_down_at_once_ends_work_in_the_middle(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from tauscope_drivers import ControlMode, DriverError, Setpoint, StopPolicy
 from tauscope_sim.device import HOTTEST, Activity, Disturbance, FaultCode, Injection, SimulatedDevice
 from tauscope_sim.device.activity import COMMANDED, POWERED, TRANSITIONS, commanded_by, stopped_by
 from tauscope_sim.device.faults import REMEDIES, FaultLatch, device_fault
-from tauscope_sim.device.posture import resting_posture
+from tauscope_sim.device.mechanism import resting_posture
 from tauscope_sim.driver import SimulatedArm
 from tauscope_sim.scenario import Scenario
 

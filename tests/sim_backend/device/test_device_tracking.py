@@ -10,9 +10,9 @@ from tauscope.robot.robot import Robot
 from tauscope_drivers import ControlMode, Setpoint, StopPolicy
 from tauscope_sim.driver import SimulatedArm
 from tauscope_sim.friction import static_friction_torque
-from tauscope_sim.inverse_dynamics import rigid_body_torque
 from tauscope_sim.model import build_model
 from tauscope_sim.motion import random_fourier_motion
+from tauscope_sim.recording import rigid_body_torque
 from tauscope_sim.scenario import Scenario
 
 RATE_HZ = 500.0

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from tauscope.robot import JointLimits, Robot, read_robot
-from tauscope_sim.device.posture import resting_posture
+from tauscope_sim.device.mechanism import resting_posture
 from tauscope_sim.examples import example_robot
 from tauscope_sim.model import build_model
 

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tauscope_sim.effects.base_tilt import BaseTilt
+from tauscope_sim.effects.carried_bodies import Payload, PayloadChange
 from tauscope_sim.effects.external_contact import ExternalContact
 from tauscope_sim.effects.friction_coupling import FrictionCoupling
-from tauscope_sim.effects.kinematic_error import KinematicError
-from tauscope_sim.effects.payload import Payload
-from tauscope_sim.effects.payload_change import PayloadChange
+from tauscope_sim.effects.geometry_errors import BaseTilt, KinematicError
 
 Array = NDArray[np.float64]
 Agree = Callable[..., dict[str, Array]]

@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tauscope_sim.effects.asymmetric_coulomb import AsymmetricCoulomb
-from tauscope_sim.effects.asymmetric_viscous import AsymmetricViscous
-from tauscope_sim.effects.cable_force import CableForce
-from tauscope_sim.effects.cogging import Cogging
-from tauscope_sim.effects.coulomb_friction import CoulombFriction
-from tauscope_sim.effects.joint_spring import JointSpring
-from tauscope_sim.effects.nonlinear_viscous import NonlinearViscous
-from tauscope_sim.effects.position_dependent_friction import PositionDependentFriction
-from tauscope_sim.effects.rotor_inertia import RotorInertia
-from tauscope_sim.effects.stribeck_friction import StribeckFriction
-from tauscope_sim.effects.torque_offset import TorqueOffset
-from tauscope_sim.effects.viscous_friction import ViscousFriction
+from tauscope_sim.effects.carried_bodies import RotorInertia
+from tauscope_sim.effects.friction_laws import (
+    AsymmetricCoulomb,
+    AsymmetricViscous,
+    CoulombFriction,
+    NonlinearViscous,
+    PositionDependentFriction,
+    StribeckFriction,
+    ViscousFriction,
+)
+from tauscope_sim.effects.periodic_torques import Cogging
+from tauscope_sim.effects.position_torques import CableForce, JointSpring, TorqueOffset
 
 
 def smooth_sign(v: float, k_v: float = 500.0) -> float:

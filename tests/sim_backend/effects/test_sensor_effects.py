@@ -7,9 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.time_delay import TimeDelay
-from tauscope_sim.effects.torque_gain_error import TorqueGainError
-from tauscope_sim.effects.torque_saturation import TorqueSaturation
+from tauscope_sim.effects.sensor_effects import TimeDelay, TorqueGainError, TorqueSaturation
 from tauscope_sim.scenario import Scenario, Sensors
 
 Array = NDArray[np.float64]

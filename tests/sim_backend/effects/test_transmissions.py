@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tauscope_sim.effects.backlash import Backlash
-from tauscope_sim.effects.cogging import Cogging
-from tauscope_sim.effects.joint_elasticity import JointElasticity
-from tauscope_sim.effects.joint_spring import JointSpring
+from tauscope_sim.effects.carried_bodies import RotorInertia
+from tauscope_sim.effects.elastic_transmissions import Backlash, JointElasticity
 from tauscope_sim.effects.load_dependent_friction import LoadDependentFriction
-from tauscope_sim.effects.rotor_inertia import RotorInertia
-from tauscope_sim.effects.torque_ripple import TorqueRipple
+from tauscope_sim.effects.periodic_torques import Cogging, TorqueRipple
+from tauscope_sim.effects.position_torques import JointSpring
 from tauscope_sim.plant import Plant
 from tauscope_sim.plant.loads import loaded_accelerations
 

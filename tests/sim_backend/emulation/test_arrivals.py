@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from tauscope_sim.emulation.arrivals import Arrivals
 from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal
+from tauscope_sim.emulation.server import Arrivals
 
 BUSY_S = 0.2
 DEADLINE_S = 10.0

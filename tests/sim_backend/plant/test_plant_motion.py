@@ -12,9 +12,9 @@ import pytest
 from arms import panda_like, random_arm, random_link, ur5_like
 from tauscope.errors import RobotFileError, ScenarioError
 from tauscope.robot.robot import FrictionCoefficients, FrictionShape, Model, Robot
-from tauscope_sim.effects.joint_elasticity import JointElasticity
-from tauscope_sim.effects.joint_spring import JointSpring
-from tauscope_sim.effects.payload_change import PayloadChange
+from tauscope_sim.effects.carried_bodies import PayloadChange
+from tauscope_sim.effects.elastic_transmissions import JointElasticity
+from tauscope_sim.effects.position_torques import JointSpring
 from tauscope_sim.model import build_model
 from tauscope_sim.plant import AMBIENT, Plant
 

@@ -39,10 +39,7 @@ class DataSheetError(ValueError):
 def read_sections(text: str) -> Sections:
     """Sections that describe the device and its objects; compact arrays are written out.
 
-    Raises
-    ------
-    DataSheetError
-        it is no such file; names the line or the section
+    Raises DataSheetError where it is no such file; names the line or the section.
     """
     # No section is everybody's default, and no indented line goes on with the one before.
     parser = configparser.RawConfigParser(inline_comment_prefixes=(";",), default_section="\0")
@@ -156,10 +153,8 @@ logging.getLogger(eds.__name__).setLevel(logging.ERROR)
 class DescribedObject:
     """One entry of the object dictionary as a file describes it.
 
-    value : bytes or None
-        the same as it is transferred, little end first; None where it is not of its type
-    default : int or None
-        value as delivered; None where the file states none, or no whole number
+    `value`: the same as it is transferred, little end first; None where it is not of its type.
+    `default`: value as delivered; None where the file states none, or no whole number.
     """
 
     name: str
@@ -182,12 +177,9 @@ class DescribedObject:
 class DeviceFile:
     """What a file says of a drive.
 
-    objects : mapping
-        of (index, subindex) to DescribedObject
-    vendor, product, revision : int or None
-        identity; None where it states none
-    node_id : int or None
-        that a DCF is made for; None where it states none
+    `objects`: of (index, subindex) to DescribedObject.
+    `vendor`, `product`, `revision`: identity; None where it states none.
+    `node_id`: that a DCF is made for; None where it states none.
     """
 
     name: str
@@ -199,13 +191,7 @@ class DeviceFile:
 
 
 def read_device_file(path: Path, node_id: int) -> DeviceFile:
-    """Read a file.
-
-    Raises
-    ------
-    DataSheetError
-        it cannot be read, or is no such file
-    """
+    """Read a file. Raises DataSheetError where it cannot be read, or is no such file."""
     sections = read_sections(_content(path))
     try:
         dictionary = eds.import_eds(io.StringIO(library_text(sections)), node_id)
@@ -213,7 +199,7 @@ def read_device_file(path: Path, node_id: int) -> DeviceFile:
     except (SectionError, LookupError, ValueError, TypeError, AttributeError, OverflowError) as error:
         reason = " ".join(str(error.args[0] if error.args else error).split())[:120]
         raise DataSheetError(f"is no whole EDS or DCF file ({reason!a}); get it anew from the maker") from error
-    entries = {(variable.index, variable.subindex): _described(variable) for variable in _variables(dictionary)}
+    entries = {(variable.index, variable.subindex): _describe(variable) for variable in _variables(dictionary)}
     device = dictionary.device_information
     made_for = sections.get("DeviceComissioning", {}).get("NodeID")
     return DeviceFile(
@@ -251,7 +237,7 @@ def _variables(dictionary: ObjectDictionary) -> Iterator[ODVariable]:
             yield from entry.subindices.values()
 
 
-def _described(variable: ODVariable) -> DescribedObject:
+def _describe(variable: ODVariable) -> DescribedObject:
     text = getattr(variable, "value_raw", None)
     return DescribedObject(
         name=_printable(variable.name),
@@ -261,7 +247,7 @@ def _described(variable: ODVariable) -> DescribedObject:
         access=variable.access_type,
         is_mappable=variable.pdo_mappable,
         value_text=None if text is None else _printable(text),
-        value=None if text is None else _transferred(variable, text),
+        value=None if text is None else _encode_value(variable, text),
         default=variable.default if isinstance(variable.default, int) else None,
     )
 
@@ -271,7 +257,7 @@ def _printable(name: str) -> str:
     return "".join(letter if letter.isprintable() else "?" for letter in name)[:_LONGEST_NAME]
 
 
-def _transferred(variable: ODVariable, text: str) -> bytes | None:
+def _encode_value(variable: ODVariable, text: str) -> bytes | None:
     """A DCF's value as it goes over the bus; None where it is not of the object's type."""
     value = variable.value
     if value is None:

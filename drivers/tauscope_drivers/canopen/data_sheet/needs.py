@@ -6,9 +6,7 @@ from typing import Protocol
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.data_sheet.device_file import TYPE_NAMES, DataSheetError, DescribedObject, DeviceFile
-from tauscope_drivers.canopen.drive_modes import TARGETS, select_modes
-from tauscope_drivers.canopen.objects import DriveObject
-from tauscope_drivers.canopen.optional_objects import SUBSTITUTES, WRITTEN
+from tauscope_drivers.canopen.objects import SUBSTITUTES, TARGETS, WRITTEN, DriveObject, select_modes
 from tauscope_drivers.canopen.pdo_plan import (
     MEASURED,
     MEASURED_WHERE_THERE,
@@ -49,24 +47,12 @@ def states_rated_torque(file: DeviceFile) -> bool:
 
 
 def require_needed(file: DeviceFile, *, reads_rated_torque: bool) -> None:
-    """Refuse a drive that the driver cannot use.
-
-    Raises
-    ------
-    DataSheetError
-        names every flaw
-    """
+    """Refuse a drive that the driver cannot use. Raises DataSheetError, which names every flaw."""
     _refuse(find_flaws(file, reads_rated_torque=reads_rated_torque))
 
 
 def require_target(file: DeviceFile, mode: ControlMode) -> None:
-    """Refuse a drive that takes no targets of a mode.
-
-    Raises
-    ------
-    DataSheetError
-        names the object
-    """
+    """Refuse a drive that takes no targets of a mode. Raises DataSheetError, which names the object."""
     _refuse(_target_flaws(file, mode))
 
 
@@ -167,10 +153,7 @@ class OptionalReader(Protocol):
 def require_identity(file: DeviceFile, dictionary: OptionalReader, place: str) -> None:
     """Refuse a drive of another vendor, product or revision than its file states; what it does not tell passes.
 
-    Raises
-    ------
-    DriverError
-        ``refused``: names what differs
+    Raises DriverError ``refused``, which names what differs.
     """
     for entry, stated in (
         (objects.VENDOR, file.vendor),

@@ -36,8 +36,7 @@ class Setting:
 class Settings:
     """The values of a DCF file; none of an EDS file.
 
-    torque_cap : int or None
-        largest torque (0x6072), which the driver sets itself and never above this [‰ of the rated torque]
+    `torque_cap`: largest torque (0x6072), which the driver sets itself and never above this [‰ of the rated torque].
     """
 
     written: tuple[Setting, ...]
@@ -48,10 +47,7 @@ class Settings:
 def settings_of(file: DeviceFile) -> Settings:
     """Values that a drive is given before it is commissioned.
 
-    Raises
-    ------
-    DataSheetError
-        a value is not of its object's type; names both
+    Raises DataSheetError where a value is not of its object's type; names both.
     """
     written: list[Setting] = []
     left_out: dict[str, tuple[DescribedObject, ...]] = {}

@@ -1,4 +1,4 @@
-"""What a given model has wrong: the robot file's model, or what recordings made in the user's own simulator show.
+"""What a given model has wrong: the robot file's, a saved one, or that of recordings from the user's own simulator.
 
 Values that are wrong (`Diagnosis.differences`) are told from structure that is missing (`Diagnosis.findings`). A term
 that the given model does not have at all is missing; one that it has is right or wrong. Wrong values are attributed to
@@ -14,18 +14,39 @@ from scipy import stats
 from threadpoolctl import ThreadpoolController
 
 from tauscope.diagnosis.against.attribution import Attribution, Explanation
-from tauscope.diagnosis.against.carried_payload import payload_finding
 from tauscope.diagnosis.against.link_changes import stated_links
 from tauscope.diagnosis.against.simulated import fit_to_simulation
 from tauscope.diagnosis.against.wrong_values import attribute
 from tauscope.diagnosis.findings.diagnosed import Diagnosis, ParameterDifference
 from tauscope.diagnosis.findings.finding import Finding, FitSizes
 from tauscope.diagnosis.findings.plain import with_plain_terms
-from tauscope.diagnosis.model.term import Place
+from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.model.term import Place, Term
+from tauscope.diagnosis.model.torque_scale import on_the_arm
+from tauscope.effects.carried_body import FARTHEST_M
+from tauscope.effects.payload import Payload
 from tauscope.effects.rotor_inertia import RotorInertia
 from tauscope.errors import IdentificationError
 from tauscope.identification import Options
 from tauscope.recording.recording import Array, Recording
+
+
+def payload_finding(diagnosis: Diagnosis, carried: Explanation) -> Finding:
+    """The payload as a finding; the model without it keeps everything else."""
+    model = diagnosis.selection.fit.model
+    parameters = model.parameters.copy()
+    parameters[: len(carried.effect)] -= carried.effect
+    effect = Payload(None, np.zeros((1, 3)), np.full(3, -FARTHEST_M), np.full(3, FARTHEST_M))
+    return Finding(
+        terms=(Term(effect, carried.values[1:], carried.values[:1]),),
+        covariances=(carried.covariance,),
+        gain=carried.gain * diagnosis.inflation,
+        probability=float(1.0 / (1.0 + np.exp(-carried.log_odds))),
+        before=diagnosis.sizes(replace(model, parameters=parameters)),
+        after=diagnosis.after,
+        in_model=False,
+    )
+
 
 CHANCE = 0.01
 """Chance of calling any parameter wrong where all are right."""
@@ -75,9 +96,9 @@ def against_model(diagnosis: Diagnosis) -> Diagnosis:
         )
     rotors = _stated_rotors(diagnosis)
     missing = tuple(finding for finding in diagnosis.findings if finding.place not in rotors)
-    found = compared(beside(diagnosis, missing) if rotors else diagnosis, _stated(diagnosis), "model")
+    found = compare_with(keep_missing(diagnosis, missing) if rotors else diagnosis, _stated(diagnosis), "model")
     wrong = [each for each in rotors.values() if is_wrong(each, CLEAR)]
-    return replace(found, differences=ordered([*found.differences, *wrong]))
+    return replace(found, differences=sort_differences([*found.differences, *wrong]))
 
 
 def _stated_rotors(diagnosis: Diagnosis) -> dict[Place, ParameterDifference]:
@@ -109,13 +130,13 @@ def against_simulation(diagnosis: Diagnosis, simulated: Sequence[Recording], opt
     missing = tuple(finding for finding in diagnosis.findings if finding.place not in fit.shared)
     given = Given(values, tuple(lacking), fit.covariance)
     given = replace(given, links=_simulated_links(diagnosis, given))
-    found = compared(beside(diagnosis, missing), given, "simulation")
+    found = compare_with(keep_missing(diagnosis, missing), given, "simulation")
     of_effects = [each for differences in fit.shared.values() for each in differences if is_wrong(each, CLEAR)]
-    return replace(found, differences=ordered([*found.differences, *of_effects]))
+    return replace(found, differences=sort_differences([*found.differences, *of_effects]))
 
 
-def beside(diagnosis: Diagnosis, missing: Sequence[Finding]) -> Diagnosis:
-    """The diagnosis beside a model that has all of its findings but some: where it has all, their misfit is no news."""
+def keep_missing(diagnosis: Diagnosis, missing: Sequence[Finding]) -> Diagnosis:
+    """Keep only the findings that the given model does not have; where it has all, their misfit is no news."""
     has_all = bool(diagnosis.findings) and not any(finding.in_model for finding in missing)
     before = diagnosis.misfit_after if has_all else diagnosis.misfit_before
     return replace(diagnosis, findings=tuple(missing), misfit_before=before)
@@ -157,7 +178,7 @@ def _stated(diagnosis: Diagnosis) -> Given:
 
 
 @ThreadpoolController().wrap(limits=1, user_api="blas")  # many small factors: threads cost more than they bring
-def compared(diagnosis: Diagnosis, given: Given, kind: Literal["model", "simulation"]) -> Diagnosis:
+def compare_with(diagnosis: Diagnosis, given: Given, kind: Literal["model", "simulation"]) -> Diagnosis:
     """Findings that the given model makes, then what it has wrong beside them."""
     plain = replace(diagnosis, findings=tuple(finding for finding in diagnosis.findings if finding.in_model))
     found = with_plain_terms(plain, given.lacking)
@@ -182,7 +203,7 @@ def compared(diagnosis: Diagnosis, given: Given, kind: Literal["model", "simulat
         for name, value, error in zip(names, real, std, strict=True)
         if name in given.values and name not in missing
     ]
-    wrong = ordered([each for each in differences if is_wrong(each, several)])
+    wrong = sort_differences([each for each in differences if is_wrong(each, several)])
     wrong = attribute(wrong, names[:count], explanations, given.links, diagnosis.robot.joints, several)
     return replace(found, against=kind, differences=wrong, before=_given_sizes(found, given))
 
@@ -218,6 +239,47 @@ def is_wrong(difference: ParameterDifference, several: float) -> bool:
     return abs(difference.in_std) > several and abs(difference.real - difference.simulation) > NEGLIGIBLE * size
 
 
-def ordered(differences: Sequence[ParameterDifference]) -> tuple[ParameterDifference, ...]:
+def sort_differences(differences: Sequence[ParameterDifference]) -> tuple[ParameterDifference, ...]:
     """Most standard errors first."""
     return tuple(sorted(differences, key=lambda each: -abs(each.in_std)))
+
+
+def against_saved(diagnosis: Diagnosis, saved: ExtendedModel) -> Diagnosis:
+    """The diagnosis compared with a saved model: what that has already is no finding, at most another value."""
+    values = dict(zip(saved.structure.names, map(float, saved.parameters), strict=True))
+    joints = [joint.name for joint in diagnosis.robot.joints]
+    lacking = tuple(
+        (joint, term) for joint, name in enumerate(joints) for term in TERMS if f"{term} {name}" not in values
+    )
+    had = {(term.effect.id, term.effect.joint): term for term in saved.terms}
+    missing = tuple(finding for finding in diagnosis.findings if finding.place not in had)
+    found = compare_with(
+        keep_missing(diagnosis, missing), Given(values, lacking, _align_covariance(diagnosis, saved)), "model"
+    )
+    differences: list[ParameterDifference] = []
+    for finding in diagnosis.findings:
+        if finding.place not in had:
+            continue
+        own, given = on_the_arm(diagnosis.selection.fit.model, finding.terms[0]), on_the_arm(saved, had[finding.place])
+        std = np.sqrt(np.maximum(np.diag(finding.covariances[0]), 0.0))
+        for place, coefficient in enumerate(own.effect.coefficients[: len(given.coefficients)]):
+            differences.append(
+                ParameterDifference(
+                    f"{coefficient.name} of {own.effect.name(joints)}",
+                    float(given.coefficients[place]),
+                    float(own.coefficients[place]),
+                    float(std[place]),
+                )
+            )
+    wrong = [each for each in differences if is_wrong(each, CLEAR)]
+    before = diagnosis.sizes(saved)
+    return replace(found, differences=sort_differences([*found.differences, *wrong]), before=before)
+
+
+def _align_covariance(diagnosis: Diagnosis, saved: ExtendedModel) -> Array | None:
+    """Covariance of the saved parameters in the columns of the diagnosed model; None where they are exact."""
+    if saved.covariance is None:
+        return None
+    own, known = diagnosis.selection.fit.model.structure.names, saved.structure.names
+    place = np.array([[name == other for other in known] for name in own], dtype=np.float64)
+    return place @ saved.covariance @ place.T

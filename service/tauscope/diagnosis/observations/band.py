@@ -54,10 +54,7 @@ alone sets the comparison, a joint's own band is opened that far."""
 def diagnosis_cutoff(conditioners: Sequence[Conditioner], identification: Identification, steepness: Array) -> float:
     """Cut-off of the band that torque and columns share [Hz].
 
-    Parameters
-    ----------
-    steepness : (n,) float64
-        K_v of every joint's friction [s/rad or s/m]
+    `steepness`: (n,), K_v of every joint's friction [s/rad or s/m].
     """
     widest = _widest(conditioners)
     limit = quiet_limit(conditioners)
@@ -84,12 +81,8 @@ def _without_corners(conditioners: Sequence[Conditioner], steepness: Array) -> f
 def state_cutoffs(conditioner: Conditioner, cutoff_hz: float | None, steepness: Array) -> Array | None:
     """Cut-off of each joint's own smoothing, (n,) [Hz]; None for no filter.
 
-    Parameters
-    ----------
-    cutoff_hz : float or None
-        of the common band [Hz]; None for no filter
-    steepness : (n,) float64
-        K_v of every joint's friction [s/rad or s/m]
+    `cutoff_hz`: of the common band [Hz]; None for no filter; `steepness`: (n,), K_v of every joint's friction [s/rad or
+    s/m].
     """
     if cutoff_hz is None:
         return None
@@ -100,12 +93,8 @@ def state_cutoffs(conditioner: Conditioner, cutoff_hz: float | None, steepness: 
 def quiet_cutoffs(conditioner: Conditioner, cutoff_hz: float | None, steepness: Array) -> Array | None:
     """The same for what the torque is at single samples.
 
-    Parameters
-    ----------
-    cutoff_hz : float or None
-        of the common band [Hz]; None for no filter
-    steepness : (n,) float64
-        K_v of every joint's friction [s/rad or s/m]
+    `cutoff_hz`: of the common band [Hz]; None for no filter; `steepness`: (n,), K_v of every joint's friction [s/rad or
+    s/m].
     """
     if cutoff_hz is None:
         return None
@@ -123,10 +112,7 @@ def step_bands(conditioner: Conditioner, steepness: Array, blurred: float) -> Ar
 
     There is no limit, and the band infinite, where a joint does not move or its positions have no noise.
 
-    Parameters
-    ----------
-    steepness : (n,) float64
-        K_v of every joint's friction [s/rad or s/m]
+    `steepness`: (n,), K_v of every joint's friction [s/rad or s/m].
     """
     density = conditioner.noise.density
     widths = 3.0 * (blurred / np.maximum(steepness, 1e-9)) ** 2 / (4.0 * np.pi**2)

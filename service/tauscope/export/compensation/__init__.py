@@ -1,6 +1,5 @@
 """Friction compensation: each joint's coefficients, ready for a controller, in joint torque and in drive units."""
 
-from tauscope.export.compensation.c_header import to_c_header
 from tauscope.export.compensation.document import to_document, to_json, to_yaml
 from tauscope.export.compensation.drive_units import DriveUnits, drive_units
 from tauscope.export.compensation.model import (
@@ -10,7 +9,7 @@ from tauscope.export.compensation.model import (
     RecordingSource,
     friction_torque,
 )
-from tauscope.export.compensation.python_module import to_python
+from tauscope.export.compensation.source_code import to_c_header, to_python
 
 __all__ = [
     "CompensationModel",

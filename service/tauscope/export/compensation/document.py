@@ -46,7 +46,7 @@ def to_yaml(model: CompensationModel, effects: Sequence[Mapping[str, Any]] = ())
     yaml.sort_base_mapping_type_on_output = False  # pyright: ignore[reportAttributeAccessIssue]
     yaml.width = 4096
     stream = io.StringIO()
-    yaml.dump(_with_quoted_text(to_document(model, effects)), stream)
+    yaml.dump(_quote_text(to_document(model, effects)), stream)
     return stream.getvalue()
 
 
@@ -75,12 +75,12 @@ _PlainRepresenter.add_representer(float, _represent_float)
 _PlainRepresenter.add_representer(_Quoted, _represent_quoted)
 
 
-def _with_quoted_text(value: Any) -> Any:
+def _quote_text(value: Any) -> Any:
     """The same data with every text, but no key, to be quoted."""
     if isinstance(value, dict):
-        return {key: _with_quoted_text(item) for key, item in value.items()}
+        return {key: _quote_text(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [_with_quoted_text(item) for item in value]
+        return [_quote_text(item) for item in value]
     return _Quoted(value) if isinstance(value, str) else value
 
 

@@ -15,10 +15,8 @@ _RATED_TORQUE = "rated_torque_nm"
 class DriveUnits:
     """What one drive unit means at the joint; None where the robot file and the recording do not tell.
 
-    torque_per_milliampere : float or None
-        joint torque per mA of recorded current, sign of the wiring included [Nm or N per mA]
-    torque_per_permille : float or None
-        joint torque per 1/1000 of the motor's rated torque, sign included [Nm per ‰]
+    `torque_per_milliampere`: joint torque per mA of recorded current, sign of the wiring included [Nm or N per mA].
+    `torque_per_permille`: joint torque per 1/1000 of the motor's rated torque, sign included [Nm per ‰].
     """
 
     torque_per_milliampere: float | None = None
@@ -36,11 +34,7 @@ def drive_units(joint: Joint, effort_kind: EffortKind) -> DriveUnits:
     Current is known where the recording holds current (ampere): `torque_constant` is then Nm per A. Per mille of rated
     torque is known where the joint's drive block states ``rated_torque_nm``, the rated torque at the motor shaft as in
     CiA 402 object 0x6076: joint torque = ‰ / 1000 · rated torque · |gear ratio|. Directions are the joint's `sign`.
-
-    Raises
-    ------
-    ExportError
-        if the torque constant is zero, or the rated torque or the gear ratio is not a usable number
+    Raises ExportError if the torque constant is zero, or the rated torque or the gear ratio is not a usable number.
     """
     milliampere, current_remark = _milliampere(joint, effort_kind)
     permille, torque_remark = _permille(joint)

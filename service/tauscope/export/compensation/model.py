@@ -20,16 +20,11 @@ EQUATION = "tau = stiction*(2/pi)*atan(k_v*v) + stribeck*(2/pi)*atan(delta*v) + 
 class JointFriction:
     """Friction of one joint and the constant beside it, equations (7), (8).
 
-    stiction, stribeck : float
-        τ_s, τ_sc [Nm or N]; their sum is the Coulomb level at speed
-    viscous : float
-        τ_v [Nm s/rad or N s/m]
-    offset : float
-        constant torque [Nm or N]
-    k_v : float
-        K_v, slope of the smooth sign [s/rad or s/m]
-    delta : float or None
-        δ, shape of the Stribeck effect [s/rad or s/m]; None where the joint has none
+    `stiction`, `stribeck`: τ_s, τ_sc [Nm or N]; their sum is the Coulomb level at speed.
+    `viscous`: τ_v [Nm s/rad or N s/m].
+    `offset`: constant torque [Nm or N].
+    `k_v`: K_v, slope of the smooth sign [s/rad or s/m].
+    `delta`: δ, shape of the Stribeck effect [s/rad or s/m]; None where the joint has none.
     """
 
     stiction: float
@@ -44,8 +39,7 @@ class JointFriction:
 class JointCompensation:
     """One joint of a compensation model.
 
-    type : JointType
-        revolute (rad, Nm) or prismatic (m, N)
+    `type`: revolute (rad, Nm) or prismatic (m, N).
     """
 
     name: str
@@ -83,10 +77,7 @@ class CompensationModel:
 def check_friction(joint: str, friction: JointFriction) -> None:
     """Refuse coefficients that are not finite and shapes without meaning.
 
-    Raises
-    ------
-    ExportError
-        naming the joint and the coefficient
+    Raises ExportError naming the joint and the coefficient.
     """
     for name in ("stiction", "stribeck", "viscous", "offset", "k_v"):
         if not math.isfinite(getattr(friction, name)):
@@ -108,15 +99,7 @@ def friction_torque(friction: JointFriction, velocity: NDArray[np.float64] | flo
 
     Seed paper, equations (7) and (8).
 
-    Parameters
-    ----------
-    velocity : array_like of float64
-        v [rad/s or m/s]
-
-    Returns
-    -------
-    array of float64
-        torque of the shape of `velocity` [Nm or N]
+    `velocity`: v [rad/s or m/s]. Returns array of: torque of the shape of `velocity` [Nm or N].
     """
     v = np.asarray(velocity, dtype=np.float64)
     step = np.arctan(friction.k_v * v) * (2.0 / np.pi)

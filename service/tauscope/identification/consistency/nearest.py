@@ -73,7 +73,9 @@ def nearest_consistent_parameters(
     """Nearest x to a weighted least-squares estimate such that every link can exist and G x ≤ h.
 
     min ‖R x - z‖² + ‖W (x - μ)‖², pseudo-inertia ⪰ ε, G x ≤ h; see the module for ε. The program
-    is convex: there is one answer, and `duality_gap` certifies it.
+    is convex: there is one answer, and `duality_gap` certifies it. Raises IdentificationError where R or z is not
+    finite, where the inequalities contradict each other or leave no link that can exist, or where the solver does not
+    reach the accuracy that is asked for.
 
     Parameters
     ----------
@@ -82,12 +84,6 @@ def nearest_consistent_parameters(
         Columns: ten standard parameters for each link, then friction coefficients. Rank may be deficient.
     target : (r,) float64
         z
-
-    Raises
-    ------
-    IdentificationError
-        where R or z is not finite, where the inequalities contradict each other or leave no link that can exist, or
-        where the solver does not reach the accuracy that is asked for
     """
     inequalities = inequalities or LinearInequalities.none(prior.mean.size)
     _check_input(factor, target, prior, inequalities)

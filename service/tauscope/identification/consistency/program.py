@@ -149,6 +149,9 @@ def assemble(
 def solve(program: ConicProgram) -> tuple[Array, str, float]:
     """The optimum of a program.
 
+    Raises IdentificationError where the inequalities contradict each other, or the solver does not reach the accuracy
+    asked for.
+
     Returns
     -------
     scaled : (p,) float64
@@ -157,11 +160,6 @@ def solve(program: ConicProgram) -> tuple[Array, str, float]:
         "interior" where no constraint is felt, else the solver's word
     gap : float
         duality gap, relative to the criterion or to 1
-
-    Raises
-    ------
-    IdentificationError
-        where the inequalities contradict each other, or the solver does not reach the accuracy asked for
     """
     interior = solve_triangular(program.triangle, program.centre)
     if program.admits(interior):

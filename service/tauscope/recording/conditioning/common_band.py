@@ -38,22 +38,13 @@ class BandFilter(Protocol):
         ...
 
     def reduce(self, values: Array) -> Array:
-        """Values (..., N) filtered and decimated to (..., M).
-
-        Parameters
-        ----------
-        values : (..., N) float64
-            signals, time last
-        """
+        """Values (..., N) filtered and decimated to (..., M). `values`: (..., N), signals, time last."""
         ...
 
     def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Which of the M outputs rest on measured samples, (..., N) → (..., M).
 
-        Parameters
-        ----------
-        measured : (..., N) bool
-            where a sample was measured
+        `measured`: (..., N), where a sample was measured.
         """
         ...
 
@@ -66,30 +57,17 @@ class BandFilter(Protocol):
 class AllPass:
     """No filter at all: for motion measured so cleanly that nothing needs to be cut.
 
-    rate_hz : float
-        sampling rate of what goes in and comes out [Hz]
+    `rate_hz`: sampling rate of what goes in and comes out [Hz].
     """
 
     rate_hz: float
 
     def reduce(self, values: Array) -> Array:
-        """Values as they are.
-
-        Parameters
-        ----------
-        values : (..., N) float64
-            signals, time last
-        """
+        """Values as they are. `values`: (..., N), signals, time last."""
         return values
 
     def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """The mask as it is.
-
-        Parameters
-        ----------
-        measured : (..., N) bool
-            where a sample was measured
-        """
+        """The mask as it is. `measured`: (..., N), where a sample was measured."""
         return measured
 
     def filtered_white(self, lags: int) -> None:
@@ -100,10 +78,8 @@ class AllPass:
 class Decimator:
     """Linear-phase low-pass (Kaiser window) evaluated only at every `factor`-th sample.
 
-    kernel : (K,) float64
-        symmetric impulse response of unit sum; K is a multiple of `factor`
-    rate_hz : float
-        sampling rate after decimation [Hz]
+    `kernel`: (K,), symmetric impulse response of unit sum; K is a multiple of `factor`.
+    `rate_hz`: sampling rate after decimation [Hz].
 
     Written as one matrix product per group of signals: with X the signal in blocks of D samples,
     y[m] = Σ_b (X H)[m+b, b], H the kernel in K/D columns. That is several times quicker than a convolution.
@@ -117,13 +93,8 @@ class Decimator:
     def design(rate_hz: float, cutoff_hz: float) -> "Decimator":
         """The decimator for one band.
 
-        Parameters
-        ----------
-        rate_hz : float
-            sampling rate of the signals [Hz]
-        cutoff_hz : float
-            where half the amplitude is left [Hz]; full stop from 1.5 times that on, at or below the new Nyquist
-            frequency
+        `rate_hz`: sampling rate of the signals [Hz]; `cutoff_hz`: where half the amplitude is left [Hz]; full stop from
+        1.5 times that on, at or below the new Nyquist frequency.
         """
         factor = max(1, int(rate_hz / (3.0 * cutoff_hz) + 1e-9))
         length, beta = signal.kaiserord(STOP_BAND_DB, 2.0 * cutoff_hz / rate_hz)
@@ -135,15 +106,7 @@ class Decimator:
     def reduce(self, values: Array) -> Array:
         """Signals filtered and decimated; only outputs whose whole kernel lies inside the signal.
 
-        Parameters
-        ----------
-        values : (..., N) float64
-            signals, time last
-
-        Returns
-        -------
-        (..., M) float64
-            M = (N - K) // D + 1, or 0 where N < K
+        `values`: (..., N), signals, time last. Returns (..., M), M = (N - K) // D + 1, or 0 where N < K.
         """
         blocks = len(self.kernel) // self.factor
         outputs = self._outputs(values.shape[-1])
@@ -164,17 +127,14 @@ class Decimator:
     def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Outputs that rest on measured samples: see `MASKED_FRACTION` and `BRIDGED_FRACTION`.
 
-        Parameters
-        ----------
-        measured : (..., N) bool
-            where a sample was measured
+        `measured`: (..., N), where a sample was measured.
         """
         if measured.all():
             return np.ones((*measured.shape[:-1], self._outputs(measured.shape[-1])), dtype=bool)
         weight = np.abs(self.kernel)
         share = Decimator(weight / weight.sum(), self.factor, self.rate_hz)
         missed = share.reduce((~measured).astype(float))
-        in_long_gaps = share.reduce(_in_long_gaps(measured, self.factor // 4).astype(float))
+        in_long_gaps = share.reduce(_mark_long_gaps(measured, self.factor // 4).astype(float))
         return (in_long_gaps <= MASKED_FRACTION) & (missed <= BRIDGED_FRACTION)
 
     def filtered_white(self, lags: int) -> Array:
@@ -186,7 +146,7 @@ class Decimator:
         return max(0, (count - len(self.kernel)) // self.factor + 1)
 
 
-def _in_long_gaps(measured: NDArray[np.bool_], bridged: int) -> NDArray[np.bool_]:
+def _mark_long_gaps(measured: NDArray[np.bool_], bridged: int) -> NDArray[np.bool_]:
     """Samples (..., N) that were not measured and lie in a gap of more than `bridged` of them."""
     rows = measured.reshape(prod(measured.shape[:-1]), measured.shape[-1])
     result = np.zeros(rows.shape, dtype=bool)
@@ -202,8 +162,7 @@ def _in_long_gaps(measured: NDArray[np.bool_], bridged: int) -> NDArray[np.bool_
 class HarmonicBand:
     """The band of one averaged period: its harmonics up to the cut-off, sampled just often enough to hold them.
 
-    rate_hz : float
-        sampling rate of the output [Hz]
+    `rate_hz`: sampling rate of the output [Hz].
     """
 
     period_samples: int
@@ -212,25 +171,14 @@ class HarmonicBand:
 
     @staticmethod
     def design(rate_hz: float, period_samples: int, cutoff_hz: float) -> "HarmonicBand":
-        """The band of a period.
-
-        Parameters
-        ----------
-        rate_hz : float
-            sampling rate [Hz]
-        cutoff_hz : float
-            highest frequency kept [Hz]
-        """
+        """The band of a period. `rate_hz`: sampling rate [Hz]; `cutoff_hz`: highest frequency kept [Hz]."""
         harmonics = min(int(cutoff_hz * period_samples / rate_hz + 1e-9), (period_samples - 1) // 2)
         return HarmonicBand(period_samples, harmonics, (2 * harmonics + 1) * rate_hz / period_samples)
 
     def reduce(self, values: Array) -> Array:
         """Signals of one period, band-limited and resampled to 2h + 1 points.
 
-        Parameters
-        ----------
-        values : (..., N) float64
-            one period, time last
+        `values`: (..., N), one period, time last.
         """
         spectrum = np.fft.rfft(values, axis=-1)[..., : self.harmonics + 1]
         count = 2 * self.harmonics + 1
@@ -239,10 +187,7 @@ class HarmonicBand:
     def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """All True where the whole period was measured, but for `MASKED_FRACTION`: a harmonic needs all of it.
 
-        Parameters
-        ----------
-        measured : (..., N) bool
-            where a sample was measured in at least one period
+        `measured`: (..., N), where a sample was measured in at least one period.
         """
         whole = measured.mean(axis=-1, keepdims=True) >= 1.0 - MASKED_FRACTION
         return np.broadcast_to(whole, (*measured.shape[:-1], 2 * self.harmonics + 1))

@@ -19,11 +19,32 @@ from tauscope.recording.conditioning.position_noise import (
     lowest_limit,
     position_noise,
 )
-from tauscope.recording.conditioning.summary import ConditioningSummary
 from tauscope.recording.conditioning.timing import Timing, find_stretches, row_at
 from tauscope.recording.conditioning.uniform import Mask, Stretch, read_stretch, uniform_grid
 from tauscope.recording.recording import Array, Recording, Samples
 from tauscope.robot.robot import Robot
+
+
+@dataclass(frozen=True)
+class ConditioningSummary:
+    """What was done to one recording, for the result and its reader.
+
+    `missed_torques`: per joint, samples without a torque (filled in for filtering, not counted in the fit).
+    `position_noise_std`: per joint, standard deviation of the position noise over the whole spectrum [rad or m].
+    """
+
+    recording: str
+    samples: int
+    missed_positions: int
+    dropped: int
+    missed_torques: tuple[int, ...]
+    gaps: int
+    rate_hz: float
+    resampled: bool
+    averaged_periods: int
+    position_noise_std: tuple[float, ...]
+    velocity_source: tuple[str, ...]
+
 
 WINDOW_ROWS = 1 << 15
 """Rows conditioned at once: bounds memory whatever the recording's length."""
@@ -70,10 +91,7 @@ class Conditioner:
     def survey(recording: Recording, robot: Robot) -> "Conditioner":
         """Find the usable stretches of a recording, the noise of its positions and the best source of its motion.
 
-        Raises
-        ------
-        RecordingError
-            where nothing in the recording is long enough to be used
+        Raises RecordingError where nothing in the recording is long enough to be used.
         """
         timing = find_stretches(recording)
         spans = _spread_windows(timing.rows)
@@ -87,10 +105,7 @@ class Conditioner:
     def as_one_motion(self, state_hz: Array | None) -> "Conditioner":
         """The same recording with no period averaged: each repetition of a motion counts as the motion that it was.
 
-        Parameters
-        ----------
-        state_hz : (n,) float64 or None
-            cut-off of the motion's own smoothing, joint by joint [Hz]; by the common band's where None
+        `state_hz`: (n,), cut-off of the motion's own smoothing, joint by joint [Hz]; by the common band's where None.
         """
         return replace(self, timing=replace(self.timing, runs=()), state_hz=state_hz)
 
@@ -124,15 +139,9 @@ class Conditioner:
     def motions(self, cutoff_hz: float | None) -> Iterator[Motion]:
         """The recording's motion, piece by piece, in one band.
 
-        Parameters
-        ----------
-        cutoff_hz : float or None
-            cut-off of the band that torque and regressor share [Hz]; None for no filter
+        Raises RecordingError where the band is so narrow that nothing of the recording is left.
 
-        Raises
-        ------
-        RecordingError
-            where the band is so narrow that nothing of the recording is left
+        `cutoff_hz`: cut-off of the band that torque and regressor share [Hz]; None for no filter.
         """
         found = False
         for rows in self.timing.rows:
@@ -149,10 +158,7 @@ class Conditioner:
     def summary(self, cutoff_hz: float | None) -> ConditioningSummary:
         """Counts of what was missing and what was averaged.
 
-        Parameters
-        ----------
-        cutoff_hz : float or None
-            the band [Hz]; whether periods are averaged depends on it
+        `cutoff_hz`: the band [Hz]; whether periods are averaged depends on it.
         """
         missed, resampled = np.zeros(self.robot.joint_count, int), False
         for samples in self.usable_samples():

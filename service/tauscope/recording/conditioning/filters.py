@@ -31,19 +31,10 @@ def smooth(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
 
     |H(f)| = 1 / (1 + (f/f_c)⁸).
 
-    Parameters
-    ----------
-    values : (N, n) float64
-        signals, a column each
-    rate_hz : float
-        sampling rate [Hz]
-    cutoff_hz : float
-        f_c, where half the amplitude is left [Hz]; at or above 0.45 of the rate nothing is filtered
-
-    Returns
-    -------
-    (N, n) float64
-        the smoothed signals; the first and last `smoothing_margin` samples still feel the edge
+    `values`: (N, n), signals, a column each.
+    `rate_hz`: sampling rate [Hz].
+    `cutoff_hz`: f_c, where half the amplitude is left [Hz]; at or above 0.45 of the rate nothing is filtered.
+    Returns (N, n), the smoothed signals; the first and last `smoothing_margin` samples still feel the edge.
     """
     if cutoff_hz >= SMOOTHED_FRACTION * rate_hz:
         return values
@@ -55,14 +46,7 @@ def smooth(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
 def smooth_each(values: Array, rate_hz: float, cutoffs_hz: Array) -> Array:
     """`smooth`, each signal in a band of its own.
 
-    Parameters
-    ----------
-    values : (N, n) float64
-        signals, a column each
-    rate_hz : float
-        sampling rate [Hz]
-    cutoffs_hz : (n,) float64
-        f_c of each [Hz]
+    `values`: (N, n), signals, a column each; `rate_hz`: sampling rate [Hz]; `cutoffs_hz`: (n,), f_c of each [Hz].
     """
     smoothed = np.empty_like(values)
     for cutoff_hz in np.unique(cutoffs_hz):
@@ -74,10 +58,7 @@ def smooth_each(values: Array, rate_hz: float, cutoffs_hz: Array) -> Array:
 def smoothing_margin(rate_hz: float, cutoff_hz: float) -> int:
     """Samples at each end that `smooth` cannot be trusted with: the slowest pole has decayed to 0.1 %.
 
-    Parameters
-    ----------
-    rate_hz, cutoff_hz : float
-        sampling rate and cut-off [Hz]
+    `rate_hz`, `cutoff_hz`: sampling rate and cut-off [Hz].
     """
     if cutoff_hz >= SMOOTHED_FRACTION * rate_hz:
         return 0
@@ -87,17 +68,8 @@ def smoothing_margin(rate_hz: float, cutoff_hz: float) -> int:
 def derivative(values: Array, rate_hz: float) -> Array:
     """First derivative in time by `CENTRAL_DIFFERENCE`.
 
-    Parameters
-    ----------
-    values : (N, n) float64
-        signals, a column each
-    rate_hz : float
-        sampling rate [Hz]
-
-    Returns
-    -------
-    (N, n) float64
-        the derivative [1/s]; the first and last `DIFFERENCE_MARGIN` rows are NaN
+    `values`: (N, n), signals, a column each; `rate_hz`: sampling rate [Hz]. Returns (N, n), the derivative [1/s]; the
+    first and last `DIFFERENCE_MARGIN` rows are NaN.
     """
     result = np.full_like(values, np.nan)
     inner = len(values) - 2 * DIFFERENCE_MARGIN

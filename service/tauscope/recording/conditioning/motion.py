@@ -22,21 +22,15 @@ from tauscope.recording.recording import Array
 class Motion:
     """One piece of conditioned motion with the torque that went with it.
 
-    time : (N,) float64
-        [s]; of the first period where periods were averaged
-    position, velocity, acceleration : (N, n) float64
-        smoothed q, q̇, q̈ at the recorded rate
-    torque : (P, N, n) float64
-        measured joint torque of every repetition; P = 1 where nothing was averaged
-    measured : (P, N, n) bool
-        where that torque was measured and not filled in
-    rate_hz : float
-        sampling rate of all of these [Hz]
-    period : (N,) float64 or None
-        progress through the repeated excitation, where it is known and not averaged: index of the period plus the part
-        of it that is over
-    scatter : (n,) float64 or None
-        standard deviation of the positions from period to period [rad or m]; None where nothing was averaged
+    `time`: (N,) [s]; of the first period where periods were averaged.
+    `position`, `velocity`, `acceleration`: (N, n), smoothed q, q̇, q̈ at the recorded rate.
+    `torque`: (P, N, n), measured joint torque of every repetition; P = 1 where nothing was averaged.
+    `measured`: (P, N, n), where that torque was measured and not filled in.
+    `rate_hz`: sampling rate of all of these [Hz].
+    `period`: (N,), progress through the repeated excitation, where it is known and not averaged: index of the period
+        plus the part of it that is over.
+    `scatter`: (n,), standard deviation of the positions from period to period [rad or m]; None where nothing was
+        averaged.
     """
 
     time: Array
@@ -70,11 +64,9 @@ class Motion:
 class Trim:
     """The band of one recording's transient motion, and the samples that it costs.
 
-    cutoff_hz : float or None
-        of the band [Hz]; None where it is open
-    state_hz : float or (n,) float64
-        cut-off of the motion's own smoothing, of each joint if they differ [Hz]; the sampling rate where nothing is
-        smoothed
+    `cutoff_hz`: of the band [Hz]; None where it is open.
+    `state_hz`: float or (n,), cut-off of the motion's own smoothing, of each joint if they differ [Hz]; the sampling
+        rate where nothing is smoothed.
     """
 
     band: AllPass | Decimator
@@ -86,14 +78,8 @@ class Trim:
     def design(rate_hz: float, cutoff_hz: float | None, state_hz: Array | None = None) -> "Trim":
         """Band and margin for a cut-off.
 
-        Parameters
-        ----------
-        rate_hz : float
-            sampling rate [Hz]
-        cutoff_hz : float or None
-            of the common band [Hz]; None for no filter
-        state_hz : (n,) float64 or None
-            of the motion's own smoothing, joint by joint [Hz]; `state_cutoff` where None
+        `rate_hz`: sampling rate [Hz]; `cutoff_hz`: of the common band [Hz]; None for no filter; `state_hz`: (n,), of
+        the motion's own smoothing, joint by joint [Hz]; `state_cutoff` where None.
         """
         margin = 2 * DIFFERENCE_MARGIN
         if cutoff_hz is None or cutoff_hz >= OPEN_BAND_FRACTION * rate_hz:
@@ -120,12 +106,7 @@ class Trim:
 def state_cutoff(rate_hz: float, cutoff_hz: float | None) -> float:
     """Cut-off of the motion's own smoothing for a given common band.
 
-    Parameters
-    ----------
-    rate_hz : float
-        sampling rate [Hz]
-    cutoff_hz : float or None
-        of the common band [Hz]; None for no filter
+    `rate_hz`: sampling rate [Hz]; `cutoff_hz`: of the common band [Hz]; None for no filter.
     """
     return rate_hz / 2.0 if cutoff_hz is None else min(STATE_BAND_RATIO * cutoff_hz, rate_hz / 2.0)
 
@@ -133,10 +114,7 @@ def state_cutoff(rate_hz: float, cutoff_hz: float | None) -> float:
 def transient_motion(stretch: Stretch, trim: Trim, source: MotionSource) -> Motion | None:
     """Smoothed and differentiated motion of a stretch, edges trimmed.
 
-    Returns
-    -------
-    Motion or None
-        None where the stretch is too short for one output of the band
+    Returns Motion or None: None where the stretch is too short for one output of the band.
     """
     rate, count = stretch.rate_hz, len(stretch.position)
     if not trim.outputs(count):
@@ -170,10 +148,7 @@ def transient_motion(stretch: Stretch, trim: Trim, source: MotionSource) -> Moti
 def average_motion(periods: Periods, cutoff_hz: float | None, source: MotionSource) -> Motion:
     """One period for all: positions averaged, differentiated by their Fourier series, torques kept apart.
 
-    Parameters
-    ----------
-    cutoff_hz : float or None
-        of the common band [Hz]; None for no filter
+    `cutoff_hz`: of the common band [Hz]; None for no filter.
     """
     rate, count = periods.rate_hz, periods.position.shape[1]
     cutoff = state_cutoff(rate, cutoff_hz)

@@ -81,12 +81,9 @@ class Source(StrEnum):
 class MotionSource:
     """What every joint's motion is made from, and the band that it stands.
 
-    velocity, acceleration : (n,) bool
-        whether the recorded signal is used for q̇, for q̈
-    limits_hz : (n,) float64
-        widest band in which q̈ keeps to `NOISE_SHARE`; infinite where it does everywhere
-    quieter_from_hz : (n,) float64 or None
-        band from which on the recorded velocity is the quieter source; infinite where it never is
+    `velocity`, `acceleration`: (n,), whether the recorded signal is used for q̇, for q̈.
+    `limits_hz`: (n,), widest band in which q̈ keeps to `NOISE_SHARE`; infinite where it does everywhere.
+    `quieter_from_hz`: (n,), band from which on the recorded velocity is the quieter source; infinite where it never is.
     """
 
     velocity: np.ndarray
@@ -95,13 +92,7 @@ class MotionSource:
     quieter_from_hz: Array | None = None
 
     def in_band(self, cutoff_hz: float | None) -> "MotionSource":
-        """The sources of a band.
-
-        Parameters
-        ----------
-        cutoff_hz : float or None
-            of the common band [Hz]; None for no filter
-        """
+        """The sources of a band. `cutoff_hz`: of the common band [Hz]; None for no filter."""
         if self.quieter_from_hz is None:
             return self
         band = np.inf if cutoff_hz is None else cutoff_hz
@@ -175,12 +166,9 @@ def _quieter_bands(stretches: Sequence[Stretch], noise: PositionNoise) -> Array 
 class _VelocityFit:
     """q̇_recorded = g q̇ - d q̈ + offset.
 
-    delay, delay_std : float
-        d and its standard error [s]
-    offset : float
-        relative to the rms of the velocity
-    misfit : float
-        rms of the rest [rad/s or m/s]
+    `delay`, `delay_std`: d and its standard error [s].
+    `offset`: relative to the rms of the velocity.
+    `misfit`: rms of the rest [rad/s or m/s].
     """
 
     gain: float

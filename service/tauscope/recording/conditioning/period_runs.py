@@ -33,8 +33,7 @@ WHOLE_PERIOD = 1e-6
 class PeriodRun:
     """Consecutive periods of one length.
 
-    rows : (int, int)
-        rows of the stretch in which it lies
+    `rows`: (int, int), rows of the stretch in which it lies.
     """
 
     rows: tuple[int, int]
@@ -51,14 +50,8 @@ class PeriodRun:
     def within(self, rows: tuple[int, int], begin_s: float, end_s: float, interval_s: float) -> "PeriodRun":
         """What of the run lies within a stretch; its `count` is 0 where nothing does.
 
-        Parameters
-        ----------
-        rows : (int, int)
-            rows of the stretch
-        begin_s, end_s : float
-            instants of its first sample and of the end of its last one [s]
-        interval_s : float
-            time from sample to sample [s]
+        `rows`: (int, int), rows of the stretch; `begin_s`, `end_s`: instants of its first sample and of the end of its
+        last one [s]; `interval_s`: time from sample to sample [s].
         """
         slack = STEP_TOLERANCE * interval_s
         start = self.start_s if self.start_s > begin_s - slack else begin_s
@@ -76,12 +69,8 @@ class PeriodRun:
     def progress(self, origin_s: float, elapsed: Array) -> Array:
         """Index of the period plus the part of it that is over, (N,); NaN outside the run.
 
-        Parameters
-        ----------
-        origin_s : float
-            an instant [s]; kept apart because epoch seconds would cost digits
-        elapsed : (N,) float64
-            time since then [s]
+        `origin_s`: an instant [s]; kept apart because epoch seconds would cost digits; `elapsed`: (N,), time since then
+        [s].
         """
         since = (origin_s - self.start_s) + elapsed
         slack = WHOLE_PERIOD * self.length_s
@@ -93,12 +82,9 @@ class PeriodRun:
 class PeriodLabels:
     """Column `period` of a recording, kept as its steps.
 
-    time : (K,) float64
-        instants at which the label changes, the first sample's own first [s]
-    label : (K,) float64
-        the label from then on; NaN outside the repeated part
-    row : (K,) int
-        rows at which it changes
+    `time`: (K,), instants at which the label changes, the first sample's own first [s].
+    `label`: (K,), the label from then on; NaN outside the repeated part.
+    `row`: (K,) int, rows at which it changes.
     """
 
     time: Array
@@ -108,14 +94,8 @@ class PeriodLabels:
     def runs(self, rows: tuple[int, int], begin_s: float, end_s: float, interval_s: float) -> Iterator[PeriodRun]:
         """The runs of periods of equal length within one stretch of a recording.
 
-        Parameters
-        ----------
-        rows : (int, int)
-            the stretch, as first and one-past-last row
-        begin_s, end_s : float
-            instants of its first sample and of the end of its last one [s]
-        interval_s : float
-            time from sample to sample [s]
+        `rows`: (int, int), the stretch, as first and one-past-last row; `begin_s`, `end_s`: instants of its first
+        sample and of the end of its last one [s]; `interval_s`: time from sample to sample [s].
         """
         first = max(int(np.searchsorted(self.row, rows[0], side="right")) - 1, 0)
         last = int(np.searchsorted(self.row, rows[1]))

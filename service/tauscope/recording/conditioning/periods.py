@@ -50,16 +50,11 @@ LEAST_WIDTH = 1e-15
 class Periods:
     """P complete periods of N samples, aligned.
 
-    position, torque : (P, N, n) float64
-        q and τ of every period
-    measured : (P, N, n) bool
-        where the torque was measured
-    rows : (int, int)
-        the samples of the stretch that the periods cover
-    velocity, acceleration : (P, N, n) float64 or None
-        recorded q̇ and q̈, where the stretch has them
-    advance : (n,) float64 or None
-        how far each joint gets from one period to the next [rad or m]; None where nobody asked
+    `position`, `torque`: (P, N, n), q and τ of every period.
+    `measured`: (P, N, n), where the torque was measured.
+    `rows`: (int, int), the samples of the stretch that the periods cover.
+    `velocity`, `acceleration`: (P, N, n), recorded q̇ and q̈, where the stretch has them.
+    `advance`: (n,), how far each joint gets from one period to the next [rad or m]; None where nobody asked.
     """
 
     rate_hz: float
@@ -81,11 +76,8 @@ class Periods:
 def split_periods(stretch: Stretch, refine: bool = False) -> Periods | None:
     """The complete repeated periods of a stretch.
 
-    Returns
-    -------
-    Periods or None
-        as many whole periods as the longest repeated part holds, counted from where it begins, which may be anywhere
-        in a period; None where it holds fewer than two
+    Returns Periods or None: as many whole periods as the longest repeated part holds, counted from where it begins,
+    which may be anywhere in a period; None where it holds fewer than two.
     """
     if stretch.period is None or len(stretch.period) < 3:
         return None
@@ -121,10 +113,8 @@ def _align(stretch: Stretch, first: int, length: float, count: int) -> Periods |
 def with_turns_removed(periods: Periods, joint_types: Sequence[JointType]) -> Periods | None:
     """The periods with their joints' advance from one to the next known, and whole turns taken out of the positions.
 
-    Returns
-    -------
-    Periods or None
-        None where a joint ends a period elsewhere than it began: gravity then differs from period to period
+    Returns Periods or None: None where a joint ends a period elsewhere than it began: gravity then differs from period
+    to period.
     """
     steps = periods.count - 1
     centre = periods.position.mean(axis=1)
@@ -141,17 +131,9 @@ def with_turns_removed(periods: Periods, joint_types: Sequence[JointType]) -> Pe
 def repeats(periods: Periods, cutoff_hz: float, noise_density: Array) -> bool:
     """Whether the motion is the same in every period.
 
-    Parameters
-    ----------
-    cutoff_hz : float
-        only what lies below matters [Hz]
-    noise_density : (n,) float64
-        one-sided spectral density of the positions' noise [rad²/Hz or m²/Hz]
-
-    Returns
-    -------
-    bool
-        False where tracking differs so much from period to period that an average would not be a motion
+    `cutoff_hz`: only what lies below matters [Hz].
+    `noise_density`: (n,), one-sided spectral density of the positions' noise [rad²/Hz or m²/Hz].
+    Returns bool: False where tracking differs so much from period to period that an average would not be a motion.
     """
     samples = periods.position.shape[1]
     frequency = np.fft.rfftfreq(samples, 1.0 / periods.rate_hz)[:, None]
@@ -172,21 +154,11 @@ def fourier_derivatives(
 
     q̇ = Σ i ω_l c_l e^{i ω_l t},  q̈ = −Σ ω_l² c_l e^{i ω_l t}.
 
-    Parameters
-    ----------
-    values : (N, n) float64
-        exactly one period of q [rad or m], or of a derivative of it
-    rate_hz : float
-        sampling rate [Hz]
-    cutoff_hz : float
-        highest harmonic kept [Hz]
-    advance : (n,) float64 or None
-        what a joint that turns on and on gains in one period: the series is that of q less this ramp
-
-    Returns
-    -------
-    tuple of (N, n) float64
-        q, q̇, q̈, or those that `orders` names
+    `values`: (N, n), exactly one period of q [rad or m], or of a derivative of it.
+    `rate_hz`: sampling rate [Hz].
+    `cutoff_hz`: highest harmonic kept [Hz].
+    `advance`: (n,), what a joint that turns on and on gains in one period: the series is that of q less this ramp.
+    Returns tuple of (N, n), q, q̇, q̈, or those that `orders` names.
     """
     count = len(values)
     ramp = np.zeros(values.shape[1]) if advance is None else advance

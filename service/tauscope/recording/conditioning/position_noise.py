@@ -49,14 +49,11 @@ DIFFERENCE_ORDER = 2
 class PositionNoise:
     """Noise of the measured positions.
 
-    density : (n,) float64
-        one-sided spectral density S_n [rad²/Hz or m²/Hz]
-    limit_hz : float or None
-        widest band in which the q̈ that is used keeps to `NOISE_SHARE`; None where the whole spectrum does
-    joint_limits_hz : (n,) float64
-        the same joint by joint; infinite where the whole spectrum does, or where the joint stands still
-    step : (n,) float64
-        step that the encoder rounds to [rad or m]; zero where it shows none
+    `density`: (n,), one-sided spectral density S_n [rad²/Hz or m²/Hz].
+    `limit_hz`: widest band in which the q̈ that is used keeps to `NOISE_SHARE`; None where the whole spectrum does.
+    `joint_limits_hz`: (n,), the same joint by joint; infinite where the whole spectrum does, or where the joint stands
+        still.
+    `step`: (n,), step that the encoder rounds to [rad or m]; zero where it shows none.
     """
 
     density: Array
@@ -69,14 +66,10 @@ class PositionNoise:
 class AccelerationSpectrum:
     """Spectrum of q̈ from some signal, and the noise in it.
 
-    frequency : (F,) float64
-        [Hz]
-    power : (F, n) float64
-        one-sided spectral density of q̈, with its noise
-    gain : (F,) float64
-        squared gain from the signal's noise to that of q̈
-    density : (n,) float64
-        one-sided spectral density of the signal's noise
+    `frequency`: (F,) [Hz].
+    `power`: (F, n), one-sided spectral density of q̈, with its noise.
+    `gain`: (F,), squared gain from the signal's noise to that of q̈.
+    `density`: (n,), one-sided spectral density of the signal's noise.
     """
 
     frequency: Array
@@ -87,10 +80,7 @@ class AccelerationSpectrum:
     def widest_band(self, rate_hz: float) -> Array:
         """Widest band in which noise keeps to `NOISE_SHARE` of q̈, (n,) [Hz]; infinite where it does everywhere.
 
-        Parameters
-        ----------
-        rate_hz : float
-            sampling rate [Hz]
+        `rate_hz`: sampling rate [Hz].
         """
         usable = self.frequency <= PLATEAU[1] * rate_hz / 2.0
         edge = (self.frequency + self.frequency[1] / 2.0)[usable, None]  # a sum up to a line ends half a line beyond it
@@ -111,10 +101,7 @@ class AccelerationSpectrum:
 def position_noise(stretches: Stretch | Sequence[Stretch], step: Array | None = None) -> PositionNoise:
     """Noise density of every joint's position from the plateau of its spectrum, and the band that it allows.
 
-    Parameters
-    ----------
-    step : (n,) float64 or None
-        the encoders' steps, as `encoder_step` finds them [rad or m]
+    `step`: (n,), the encoders' steps, as `encoder_step` finds them [rad or m].
     """
     stretches = [stretches] if isinstance(stretches, Stretch) else list(stretches)
     rate = stretches[0].rate_hz
@@ -130,10 +117,7 @@ def position_noise(stretches: Stretch | Sequence[Stretch], step: Array | None = 
 def lowest_limit(limits_hz: Array) -> float | None:
     """The joint that stands least sets the band of all; None where none sets one.
 
-    Parameters
-    ----------
-    limits_hz : (n,) float64
-        joint by joint, infinite where there is none [Hz]
+    `limits_hz`: (n,), joint by joint, infinite where there is none [Hz].
     """
     lowest = float(limits_hz.min())
     return lowest if np.isfinite(lowest) else None
@@ -144,14 +128,8 @@ def acceleration_spectrum(
 ) -> AccelerationSpectrum:
     """Spectrum of q̈ by differences of a measured signal.
 
-    Parameters
-    ----------
-    signals : sequence of (N, n) float64
-        pieces of q (order 2), q̇ (order 1) or q̈ (order 0)
-    rate_hz : float
-        sampling rate [Hz]
-    floor : (n,) float64 or float
-        least density of the signal's noise
+    `signals`: sequence of (N, n), pieces of q (order 2), q̇ (order 1) or q̈ (order 0); `rate_hz`: sampling rate [Hz];
+    `floor`: (n,) or float, least density of the signal's noise.
     """
     accelerations = [np.diff(values, n=order, axis=0) * rate_hz**order for values in signals]
     length = min(SEGMENT, max(len(values) for values in accelerations))
@@ -191,17 +169,8 @@ def _gain(frequency: Array, rate_hz: float, order: int) -> Array:
 def segment_spectra(values: Array, rate_hz: float, length: int) -> Array:
     """One-sided spectral densities of half-overlapping segments under a Hann window: Welch's, before their mean.
 
-    Parameters
-    ----------
-    values : (N, n) float64
-        signals, a column each
-    rate_hz : float
-        sampling rate [Hz]
-
-    Returns
-    -------
-    (S, F, n) float64
-        of every segment, its mean removed; half the time of `scipy.signal.welch`, which goes from segment to segment
+    `values`: (N, n), signals, a column each; `rate_hz`: sampling rate [Hz]. Returns (S, F, n), of every segment, its
+    mean removed; half the time of `scipy.signal.welch`, which goes from segment to segment.
     """
     step = length - length // 2
     segments = np.lib.stride_tricks.sliding_window_view(np.ascontiguousarray(values.T), length, axis=1)[:, ::step]
@@ -215,10 +184,7 @@ def segment_spectra(values: Array, rate_hz: float, length: int) -> Array:
 def encoder_step(positions: Sequence[Array]) -> Array:
     """Smallest difference between two positions that is no rounding error, (n,) [rad or m]; zero where there is none.
 
-    Parameters
-    ----------
-    positions : sequence of (N, n) float64
-        positions as they were recorded, never interpolated
+    `positions`: sequence of (N, n), positions as they were recorded, never interpolated.
     """
     columns = np.concatenate(positions).T
     return np.array([_smallest_difference(column[np.isfinite(column)]) for column in columns])

@@ -44,8 +44,7 @@ SHORTEST_STRETCH = 32
 class Timing:
     """How a recording was sampled.
 
-    rows : tuple of (int, int)
-        row ranges without a long gap, each at least `SHORTEST_STRETCH` complete rows
+    `rows`: tuple of (int, int), row ranges without a long gap, each at least `SHORTEST_STRETCH` complete rows.
     """
 
     rate_hz: float
@@ -59,12 +58,7 @@ class Timing:
     def progress(self, origin_s: float, elapsed: Array) -> Array | None:
         """Progress through the repeated excitation, (N,); NaN outside, None where nothing repeats in this time.
 
-        Parameters
-        ----------
-        origin_s : float
-            an instant [s]
-        elapsed : (N,) float64
-            time since then, increasing [s]
+        `origin_s`: an instant [s]; `elapsed`: (N,), time since then, increasing [s].
         """
         near = [run for run in self.runs if run.start_s < origin_s + elapsed[-1] and run.stop_s > origin_s + elapsed[0]]
         if not near:
@@ -78,10 +72,7 @@ class Timing:
 def find_stretches(recording: Recording) -> Timing:
     """Row ranges of `recording` that can be filtered in one go.
 
-    Raises
-    ------
-    RecordingError
-        where no stretch is long enough to be used
+    Raises RecordingError where no stretch is long enough to be used.
     """
     interval, incomplete, labels = _scan(recording)
     count = len(recording) - len(incomplete)
@@ -110,12 +101,7 @@ def find_stretches(recording: Recording) -> Timing:
 def row_at(recording: Recording, time_s: float, rows: tuple[int, int]) -> int:
     """First of the rows that is not before an instant; the one after the last where all are.
 
-    Parameters
-    ----------
-    time_s : float
-        the instant [s]
-    rows : (int, int)
-        first and one-past-last row to look at
+    `time_s`: the instant [s]; `rows`: (int, int), first and one-past-last row to look at.
     """
     found = bisect_left(range(*rows), time_s, key=lambda row: float(recording.table.rows(row, row + 1)[0, 0]))
     return rows[0] + found

@@ -34,15 +34,12 @@ NEARBY = 0.75
 class Stretch:
     """Uniformly sampled motion without a long gap.
 
-    position, torque : (N, n) float64
-        q [rad or m] and joint torque τ [Nm or N]; finite everywhere
-    measured : (N, n) bool
-        False where a joint's torque was filled in and must not be counted
-    period : (N,) float64 or None
-        progress through the repeated excitation: index of the period plus the part of it that is over; NaN outside
-    velocity, acceleration : (N, n) float64 or None
-        recorded qd, qdd where there are such columns; a joint of which more than single samples were missed is NaN
-        throughout
+    `position`, `torque`: (N, n), q [rad or m] and joint torque τ [Nm or N]; finite everywhere.
+    `measured`: (N, n), False where a joint's torque was filled in and must not be counted.
+    `period`: (N,), progress through the repeated excitation: index of the period plus the part of it that is over; NaN
+        outside.
+    `velocity`, `acceleration`: (N, n), recorded qd, qdd where there are such columns; a joint of which more than single
+        samples were missed is NaN throughout.
     """
 
     start_s: float
@@ -60,10 +57,8 @@ class Stretch:
 class Grid:
     """Where the samples lie on a uniform grid.
 
-    index : (N,) int
-        grid point of every sample
-    start_s : float
-        instant of grid point 0, relative to the first sample [s]
+    `index`: (N,) int, grid point of every sample.
+    `start_s`: instant of grid point 0, relative to the first sample [s].
     """
 
     index: NDArray[np.int_]
@@ -107,17 +102,8 @@ def read_stretch(recording: Recording, robot: Robot, start: int, stop: int, timi
 def uniform_grid(elapsed: Array, rate_hz: float) -> Grid | None:
     """The uniform grid that the samples lie on, as far as their stamps can tell.
 
-    Parameters
-    ----------
-    elapsed : (N,) float64
-        stamps relative to the first one [s]
-    rate_hz : float
-        nominal sampling rate [Hz]
-
-    Returns
-    -------
-    Grid or None
-        None where the stamps deviate by more than `UNIFORM_TOLERANCE` and half of their own last digit
+    `elapsed`: (N,), stamps relative to the first one [s]; `rate_hz`: nominal sampling rate [Hz]. Returns Grid or None:
+    None where the stamps deviate by more than `UNIFORM_TOLERANCE` and half of their own last digit.
     """
     tolerance = UNIFORM_TOLERANCE + 0.5 * _last_digit(elapsed) * rate_hz
     fits = [_fit_grid(index, elapsed, rate_hz) for index in _possible_indices(elapsed * rate_hz)]

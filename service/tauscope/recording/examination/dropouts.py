@@ -31,18 +31,11 @@ class ZeroRuns:
     """Collects runs of zero, block by block: of every joint, and of all at once."""
 
     def __init__(self, scales: Sequence[EffortScale]) -> None:
-        """Start before the first row."""
         self._scales = scales
         self._runs: list[list[tuple[int, int]]] = [[] for _ in range(len(scales) + 1)]
 
     def add(self, samples: Samples, first: int) -> None:
-        """Take the next rows.
-
-        Parameters
-        ----------
-        first : int
-            row of the first of them
-        """
+        """Take the next rows. `first`: row of the first of them."""
         zero = samples.effort == 0.0
         if not zero.any():
             return

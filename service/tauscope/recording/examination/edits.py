@@ -19,16 +19,11 @@ NO_ROWS: Rows = np.empty((0, 2), dtype=np.int64)
 class ColumnEdit:
     """Edits of one column.
 
-    blank : (k, 2) int64
-        rows start:stop that were never measured: NaN; ascending, disjoint
-    jumps : (m,) int64
-        rows from which on the column is off by a constant
-    offsets : (m,) float64
-        that constant: subtracted [rad or m]
-    hold : int
-        rows for which the source holds a value: those in between are on a straight line from one value to the next
-    fill : int
-        missed rows up to which a straight line is drawn
+    `blank`: (k, 2) int64, rows start:stop that were never measured: NaN; ascending, disjoint.
+    `jumps`: (m,) int64, rows from which on the column is off by a constant.
+    `offsets`: (m,), that constant: subtracted [rad or m].
+    `hold`: rows for which the source holds a value: those in between are on a straight line from one value to the next.
+    `fill`: missed rows up to which a straight line is drawn.
     """
 
     blank: Rows = field(default_factory=lambda: NO_ROWS)
@@ -42,7 +37,6 @@ class EditedTable:
     """A table of which some columns are mended as they are read."""
 
     def __init__(self, table: Table, edits: Mapping[int, ColumnEdit]) -> None:
-        """Keep a table and the edits by index of their column."""
         self._table = table
         self._edits = dict(edits)
         self._spare = 2 + max(((2 * edit.hold + 2) * (edit.fill + 1) for edit in edits.values()), default=0)
@@ -96,24 +90,12 @@ def _interpolate(values: Array, time: Array, doubtful: NDArray[np.bool_], longes
 
 
 def row_numbers(ranges: Rows) -> Numbers:
-    """Row numbers of ranges, (m,).
-
-    Parameters
-    ----------
-    ranges : (k, 2) int64
-        start:stop
-    """
+    """Row numbers of ranges, (m,). `ranges`: (k, 2) int64, start:stop."""
     return np.concatenate([NO_NUMBERS, *(np.arange(start, stop) for start, stop in ranges)])
 
 
 def join_ranges(rows: Numbers) -> Rows:
-    """Ranges start:stop of ascending row numbers, (k, 2).
-
-    Parameters
-    ----------
-    rows : (m,) int64
-        rows, ascending, each once
-    """
+    """Ranges start:stop of ascending row numbers, (k, 2). `rows`: (m,) int64, rows, ascending, each once."""
     if not len(rows):
         return NO_ROWS
     edges = np.flatnonzero(np.diff(rows, prepend=rows[0] - 2, append=rows[-1] + 2) != 1)
@@ -121,11 +103,5 @@ def join_ranges(rows: Numbers) -> Rows:
 
 
 def find_runs(mask: NDArray[np.bool_]) -> Rows:
-    """Ranges start:stop in which a mask is true, (k, 2).
-
-    Parameters
-    ----------
-    mask : (N,) bool
-        one value a row
-    """
+    """Ranges start:stop in which a mask is true, (k, 2). `mask`: (N,), one value a row."""
     return np.flatnonzero(np.diff(mask, prepend=False, append=False)).reshape(-1, 2)

@@ -35,14 +35,8 @@ LEAST_MOVE = 0.01
 def find_stuck(rows: Numbers, effort: Array, position: Array, scale: EffortScale) -> Numbers:
     """Rows of a block in which one joint's effort is stuck.
 
-    Parameters
-    ----------
-    rows : (N,) int64
-        row of each value within the recording
-    effort : (N,) float64
-        in the recording's own unit, finite
-    position : (N, n) float64
-        q of all joints in the same rows [rad or m]
+    `rows`: (N,) int64, row of each value within the recording; `effort`: (N,), in the recording's own unit, finite;
+    `position`: (N, n), q of all joints in the same rows [rad or m].
     """
     if scale.run > USUAL_RUN * scale.hold:
         return NO_NUMBERS
@@ -55,10 +49,7 @@ def find_stuck(rows: Numbers, effort: Array, position: Array, scale: EffortScale
 def _leave_turns_out(stuck: Numbers, change: Array) -> Numbers:
     """Rows of values that end with a jump: one that goes on by a single step of the drive's was turning, not stuck.
 
-    Parameters
-    ----------
-    change : (N,) float64
-        of the effort, from row to row
+    `change`: (N,), of the effort, from row to row.
     """
     steps = np.abs(change[np.isfinite(change) & (change != 0.0)])
     if not len(stuck) or not len(steps):
@@ -72,14 +63,8 @@ def _leave_turns_out(stuck: Numbers, change: Array) -> Numbers:
 def find_all_stuck(rows: Numbers, effort: Array, position: Array, scales: Sequence[EffortScale]) -> Numbers:
     """Rows of a block in which the efforts of several joints are stuck at once, whatever their level.
 
-    Parameters
-    ----------
-    rows : (N,) int64
-        row of each value within the recording
-    effort : (N, n) float64
-        in the recording's own unit
-    position : (N, n) float64
-        q of the same rows [rad or m]
+    `rows`: (N,) int64, row of each value within the recording; `effort`: (N, n), in the recording's own unit;
+    `position`: (N, n), q of the same rows [rad or m].
     """
     if len(scales) < 2 or not any(0 < scale.run <= USUAL_RUN * scale.hold for scale in scales):
         return NO_NUMBERS
@@ -97,12 +82,7 @@ def _find_stuck_rows(rows: Numbers, same: NDArray[np.bool_], position: Array, le
 def find_spikes(rows: Numbers, effort: Array, scale: EffortScale) -> Numbers:
     """Rows of a block in which one joint's effort is far from all of its neighbours.
 
-    Parameters
-    ----------
-    rows : (N,) int64
-        row of each value within the recording
-    effort : (N,) float64
-        in the recording's own unit, finite
+    `rows`: (N,) int64, row of each value within the recording; `effort`: (N,), in the recording's own unit, finite.
     """
     if scale.hold > 1:  # a held spike is as wide as the hold: one row of each run is judged, for all of them
         firsts = np.flatnonzero(is_new(effort))
@@ -127,12 +107,6 @@ def find_spikes(rows: Numbers, effort: Array, scale: EffortScale) -> Numbers:
 
 
 def is_moving(position: Array) -> bool:
-    """Whether any joint moves within some rows.
-
-    Parameters
-    ----------
-    position : (N, n) float64
-        q [rad or m]
-    """
+    """Whether any joint moves within some rows. `position`: (N, n), q [rad or m]."""
     low, high = np.fmin.reduce(position, axis=0), np.fmax.reduce(position, axis=0)
     return bool((high - low > LEAST_MOVE).any())

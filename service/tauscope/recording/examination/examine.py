@@ -1,14 +1,17 @@
 """One way from a file to a recording that can be trusted, for every verb."""
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from tauscope.errors import RecordingError
 from tauscope.recording.columns import table_columns
-from tauscope.recording.examination.mending import mend_recording
+from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, EditedTable, Numbers
 from tauscope.recording.examination.plausibility import find_implausible
+from tauscope.recording.examination.scan import Defects, JointDefects, find_defects
 from tauscope.recording.examination.sketch import BLOCK_ROWS, joint_types
 from tauscope.recording.link_encoders import link_warnings
 from tauscope.recording.reading import read_recording
@@ -18,16 +21,114 @@ from tauscope.recording.units import SI, Reading
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.robot import Robot
 
+FILLED_ROWS = 4
+"""Rows without an effort that are filled in where positions and efforts come in rows of their own."""
+
+BUS = "check the bus for lost reads and damaged frames"
+
+
+def mend_recording(recording: Recording, robot: Robot | None = None) -> Recording:
+    """Mask or repair the samples of a recording that were never measured, and say so in its notes."""
+    names = [None] * recording.joint_count if robot is None else [joint.name for joint in robot.joints]
+    defects = find_defects(recording, joint_types(recording, robot))
+    edits = _build_edits(recording, defects)
+    if not edits:
+        return recording
+    notes = (*recording.notes, *_describe_defects(recording, defects, names))
+    return replace(recording, table=EditedTable(recording.table, edits), notes=notes)
+
+
+def _build_edits(recording: Recording, defects: Defects) -> dict[int, ColumnEdit]:
+    """Edits by column."""
+    edits: dict[int, ColumnEdit] = {}
+    n = recording.joint_count
+    for joint, found in enumerate(defects.joints):
+        # A row without one joint's position is left out as a whole.
+        position = found.position_edit(len(recording), defects.bunched if joint == 0 else NO_NUMBERS)
+        if len(position.blank) or len(position.jumps):
+            edits[1 + joint] = position
+        if recording.effort_kind is EffortKind.COMMAND:  # targets may rest, jump and repeat
+            continue
+        hold = found.effort_hold if found.effort_hold > 1 else 0
+        effort = ColumnEdit(found.lost_efforts, hold=hold, fill=FILLED_ROWS if defects.alternate else 0)
+        if len(effort.blank) or effort.hold or effort.fill:
+            edits[1 + n + joint] = effort
+    return edits
+
+
+def _describe_defects(recording: Recording, defects: Defects, joints: Sequence[str | None]) -> Iterator[ResultWarning]:
+    """A warning about each kind of defect of each joint."""
+
+    def begin(row: int) -> str:
+        return f"first at t = {recording.samples(row, row + 1).time[0]:.6g} s"
+
+    if len(defects.bunched):
+        text = f"column t: {_count(defects.bunched)} within a tenth of an interval of another row"
+        remedy = "stamp samples when they are measured, not when a buffer is emptied"
+        yield ResultWarning(
+            code="time-stamps", text=f"{text}, {begin(int(defects.bunched[0]))}; left out", remedy=remedy
+        )
+    if defects.alternate and recording.effort_kind is not EffortKind.COMMAND:
+        text = "positions and efforts stand in rows of their own; efforts are interpolated to the rows of the positions"
+        yield ResultWarning(code="held-samples", text=text, remedy="record both at the same instants")
+    kind = recording.effort_kind.value
+    alike: dict[tuple[str, str, str | None], list[int]] = {}
+    for number, joint in enumerate(defects.joints, 1):
+        for column, code, text, remedy in _describe_joint(joint, begin):
+            if column == "effort" and recording.effort_kind is EffortKind.COMMAND:
+                continue
+            alike.setdefault((code, f"{column}: {text}", remedy), []).append(number)
+    for (code, text, remedy), numbers in alike.items():
+        group, _, words = text.partition(": ")
+        columns = [f"{kind if group == 'effort' else 'q'}{number}" for number in numbers]
+        many = "column" if len(columns) == 1 else "columns"
+        joint = joints[numbers[0] - 1] if len(numbers) == 1 else None
+        yield ResultWarning(code=code, joint=joint, text=f"{many} {', '.join(columns)}: {words}", remedy=remedy)
+
+
+def _describe_joint(
+    joint: JointDefects, begin: Callable[[int], str]
+) -> Iterator[tuple[Literal["q", "effort"], str, str, str | None]]:
+    """Column, code, text and remedy of each kind of defect of one joint."""
+    if joint.wraps:
+        first, times = min(joint.wraps)[0], "once" if len(joint.wraps) == 1 else f"{len(joint.wraps)} times"
+        yield "q", "wrapped-angle", f"wraps by 2π {times}, {begin(first)}; unwrapped", None
+    if joint.jumps:
+        jumps = sorted(joint.jumps)
+        heights = ", ".join(f"{step:.4g}" for _, step in jumps[:3]) + (", …" if len(jumps) > 3 else "")
+        text = f"jumps by {heights}, {begin(jumps[0][0])}; taken out, the longest piece is kept as it is"
+        yield "q", "encoder-reset", text, "home the encoder before the recording, and not within it"
+    slow = "record at the rate of the controller"
+    if len(repeated := joint.rows["repeated"]):
+        text = f"each value is held for about {joint.hold} rows; {_count(repeated)} masked"
+        yield "q", "held-samples", text, slow
+    if joint.effort_hold > 1:
+        text = f"each value is held for about {joint.effort_hold} rows; interpolated from change to change"
+        yield "effort", "held-samples", text, slow
+    masked: tuple[tuple[Literal["q", "effort"], str, str, str], ...] = (
+        ("q", "spikes", "spikes", "away from the neighbours by a jump and back"),
+        ("q", "stuck-samples", "frozen", "with a repeated value that the next one makes up for"),
+        ("effort", "effort-dropouts", "zeros", "of exactly zero between others that are not"),
+        ("effort", "stuck-samples", "stuck", "with a repeated value while the arm moves"),
+        ("effort", "spikes", "effort_spikes", "far from all of their neighbours"),
+    )
+    for column, code, kind, words in masked:
+        if len(rows := joint.rows[kind]):
+            yield column, code, f"{_count(rows)} {words}, {begin(int(rows[0]))}; masked", BUS
+
+
+def _count(rows: Numbers) -> str:
+    """A count of rows in words."""
+    return "1 row" if len(rows) == 1 else f"{len(rows)} rows"
+
+
 TRUST = "go on with --trust-units"
 
 
 def open_recording(path: str | Path, robot: Robot | None = None, reading: Reading = SI) -> Recording:
     """Read a recording, convert its units, and examine it.
 
-    Raises
-    ------
-    RecordingError
-        the file cannot be read, a column can hardly be in its unit, or a joint has no effort
+    Raises RecordingError where the file cannot be read, a column can hardly be in its unit, or a joint has no effort.
     """
     reading = reading.for_robot(robot)
     joints = None if robot is None else [joint.name for joint in robot.joints]
@@ -37,10 +138,7 @@ def open_recording(path: str | Path, robot: Robot | None = None, reading: Readin
 def examine_recording(recording: Recording, robot: Robot | None = None, *, trust_units: bool = False) -> Recording:
     """Examine a recording, and mend its samples; an examined one is returned as it is.
 
-    Raises
-    ------
-    RecordingError
-        a column can hardly be in its unit, or a joint has no effort
+    Raises RecordingError where a column can hardly be in its unit, or a joint has no effort.
     """
     if recording.is_examined:
         return recording

@@ -184,7 +184,7 @@ def _doubt_angle(sketch: Sketch, types: list[JointType], robot: Robot | None) ->
         return _doubt(f"q{joint + 1}", text)
     revolute = np.array([kind is JointType.REVOLUTE for kind in types])
     for kind, unit, factor in ((revolute, "deg", np.pi / 180.0), (~revolute, "mm", 1e-3)):
-        found = _beyond_limits(sketch, kind, factor, robot)
+        found = _find_beyond_limits(sketch, kind, factor, robot)
         if found is not None:
             joint, text = found
             return _doubt(f"q{joint + 1}", text, f"q={unit}")
@@ -209,7 +209,7 @@ def _doubt_angle(sketch: Sketch, types: list[JointType], robot: Robot | None) ->
     return None
 
 
-def _beyond_limits(sketch: Sketch, kind: np.ndarray, factor: float, robot: Robot | None) -> tuple[int, str] | None:
+def _find_beyond_limits(sketch: Sketch, kind: np.ndarray, factor: float, robot: Robot | None) -> tuple[int, str] | None:
     """A joint that is beyond its limits most of the time, where another unit would keep all joints within theirs."""
     limits = [None if robot is None else joint.limits.position for joint in robot.joints] if robot else []
     beyond, judged = [], 0

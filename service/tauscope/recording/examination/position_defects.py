@@ -50,18 +50,11 @@ def scan_position(
 ) -> Iterator[PositionDefect]:
     """Defects of a block of one joint's known positions.
 
-    Parameters
-    ----------
-    rows : (N,) int64
-        row of each value within the recording
-    time : (N,) float64
-        stamps [s]
-    position : (N,) float64
-        q [rad or m], finite
-    interval : float
-        longest usual time from row to row [s]
-    core : (int, int)
-        rows that this block answers for; the others are neighbours
+    `rows`: (N,) int64, row of each value within the recording.
+    `time`: (N,), stamps [s].
+    `position`: (N,), q [rad or m], finite.
+    `interval`: longest usual time from row to row [s].
+    `core`: (int, int), rows that this block answers for; the others are neighbours.
     """
     if len(position) < 8:
         return
@@ -106,10 +99,7 @@ def _returns(surprise: Array, a: int, b: int) -> bool:
 def _count_frozen(steps: Array, calm: Array, k: int) -> int:
     """Repeated rows before a step that makes up for them; 0 where it does not.
 
-    Parameters
-    ----------
-    calm : (N,) float64
-        the steps without jumps, from which speeds are taken [rad or m]
+    `calm`: (N,), the steps without jumps, from which speeds are taken [rad or m].
     """
     before, after = np.flatnonzero(steps[:k])[-CHANGES:], k + 1 + np.flatnonzero(steps[k + 1 :])[:CHANGES]
     if not len(before) or not len(after) or before[-1] == k - 1:

@@ -40,14 +40,10 @@ NEIGHBOURS = 3
 class PositionScale:
     """Typical steps of one joint's position.
 
-    step : float
-        encoder's step, or the least noise [rad or m]
-    move : float
-        95th percentile of the change from row to row, while the joint moves [rad or m]
-    surprise : float
-        90th percentile of the change beyond what the neighbours foretell, while the joint moves [rad or m]
-    hold : int
-        rows for which the source holds a value; 1 where it does not
+    `step`: encoder's step, or the least noise [rad or m].
+    `move`: 95th percentile of the change from row to row, while the joint moves [rad or m].
+    `surprise`: 90th percentile of the change beyond what the neighbours foretell, while the joint moves [rad or m].
+    `hold`: rows for which the source holds a value; 1 where it does not.
     """
 
     is_wrapped: bool
@@ -61,16 +57,11 @@ class PositionScale:
 class EffortScale:
     """Typical steps of one joint's effort, in its own unit.
 
-    low, high : float
-        1st and 99th percentile
-    span : float
-        from the 5th to the 95th percentile
-    change : float
-        90th percentile of the change from row to row
-    surprise : float
-        95th percentile of the distance beyond the range of the neighbours
-    run : int
-        99th percentile of the rows for which a value is repeated
+    `low`, `high`: 1st and 99th percentile.
+    `span`: from the 5th to the 95th percentile.
+    `change`: 90th percentile of the change from row to row.
+    `surprise`: 95th percentile of the distance beyond the range of the neighbours.
+    `run`: 99th percentile of the rows for which a value is repeated.
     """
 
     low: float
@@ -123,13 +114,7 @@ def measure_efforts(sketch: Sketch) -> list[EffortScale]:
 
 
 def unwrap_steps(steps: Array, *, is_wrapped: bool) -> Array:
-    """Steps of an angle without the turn that a wrap adds.
-
-    Parameters
-    ----------
-    steps : (N,) float64
-        changes from row to row [rad]
-    """
+    """Steps of an angle without the turn that a wrap adds. `steps`: (N,), changes from row to row [rad]."""
     if not is_wrapped:
         return steps
     is_wrap = np.abs(np.abs(steps) - ONE_TURN) < LARGEST_STEP  # two turns at once are a spike
@@ -137,37 +122,19 @@ def unwrap_steps(steps: Array, *, is_wrapped: bool) -> Array:
 
 
 def is_new(values: Array) -> NDArray[np.bool_]:
-    """Whether a value is another than the one before, (N,).
-
-    Parameters
-    ----------
-    values : (N,) float64
-        a signal
-    """
+    """Whether a value is another than the one before, (N,). `values`: (N,), a signal."""
     return np.diff(values, prepend=np.nan) != 0.0
 
 
 def neighbours_median(values: Array) -> Array:
-    """Median of the seven values around each one, (N,); the ends are repeated.
-
-    Parameters
-    ----------
-    values : (N,) float64
-        a signal
-    """
+    """Median of the seven values around each one, (N,); the ends are repeated. `values`: (N,), a signal."""
     from scipy.ndimage import median_filter  # slow to import, and a control process reads no recordings
 
     return median_filter(values, size=2 * NEIGHBOURS + 1, mode="nearest")
 
 
 def neighbour_windows(values: Array) -> Array:
-    """Each value with its neighbours, (N, 7), mirrored at the ends.
-
-    Parameters
-    ----------
-    values : (N,) float64
-        a signal
-    """
+    """Each value with its neighbours, (N, 7), mirrored at the ends. `values`: (N,), a signal."""
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, NEIGHBOURS, mode="reflect"), 2 * NEIGHBOURS + 1)
 
 
@@ -176,10 +143,7 @@ def distance_beyond(windows: Array) -> Array:
 
     The range leaves the highest and the lowest neighbour out, which may be a spike, too. A step lies within it.
 
-    Parameters
-    ----------
-    windows : (N, 7) float64
-        values and their neighbours
+    `windows`: (N, 7), values and their neighbours.
     """
     values = windows[:, NEIGHBOURS]
     others = np.sort(np.delete(windows, NEIGHBOURS, axis=1), axis=1)

@@ -40,12 +40,10 @@ REST_HOLDS = 4
 class JointDefects:
     """Defects of one joint's samples.
 
-    hold, effort_hold : int
-        rows for which position, effort are held; 1 where they are not
-    rows : dict of str to (m,) int64
-        rows, ascending: spikes, frozen, repeated of positions, zeros, stuck, effort_spikes of efforts
-    jumps, wraps : list of (int, float)
-        first row behind a jump, and its height [rad or m]
+    `hold`, `effort_hold`: rows for which position, effort are held; 1 where they are not.
+    `rows`: dict of str to (m,) int64, rows, ascending: spikes, frozen, repeated of positions, zeros, stuck,
+        effort_spikes of efforts.
+    `jumps`, `wraps`: list of (int, float), first row behind a jump, and its height [rad or m].
     """
 
     hold: int
@@ -57,10 +55,7 @@ class JointDefects:
     def position_edit(self, count: int, lost: Numbers) -> ColumnEdit:
         """Edit of the position of a recording of `count` rows: jumps are relative to the longest piece.
 
-        Parameters
-        ----------
-        lost : (m,) int64
-            further rows to be masked
+        `lost`: (m,) int64, further rows to be masked.
         """
         where, offsets = NO_NUMBERS, np.empty(0)
         if self.jumps or self.wraps:
@@ -82,10 +77,8 @@ class JointDefects:
 class Defects:
     """Defects of a recording's samples.
 
-    bunched : (m,) int64
-        rows whose stamp is that of a neighbour
-    alternate : bool
-        whether positions and efforts come in rows of their own
+    `bunched`: (m,) int64, rows whose stamp is that of a neighbour.
+    `alternate`: whether positions and efforts come in rows of their own.
     """
 
     joints: list[JointDefects]
@@ -96,10 +89,7 @@ class Defects:
 def find_defects(recording: Recording, types: list[JointType]) -> Defects:
     """Find a recording's defects in memory that grows with their number only.
 
-    Parameters
-    ----------
-    types : list of JointType
-        of the joints: only revolute ones wrap
+    `types`: of the joints: only revolute ones wrap.
     """
     sketch = Sketch.of(recording)
     positions, efforts = measure_positions(sketch, types), measure_efforts(sketch)
@@ -183,10 +173,7 @@ class _Scan:
 def _sum_jumps(jumps: list[tuple[int, float]], where: Numbers, count: int) -> Array:
     """Offset from each of some rows on, (m,): the sum of the jumps up to there, 0 in the longest piece between them.
 
-    Parameters
-    ----------
-    where : (m,) int64
-        rows, ascending
+    `where`: (m,) int64, rows, ascending.
     """
     ordered = sorted(jumps)
     starts = np.array([0, *(row for row, _ in ordered)], dtype=np.int64)

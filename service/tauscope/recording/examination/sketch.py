@@ -120,12 +120,7 @@ def joint_types(recording: Recording, robot: Robot | None) -> list[JointType]:
 def percentile(values: Array, share: float) -> Array:
     """Percentile of every column's finite values, (n,); 0 where there are none.
 
-    Parameters
-    ----------
-    values : (N, n) float64
-        columns
-    share : float
-        percentile, 0 to 100
+    `values`: (N, n), columns; `share`: percentile, 0 to 100.
     """
     few = values[:: max(1, len(values) // RANKED_ROWS)]
     known = [column[np.isfinite(column)] for column in few.T]

@@ -24,14 +24,10 @@ LONGEST_NAME = 200
 class Family:
     """Columns of one quantity, one a joint.
 
-    template : str
-        name of the columns with a placeholder for the joint
-    columns : tuple of str
-        columns in the order of the joints: by number, of the robot, or of the file
-    is_regular : bool
-        whether the template gives the columns; zeros in front of a number it does not
-    is_guessed : bool
-        whether the joints' names are any part of the columns' names
+    `template`: name of the columns with a placeholder for the joint.
+    `columns`: columns in the order of the joints: by number, of the robot, or of the file.
+    `is_regular`: whether the template gives the columns; zeros in front of a number it does not.
+    `is_guessed`: whether the joints' names are any part of the columns' names.
     """
 
     template: str
@@ -53,20 +49,14 @@ def words_of(text: str) -> tuple[str, ...]:
 def find_families(header: Sequence[str], joint_names: Sequence[str] | None) -> list[Family]:
     """Families of a header: named by the robot's joints, numbered, or named by any word; one joint has no number."""
     header = [name for name in header if len(name) <= LONGEST_NAME]
-    named = _named_by(header, joint_names or ())
+    named = _find_named_families(header, joint_names or ())
     has_one = joint_names is None or len(joint_names) == 1
     single = [Family(name, (name,), is_guessed=True) for name in header if has_one and not _NUMBER.search(name)]
-    return [*named, *_find_numbered(header), *([] if named else _named_by_segments(header)), *single]
+    return [*named, *_find_numbered(header), *([] if named else _find_segment_families(header)), *single]
 
 
 def fill_template(template: str, index: int, name: str | None) -> str:
-    """The column of a joint.
-
-    Parameters
-    ----------
-    index : int
-        counted from 0
-    """
+    """The column of a joint. `index`: counted from 0."""
     filled = template.replace(FROM_ZERO, str(index)).replace(FROM_ONE, str(index + 1))
     return filled if name is None else filled.replace(BY_NAME, name)
 
@@ -95,7 +85,7 @@ def _find_numbered(header: Sequence[str]) -> list[Family]:
     return found
 
 
-def _named_by(header: Sequence[str], joint_names: Sequence[str]) -> list[Family]:
+def _find_named_families(header: Sequence[str], joint_names: Sequence[str]) -> list[Family]:
     """Families that name every joint of the robot."""
     patterns = {
         name: re.compile(f"(?<![A-Za-z0-9]){re.escape(name)}(?![A-Za-z0-9])")
@@ -115,7 +105,7 @@ def _named_by(header: Sequence[str], joint_names: Sequence[str]) -> list[Family]
     ]
 
 
-def _named_by_segments(header: Sequence[str]) -> list[Family]:
+def _find_segment_families(header: Sequence[str]) -> list[Family]:
     """Families in which one segment is the joint: ``/states/elbow/position``, ``effort[elbow]``, ``elbow_pos``."""
     groups: dict[str, dict[str, str]] = {}
     for column in header:

@@ -26,14 +26,8 @@ def guess_layout(
 ) -> RecordingLayout | None:
     """The layout of a header; None where positions, efforts or commands, or the time are not among them.
 
-    Parameters
-    ----------
-    joint_names : sequence of str or None
-        of the robot
-    preset : str or None
-        tool that wrote the file; None for any
-    prefers_torque : bool
-        whether commanded torques go before currents, because no torque constant is known
+    `joint_names`: of the robot; `preset`: tool that wrote the file; None for any; `prefers_torque`: whether commanded
+    torques go before currents, because no torque constant is known.
     """
     found = guess_parts(header, joint_names, preset=preset, prefers_torque=prefers_torque)
     columns = found.columns if isinstance(found.columns, Mapping) else {}

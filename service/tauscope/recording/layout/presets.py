@@ -8,10 +8,8 @@ from dataclasses import dataclass, field
 class Preset:
     """How one tool names its columns.
 
-    columns : mapping of str to tuple of str
-        by group of CONTRACT.md, ends of the columns' names without the joint, their words joined by ``_``
-    units : mapping of str to str
-        as in a robot file
+    `columns`: by group of CONTRACT.md, ends of the columns' names without the joint, their words joined by ``_``.
+    `units`: as in a robot file.
     """
 
     columns: Mapping[str, tuple[str, ...]]

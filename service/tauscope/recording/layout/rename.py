@@ -10,7 +10,7 @@ from tauscope.recording.layout.families import BY_NAME, PLACEHOLDERS, fill_templ
 from tauscope.recording.layout.guess import guess_layout, guess_parts, layout_text
 from tauscope.recording.layout.presets import PRESET_OF
 from tauscope.recording.units import Reading
-from tauscope.recording.words import listed, printable
+from tauscope.robot.messages import listed, printable
 from tauscope.robot.recording_layout import RecordingLayout, Source
 
 _TARGET = re.compile(r"([a-z]+)([0-9]*)")
@@ -23,12 +23,8 @@ _EFFORTS = ("tau", "i")
 def rename_columns(header: Sequence[str], reading: Reading, file: str) -> list[str]:
     """The header with the names of CONTRACT.md.
 
-    Raises
-    ------
-    RecordingError
-        the file has no column of a name that the mapping states
-    RecordingMismatchError
-        it names other joints than the robot, or numbers more of them
+    Raises RecordingError where the file has no column of a name that the mapping states. Raises RecordingMismatchError
+    where it names other joints than the robot, or numbers more of them.
     """
     columns = reading.columns
     if columns is None:

@@ -27,13 +27,7 @@ GENESIS = "0" * 64
 
 
 def chained_line(previous: Mapping[str, Any] | None, content: Mapping[str, Any]) -> bytes:
-    """The line that follows another one.
-
-    Parameters
-    ----------
-    previous : mapping or None
-        the entry before; None for the first
-    """
+    """The line that follows another one. `previous`: the entry before; None for the first."""
     entry = {
         "number": 1 if previous is None else previous["number"] + 1,
         **content,
@@ -46,10 +40,8 @@ def chained_line(previous: Mapping[str, Any] | None, content: Mapping[str, Any])
 class Verification:
     """What a log is worth.
 
-    head : str or None
-        hash of the last one; None where there is none
-    fault : str or None
-        the first thing that is wrong, one line; None where nothing is
+    `head`: hash of the last one; None where there is none.
+    `fault`: the first thing that is wrong, one line; None where nothing is.
     """
 
     entries: int
@@ -141,23 +133,11 @@ class AuditLog:
         self._clock = clock
 
     def append(self, actor: str, action: str, **details: Any) -> None:
-        """Add an entry; it is on the disk when this returns.
-
-        Raises
-        ------
-        OSError
-            if it cannot be written
-        """
+        """Add an entry; it is on the disk when this returns. Raises OSError if it cannot be written."""
         self._append(self._content(actor, action, details))
 
     def verify(self, noted: str | None = None) -> Verification:
-        """Check the whole log.
-
-        Raises
-        ------
-        NotFoundError
-            if there is no log
-        """
+        """Check the whole log. Raises NotFoundError if there is no log."""
         try:
             with self.path.open("rb") as file:
                 return verify_lines(file, noted)

@@ -25,24 +25,12 @@ class RateLimit:
     """Token buckets. Used by the event loop only, so that it needs no lock."""
 
     def __init__(self, per_second: float, burst: float, clock: Callable[[], float] = time.monotonic) -> None:
-        """Begin with full buckets.
-
-        Parameters
-        ----------
-        per_second : float
-            how often a caller may call in the long run [1/s]
-        """
+        """Begin with full buckets. `per_second`: how often a caller may call in the long run [1/s]."""
         self._rate, self._burst, self._clock = per_second, burst, clock
         self._buckets: OrderedDict[str, tuple[float, float]] = OrderedDict()
 
     def take(self, caller: str) -> float:
-        """Count a call.
-
-        Returns
-        -------
-        float
-            0 where the call may pass; else the time after which the next one may [s]
-        """
+        """Count a call. Returns float: 0 where the call may pass; else the time after which the next one may [s]."""
         now = self._clock()
         tokens, then = self._buckets.pop(caller, (self._burst, now))
         tokens = min(self._burst, tokens + (now - then) * self._rate)
@@ -148,15 +136,9 @@ def _key(headers: Headers) -> str | None:
 def require_upload_quota(scope: AsgiScope) -> Callable[[int], None]:
     """Refuse an upload of a caller who has sent enough for now.
 
-    Returns
-    -------
-    callable
-        counts what is sent [bytes]
+    Raises ProblemError if the caller has to wait.
 
-    Raises
-    ------
-    ProblemError
-        if the caller has to wait
+    Returns callable: counts what is sent [bytes].
     """
     access, caller = cast(Access, scope["app"].state.services.access), find_caller(scope)
     quota, key = access.uploads, caller.key or caller.name

@@ -68,10 +68,7 @@ class KeyFile:
     def read(self) -> tuple[ApiKey, ...]:
         """All keys ever made, revoked ones too; none where there is no file.
 
-        Raises
-        ------
-        TauscopeError
-            if the file is damaged or cannot be read
+        Raises TauscopeError if the file is damaged or cannot be read.
         """
         try:
             return _KeyList.model_validate_json(self.path.read_bytes()).keys
@@ -90,13 +87,7 @@ class KeyFile:
         return status.st_mtime_ns, status.st_size, status.st_ino
 
     def add(self, name: str, scope: Scope, now: datetime, life: timedelta | None) -> tuple[ApiKey, str]:
-        """Make a key.
-
-        Raises
-        ------
-        TauscopeError
-            if the name is in use, or none
-        """
+        """Make a key. Raises TauscopeError if the name is in use, or none."""
         if not (name.isprintable() and 0 < len(name.strip()) <= 100):
             raise TauscopeError(one_line(f"name {shown(name)}: give 1 to 100 printable characters"))
         secret, salt = secrets.token_urlsafe(32), secrets.token_hex(16)
@@ -106,7 +97,7 @@ class KeyFile:
             name=name,
             scope=scope,
             salt=salt,
-            hash=_hashed(salt, secret),
+            hash=_hash(salt, secret),
             created=now,
             expires=expires,
         )
@@ -117,13 +108,7 @@ class KeyFile:
         return key, f"{_PREFIX}_{key.id}_{secret}"
 
     def revoke(self, name: str, now: datetime) -> ApiKey:
-        """Take a key back; a service that runs knows within seconds.
-
-        Raises
-        ------
-        TauscopeError
-            if there is no such key
-        """
+        """Take a key back; a service that runs knows within seconds. Raises TauscopeError if there is no such key."""
         with self._changing() as keys:
             for place, key in enumerate(keys):
                 if name in (key.name, key.id) and key.revoked is None:
@@ -151,7 +136,7 @@ def match_key(keys: tuple[ApiKey, ...], text: str) -> ApiKey | None:
     identifier, _, secret = rest.partition("_")
     found = next((key for key in keys if key.id == identifier), None)
     salt, expected = (_NOBODY[:32], _NOBODY) if found is None else (found.salt, found.hash)
-    is_right = hmac.compare_digest(_hashed(salt, secret), expected)
+    is_right = hmac.compare_digest(_hash(salt, secret), expected)
     return found if is_right and prefix == _PREFIX else None
 
 
@@ -160,7 +145,7 @@ def utc_now() -> datetime:
     return datetime.now(UTC)
 
 
-def _hashed(salt: str, secret: str) -> str:
+def _hash(salt: str, secret: str) -> str:
     """What is kept of a secret."""
     return hashlib.sha256(bytes.fromhex(salt) + secret.encode("utf-8", "surrogatepass")).hexdigest()
 
@@ -192,13 +177,7 @@ class KeyRing:
     """
 
     def __init__(self, file: KeyFile, *, is_required: bool, clock: Callable[[], datetime] = utc_now) -> None:
-        """Read the keys.
-
-        Raises
-        ------
-        TauscopeError
-            if the file is damaged
-        """
+        """Read the keys. Raises TauscopeError if the file is damaged."""
         self._file, self._clock = file, clock
         self._is_required = is_required
         self._stamp = file.stamp()
@@ -233,11 +212,11 @@ class KeyRing:
             stamp = self._file.stamp()
             if stamp != self._stamp:
                 keys = self._file.read()
-                self._keys, self._stamp = keys or self._revoked(), stamp
+                self._keys, self._stamp = keys or self._revoke_all(), stamp
         except (TauscopeError, OSError):
             _log.exception("the API keys could not be read again; those known so far count")
 
-    def _revoked(self) -> tuple[ApiKey, ...]:
+    def _revoke_all(self) -> tuple[ApiKey, ...]:
         """All known keys as revoked: their file was taken away."""
         return tuple(key.model_copy(update={"revoked": key.revoked or self._clock()}) for key in self._keys)
 

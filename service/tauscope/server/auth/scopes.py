@@ -25,13 +25,7 @@ class Scope(StrEnum):
 
 
 def parse_scope(text: str) -> Scope:
-    """The scope of a name.
-
-    Raises
-    ------
-    TauscopeError
-        if there is none of that name
-    """
+    """The scope of a name. Raises TauscopeError if there is none of that name."""
     try:
         return Scope(text)
     except ValueError:
@@ -49,7 +43,7 @@ _RULES: tuple[tuple[str, re.Pattern[str], Scope], ...] = tuple(
         ("POST", "stop", Scope.READ),
         ("POST", f"(runs|campaigns)/{_ITEM}/stop", Scope.READ),
         ("POST", "(robots|mappings)/check", Scope.ANALYSE),
-        ("POST", "recordings", Scope.ANALYSE),
+        ("POST", "(recordings|robots)", Scope.ANALYSE),
         ("POST", _ANALYSES, Scope.ANALYSE),
         ("DELETE", f"{_ANALYSES}/{_ITEM}", Scope.ANALYSE),
         ("POST", f"events/{_ITEM}/acknowledge", Scope.ANALYSE),
@@ -57,7 +51,7 @@ _RULES: tuple[tuple[str, re.Pattern[str], Scope], ...] = tuple(
         ("POST", "(runs|campaigns|leases)", Scope.MOVE),
         ("POST", f"leases/{_ITEM}/(heartbeat|arm|disarm)", Scope.MOVE),
         ("DELETE", f"leases/{_ITEM}", Scope.MOVE),
-        ("DELETE", f"(recordings|runs|campaigns|schedules)/{_ITEM}", Scope.ADMIN),
+        ("DELETE", f"(recordings|robots/versions|runs|campaigns|schedules)/{_ITEM}", Scope.ADMIN),
         # What is compared with, and what moves at night, is the operator's to decide.
         ("POST", f"models/{_ITEM}/(activate|make-reference)", Scope.ADMIN),
         ("PUT", f"model-policy|schedules/{_ITEM}", Scope.ADMIN),

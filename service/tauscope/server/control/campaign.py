@@ -5,8 +5,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from tauscope.server.queue.stored import read_stored, write_stored
-from tauscope.server.queue.workspace import Workspace
+from tauscope.server.queue.job_folder import Workspace, read_stored, write_stored
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.campaign import CampaignOptions
 from tauscope.tasks.run import BackendChoice

@@ -29,12 +29,8 @@ class CampaignManager(Manager[CampaignRunner]):
     def submit(self, staged: Path, permit: Permit = FREE) -> str:
         """Start a campaign; it claims the arm until its motions are done.
 
-        Raises
-        ------
-        BusyError
-            if somebody else has the arm; the folder stays staged
-        LeaseError
-            if the arm may not be moved by that leave; the folder stays staged
+        Raises BusyError if somebody else has the arm; the folder stays staged. Raises LeaseError if the arm may not be
+        moved by that leave; the folder stays staged.
         """
         workspace = CampaignWorkspace(staged)
         order = workspace.read_order()
@@ -61,10 +57,7 @@ class CampaignManager(Manager[CampaignRunner]):
     def stop(self, identifier: str) -> JobState | None:
         """Stop a campaign: takes no lock, waits for nothing, may be called any number of times.
 
-        Returns
-        -------
-        JobState or None
-            where the campaign stood; None where nothing of it goes on
+        Returns JobState or None: where the campaign stood; None where nothing of it goes on.
         """
         runner = self._threads.find(identifier)
         if runner is None:

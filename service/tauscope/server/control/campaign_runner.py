@@ -24,9 +24,14 @@ from tauscope.server.control.motions import (
 )
 from tauscope.server.control.run import RunRequestRecord, RunWorkspace
 from tauscope.server.control.run_manager import RunManager, run_recording_name
-from tauscope.server.queue.diagnosis import DiagnosisOrder, DiagnosisWorkspace
+from tauscope.server.queue.analyses import (
+    DiagnosisOrder,
+    DiagnosisWorkspace,
+    IdentificationOrder,
+    IdentificationWorkspace,
+)
 from tauscope.server.queue.excitation import ExcitationOrder, ExcitationWorkspace
-from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace
+from tauscope.server.queue.job_folder import StoppedError, Workspace
 from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, JobKind, JobQueue, QueueFullError
 from tauscope.server.queue.record import JobProblem, JobState
 from tauscope.server.queue.task_job import (
@@ -36,8 +41,6 @@ from tauscope.server.queue.task_job import (
     staged_workspace,
     submit_job,
 )
-from tauscope.server.queue.work import StoppedError
-from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.tasks.campaign import backend_of_run
 from tauscope.tasks.design_excitation import ExcitationDesignOptions

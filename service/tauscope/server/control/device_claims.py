@@ -19,13 +19,7 @@ class DeviceClaims:
         self._holders: dict[str, str] = {}
 
     def take(self, device: str, holder: str) -> None:
-        """Take an arm.
-
-        Raises
-        ------
-        BusyError
-            if somebody else has it, or as many arms are held as are allowed
-        """
+        """Take an arm. Raises BusyError if somebody else has it, or as many arms are held as are allowed."""
         with self._lock:
             present = self._holders.get(device)
             if present is not None and present != holder:
@@ -37,10 +31,7 @@ class DeviceClaims:
     def require_free(self, device: str) -> None:
         """Say at once that somebody has an arm, before work is begun for whoever wants it.
 
-        Raises
-        ------
-        BusyError
-            if somebody has it
+        Raises BusyError if somebody has it.
         """
         holder = self._holders.get(device)
         if holder is not None:

@@ -16,10 +16,7 @@ def find_objection(data_folder: Path, name: str, robot: str, device: str) -> str
 
     Only programs in the folder are called, never a command that came over the network.
 
-    Returns
-    -------
-    str or None
-        one line: why it is not free; None where it is
+    Returns str or None: one line: why it is not free; None where it is.
     """
     path = data_folder / FOLDER / name
     fault = _fault(path)

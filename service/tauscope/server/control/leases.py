@@ -1,7 +1,7 @@
-"""Who controls which arm: exclusive leases that expire unless renewed, numbered for fencing, and permits to move.
+"""Who controls which arm: exclusive leases that expire unless renewed, and permits to move.
 
-A lease holds while the clock is before its end; no thread has to be alive for it to expire. Its number is higher than
-that of every lease before it, also after a restart, so that a former holder is never taken for the present one.
+A lease holds while the clock is before its end; no thread has to be alive for it to expire. Its secret is drawn anew:
+a former holder is never taken for the present one.
 """
 
 import hmac
@@ -10,13 +10,12 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from itertools import count
 from typing import Protocol
 
 from typing_extensions import override
 
 from tauscope.errors import AcquisitionError
-from tauscope.files import write_atomically
 from tauscope.robot.messages import one_line
 from tauscope.server.control.device_claims import DeviceClaims
 
@@ -25,13 +24,7 @@ class Permit(Protocol):
     """Somebody's leave to move one arm. Every method takes no lock, touches no disk and returns at once."""
 
     def require(self) -> None:
-        """Refuse a motion that may not begin.
-
-        Raises
-        ------
-        LeaseError
-            if it may not
-        """
+        """Refuse a motion that may not begin. Raises LeaseError if it may not."""
         ...
 
     def find_end_reason(self) -> str | None:
@@ -91,10 +84,8 @@ class Lease:
 
     Attributes are replaced one at a time and never need a lock to be read.
 
-    ttl_s : float
-        how long it lasts without a sign of life [s]
-    ends : float
-        when it ends, on the clock of `Leases` [s]
+    `ttl_s`: how long it lasts without a sign of life [s].
+    `ends`: when it ends, on the clock of `Leases` [s].
     """
 
     id: str
@@ -112,19 +103,6 @@ class Lease:
     def token(self) -> str:
         """What its holder shows."""
         return f"{self.number}-{self.secret}"
-
-
-def next_number(counter: Path) -> int:
-    """A number above all before, kept before it is used."""
-    try:
-        last = int(counter.read_text(encoding="ascii"))
-    except FileNotFoundError:
-        last = 0
-    except (OSError, ValueError):
-        # The seconds of our era are more than any number that was counted one by one.
-        last = int(time.time())
-    write_atomically(counter, str(last + 1).encode())
-    return last + 1
 
 
 class LeasePermit:
@@ -176,12 +154,11 @@ class Leases:
     def __init__(
         self,
         claims: DeviceClaims,
-        counter: Path,
         *,
         clock: Callable[[], float] = time.monotonic,
         on_end: LeaseEnd | None = None,
     ) -> None:
-        self._claims, self._counter, self._clock = claims, counter, clock
+        self._claims, self._numbers, self._clock = claims, count(1), clock
         self._on_end = on_end or (lambda _lease, _why: None)
         self._lock = threading.Lock()
         self._active: Mapping[str, Lease] = {}
@@ -198,25 +175,17 @@ class Leases:
     def acquire(self, device: str, holder: str, owner: str, ttl_s: float, *, take: bool = False) -> Lease:
         """Lease an arm that nobody has.
 
-        Parameters
-        ----------
-        ttl_s : float
-            how long it lasts without a sign of life [s]
+        Raises LeasedError if somebody has it and it is not taken. Raises BusyError if it moves without a lease.
 
-        Raises
-        ------
-        LeasedError
-            if somebody has it and it is not taken
-        BusyError
-            if it moves without a lease
+        `ttl_s`: how long it lasts without a sign of life [s].
         """
         with self._lock:
             present = self._present(device)
             if present is not None:
                 if not take:
-                    raise self._leased(present)
+                    raise self._refuse_leased(present)
                 self._finish(present, f"{holder} took the arm")
-            number = next_number(self._counter)
+            number = next(self._numbers)
             lease = Lease(
                 id=f"lease-{number}",
                 number=number,
@@ -241,10 +210,7 @@ class Leases:
     def renew(self, device: str, token: str, owner: str) -> Lease:
         """Take a sign of life.
 
-        Raises
-        ------
-        LeaseLostError
-            if that is not the present lease: one that has ended is not renewed
+        Raises LeaseLostError if that is not the present lease: one that has ended is not renewed.
         """
         with self._lock:
             lease = self.require(device, token, owner)
@@ -252,13 +218,7 @@ class Leases:
         return lease
 
     def arm(self, device: str, token: str, owner: str, *, armed: bool) -> Lease:
-        """Let the arm move, or not any more.
-
-        Raises
-        ------
-        LeaseLostError
-            if that is not the present lease
-        """
+        """Let the arm move, or not any more. Raises LeaseLostError if that is not the present lease."""
         with self._lock:
             lease = self.require(device, token, owner)
             lease.is_armed = armed
@@ -267,10 +227,7 @@ class Leases:
     def release(self, device: str, token: str, owner: str) -> None:
         """Give an arm back; what moves by the lease stops.
 
-        Raises
-        ------
-        LeaseLostError
-            if that is not the present lease; nothing happens to the present one
+        Raises LeaseLostError if that is not the present lease; nothing happens to the present one.
         """
         with self._lock:
             self._finish(self.require(device, token, owner), "it was released")
@@ -285,13 +242,7 @@ class Leases:
         return next((lease for lease in self.active() if lease.id == identifier), None)
 
     def require(self, device: str, token: str, owner: str) -> Lease:
-        """The present lease of an arm, if it is the one that is shown.
-
-        Raises
-        ------
-        LeaseLostError
-            if it is not
-        """
+        """The present lease of an arm, if it is the one that is shown. Raises LeaseLostError if it is not."""
         lease = self._present(device)
         shown = token.encode("utf-8", "surrogatepass")
         if lease is None or not hmac.compare_digest(shown, lease.token.encode()) or owner != lease.owner:
@@ -300,13 +251,7 @@ class Leases:
         return lease
 
     def permit(self, device: str, token: str | None, owner: str, *, is_needed: bool) -> Permit:
-        """Leave to move an arm.
-
-        Raises
-        ------
-        LeaseError
-            if there is no such leave
-        """
+        """Leave to move an arm. Raises LeaseError if there is no such leave."""
         if token is not None:
             permit: Permit = LeasePermit(self.require(device, token, owner), self.find_end_reason)
         elif is_needed:
@@ -324,16 +269,10 @@ class Leases:
         return lease.lost
 
     def require_unleased(self, device: str) -> None:
-        """Refuse an arm that somebody has a lease of.
-
-        Raises
-        ------
-        LeasedError
-            if somebody has
-        """
+        """Refuse an arm that somebody has a lease of. Raises LeasedError if somebody has."""
         present = self._present(device)
         if present is not None:
-            raise self._leased(present)
+            raise self._refuse_leased(present)
 
     def _present(self, device: str) -> Lease | None:
         """The lease that holds for an arm."""
@@ -347,7 +286,7 @@ class Leases:
             lease.is_armed = False
             self._on_end(lease, why)
 
-    def _leased(self, lease: Lease) -> LeasedError:
+    def _refuse_leased(self, lease: Lease) -> LeasedError:
         """Somebody has the arm."""
         left = self.seconds_left(lease)
         return LeasedError(

@@ -9,10 +9,10 @@ from typing import Any
 from tauscope.errors import AcquisitionError
 from tauscope.server.control.run import RunWorkspace
 from tauscope.server.queue.excitation import ExcitationWorkspace
+from tauscope.server.queue.job_folder import Workspace
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.record import JobProblem, JobRecord, JobState
 from tauscope.server.queue.task_job import TaskWorkspace
-from tauscope.server.queue.workspace import Workspace
 
 Motion = Callable[[RunWorkspace, threading.Event], bool]
 """Sees to it that a run has its trajectory; False where the event, which asks to stop, came first.
@@ -38,13 +38,7 @@ class DesignedMotion:
     excitation: str
 
     def __call__(self, run: RunWorkspace, stop: threading.Event) -> bool:
-        """Wait for the job and fetch its trajectory.
-
-        Raises
-        ------
-        TauscopeError
-            if the job has no result
-        """
+        """Wait for the job and fetch its trajectory. Raises TauscopeError if the job has no result."""
         design = ExcitationWorkspace(self.excitations.items.folder(self.excitation))
         run.write_step("design the motion")
         record = wait_for_end(design, stop)
@@ -59,15 +53,9 @@ class DesignedMotion:
 def wait_for_end(workspace: Workspace, stop: threading.Event) -> JobRecord | None:
     """Wait until a job has ended.
 
-    Returns
-    -------
-    JobRecord or None
-        in an end state; None where the event came first
+    Raises AcquisitionError if the job's state is damaged, or the job was removed.
 
-    Raises
-    ------
-    AcquisitionError
-        if the job's state is damaged, or the job was removed
+    Returns JobRecord or None: in an end state; None where the event came first.
     """
     while not stop.is_set():
         record = workspace.read_record()
@@ -88,13 +76,7 @@ class StepFailedError(AcquisitionError):
 
 
 def require_succeeded(record: JobRecord, name: str) -> None:
-    """Refuse to go on without a result.
-
-    Raises
-    ------
-    StepFailedError
-        with the problem that the job ended in
-    """
+    """Refuse to go on without a result. Raises StepFailedError with the problem that the job ended in."""
     if record.state is not JobState.SUCCEEDED:
         problem = record.problem or JobProblem(code="internal", detail="it has no result")
         raise StepFailedError(problem.model_copy(update={"detail": f"{name}: {problem.detail}"}))
@@ -103,10 +85,7 @@ def require_succeeded(record: JobRecord, name: str) -> None:
 def take_trajectory(excitation: TaskWorkspace[Any], run: RunWorkspace) -> None:
     """Give a run the trajectory of an excitation that succeeded.
 
-    Raises
-    ------
-    AcquisitionError
-        if the trajectory is not there any more
+    Raises AcquisitionError if the trajectory is not there any more.
     """
     try:
         shutil.copyfile(excitation.trajectory, run.trajectories / excitation.trajectory.name)

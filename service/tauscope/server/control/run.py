@@ -23,9 +23,8 @@ from tauscope.runtime.record import (
 from tauscope.runtime.recovery import recover_run
 from tauscope.runtime.run_process import RunProcess
 from tauscope.runtime.states import RunState
-from tauscope.server.queue.job_folder import JobFolder
+from tauscope.server.queue.job_folder import JobFolder, read_stored, write_stored
 from tauscope.server.queue.record import EndedEvent, JobProblem, without_folders
-from tauscope.server.queue.stored import read_stored, write_stored
 from tauscope.strict_model import StrictModel
 from tauscope.tasks import run
 from tauscope.tasks.run import BackendChoice, recording_file
@@ -105,13 +104,7 @@ class RunWorkspace(JobFolder):
         return record is None or record.state.is_end
 
     def end_before_start(self, state: RunState, problem: RunProblem | None) -> None:
-        """Write the end of a run that no control process was started for.
-
-        Raises
-        ------
-        OSError
-            if it cannot be written
-        """
+        """Write the end of a run that no control process was started for. Raises OSError if it cannot be written."""
         record = self.read_run()
         if record is None or record.state.is_end or self._has_begun:
             return
@@ -120,10 +113,7 @@ class RunWorkspace(JobFolder):
     def recover(self) -> None:
         """Show a run that nobody carries out any more as interrupted; nothing happens to one that has ended.
 
-        Raises
-        ------
-        AcquisitionError
-            if its record is damaged, or its control process does not end
+        Raises AcquisitionError if its record is damaged, or its control process does not end.
         """
         if self._has_begun:
             recover_run(self.control)
@@ -158,12 +148,8 @@ class RunWorkspace(JobFolder):
 def start_control(workspace: RunWorkspace, report: Report, *, sim_socket: Path | None = None) -> RunProcess:
     """Start the control process of a run whose folder holds everything that it needs.
 
-    Raises
-    ------
-    RobotFileError
-        if the robot file was damaged meanwhile
-    AcquisitionError
-        if files are missing, or the process cannot be started
+    Raises RobotFileError if the robot file was damaged meanwhile. Raises AcquisitionError if files are missing, or the
+    process cannot be started.
     """
     order, trajectory = workspace.read_order(), workspace.trajectory
     if order is None or trajectory is None:

@@ -45,17 +45,10 @@ class RunManager(Manager[RunSupervisor]):
     def submit(self, staged: Path, motion: Motion, holder: str | None = None, permit: Permit = FREE) -> str:
         """Start a run.
 
-        Parameters
-        ----------
-        holder : str or None
-            who has the arm already, to whom the run belongs; None where the run takes the arm itself
+        Raises BusyError if somebody else has the arm; the folder stays staged. Raises LeaseError if the arm may not be
+        moved by that leave; the folder stays staged.
 
-        Raises
-        ------
-        BusyError
-            if somebody else has the arm; the folder stays staged
-        LeaseError
-            if the arm may not be moved by that leave; the folder stays staged
+        `holder`: who has the arm already, to whom the run belongs; None where the run takes the arm itself.
         """
         workspace = RunWorkspace(staged)
         request = workspace.read_order()
@@ -83,10 +76,7 @@ class RunManager(Manager[RunSupervisor]):
     def stop(self, identifier: str) -> Live | None:
         """Stop a run, in whatever state it is: takes no lock, waits for nothing, may be called any number of times.
 
-        Returns
-        -------
-        Live or None
-            where the run stood; None where it does not go on
+        Returns Live or None: where the run stood; None where it does not go on.
         """
         supervisor = self._threads.find(identifier)
         if supervisor is None:
@@ -106,10 +96,7 @@ class RunManager(Manager[RunSupervisor]):
     def settle(self) -> None:
         """Keep the recordings that a full disk did not take; to be called again and again.
 
-        Raises
-        ------
-        OSError
-            if the disk is in the way still
+        Raises OSError if the disk is in the way still.
         """
         for workspace in list(self._pending.values()):
             self._conclude(workspace)

@@ -39,15 +39,9 @@ class ControlProcess(Protocol):
     def wait(self, timeout_s: float | None = None) -> RunRecord:
         """Wait for the end of the run.
 
-        Parameters
-        ----------
-        timeout_s : float or None
-            how long; for good where None [s]
+        Raises TimeoutError if it has not come by then.
 
-        Raises
-        ------
-        TimeoutError
-            if it has not come by then
+        `timeout_s`: how long; for good where None [s].
         """
         ...
 

@@ -92,15 +92,9 @@ class Manager(Generic[S]):
     def remove(self, identifier: str) -> bool:
         """Remove an item that has ended, with all its files; its recordings stay.
 
-        Returns
-        -------
-        bool
-            False where the item is active
+        Raises NotFoundError if there is no such item.
 
-        Raises
-        ------
-        NotFoundError
-            if there is no such item
+        Returns bool: False where the item is active.
         """
         if self._threads.find(identifier) is not None:
             return False

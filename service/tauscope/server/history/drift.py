@@ -17,12 +17,9 @@ _LINK = re.compile(r"\d+$")
 class NamedParameter:
     """An identified parameter.
 
-    value : float
-        estimate [SI]
-    std : float
-        its standard error [SI]
-    scale : float
-        what a change is a part of [SI]: the value itself, or what is larger where the value is next to nothing
+    `value`: estimate [SI].
+    `std`: its standard error [SI].
+    `scale`: what a change is a part of [SI]: the value itself, or what is larger where the value is next to nothing.
     """
 
     name: str
@@ -82,10 +79,8 @@ def _value(entry: FrictionEntry, term: str) -> float:
 class Drift:
     """The change of one parameter.
 
-    before, after : float
-        values [SI]
-    std : float
-        standard error of the difference [SI]; of two identifications that share no recording
+    `before`, `after`: values [SI].
+    `std`: standard error of the difference [SI]; of two identifications that share no recording.
     """
 
     name: str

@@ -13,12 +13,10 @@ from typing import Any
 from tauscope.errors import NotFoundError
 from tauscope.server.control.campaign import CampaignWorkspace
 from tauscope.server.control.run import RunWorkspace
-from tauscope.server.queue.diagnosis import DiagnosisWorkspace
+from tauscope.server.queue.analyses import DiagnosisWorkspace, IdentificationWorkspace, RolloutWorkspace
 from tauscope.server.queue.excitation import ExcitationWorkspace
-from tauscope.server.queue.identification import IdentificationWorkspace
+from tauscope.server.queue.job_folder import Workspace
 from tauscope.server.queue.record import JobState
-from tauscope.server.queue.rollout import RolloutWorkspace
-from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.database.index import FileMetadata, Index, ItemMetadata, RecordingRole
 from tauscope.server.store.files import hash_file, identifier_time
 from tauscope.server.store.items import ItemStore
@@ -56,10 +54,7 @@ def stamp(kind: str, folder: Path) -> str:
 def find_changed_file(folder: Path, artefacts: tuple[FileMetadata, ...], *, deep: bool) -> str | None:
     """The first file of an item that is not what it was when the item ended.
 
-    Returns
-    -------
-    str or None
-        its path below the folder; None where all are as they were
+    Returns str or None: its path below the folder; None where all are as they were.
     """
     for file in artefacts:
         path = folder / file.path
@@ -86,7 +81,7 @@ def _job(kind: str, workspace: Workspace, order: Any, read_result: Callable[[], 
     folder = workspace.folder
     mark, record = stamp(kind, folder), workspace.read_record()
     if record is None or order is None:
-        return _damaged(kind, folder, mark, "order.json" if order is None else "state.json")
+        return _describe_damage(kind, folder, mark, "order.json" if order is None else "state.json")
     facts = ItemMetadata(
         kind=kind,
         identifier=folder.name,
@@ -103,7 +98,7 @@ def _job(kind: str, workspace: Workspace, order: Any, read_result: Callable[[], 
         return facts
     content = read_result()
     if content is None:
-        return _damaged(kind, folder, mark, "result.json")
+        return _describe_damage(kind, folder, mark, "result.json")
     return replace(facts, figures=_figures(kind, json.loads(content)))
 
 
@@ -131,7 +126,7 @@ def _figures(kind: str, document: Mapping[str, Any]) -> dict[str, str | float | 
     return errors
 
 
-def _damaged(kind: str, folder: Path, mark: str, file: str) -> ItemMetadata:
+def _describe_damage(kind: str, folder: Path, mark: str, file: str) -> ItemMetadata:
     """An item that has lost a file without which nothing can be said of it."""
     detail = f"{folder.name}: {file} is missing or damaged; restore it from a backup, or remove it"
     created = identifier_time(folder.name)
@@ -168,7 +163,7 @@ def _run(folder: Path) -> ItemMetadata:
     workspace, mark = RunWorkspace(folder), stamp("run", folder)
     request, record = workspace.read_order(), workspace.read_run()
     if request is None or record is None:
-        return _damaged("run", folder, mark, "request.json" if request is None else "run.json")
+        return _describe_damage("run", folder, mark, "request.json" if request is None else "run.json")
     problem = workspace.problem()
     return ItemMetadata(
         kind="run",
@@ -232,10 +227,7 @@ class Indexer:
     def sync(self, *, thorough: bool = False) -> None:
         """Bring the index up to date.
 
-        Raises
-        ------
-        StoreError
-            if the database does not answer; the next call goes on where this one ended
+        Raises StoreError if the database does not answer; the next call goes on where this one ended.
         """
         with self._lock:
             thorough = thorough or not self._is_whole
@@ -253,10 +245,7 @@ class Indexer:
     def refresh(self) -> None:
         """Bring the index up to date, unless that takes long because somebody else is at it.
 
-        Raises
-        ------
-        StoreError
-            if the database does not answer
+        Raises StoreError if the database does not answer.
         """
         if self._lock.acquire(timeout=LONGEST_WAIT_S):
             self._lock.release()
@@ -347,10 +336,7 @@ class Indexer:
 def open_index(index: Index, items: Mapping[str, ItemStore], recordings: RecordingStore, label: str) -> Indexer:
     """Open the index of a data folder; `Indexer.sync` fills it from the folders, and upgrades an old one so.
 
-    Raises
-    ------
-    StoreError
-        if the database does not answer
+    Raises StoreError if the database does not answer.
     """
     index.register(label, datetime.now(UTC))
     return Indexer(index, items, recordings)

@@ -69,12 +69,8 @@ class ModelHistory:
     def consider(self, candidate: Candidate, now: datetime) -> ModelEntry:
         """Judge an identification: compare it, make it active where it passes, and raise what people should know.
 
-        Raises
-        ------
-        NotFoundError
-            if its robot is not in the index
-        IntegrityError
-            if another service judged it meanwhile
+        Raises NotFoundError if its robot is not in the index. Raises IntegrityError if another service judged it
+        meanwhile.
         """
         with self._database.writing() as session:
             robot = _robot(session, candidate.robot)
@@ -83,10 +79,7 @@ class ModelHistory:
     def activate(self, identifier: str, role: str, reason: str, now: datetime) -> ModelEntry:
         """Make a model the active one, or the one that drift is counted from, on somebody's word.
 
-        Raises
-        ------
-        NotFoundError
-            if there is no such model, or nobody could read it
+        Raises NotFoundError if there is no such model, or nobody could read it.
         """
         with self._database.writing() as session:
             model = _model(session, identifier)
@@ -102,23 +95,14 @@ class ModelHistory:
             return frozenset(session.scalars(select(Model.identifier).where(Model.is_active | Model.is_reference)))
 
     def find(self, identifier: str) -> ModelEntry:
-        """A model.
-
-        Raises
-        ------
-        NotFoundError
-            if no such identification was judged
-        """
+        """A model. Raises NotFoundError if no such identification was judged."""
         with self._database.reading() as session:
             return _entry(_model(session, identifier))
 
     def document(self, identifier: str) -> IdentificationDocument:
         """What a model says; also where its identification was removed.
 
-        Raises
-        ------
-        NotFoundError
-            if no such identification was judged, or its result could not be read
+        Raises NotFoundError if no such identification was judged, or its result could not be read.
         """
         with self._database.reading() as session:
             content = _model(session, identifier).document
@@ -155,10 +139,7 @@ class ModelHistory:
     def documents(self, robot: str, since: datetime | None = None) -> list[tuple[ModelEntry, IdentificationDocument]]:
         """Every model of a robot that was ever active, with what it says; the oldest first.
 
-        Raises
-        ------
-        NotFoundError
-            if there is no such robot
+        Raises NotFoundError if there is no such robot.
         """
         query = select(Model).options(undefer(Model.document)).where(Model.state.in_(("active", "kept")))
         if since is not None:
@@ -168,23 +149,14 @@ class ModelHistory:
             return [(_entry(each), IdentificationDocument.model_validate(each.document)) for each in models]
 
     def policy(self, robot: str) -> ModelPolicy:
-        """The bounds for a robot.
-
-        Raises
-        ------
-        NotFoundError
-            if there is no such robot
-        """
+        """The bounds for a robot. Raises NotFoundError if there is no such robot."""
         with self._database.reading() as session:
             return _policy(session, _robot(session, robot))
 
     def set_policy(self, robot: str, policy: ModelPolicy) -> None:
         """Set the bounds for a robot; models that were judged stay as they were judged.
 
-        Raises
-        ------
-        NotFoundError
-            if there is no such robot
+        Raises NotFoundError if there is no such robot.
         """
         with self._database.writing() as session:
             session.merge(RobotPolicy(robot_id=_robot(session, robot).id, document=policy.model_dump()))
@@ -202,10 +174,7 @@ class ModelHistory:
     def acknowledge(self, number: int, note: str, now: datetime) -> ModelEventEntry:
         """Take note of an event; nothing happens to one that was closed before.
 
-        Raises
-        ------
-        NotFoundError
-            if there is no such event
+        Raises NotFoundError if there is no such event.
         """
         with self._database.writing() as session:
             event = session.get(ModelEvent, number)

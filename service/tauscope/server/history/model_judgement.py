@@ -47,10 +47,8 @@ class OwnDiagnosis(BaseModel):
 class Candidate:
     """An identification that is to be judged.
 
-    result : bytes or None
-        its document; None where it cannot be read
-    diagnosis : bytes or None
-        document of the diagnosis of the same recordings; None where there is none
+    `result`: its document; None where it cannot be read.
+    `diagnosis`: document of the diagnosis of the same recordings; None where there is none.
     """
 
     identifier: str

@@ -16,8 +16,7 @@ from tauscope.server.control.run import RunWorkspace
 from tauscope.server.history.drift import Drift
 from tauscope.server.history.model_history import ModelEntry, ModelHistory
 from tauscope.server.history.model_judgement import Candidate, compare_models
-from tauscope.server.queue.diagnosis import DiagnosisWorkspace
-from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace
+from tauscope.server.queue.analyses import DiagnosisWorkspace, IdentificationOrder, IdentificationWorkspace
 from tauscope.server.store.items import ItemStore
 
 _log = logging.getLogger("tauscope.jobs")
@@ -36,10 +35,7 @@ class ModelRegistry:
     def judge_new(self) -> list[ModelEntry]:
         """Judge every identification in the index that was not judged yet.
 
-        Raises
-        ------
-        StoreError
-            if the database does not answer; the next call goes on where this one ended
+        Raises StoreError if the database does not answer; the next call goes on where this one ended.
         """
         return [entry for identifier in self.history.list_unjudged(self._site) if (entry := self._consider(identifier))]
 
@@ -129,10 +125,7 @@ class DriftMonitor:
     def look(self) -> None:
         """Bring what is known up to date.
 
-        Raises
-        ------
-        StoreError
-            if the database does not answer; what was known before stays
+        Raises StoreError if the database does not answer; what was known before stays.
         """
         pairs = self._history.active_and_reference(self._site)
         told = self._history.events(None, only_open=True, limit=_MOST_EVENTS) if pairs else []

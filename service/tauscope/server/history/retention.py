@@ -37,12 +37,7 @@ def plan_removal(
     """What a rule lets go.
 
     The identification of an active model, or of one that drift is counted from, stays; so does what goes on, and what
-    is damaged: somebody should look at it.
-
-    Raises
-    ------
-    StoreError
-        if the database does not answer
+    is damaged: somebody should look at it. Raises StoreError if the database does not answer.
     """
     indexer.sync(thorough=True)
     list_protected = history.list_protected()
@@ -71,10 +66,7 @@ def remove(
 ) -> Removal:
     """Remove what was planned; what somebody else removed meanwhile is left out.
 
-    Raises
-    ------
-    OSError
-        if something cannot be removed; what was removed before is gone
+    Raises OSError if something cannot be removed; what was removed before is gone.
     """
     items = tuple(entry for entry in removal.items if _is_gone(removers[entry.kind], entry.identifier))
     names = tuple(name for name in removal.recordings if _is_gone(recordings.remove, name))
@@ -109,12 +101,8 @@ class RetentionSweeper:
     def tidy(self) -> None:
         """Remove what the rule lets go.
 
-        Raises
-        ------
-        StoreError
-            if the database does not answer; nothing goes then
-        OSError
-            if something cannot be removed
+        Raises StoreError if the database does not answer; nothing goes then. Raises OSError if something cannot be
+        removed.
         """
         plan = plan_removal(self._indexer, self._history, self._recordings, self._rule, utc_now())
         gone = remove(plan, self._removers, self._recordings, self._indexer)

@@ -18,8 +18,7 @@ WEEK_S = 7 * 86400.0
 class TrendPoint:
     """A parameter in one identification.
 
-    value, std : float
-        estimate and its standard error [SI]
+    `value`, `std`: estimate and its standard error [SI].
     """
 
     time: datetime
@@ -31,10 +30,8 @@ class TrendPoint:
 class Trend:
     """The line through all points.
 
-    slope : float
-        change a week [SI/week]
-    change : float
-        of the line from the first point to the last [SI]
+    `slope`: change a week [SI/week].
+    `change`: of the line from the first point to the last [SI].
     """
 
     count: int
@@ -52,10 +49,7 @@ class Trend:
 def fit_trend(points: Sequence[TrendPoint]) -> Trend | None:
     """The line through all points, by weighted least squares.
 
-    Returns
-    -------
-    Trend or None
-        None where fewer than three points, or all at one time, tell no slope
+    Returns Trend or None: None where fewer than three points, or all at one time, tell no slope.
     """
     if len(points) < 3:
         return None
@@ -78,8 +72,7 @@ def fit_trend(points: Sequence[TrendPoint]) -> Trend | None:
 class ParameterTrend:
     """One parameter over time.
 
-    points : tuple of (str, TrendPoint)
-        identifier of each model, and what it says; the oldest first
+    `points`: tuple of (str, TrendPoint), identifier of each model, and what it says; the oldest first.
     """
 
     name: str
@@ -91,10 +84,7 @@ class ParameterTrend:
 def parameter_trends(models: Sequence[tuple[ModelEntry, IdentificationDocument]]) -> list[ParameterTrend]:
     """Every parameter that the newest model tells, over all models that tell it.
 
-    Parameters
-    ----------
-    models : sequence of (ModelEntry, IdentificationDocument)
-        every model that was ever active, the oldest first
+    `models`: sequence of (ModelEntry, IdentificationDocument), every model that was ever active, the oldest first.
     """
     told = [(entry, {each.name: each for each in extract_parameters(document)}) for entry, document in models]
     trends = []

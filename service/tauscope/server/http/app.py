@@ -6,12 +6,18 @@ from contextlib import asynccontextmanager
 
 from fastapi import Depends, FastAPI
 
+from tauscope.closed_loop import RolloutDocument
+from tauscope.diagnosis import DiagnosisDocument
+from tauscope.diagnosis.documents.plots import DiagnosisPlots
+from tauscope.export.model_file import ModelFile
+from tauscope.identification import IdentificationDocument
+from tauscope.report.identification_plots import IdentificationPlots
 from tauscope.server.auth.audited_requests import AuditedRequests
 from tauscope.server.auth.gate import Gate
 from tauscope.server.control.run_supervisor import StartControl
 from tauscope.server.history.gates import ModelPolicy
 from tauscope.server.http import health, pages
-from tauscope.server.http.campaigns import CampaignRequest
+from tauscope.server.http.campaigns import CampaignRequest, CampaignResult
 from tauscope.server.http.campaigns import router as campaigns
 from tauscope.server.http.diagnoses import DiagnosisRequest
 from tauscope.server.http.diagnoses import router as diagnoses
@@ -23,10 +29,9 @@ from tauscope.server.http.history import router as history
 from tauscope.server.http.identifications import IdentificationRequest
 from tauscope.server.http.identifications import router as identifications
 from tauscope.server.http.items import router as items
-from tauscope.server.http.leases.models import LeaseRequest
-from tauscope.server.http.leases.router import router as leases
-from tauscope.server.http.leases.router import stop_router
-from tauscope.server.http.methods import collect_methods
+from tauscope.server.http.leases import LeaseRequest, stop_router
+from tauscope.server.http.leases import router as leases
+from tauscope.server.http.methods import collect_methods, require_known_query
 from tauscope.server.http.openapi import install_openapi
 from tauscope.server.http.problem_handlers import install_problem_handlers
 from tauscope.server.http.protection import BodyLimit, ConcurrencyLimiter, OriginCheck, RequestLog, ResponseProtection
@@ -44,12 +49,12 @@ from tauscope.server.http.schedules import ScheduleRequest
 from tauscope.server.http.schedules import router as schedules
 from tauscope.server.http.services import open_services
 from tauscope.server.http.settings import Settings
-from tauscope.server.http.strict_query import require_known_query
 from tauscope.server.http.tasks.events import EVENT_MODELS
 from tauscope.server.page.router import router as page
 from tauscope.server.problems import Problem
+from tauscope.trajectory.document import TrajectoryDocument
 
-API_VERSION = "1.20.0"
+API_VERSION = "1.21.0"
 """Of the interface, not of the package; a change of tests/server/http/openapi.json goes with a change here."""
 
 PREFIX = "/api/v1"
@@ -72,6 +77,18 @@ VERBS = (
     stop_router,
 )
 """Routers of everything that a client may ask for, below `PREFIX`."""
+
+FORMATS = (
+    IdentificationDocument,
+    IdentificationPlots,
+    DiagnosisDocument,
+    DiagnosisPlots,
+    RolloutDocument,
+    CampaignResult,
+    ModelFile,
+    TrajectoryDocument,
+)
+"""Formats of files that tasks write, with versions of their own; `/docs/schemas/NAME` is the JSON Schema of each."""
 
 REQUESTS = (
     IdentificationRequest,
@@ -121,7 +138,7 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
     app.include_router(pages.router)
     app.include_router(page)
     install_problem_handlers(app)
-    install_openapi(app, [*REQUESTS, Problem, *EVENT_MODELS])
+    install_openapi(app, [*REQUESTS, Problem, *EVENT_MODELS], FORMATS)
     # The last one added is the first to see a request.
     app.add_middleware(IdempotentRequests)
     app.add_middleware(AuditedRequests)

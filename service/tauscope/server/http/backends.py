@@ -39,13 +39,8 @@ class BackendRequest(StrictModel):
 def chosen_backend(settings: Settings, request: BackendRequest, robot: Robot) -> BackendChoice:
     """The backend of a request.
 
-    Raises
-    ------
-    ScenarioError
-        if the scenario is no plain data
-    RobotFileError
-        if a drive block names a file that the driver would open: no path of the server is opened for a client; or if
-        an arm without a model is to be simulated
+    Raises ScenarioError if the scenario is no plain data. Raises RobotFileError if a drive block names a file that the
+    driver would open: no path of the server is opened for a client; or if an arm without a model is to be simulated.
     """
     if request.scenario is not None and to_json_text(request.scenario) is None:
         raise ScenarioError("scenario: holds NaN, infinity or text that is not Unicode; write plain numbers and text")

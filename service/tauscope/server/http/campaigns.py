@@ -17,17 +17,24 @@ from tauscope.server.http.backends import BackendRequest, chosen_backend
 from tauscope.server.http.diagnoses import DIAGNOSES
 from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.identifications import IDENTIFICATIONS
-from tauscope.server.http.leases.router import permit_of
+from tauscope.server.http.leases import permit_of
 from tauscope.server.http.robots.files import read_received_robot
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.server.http.runs import find_run
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.answers import JobAnswer, damaged_fields, job_fields, require_document, require_success
+from tauscope.server.http.tasks.answers import (
+    JobAnswer,
+    MotionLinks,
+    damaged_fields,
+    job_fields,
+    require_document,
+    require_success,
+)
 from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
 from tauscope.server.http.tasks.routes import ENDINGS, Identifier, collection
-from tauscope.server.http.tasks.submission import RobotRequest, keep_robot, receive_request
+from tauscope.server.http.tasks.submission import RobotRequest, keep_robot, receive_request, stage_request
 from tauscope.server.models import AnswerModel, PageAnswer
-from tauscope.server.problems import ProblemError, problem_responses
+from tauscope.server.problems import problem_responses
 from tauscope.server.queue.record import JobState
 from tauscope.tasks.campaign import CampaignOptions
 from tauscope.tasks.run import BackendChoice
@@ -64,12 +71,9 @@ class CampaignStepAnswer(AnswerModel):
     link: str | None = Field(default=None, description="its excitation, run, identification or diagnosis")
 
 
-class CampaignLinksAnswer(AnswerModel):
+class CampaignLinksAnswer(MotionLinks):
     """Where to go on from a campaign."""
 
-    self_: str = Field(alias="self", description="its state")
-    events: str = Field(description="what happens to it, as server-sent events")
-    stop: str = Field(description="where a POST stops it")
     recordings: tuple[str, ...] = Field(default=(), description="recordings that the model is made from")
     held_out: tuple[str, ...] = Field(default=(), description="recordings that it is judged by")
     identification: str | None = Field(default=None, description="its identification, exports included")
@@ -80,7 +84,6 @@ class CampaignLinksAnswer(AnswerModel):
 class CampaignAnswer(JobAnswer):
     """The state of a campaign."""
 
-    robot: str | None = Field(default=None, description="name of the robot")
     backend: BackendChoice | None = Field(default=None, description="which arm is moved")
     steps: tuple[CampaignStepAnswer, ...] = Field(default=(), description="in their order")
     links: CampaignLinksAnswer = Field(description="where to go on")
@@ -118,24 +121,12 @@ WAITING, GONE = "waiting", "gone"
 
 
 def find_campaign(services: Services, identifier: str) -> CampaignWorkspace:
-    """The folder of a campaign.
-
-    Raises
-    ------
-    NotFoundError
-        if there is none
-    """
+    """The folder of a campaign. Raises NotFoundError if there is none."""
     return CampaignWorkspace(services.campaigns.items.folder(identifier))
 
 
 def describe(services: Services, identifier: str, root: str) -> CampaignAnswer:
-    """The state of a campaign; one whose files are damaged is said to be so.
-
-    Raises
-    ------
-    NotFoundError
-        if there is none
-    """
+    """The state of a campaign; one whose files are damaged is said to be so. Raises NotFoundError if there is none."""
     workspace = find_campaign(services, identifier)
     here, made, order = f"{root}/campaigns/{identifier}", workspace.read_made(), workspace.read_order()
     if order is None:
@@ -150,12 +141,8 @@ def describe(services: Services, identifier: str, root: str) -> CampaignAnswer:
 def result_of(services: Services, identifier: str, root: str) -> CampaignResult:
     """What came of a campaign that succeeded.
 
-    Raises
-    ------
-    NotFoundError
-        if there is none, or its identification was removed
-    ProblemError
-        if it has not succeeded
+    Raises NotFoundError if there is none, or its identification was removed. Raises ProblemError if it has not
+    succeeded.
     """
     require_success(find_campaign(services, identifier))
     answer = describe(services, identifier, root)
@@ -218,20 +205,12 @@ def _links(here: str, root: str, made: CampaignLinks, *, has_result: bool) -> Ca
 async def submit_campaign(request: Request, services: Services) -> str:
     """Take a request for a campaign.
 
-    Raises
-    ------
-    ProblemError
-        if the request is not as documented
-    TauscopeError
-        if the robot is not valid, somebody else has the arm, or the lease does not let it move
+    Raises ProblemError if the request is not as documented. Raises TauscopeError if the robot is not valid, somebody
+    else has the arm, or the lease does not let it move.
     """
-    items = services.campaigns.items
-    staged = await run_in_threadpool(items.stage)
-    try:
-        workspace = CampaignWorkspace(staged)
-        await run_in_threadpool(workspace.prepare)
+    async with stage_request(services.campaigns.items, CampaignWorkspace) as workspace:
         received = await receive_request(request, CampaignRequest, services.settings, workspace.robot)
-        robot_file = await run_in_threadpool(keep_robot, received, workspace.robot)
+        robot_file = await run_in_threadpool(keep_robot, received, workspace.robot, services.robots)
         robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
         backend = chosen_backend(services.settings, received.document.backend, robot)
         permit = permit_of(request, services, backend.device(robot.name))
@@ -243,8 +222,6 @@ async def submit_campaign(request: Request, services: Services) -> str:
         )
         await run_in_threadpool(workspace.write_order, order)
         return await run_in_threadpool(services.campaigns.submit, workspace.folder, permit)
-    finally:
-        await run_in_threadpool(items.discard, staged)
 
 
 CAMPAIGNS = Resource(
@@ -289,22 +266,18 @@ def get_result(request: Request, identifier: Identifier, services: ServicesDep) 
     return result_of(services, identifier, collection(request, 3))
 
 
-def _stop(services: Services, identifier: str) -> CampaignStopAnswer:
-    """Stop a campaign; neither a lock nor a disk is needed for one that goes on."""
-    state = services.campaigns.stop(identifier)
-    if state is not None:
-        return CampaignStopAnswer(id=identifier, state=state)
+def _read_state(services: Services, identifier: str) -> JobState | None:
+    """Where a campaign stands; None where its record is damaged."""
     record = find_campaign(services, identifier).read_record()
-    if record is None:
-        raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it does not go on")
-    return CampaignStopAnswer(id=identifier, state=record.state)
+    return None if record is None else record.state
 
 
 add_stopping(
     router,
     CAMPAIGNS,
     CampaignStopAnswer,
-    _stop,
+    lambda services, identifier: services.campaigns.stop(identifier),
+    _read_state,
     lambda services, identifier: services.campaigns.remove(identifier),
     (
         "Stops the arm first, then everything else of it; legal in every state, any number of times; needs no body.",

@@ -1,31 +1,42 @@
 """Diagnoses: requests, answers and what is special about this resource."""
 
-from typing import Any, Self
+from typing import Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.plots import DiagnosisPlots
-from tauscope.diagnosis.extended_model.saved import LARGEST_FILE
+from tauscope.diagnosis.extended_model import LARGEST_FILE
 from tauscope.export.model_file import ModelFile
-from tauscope.server.http.identifications import Names, require_listed_once
 from tauscope.server.http.openapi import binary_part, binary_parts
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
-from tauscope.server.http.saved_models import MODEL_FILE, keep_model
 from tauscope.server.http.services import Services
-from tauscope.server.http.tasks.answers import JobAnswer, require_document
+from tauscope.server.http.tasks.answers import JobAnswer, JobLinks, require_document
 from tauscope.server.http.tasks.queued import QueuedTask
-from tauscope.server.http.tasks.router import HTML, JobDocument, text_document
-from tauscope.server.http.tasks.submission import Received, RobotRequest
-from tauscope.server.models import AnswerModel, PageAnswer
+from tauscope.server.http.tasks.router import (
+    JobDocument,
+    plots_document,
+    report_document,
+    result_document,
+    text_document,
+)
+from tauscope.server.http.tasks.submission import (
+    MODEL_FILE,
+    RECORDINGS_EXAMPLE,
+    Names,
+    Received,
+    RecordingsRequest,
+    keep_model,
+)
+from tauscope.server.models import PageAnswer
 from tauscope.server.problems import ProblemError
-from tauscope.server.queue.diagnosis import DiagnosisWorkspace
+from tauscope.server.queue.analyses import DiagnosisWorkspace
 from tauscope.server.queue.task_job import SAVED_MODEL, TRAJECTORY, OrderedRecording
 from tauscope.tasks.diagnose import DiagnosisOptions
 from tauscope.trajectory.document import TrajectoryDocument
 
 
-class DiagnosisRequest(RobotRequest):
+class DiagnosisRequest(RecordingsRequest):
     """What is to be diagnosed."""
 
     recordings: Names | None = Field(
@@ -48,18 +59,9 @@ class DiagnosisRequest(RobotRequest):
     )
     options: DiagnosisOptions = Field(default=DiagnosisOptions(), description="how it is diagnosed")
 
-    @model_validator(mode="after")
-    def _check_once(self) -> Self:
-        """A recording counts once."""
-        require_listed_once(self.recordings, self.held_out, self.simulated)
-        return self
-
 
 EXAMPLES: dict[str, tuple[str, Any]] = {
-    "server": (
-        "Recordings that lie on the server",
-        {"robot": EXAMPLE_ROBOT, "recordings": ["monday.csv", "tuesday.csv"], "held_out": ["wednesday.mcap"]},
-    ),
+    "server": RECORDINGS_EXAMPLE,
     "simulation": (
         "What your own simulation has wrong, and what it lacks",
         {
@@ -81,12 +83,9 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 }
 
 
-class DiagnosisLinksAnswer(AnswerModel):
+class DiagnosisLinksAnswer(JobLinks):
     """Where to go on from a diagnosis."""
 
-    self_: str = Field(alias="self", description="its state")
-    events: str = Field(description="what happens to it, as server-sent events")
-    result: str | None = Field(default=None, description="its result, once it succeeded")
     plots: str | None = Field(default=None, description="data of its figures, once it succeeded")
     report: str | None = Field(default=None, description="its report as a page, once it succeeded")
     model: str | None = Field(default=None, description="the model with all findings, once it succeeded")
@@ -101,7 +100,6 @@ class DiagnosisLinksAnswer(AnswerModel):
 class DiagnosisAnswer(JobAnswer):
     """The state of a diagnosis."""
 
-    robot: str | None = Field(default=None, description="name of the robot")
     recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what is explained")
     held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what findings are confirmed by")
     simulated: tuple[OrderedRecording, ...] = Field(default=(), description="what the user's simulator recorded")
@@ -121,15 +119,11 @@ class DiagnosisListAnswer(PageAnswer):
 YAML = "text/yaml"  # an alias of application/yaml (RFC 9512), which generators of clients do not read
 
 
-def compared_model(received: Received[DiagnosisRequest], services: Services, workspace: Any) -> dict[str, str | None]:
+def place_model(received: Received[DiagnosisRequest], services: Services, workspace: Any) -> dict[str, str | None]:
     """Put the model that is compared with into its place; what is compared with and what was sent belong together.
 
-    Raises
-    ------
-    ProblemError
-        where they do not, or the model came twice
-    NotFoundError
-        if there is no diagnosis of that identifier
+    Raises ProblemError where they do not, or the model came twice. Raises NotFoundError if there is no diagnosis of
+    that identifier.
     """
     document, file = received.document, received.form.file("model")
     against, has_simulated = document.options.against, bool(received.form.files.get("simulated") or document.simulated)
@@ -161,7 +155,7 @@ DIAGNOSES = QueuedTask(
         "simulated": binary_parts("recordings made in your own simulator"),
         "model": binary_part("a model that an earlier diagnosis saved, to compare with"),
     },
-    further=compared_model,
+    further=place_model,
     further_parts={"model": (SAVED_MODEL, LARGEST_FILE)},
     work_problems=(
         "robot-file",
@@ -172,28 +166,9 @@ DIAGNOSES = QueuedTask(
         "invalid-request",
     ),
     documents=(
-        JobDocument(
-            "result",
-            "result.json",
-            "Fetch the result",
-            "The result of a diagnosis that succeeded; else the problem that it ended in.",
-            {"model": DiagnosisDocument, "description": "the same document as `tauscope diagnose --json`"},
-        ),
-        JobDocument(
-            "plots",
-            "plots.json",
-            "Fetch the data of its figures",
-            "What figures of the diagnosis are drawn from.",
-            {"model": DiagnosisPlots, "description": "residuals over time and by variable, before and after"},
-        ),
-        text_document(
-            "report",
-            "report.html",
-            HTML,
-            "Fetch the report",
-            "The report as one page: no script, no request to anywhere, ready to print.",
-            "page as `tauscope diagnose --report`",
-        ),
+        result_document("a diagnosis", "diagnose", DiagnosisDocument),
+        plots_document("the diagnosis", DiagnosisPlots, "residuals over time and by variable, before and after"),
+        report_document("diagnose"),
         JobDocument(
             "model",
             MODEL_FILE,

@@ -32,17 +32,9 @@ def refuse_media_type(request: Request, *accepted: str) -> ProblemError:
 async def read_document(request: Request, kind: type[Model], limit: int) -> Model:
     """The JSON body of a request.
 
-    Parameters
-    ----------
-    limit : int
-        largest body [bytes]
+    Raises ProblemError if the body is not as the model wants it. Raises LimitExceededError if it is too large.
 
-    Raises
-    ------
-    ProblemError
-        if the body is not as the model wants it
-    LimitExceededError
-        if it is too large
+    `limit`: largest body [bytes].
     """
     content = bytearray()
     async for piece in request.stream():
@@ -53,13 +45,7 @@ async def read_document(request: Request, kind: type[Model], limit: int) -> Mode
 
 
 def parse_document(content: bytes, kind: type[Model], *, within: str) -> Model:
-    """A model from JSON text.
-
-    Raises
-    ------
-    ProblemError
-        if it is not as the model wants it
-    """
+    """A model from JSON text. Raises ProblemError if it is not as the model wants it."""
     try:
         return kind.model_validate_json(content)
     except ValidationError as error:

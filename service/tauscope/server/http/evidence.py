@@ -1,19 +1,17 @@
 """Evidence of models: what an active model or a reference rests on is not removed."""
 
 from collections.abc import Collection
+from contextlib import suppress
 
+from tauscope.errors import NotFoundError
 from tauscope.server.http.services import Services
 from tauscope.server.problems import ProblemError
+from tauscope.server.queue.analyses import IdentificationWorkspace
+from tauscope.server.store.robots import hash_robot
 
 
 def require_no_model(services: Services, identifier: str) -> None:
-    """Refuse to remove an identification that is an active model or a reference.
-
-    Raises
-    ------
-    ProblemError
-        if it is one
-    """
+    """Refuse to remove an identification that is an active model or a reference. Raises ProblemError if it is one."""
     _judge_new(services)
     _require_free(services, identifier, {identifier})
 
@@ -21,13 +19,26 @@ def require_no_model(services: Services, identifier: str) -> None:
 def require_no_evidence(services: Services, recording: str) -> None:
     """Refuse to remove a recording that an active model or a reference was made from or judged by.
 
-    Raises
-    ------
-    ProblemError
-        if one was
+    Raises ProblemError if one was.
     """
     _judge_new(services)
     _require_free(services, recording, services.index.index.list_users(recording))
+
+
+def require_no_identification(services: Services, version: str) -> None:
+    """Refuse to remove a robot with which an active model or a reference was identified.
+
+    Raises ProblemError if one was.
+    """
+    _judge_new(services)
+    users = set()
+    for identifier in services.models.history.list_protected():
+        with suppress(NotFoundError):  # of another service
+            workspace = IdentificationWorkspace(services.identifications.items.folder(identifier))
+            order = workspace.read_order()
+            if order is not None and hash_robot(workspace.robot, order.robot_file) == version:
+                users.add(identifier)
+    _require_free(services, version, users)
 
 
 def _judge_new(services: Services) -> None:

@@ -12,15 +12,15 @@ from tauscope.server.http.openapi import file_contents
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.server.http.services import ServicesDep
-from tauscope.server.http.tasks.answers import JobAnswer, require_document
+from tauscope.server.http.tasks.answers import JobAnswer, JobLinks, require_document
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import JobDocument
 from tauscope.server.http.tasks.routes import ENDINGS, Identifier
 from tauscope.server.http.tasks.submission import RobotRequest
-from tauscope.server.models import AnswerModel, PageAnswer
+from tauscope.server.models import PageAnswer
 from tauscope.server.problems import problem_responses
 from tauscope.server.queue.excitation import ExcitationWorkspace, write_trajectory_piece
-from tauscope.server.queue.stored import read_bytes
+from tauscope.server.queue.job_folder import read_bytes
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.trajectory.csv_format import PIECE_ROWS
 
@@ -42,11 +42,9 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 }
 
 
-class ExcitationLinks(AnswerModel):
+class ExcitationLinks(JobLinks):
     """Where to go on from an excitation."""
 
-    self_: str = Field(alias="self", description="its state")
-    events: str = Field(description="what happens to it, as server-sent events")
     result: str | None = Field(default=None, description="its document, once it succeeded")
     trajectory: str | None = Field(default=None, description="its trajectory, once it succeeded")
 
@@ -54,7 +52,6 @@ class ExcitationLinks(AnswerModel):
 class ExcitationAnswer(JobAnswer):
     """The state of an excitation."""
 
-    robot: str | None = Field(default=None, description="name of the robot")
     options: ExcitationDesignOptions | None = Field(default=None, description="how the motion is designed")
     links: ExcitationLinks = Field(description="where to go on")
 

@@ -27,12 +27,9 @@ FORM = "multipart/form-data"
 class PartRule:
     """What a part of a form may be.
 
-    limit : int
-        largest size [bytes]
-    folder : Path or None
-        where its files are written; None for text that is kept in memory
-    default_name : str or None
-        name of a file that was sent without one; None where it has to have one
+    `limit`: largest size [bytes].
+    `folder`: where its files are written; None for text that is kept in memory.
+    `default_name`: name of a file that was sent without one; None where it has to have one.
     """
 
     limit: int
@@ -57,13 +54,8 @@ class ReceivedForm:
 async def receive_form(request: Request, rules: Mapping[str, PartRule]) -> ReceivedForm:
     """Read the form of a request; two files of one part never share a name.
 
-    Raises
-    ------
-    ProblemError
-        if the body is no form, or has a part that is not foreseen, or a file of a name that is not allowed; or the
-        caller has sent enough for now
-    LimitExceededError
-        if a part is too large
+    Raises ProblemError if the body is no form, or has a part that is not foreseen, or a file of a name that is not
+    allowed; or the caller has sent enough for now. Raises LimitExceededError if a part is too large.
     """
     charge = require_upload_quota(request.scope)
     receiver = _Receiver(rules)
@@ -164,9 +156,9 @@ class _Receiver:
             return
         filename = options.get(b"filename")
         name = rule.default_name if filename is None else filename.decode("utf-8", "replace")
-        self._file = IncomingFile(rule.folder, self._accepted_name(name), rule.limit)
+        self._file = IncomingFile(rule.folder, self._accept_name(name), rule.limit)
 
-    def _accepted_name(self, name: str | None) -> str:
+    def _accept_name(self, name: str | None) -> str:
         """The name of a file, if the form may have such a file."""
         files = self.form.files.setdefault(self._part, [])
         if name is None:

@@ -184,10 +184,7 @@ def comparison_answer(
 def trend_answer(robot: str, models: Sequence[tuple[ModelEntry, IdentificationDocument]]) -> TrendAnswer:
     """The answer that shows a robot's parameters over time.
 
-    Parameters
-    ----------
-    models : sequence of (ModelEntry, IdentificationDocument)
-        every model that was ever active, the oldest first
+    `models`: sequence of (ModelEntry, IdentificationDocument), every model that was ever active, the oldest first.
     """
     parameters = []
     for trend in parameter_trends(models):

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query
 from pydantic import AwareDatetime, Field
 
+from tauscope.server.http.robots.models import RobotVersionAnswer
 from tauscope.server.http.services import ServicesDep
 from tauscope.server.http.tasks.routes import Limit
 from tauscope.server.models import AnswerModel
@@ -52,6 +53,7 @@ class RobotListAnswer(AnswerModel):
     """Robots that something is kept about."""
 
     robots: list[KnownRobotAnswer] = Field(description="by name")
+    versions: list[RobotVersionAnswer] = Field(description="robots that were sent to be kept, the newest first")
 
 
 router = APIRouter(tags=["items"], responses=problem_responses("store"))
@@ -94,7 +96,8 @@ def search_items(
 def list_robots(services: ServicesDep) -> RobotListAnswer:
     """Every robot that something is or was kept about; its name is the one in its file."""
     services.index.refresh()
-    return RobotListAnswer(robots=[KnownRobotAnswer.model_validate(each) for each in services.index.index.robots()])
+    known = [KnownRobotAnswer.model_validate(each) for each in services.index.index.robots()]
+    return RobotListAnswer(robots=known, versions=[RobotVersionAnswer.of(each) for each in services.robots.versions()])
 
 
 def _next(found: list[ItemAnswer], limit: int) -> datetime | None:

@@ -1,5 +1,6 @@
 """The OpenAPI document: bodies that the framework does not see, and models that only they refer to."""
 
+import json
 from collections.abc import Mapping, Sequence
 from functools import reduce
 from operator import getitem
@@ -12,37 +13,29 @@ from pydantic.json_schema import models_json_schema
 
 from tauscope.server.auth.audited_requests import is_audited
 from tauscope.server.auth.scopes import find_needed_scope, is_stop
-from tauscope.server.http.openapi_sharing import merge_problems, share_parts
+from tauscope.server.http.openapi_sharing import SCHEMAS, merge_problems, share_parts
 from tauscope.server.http.repeated_requests import HEADER as ONCE
 from tauscope.server.http.repeated_requests import LONGEST_KEY, is_repeatable
 from tauscope.server.problems import problem_responses
 
-_REFERENCE = "#/components/schemas/{model}"
+_REFERENCE = SCHEMAS + "{model}"
 
 Examples = Mapping[str, tuple[str, Any]]
 """For each example its summary and its value."""
 
 
 def json_body(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
-    """A JSON body of an operation.
-
-    Parameters
-    ----------
-    examples : mapping of str to (str, plain data)
-        summary and value by name
-    """
+    """A JSON body of an operation. `examples`: mapping of str to (str, plain data), summary and value by name."""
     shown = {name: {"summary": summary, "value": value} for name, (summary, value) in examples.items()}
     return {"application/json": {"schema": model_reference(model), "examples": shown}}
 
 
-def form_body(
-    parts: Mapping[str, Any], required: Sequence[str], encoding: Mapping[str, Any] | None = None
-) -> dict[str, Any]:
-    """A multipart body of an operation."""
+def form_body(parts: Mapping[str, Any], required: Sequence[str]) -> dict[str, Any]:
+    """A multipart body of an operation; an object in it is JSON."""
     schema = {"type": "object", "properties": dict(parts), "additionalProperties": False}
     if required:
         schema["required"] = list(required)
-    return {"multipart/form-data": {"schema": schema, **({"encoding": dict(encoding)} if encoding else {})}}
+    return {"multipart/form-data": {"schema": schema}}
 
 
 _BYTES = "application/octet-stream"
@@ -84,19 +77,26 @@ def resolve_reference(document: Mapping[str, Any], node: dict[str, Any]) -> dict
     return node
 
 
-def install_openapi(app: FastAPI, models: Sequence[type[BaseModel]]) -> None:
-    """Have the application's OpenAPI document hold further models."""
+def install_openapi(app: FastAPI, models: Sequence[type[BaseModel]], formats: Sequence[type[BaseModel]]) -> None:
+    """Have the application's OpenAPI document hold further models, and refer to formats of files by their address.
+
+    ``app.state.schemas`` then holds every model in full, as text by name: a reference is the other model's name.
+    """
 
     def document() -> dict[str, Any]:
         if app.openapi_schema is None:
-            app.openapi_schema = _document(app, models)
+            whole = _document(app, models)
+            schemas = whole["components"]["schemas"].items()
+            app.state.schemas = {name: json.dumps(each).replace(SCHEMAS, "") for name, each in schemas}
+            share_parts(whole, formats)
+            app.openapi_schema = whole
         return app.openapi_schema
 
     app.openapi = document
 
 
 def _document(app: FastAPI, models: Sequence[type[BaseModel]]) -> dict[str, Any]:
-    """The document with all models, sorted so that it changes only where the interface does."""
+    """The document with all models, each part as often as it is used."""
     document = get_openapi(
         title=app.title, version=app.version, summary=app.summary, description=app.description, routes=app.routes
     )
@@ -104,10 +104,6 @@ def _document(app: FastAPI, models: Sequence[type[BaseModel]]) -> dict[str, Any]
     components = document.setdefault("components", {}).setdefault("schemas", {})
     components.update(definitions.get("$defs", {}))
     _add_common_answers(document)
-    for unused in ("HTTPValidationError", "ValidationError"):
-        components.pop(unused, None)
-    document["components"]["schemas"] = dict(sorted(components.items()))
-    share_parts(document)
     return document
 
 
@@ -133,12 +129,15 @@ def _add_common_answers(document: dict[str, Any]) -> None:
             "description": "an API key (`tauscope key add`); not asked for by a service on loopback that has no keys",
         }
     }
+    words = "Every field of an answer and of a file: /docs/schemas/NAME, NAME as in components/schemas."
+    document["externalDocs"] = {"url": "/docs", "description": words}
+    document["security"] = [{"key": []}, {}]
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
             scope = find_needed_scope(method.upper(), path)
             if scope is None:
+                operation["security"] = []
                 continue
-            operation["security"] = [{"key": []}, {}]
             operation["x-tauscope-scope"] = scope.value
             if "HTTPValidationError" in str(operation["responses"].get("422")):
                 del operation["responses"]["422"]  # the framework's own form is never sent

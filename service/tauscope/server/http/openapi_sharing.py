@@ -1,9 +1,13 @@
 """Parts of the OpenAPI document that repeat: each is written once, and referred to."""
 
 import json
+import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from http import HTTPStatus
 from typing import Any
+
+from pydantic import BaseModel
 
 from tauscope.server.problems import MEDIA_TYPE, problem_responses
 
@@ -14,23 +18,86 @@ _COMMON = (
     "unauthorized",
     "forbidden",
     "invalid-request",
+    "limit-exceeded",
+    "media-type",
     "rate-limited",
+    "queue-full",
     "internal",
+    "worker-lost",
+    "store",
+    "storage-full",
 )
 """Problems that any request to the interface may meet, before its route or in it."""
 
 _VALUES = ("examples", "default", "enum", "const")
 """Keywords of a schema that hold plain data."""
 
+_LEAST_SHARED = 150
+"""A shorter schema is not worth a name and two references [characters]."""
 
-def share_parts(document: dict[str, Any]) -> None:
-    """Refer to problems and parameters, and leave out titles, which repeat the names of properties."""
-    for operation in _operations(document):
-        _drop_titles(operation)
-    for schema in document["components"]["schemas"].values():
-        _drop_titles(schema)
+SCHEMAS = "#/components/schemas/"
+
+
+def share_parts(document: dict[str, Any], formats: Sequence[type[BaseModel]]) -> None:
+    """Refer to parts that repeat, and leave out keywords that say nothing more.
+
+    `formats`: formats of files: their schemas have addresses of their own.
+    """
+    _refer_to_formats(document, formats)
+    _drop_unused(document)
+    _drop_descriptions_of_answers(document)
+    for node in _schema_nodes(document):
+        _shorten(node)
     _share_problems(document)
+    for operation in _operations(document):
+        _shorten_answers(operation)
     _share_parameters(document)
+    _share_answers(document)
+    _share_properties(document)
+
+
+def format_address(name: str) -> str:
+    """Where the schema of a file's format is read."""
+    return f"/docs/schemas/{name}"
+
+
+def _refer_to_formats(document: dict[str, Any], formats: Sequence[type[BaseModel]]) -> None:
+    """Have answers that are files name their format instead of holding it."""
+    addresses = {SCHEMAS + each.__name__: format_address(each.__name__) for each in formats}
+    for operation in _operations(document):
+        for answer in operation["responses"].values():
+            for content in answer.get("content", {}).values():
+                address = addresses.get(content.get("schema", {}).get("$ref"))
+                if address is not None:
+                    file = {"type": "object", "additionalProperties": True}
+                    content["schema"] = {**file, "externalDocs": {"url": address}}
+
+
+def _drop_unused(document: dict[str, Any]) -> None:
+    """Remove schemas to which nothing leads."""
+    schemas = document["components"]["schemas"]
+    used = _find_schemas(schemas, document["paths"])
+    document["components"]["schemas"] = {name: schema for name, schema in schemas.items() if name in used}
+
+
+def _drop_descriptions_of_answers(document: dict[str, Any]) -> None:
+    """Leave the words on answers to `format_address`: requests are written by hand, answers are read by their types."""
+    schemas = document["components"]["schemas"]
+    sent = [operation.get("requestBody", {}) for operation in _operations(document)]
+    for name in schemas.keys() - _find_schemas(schemas, sent):
+        for node in _nodes(schemas[name]):
+            for keyword in ("description", "examples"):
+                node.pop(keyword, None)
+
+
+def _find_schemas(schemas: dict[str, Any], node: Any) -> set[str]:
+    """Names of the schemas to which a part of the document leads."""
+    open_, found = [json.dumps(node)], set[str]()
+    while open_:
+        new = set(re.findall(r'"#/components/schemas/([^"]+)"', open_.pop())) - found
+        found |= new
+        open_ += [json.dumps(schemas[name]) for name in new]
+    return found
 
 
 def _operations(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -39,56 +106,94 @@ def _operations(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
         yield from operations.values()
 
 
-def _drop_titles(node: Any) -> None:
-    """Remove the titles of a schema and of all within it."""
+def _schema_nodes(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Every schema of the document, within others too."""
+    yield from _nodes([*document["components"]["schemas"].values(), *_operations(document)])
+
+
+def _nodes(node: Any) -> Iterator[dict[str, Any]]:
+    """Objects of a part of the document that are no plain data and no lists of properties."""
     if isinstance(node, list):
         for each in node:
-            _drop_titles(each)
+            yield from _nodes(each)
     elif isinstance(node, dict):
-        if isinstance(node.get("title"), str):
-            del node["title"]
+        yield node
         for keyword, value in node.items():
             if keyword == "properties":
-                for schema in value.values():
-                    _drop_titles(schema)
+                yield from _nodes(list(value.values()))
             elif keyword not in _VALUES:
-                _drop_titles(value)
+                yield from _nodes(value)
+
+
+def _shorten(node: dict[str, Any]) -> None:
+    """Leave out titles, which repeat names, and defaults that are null or those of a model; null is one more type."""
+    if isinstance(node.get("title"), str):
+        del node["title"]
+    if "default" in node and (node["default"] is None or isinstance(node["default"], dict)):
+        del node["default"]
+    match node.get("anyOf"):
+        case [{"type": str(kind)} as only, {"type": "null"}] if not {"enum", "const"} & set(only):
+            del node["anyOf"]
+            node |= {**only, "type": [kind, "null"]}
+
+
+def _shorten_answers(operation: dict[str, Any]) -> None:
+    """A parameter is described once; an answer of which nothing is known is described by its status."""
+    for parameter in operation.get("parameters", []):
+        if "description" in parameter:
+            parameter["schema"].pop("description", None)
+    for status, answer in operation["responses"].items():
+        if answer.get("description") == "Successful Response":
+            answer["description"] = HTTPStatus(int(status)).phrase
 
 
 def _share_problems(document: dict[str, Any]) -> None:
     """Put each problem's example, and each set of problems, into the document once.
 
-    The answer `default` of an operation with a scope holds the problems of any request.
+    The answer `default` of an operation with a scope holds the problems of any request; a status that has no others
+    is left out.
     """
     examples: dict[str, Any] = {}
-    shared: dict[str, Any] = {}
+    shared: dict[str, dict[str, Any]] = {}
     for operation in _operations(document):
         answers = operation["responses"]
         common = problem_responses(*_COMMON) if "x-tauscope-scope" in operation else {}
-        for status, answer in common.items():
-            if str(status) in answers:
-                merge_problems(answers, str(status), answer)
-        for status, answer in answers.items():
-            if MEDIA_TYPE in answer.get("content", {}):
-                answers[status] = _refer(answer, examples, shared)
+        for status, answer in list(answers.items()):
+            if MEDIA_TYPE not in answer.get("content", {}):
+                continue
+            if set(answer["content"][MEDIA_TYPE]["examples"]) <= set(_COMMON) and common:
+                del answers[status]
+                continue
+            if int(status) in common:
+                merge_problems(answers, status, common[int(status)])
+            answers[status] = _refer(status, answer, examples, shared)
         if common:
             whole: dict[str, Any] = {}
             for answer in common.values():
                 merge_problems(whole, "default", answer)
-            answers["default"] = _refer(whole["default"], examples, shared, name="any-request")
+            answers["default"] = _refer("any", whole["default"], examples, shared)
     document["components"] |= {"examples": dict(sorted(examples.items())), "responses": dict(sorted(shared.items()))}
 
 
 def _refer(
-    answer: dict[str, Any], examples: dict[str, Any], shared: dict[str, Any], name: str | None = None
+    name: str, answer: dict[str, Any], examples: dict[str, Any], shared: dict[str, dict[str, Any]]
 ) -> dict[str, str]:
-    """Share an answer and its examples; the reference to it."""
+    """Share an answer and its examples; the reference to it, by its only problem, or by its status and a number."""
     content = answer["content"][MEDIA_TYPE]
-    problems = content["examples"]
-    examples |= problems
-    name = name or "-or-".join(sorted(problems))
-    references = {code: {"$ref": f"#/components/examples/{code}"} for code in problems}
-    shared[name] = {**answer, "content": {MEDIA_TYPE: {**content, "examples": references}}}
+    codes = sorted(content["examples"])
+    examples |= {code: {"value": content["examples"][code]["value"]} for code in codes}
+    references = {code: {"$ref": f"#/components/examples/{code}"} for code in codes}
+    whole = {
+        **answer,
+        "description": ", ".join(codes),
+        "content": {MEDIA_TYPE: {**content, "examples": references}},
+    }
+    if len(codes) == 1:
+        name = codes[0]
+    elif name.isdecimal():
+        alike = [each for each in shared if each.startswith(f"{name}-")]
+        name = next((each for each in alike if shared[each] == whole), f"{name}-{len(alike) + 1}")
+    shared[name] = whole
     return {"$ref": f"#/components/responses/{name}"}
 
 
@@ -97,9 +202,9 @@ def merge_problems(answers: dict[str, Any], status: str, answer: dict[str, Any])
     present = answers.setdefault(status, answer)
     if present is not answer:
         examples = present["content"][MEDIA_TYPE]["examples"]
-        new = {code: value for code, value in answer["content"][MEDIA_TYPE]["examples"].items() if code not in examples}
-        examples.update(new)
-        present["description"] = "; ".join([present["description"], *(value["summary"] for value in new.values())])
+        examples |= {
+            code: each for code, each in answer["content"][MEDIA_TYPE]["examples"].items() if code not in examples
+        }
 
 
 def _share_parameters(document: dict[str, Any]) -> None:
@@ -119,3 +224,43 @@ def _share_parameters(document: dict[str, Any]) -> None:
                 shared[names[text]] = parameter
             parameters[place] = {"$ref": f"#/components/parameters/{names[text]}"}
     document["components"]["parameters"] = dict(sorted(shared.items()))
+
+
+def _share_answers(document: dict[str, Any]) -> None:
+    """Put each answer that several operations have, and that is no problem, into the document once."""
+    counts = Counter(
+        json.dumps(answer) for operation in _operations(document) for answer in operation["responses"].values()
+    )
+    names: dict[str, str] = {}
+    for operation in _operations(document):
+        for status, answer in operation["responses"].items():
+            text = json.dumps(answer)
+            if "$ref" not in answer and counts[text] > 1 and len(text) > _LEAST_SHARED:
+                found = re.search(r'schemas/(\w+)"', text)
+                name = names.setdefault(text, f"{found[1] if found else 'answer'}-{len(names) + 1}")
+                document["components"]["responses"][name] = answer
+                operation["responses"][status] = {"$ref": f"#/components/responses/{name}"}
+
+
+def _share_properties(document: dict[str, Any]) -> None:
+    """Put each long schema that several properties have into the document once, under the property's name."""
+    schemas = document["components"]["schemas"]
+    places = [
+        (node["properties"], name)
+        for node in [*_schema_nodes(document)]
+        if isinstance(node.get("properties"), dict)
+        for name in node["properties"]
+    ]
+    counts = Counter(json.dumps(properties[name], sort_keys=True) for properties, name in places)
+    names: dict[str, str] = {}
+    for properties, property_ in places:
+        text = json.dumps(properties[property_], sort_keys=True)
+        if counts[text] == 1 or len(text) < _LEAST_SHARED or "$ref" in properties[property_]:
+            continue
+        if text not in names:
+            name = "".join(part.capitalize() for part in property_.split("_"))
+            while name in schemas:
+                name += "Field"
+            names[text], schemas[name] = name, properties[property_]
+        properties[property_] = {"$ref": SCHEMAS + names[text]}
+    document["components"]["schemas"] = dict(sorted(schemas.items()))

@@ -17,7 +17,7 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 from tauscope.errors import NotFoundError
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.server.http.openapi import resolve_reference
 from tauscope.server.problems import KINDS
 
@@ -127,6 +127,16 @@ def show_guide(name: str) -> Response:
     if chapter is None:
         raise NotFoundError(one_line(f"there is no page {shown(name)}; /docs lists them"))
     return HTMLResponse(_templates.get_template("guide.html").render(chapter=chapter))
+
+
+@router.get("/schemas/{name}")
+def get_schema(name: str, request: Request) -> Response:
+    """The JSON Schema of a request, an answer or a file; a reference leads to its neighbour."""
+    request.app.openapi()
+    schemas: Mapping[str, str] = request.app.state.schemas
+    if name not in schemas:
+        raise NotFoundError(one_line(f"there is no schema {shown(name)}; {nearest(name, set(schemas))}"))
+    return Response(schemas[name], media_type="application/schema+json")
 
 
 def _operations(document: dict[str, Any]) -> list[dict[str, Any]]:

@@ -33,8 +33,7 @@ MOST_SETBACK_S = 60.0
 class Readiness:
     """Everything that may stand in the way of work.
 
-    checks : mapping
-        what is asked, by name; each tells an obstacle in a few words, or None, and may hang
+    `checks`: what is asked, by name; each tells an obstacle in a few words, or None, and may hang.
     """
 
     checks: Mapping[str, Callable[[], str | None]]

@@ -52,14 +52,8 @@ class ReadingQueue:
     ) -> Result:
         """Call a function in a process, for the caller of a request.
 
-        Raises
-        ------
-        ProblemError
-            if too many requests wait, or the process died
-        LimitExceededError
-            if it takes too long, or too much memory
-        ClientDisconnect
-            if the client has gone; the process is ended then
+        Raises ProblemError if too many requests wait, or the process died. Raises LimitExceededError if it takes too
+        long, or too much memory. Raises ClientDisconnect if the client has gone; the process is ended then.
         """
         who = find_caller(request.scope)
         caller = who.key or who.name

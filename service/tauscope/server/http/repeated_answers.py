@@ -1,4 +1,4 @@
-"""Answers that are kept for repeated requests, on the disk or, where they hold a secret, in memory."""
+"""Answers that are kept on the disk for repeated requests."""
 
 import base64
 import hashlib
@@ -7,10 +7,8 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
 
 from pydantic import Field, ValidationError
-from typing_extensions import override
 
 from tauscope.files import sync_folder, write_atomically
 from tauscope.strict_model import StrictModel
@@ -32,33 +30,6 @@ class KeptAnswer(StrictModel):
         return base64.b64decode(self.body)
 
 
-class Answers(Protocol):
-    """Answers by the name of their request."""
-
-    def begin(self, name: str) -> bool:
-        """Claim a request before anything is done.
-
-        Returns
-        -------
-        bool
-            False where the request was begun before
-
-        Raises
-        ------
-        OSError
-            if that has to be written down and cannot be
-        """
-        ...
-
-    def finish(self, name: str, answer: KeptAnswer | None) -> None:
-        """Keep the answer, or forget a request that did nothing."""
-        ...
-
-    def find(self, name: str) -> KeptAnswer | None:
-        """The answer to a request; None where there is none (yet)."""
-        ...
-
-
 def request_name(caller: str, path: str, key: str) -> str:
     """What a request is called: nobody meets another caller's answers."""
     return hashlib.sha256("\n".join((caller, path, key)).encode()).hexdigest()
@@ -67,7 +38,7 @@ def request_name(caller: str, path: str, key: str) -> str:
 _TIDY_EVERY = 500
 
 
-class StoredAnswers(Answers):
+class StoredAnswers:
     """Answers that outlast the service, each request durably claimed."""
 
     def __init__(self, folder: Path, clock: Callable[[], float] = time.time) -> None:
@@ -78,8 +49,13 @@ class StoredAnswers(Answers):
         folder.mkdir(parents=True, exist_ok=True)
         self._tidy()
 
-    @override
     def begin(self, name: str) -> bool:
+        """Claim a request before anything is done.
+
+        Raises OSError if that has to be written down and cannot be.
+
+        Raises OSError if that cannot be written down. Returns bool: False where the request was begun before.
+        """
         with self._lock:
             self._begun += 1
             if self._begun % _TIDY_EVERY == 0:
@@ -92,15 +68,15 @@ class StoredAnswers(Answers):
         sync_folder(self._folder)
         return True
 
-    @override
     def finish(self, name: str, answer: KeptAnswer | None) -> None:
+        """Keep the answer, or forget a request that did nothing."""
         if answer is None:
             (self._folder / name).unlink(missing_ok=True)
         else:
             write_atomically(self._folder / name, answer.model_dump_json().encode())
 
-    @override
     def find(self, name: str) -> KeptAnswer | None:
+        """The answer to a request; None where there is none (yet)."""
         try:
             return KeptAnswer.model_validate_json((self._folder / name).read_bytes())
         except (OSError, ValidationError):
@@ -114,53 +90,3 @@ class StoredAnswers(Answers):
                     entry.unlink(missing_ok=True)
             except OSError:
                 continue
-
-
-MOST = 1000
-"""Requests that are remembered; beyond it the oldest is forgotten."""
-
-
-class MemoryAnswers(Answers):
-    """Answers none of which is ever written to a disk."""
-
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """Begin without any.
-
-        Parameters
-        ----------
-        clock : callable
-            by which they age [s]
-        """
-        self._clock = clock
-        self._lock = threading.Lock()
-        self._kept: dict[str, tuple[float, KeptAnswer | None]] = {}
-
-    @override
-    def begin(self, name: str) -> bool:
-        now = self._clock()
-        with self._lock:
-            while self._kept and now - self._kept[self._oldest()][0] > LIFE_S:
-                del self._kept[self._oldest()]
-            if name in self._kept:
-                return False
-            if len(self._kept) == MOST:
-                del self._kept[self._oldest()]
-            self._kept[name] = (now, None)
-            return True
-
-    @override
-    def finish(self, name: str, answer: KeptAnswer | None) -> None:
-        with self._lock:
-            if answer is None:
-                self._kept.pop(name, None)
-            elif name in self._kept:
-                self._kept[name] = (self._kept[name][0], answer)
-
-    @override
-    def find(self, name: str) -> KeptAnswer | None:
-        with self._lock:
-            return self._kept.get(name, (0.0, None))[1]
-
-    def _oldest(self) -> str:
-        """The request that was begun first."""
-        return next(iter(self._kept))

@@ -13,7 +13,7 @@ from starlette.types import ASGIApp, Message, Receive, Send
 from starlette.types import Scope as AsgiScope
 
 from tauscope.server.auth.gate import find_caller
-from tauscope.server.http.repeated_answers import Answers, KeptAnswer, request_name
+from tauscope.server.http.repeated_answers import KeptAnswer, StoredAnswers, request_name
 from tauscope.server.http.services import Services
 from tauscope.server.problems import make_problem, problem_answer
 
@@ -50,9 +50,8 @@ HEADER = "Idempotency-Key"
 LONGEST_KEY = 200
 """Most characters of the header's value."""
 
-_LEASES = "/api/v1/leases"
 _REPEATABLE = re.compile(
-    r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|rollouts|recordings|leases|schedules/[^/]+/run)"
+    r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|rollouts|recordings|schedules/[^/]+/run)"
 )
 _KEY = re.compile(rf"[\x21-\x7e]{{1,{LONGEST_KEY}}}")
 
@@ -81,7 +80,7 @@ class IdempotentRequests:
             text = "the request could not be written down, so that it was not begun; make room on the disk"
             return await problem_answer(make_problem("storage-full", text, scope["path"]))(scope, receive, send)
         if not is_new:
-            return await (await _repeated(scope, receive, store, name, is_underway))(scope, receive, send)
+            return await (await _repeat(scope, receive, store, name, is_underway))(scope, receive, send)
         self._underway.add(name)
         try:
             await self._answer_first(scope, receive, send, name)
@@ -93,7 +92,7 @@ class IdempotentRequests:
         store = _answers_of(scope)
         fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
         answer = _Captured()
-        await self.app(scope, _counted(receive, fingerprint), answer.take)
+        await self.app(scope, _count_body(receive, fingerprint), answer.take)
         kept = None
         # What was refused has done nothing, and may be corrected and sent again.
         if not 400 <= answer.status < 500:
@@ -111,10 +110,9 @@ def is_repeatable(path: str) -> bool:
     return _REPEATABLE.fullmatch(path) is not None
 
 
-def _answers_of(scope: AsgiScope) -> Answers:
-    """Where the answers to a request are kept: a lease's secret never on the disk, it ends with the service anyway."""
-    services = cast(Services, scope["app"].state.services)
-    return services.lease_answers if scope["path"] == _LEASES else services.answers
+def _answers_of(scope: AsgiScope) -> StoredAnswers:
+    """Where answers are kept."""
+    return cast(Services, scope["app"].state.services).answers
 
 
 class _Captured:
@@ -139,7 +137,7 @@ class _Captured:
         return tuple((name.decode("latin-1"), value.decode("latin-1")) for name, value in self._headers)
 
 
-def _counted(receive: Receive, fingerprint: Fingerprint) -> Receive:
+def _count_body(receive: Receive, fingerprint: Fingerprint) -> Receive:
     """The body on its way to the application."""
 
     async def received() -> Message:
@@ -150,7 +148,7 @@ def _counted(receive: Receive, fingerprint: Fingerprint) -> Receive:
     return received
 
 
-async def _repeated(scope: AsgiScope, receive: Receive, store: Answers, name: str, is_underway: bool) -> Response:
+async def _repeat(scope: AsgiScope, receive: Receive, store: StoredAnswers, name: str, is_underway: bool) -> Response:
     """The answer to a request that came before."""
     fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
     more = True

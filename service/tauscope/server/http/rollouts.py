@@ -1,29 +1,28 @@
 """Rollouts: requests, answers and what is special about this resource."""
 
-from typing import Any, Self
+from typing import Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tauscope.closed_loop import RolloutDocument
-from tauscope.diagnosis.extended_model.saved import LARGEST_FILE
+from tauscope.diagnosis.extended_model import LARGEST_FILE
 from tauscope.errors import NotFoundError
 from tauscope.server.http.diagnoses import DIAGNOSES
-from tauscope.server.http.identifications import IDENTIFICATIONS, Names, require_listed_once
+from tauscope.server.http.identifications import IDENTIFICATIONS
 from tauscope.server.http.openapi import binary_part, binary_parts
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
-from tauscope.server.http.saved_models import MODEL_FILE, keep_model
 from tauscope.server.http.services import Services
-from tauscope.server.http.tasks.answers import JobAnswer, require_document
+from tauscope.server.http.tasks.answers import JobAnswer, JobLinks, require_document
 from tauscope.server.http.tasks.queued import QueuedTask
-from tauscope.server.http.tasks.router import HTML, JobDocument, text_document
-from tauscope.server.http.tasks.submission import Received, RobotRequest
-from tauscope.server.models import AnswerModel, PageAnswer
-from tauscope.server.queue.rollout import RolloutWorkspace
+from tauscope.server.http.tasks.router import report_document, result_document
+from tauscope.server.http.tasks.submission import MODEL_FILE, Names, Received, RecordingsRequest, keep_model
+from tauscope.server.models import PageAnswer
+from tauscope.server.queue.analyses import RolloutWorkspace
 from tauscope.server.queue.task_job import SAVED_MODEL, OrderedRecording
 from tauscope.tasks.task import ReadingOptions
 
 
-class RolloutRequest(RobotRequest):
+class RolloutRequest(RecordingsRequest):
     """What is to be rolled out."""
 
     recordings: Names | None = Field(
@@ -43,12 +42,6 @@ class RolloutRequest(RobotRequest):
     )
     options: ReadingOptions = Field(default=ReadingOptions(), description="how the recordings are read")
 
-    @model_validator(mode="after")
-    def _check_once(self) -> Self:
-        """A recording counts once."""
-        require_listed_once(self.recordings, self.refine)
-        return self
-
 
 EXAMPLES: dict[str, tuple[str, Any]] = {
     "identified": (
@@ -58,19 +51,15 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 }
 
 
-class RolloutLinksAnswer(AnswerModel):
+class RolloutLinksAnswer(JobLinks):
     """Where to go on from a rollout."""
 
-    self_: str = Field(alias="self", description="its state")
-    events: str = Field(description="what happens to it, as server-sent events")
-    result: str | None = Field(default=None, description="its result, once it succeeded")
     report: str | None = Field(default=None, description="its report as a page, once it succeeded")
 
 
 class RolloutAnswer(JobAnswer):
     """The state of a rollout."""
 
-    robot: str | None = Field(default=None, description="name of the robot")
     recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what is rolled out")
     refine: tuple[OrderedRecording, ...] = Field(default=(), description="what the model is refined by")
     options: ReadingOptions | None = Field(default=None, description="how the recordings are read")
@@ -83,15 +72,11 @@ class RolloutListAnswer(PageAnswer):
     rollouts: list[RolloutAnswer] = Field(description="the newest first")
 
 
-def rolled_out_model(received: Received[RolloutRequest], services: Services, workspace: Any) -> dict[str, str | None]:
+def place_model(received: Received[RolloutRequest], services: Services, workspace: Any) -> dict[str, str | None]:
     """Put the model into its place.
 
-    Raises
-    ------
-    ProblemError
-        where it came twice, or what is named has not succeeded
-    NotFoundError
-        if there is neither an identification nor a diagnosis of that identifier
+    Raises ProblemError where it came twice, or what is named has not succeeded. Raises NotFoundError if there is
+    neither an identification nor a diagnosis of that identifier.
     """
 
     def read(identifier: str) -> bytes:
@@ -119,25 +104,12 @@ ROLLOUTS = QueuedTask(
         "refine": binary_parts("recordings with commands by which the model is refined"),
         "model": binary_part("a model that identify or diagnose saved"),
     },
-    further=rolled_out_model,
+    further=place_model,
     further_parts={"model": (SAVED_MODEL, LARGEST_FILE)},
     work_problems=("robot-file", "recording", "recording-mismatch", "identification", "export", "invalid-request"),
     documents=(
-        JobDocument(
-            "result",
-            "result.json",
-            "Fetch the result",
-            "The result of a rollout that succeeded; else the problem that it ended in.",
-            {"model": RolloutDocument, "description": "the same document as `tauscope rollout --json`"},
-        ),
-        text_document(
-            "report",
-            "report.html",
-            HTML,
-            "Fetch the report",
-            "The report as one page: no script, no request to anywhere, ready to print.",
-            "page as `tauscope rollout --report`",
-        ),
+        result_document("a rollout", "rollout", RolloutDocument),
+        report_document("rollout"),
     ),
 )
 

@@ -27,15 +27,15 @@ from tauscope.server.http.backends import BackendRequest, chosen_backend
 from tauscope.server.http.documents import file_answer, to_json_text
 from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.form import PartRule
-from tauscope.server.http.leases.router import permit_of
+from tauscope.server.http.leases import permit_of
 from tauscope.server.http.openapi import binary_part, file_contents
 from tauscope.server.http.robots.files import read_received_robot
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.answers import shown_problem
+from tauscope.server.http.tasks.answers import MotionLinks, shown_problem
 from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
 from tauscope.server.http.tasks.routes import Identifier
-from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request
+from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request, stage_request
 from tauscope.server.models import AnswerModel, PageAnswer
 from tauscope.server.problems import Problem, ProblemError, make_problem, problem_responses
 from tauscope.server.queue.excitation import ExcitationOrder, ExcitationWorkspace, check_trajectory
@@ -85,12 +85,9 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 }
 
 
-class RunLinks(AnswerModel):
+class RunLinks(MotionLinks):
     """Where to go on from a run."""
 
-    self_: str = Field(alias="self", description="its state")
-    events: str = Field(description="what happens to it, as server-sent events")
-    stop: str = Field(description="where a POST stops it")
     excitation: str | None = Field(default=None, description="the excitation that it plays")
     recordings: dict[RecordingFormat, str] = Field(default={}, description="its recording by format, once there is one")
 
@@ -159,13 +156,7 @@ FORMATS: tuple[RecordingFormat, ...] = ("mcap", "csv", "parquet")
 
 
 def find_run(services: Services, identifier: str) -> RunWorkspace:
-    """The folder of a run.
-
-    Raises
-    ------
-    NotFoundError
-        if there is none
-    """
+    """The folder of a run. Raises NotFoundError if there is none."""
     return RunWorkspace(services.runs.items.folder(identifier))
 
 
@@ -178,13 +169,7 @@ class FollowedRun:
 
 
 def followed_run(services: Services, identifier: str) -> FollowedRun:
-    """A run whose events are followed.
-
-    Raises
-    ------
-    NotFoundError
-        if there is none
-    """
+    """A run whose events are followed. Raises NotFoundError if there is none."""
     workspace = find_run(services, identifier)
 
     def has_ended() -> bool:
@@ -194,13 +179,7 @@ def followed_run(services: Services, identifier: str) -> FollowedRun:
 
 
 def describe(services: Services, identifier: str, root: str) -> RunAnswer:
-    """The state of a run; one whose files are damaged is said to be so.
-
-    Raises
-    ------
-    NotFoundError
-        if there is none
-    """
+    """The state of a run; one whose files are damaged is said to be so. Raises NotFoundError if there is none."""
     workspace, live = find_run(services, identifier), services.runs.live(identifier)
     here = f"{root}/runs/{identifier}"
     record, request = workspace.read_run(), workspace.read_order()
@@ -240,12 +219,7 @@ def describe(services: Services, identifier: str, root: str) -> RunAnswer:
 def require_recording(services: Services, identifier: str, format_: RecordingFormat) -> RunWorkspace:
     """The folder of a run that left a recording of a format.
 
-    Raises
-    ------
-    NotFoundError
-        if there is no such run, or no such file
-    ProblemError
-        if the run goes on
+    Raises NotFoundError if there is no such run, or no such file. Raises ProblemError if the run goes on.
     """
     workspace = find_run(services, identifier)
     if not workspace.has_ended() or services.runs.live(identifier) is not None:
@@ -291,18 +265,10 @@ LARGEST_TRAJECTORY = 64 * 2**20
 async def submit_run(request: Request, services: Services) -> str:
     """Take a request for a run.
 
-    Raises
-    ------
-    ProblemError
-        if the request is not as documented
-    TauscopeError
-        if the robot or the motion is not valid, somebody else has the arm, or the lease does not let it move
+    Raises ProblemError if the request is not as documented. Raises TauscopeError if the robot or the motion is not
+    valid, somebody else has the arm, or the lease does not let it move.
     """
-    items = services.runs.items
-    staged = await run_in_threadpool(items.stage)
-    try:
-        workspace = RunWorkspace(staged)
-        await run_in_threadpool(workspace.prepare)
+    async with stage_request(services.runs.items, RunWorkspace) as workspace:
         most = min(LARGEST_TRAJECTORY, services.settings.max_upload_bytes)
         parts = {"trajectory": PartRule(most, workspace.trajectories, default_name="trajectory.json")}
         received = await receive_request(request, RunRequest, services.settings, workspace.robot, parts)
@@ -315,8 +281,6 @@ async def submit_run(request: Request, services: Services) -> str:
                 request, check_trajectory, workspace.trajectories, workspace.robot / wanted.robot_file
             )
         return await run_in_threadpool(_submit, wanted, services, workspace, permit)
-    finally:
-        await run_in_threadpool(items.discard, staged)
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,7 +298,7 @@ def _put_robot(received: Received[RunRequest], services: Services, workspace: Ru
     """Put the robot into its place; returns its file's name."""
     document, has_robot = received.document, received.form.file("robot") or received.document.robot
     if document.excitation is None or has_robot:
-        return keep_robot(received, workspace.robot)
+        return keep_robot(received, workspace.robot, services.robots)
     excitation = EXCITATIONS.finished(services, document.excitation)
     order = excitation.read_order()
     shutil.copytree(excitation.robot, workspace.robot, dirs_exist_ok=True)
@@ -425,15 +389,16 @@ RUNS = Resource(
 router = make_router(RUNS)
 
 
-def _stop(services: Services, identifier: str) -> StopAnswer:
-    """Stop a run; neither a lock nor a disk is needed for one that goes on."""
+def _stop(services: Services, identifier: str) -> RunState | None:
+    """Stop a run; None where it does not go on."""
     live = services.runs.stop(identifier)
-    if live is not None:
-        return StopAnswer(id=identifier, state=live.state)
+    return None if live is None else live.state
+
+
+def _read_state(services: Services, identifier: str) -> RunState | None:
+    """Where a run stands; None where its record is damaged."""
     record = find_run(services, identifier).read_run()
-    if record is None:
-        raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it does not go on")
-    return StopAnswer(id=identifier, state=record.state)
+    return None if record is None else record.state
 
 
 add_stopping(
@@ -441,6 +406,7 @@ add_stopping(
     RUNS,
     StopAnswer,
     _stop,
+    _read_state,
     lambda services, identifier: services.runs.remove(identifier),
     (
         "Stops the arm by the run's stop policy; legal in every state, any number of times; needs no body.\n\n"

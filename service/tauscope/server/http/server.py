@@ -72,11 +72,8 @@ SWITCH_S = 0.0005
 def serve(settings: Settings, announce: Callable[[str], None]) -> None:
     """Answer requests until SIGINT or SIGTERM.
 
-    Raises
-    ------
-    TauscopeError
-        if the address cannot be had, others could reach it and there is no API key, or another service works with the
-        data folder; or the certificate cannot be used
+    Raises TauscopeError if the address cannot be had, others could reach it and there is no API key, or another service
+    works with the data folder; or the certificate cannot be used.
     """
     _check_certificate(settings)
     require_data_folder(settings)
@@ -120,10 +117,7 @@ class _Server(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Open the services, answer requests, and only then say so.
 
-        Raises
-        ------
-        TauscopeError
-            if the services cannot be opened
+        Raises TauscopeError if the services cannot be opened.
         """
         await self._open.enter_async_context(self._app.router.lifespan_context(self._app))
         try:

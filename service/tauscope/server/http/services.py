@@ -33,17 +33,15 @@ from tauscope.server.http.heartbeat import Heartbeat
 from tauscope.server.http.metrics import Metrics, TimedExecutor
 from tauscope.server.http.readiness import Clock, Readiness, ReadyMetrics, check_database, check_disk
 from tauscope.server.http.reading import WIDTH, ReadingQueue
-from tauscope.server.http.repeated_answers import Answers, MemoryAnswers, StoredAnswers
+from tauscope.server.http.repeated_answers import StoredAnswers
 from tauscope.server.http.settings import Settings
 from tauscope.server.http.tasks.event_feeds import EventFeeds
+from tauscope.server.queue.analyses import run_diagnosis, run_identification, run_rollout
 from tauscope.server.queue.cluster_executor import ClusterExecutor
-from tauscope.server.queue.diagnosis import run_diagnosis
 from tauscope.server.queue.excitation import run_excitation
 from tauscope.server.queue.executors import open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
-from tauscope.server.queue.identification import run_identification
 from tauscope.server.queue.queue import JobKind, JobQueue
-from tauscope.server.queue.rollout import run_rollout
 from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.server.schedules.repeater import Repeater
 from tauscope.server.schedules.repository import ScheduleRepository
@@ -53,6 +51,7 @@ from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
+from tauscope.server.store.robots import RobotStore
 
 _log = logging.getLogger("tauscope.jobs")
 
@@ -63,6 +62,7 @@ class Services:
 
     settings: Settings
     recordings: RecordingStore
+    robots: RobotStore
     identifications: JobKind
     diagnoses: JobKind
     rollouts: JobKind
@@ -74,8 +74,7 @@ class Services:
     access: Access
     leases: Leases
     audit: AuditTrail
-    answers: Answers
-    lease_answers: Answers
+    answers: StoredAnswers
     metrics: Metrics
     readiness: Readiness
     heartbeat: Heartbeat
@@ -117,10 +116,7 @@ def open_services(
 ) -> Iterator[Services]:
     """Take the data folder, and end all work on leaving: first what moves, then the rest.
 
-    Raises
-    ------
-    TauscopeError
-        if another service works with the data folder, or its database cannot be used
+    Raises TauscopeError if another service works with the data folder, or its database cannot be used.
     """
     settings.data_folder.mkdir(0o700, parents=True, exist_ok=True)
     access = _open_access(settings)
@@ -210,7 +206,7 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
         jobs = new_queue(slots=settings.workers)
     audit = AuditTrail(AuditLog(settings.data_folder))
     claims, closing = DeviceClaims(settings.max_arms), threading.Event()
-    leases = Leases(claims, settings.data_folder / "lease-number", on_end=partial(_note_end, audit))
+    leases = Leases(claims, on_end=partial(_note_end, audit))
     start = start or partial(start_control, sim_socket=settings.sim_socket)
     runs = RunManager(items["run"], recordings, start, claims, heartbeat.is_alive, metrics.run_ended)
     dependencies = CampaignDependencies(jobs, excitations, identifications, diagnoses, runs, recordings)
@@ -222,6 +218,7 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
     return Services(
         settings=settings,
         recordings=recordings,
+        robots=RobotStore(settings.data_folder / "robots"),
         identifications=identifications,
         diagnoses=diagnoses,
         rollouts=rollouts,
@@ -234,7 +231,6 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
         leases=leases,
         audit=audit,
         answers=StoredAnswers(settings.data_folder / "idempotency"),
-        lease_answers=MemoryAnswers(),
         metrics=metrics,
         readiness=Readiness(_collect_checks(ground, jobs, readers, audit, closing)),
         closing=closing,
@@ -346,10 +342,8 @@ def _open_access(settings: Settings) -> Access:
 def require_data_folder(settings: Settings) -> None:
     """Make the data folder, and refuse one that cannot be worked with.
 
-    Raises
-    ------
-    TauscopeError
-        if it cannot be made or written to, another service works with it, or it has no key where one is needed
+    Raises TauscopeError if it cannot be made or written to, another service works with it, or it has no key where one
+    is needed.
     """
     folder = settings.data_folder
     try:

@@ -27,13 +27,7 @@ class LoopThread:
         self._stopping = asyncio.Event()
 
     def open(self) -> "IOLoop":
-        """The running loop, started where it is not.
-
-        Raises
-        ------
-        ImportError
-            if Dask is not installed
-        """
+        """The running loop, started where it is not. Raises ImportError if Dask is not installed."""
         if self._loop is None:
             from tornado.ioloop import IOLoop
 
@@ -51,10 +45,7 @@ class LoopThread:
     def stop(self, within_s: float) -> None:
         """End the thread, with whatever its clients still had under way.
 
-        Parameters
-        ----------
-        within_s : float
-            how long to wait for its end [s]
+        `within_s`: how long to wait for its end [s].
         """
         if self._loop is not None:
             self._loop.add_callback(self._stopping.set)
@@ -90,15 +81,9 @@ class ClusterExecutor(Executor):
     def __init__(self, address: str, wait_s: float = 0.0) -> None:
         """Reach the scheduler.
 
-        Parameters
-        ----------
-        wait_s : float
-            how long `submit` waits for a scheduler that is away [s]
+        Raises StoreError if it does not answer, or Dask is not installed.
 
-        Raises
-        ------
-        StoreError
-            if it does not answer, or Dask is not installed
+        `wait_s`: how long `submit` waits for a scheduler that is away [s].
         """
         self._address, self._wait_s = address, wait_s
         self._width = 1
@@ -129,12 +114,7 @@ class ClusterExecutor(Executor):
     ) -> "Future[Result]":
         """Have a function called by a worker.
 
-        Raises
-        ------
-        ClusterUnavailableError
-            if the scheduler is away
-        RuntimeError
-            after `shutdown`
+        Raises ClusterUnavailableError if the scheduler is away. Raises RuntimeError after `shutdown`.
         """
         if self._closing.is_set():
             raise RuntimeError("the cluster was left")

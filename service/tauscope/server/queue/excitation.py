@@ -22,17 +22,14 @@ MOST_ROWS = 2_000_000
 class ExcitationOrder(TaskOrder):
     """Input of an excitation job."""
 
+    task = design_excitation
+
     form: Literal["tauscope.excitation-order/1"] = Field(
         default="tauscope.excitation-order/1", description="name and version of this form"
     )
     options: ExcitationDesignOptions = Field(
         default=ExcitationDesignOptions(), description="how the motion is designed"
     )
-
-    @property
-    def request(self) -> design_excitation.Request:
-        """The request of the task."""
-        return design_excitation.Request(robot=self.robot_file, options=self.options)
 
 
 class ExcitationWorkspace(TaskWorkspace[ExcitationOrder]):
@@ -45,25 +42,16 @@ class ExcitationWorkspace(TaskWorkspace[ExcitationOrder]):
 
 def run_excitation(folder: Path) -> JobProblem | None:
     """Do an excitation job; returns why there is no result."""
-    return perform_job(design_excitation, ExcitationWorkspace(folder), folder)
+    return perform_job(ExcitationWorkspace(folder), folder)
 
 
 def write_trajectory_piece(workspace: TaskWorkspace[Any], rate_hz: float, start: int) -> bytes:
     """Rows of the trajectory of an excitation that succeeded, as CSV; empty beyond the last one.
 
-    Parameters
-    ----------
-    rate_hz : float
-        samples a second [Hz]
+    Raises NotFoundError if the file is missing. Raises ExcitationError if the file was damaged. Raises
+    LimitExceededError if the CSV would be too long.
 
-    Raises
-    ------
-    NotFoundError
-        if the file is missing
-    ExcitationError
-        if the file was damaged
-    LimitExceededError
-        if the CSV would be too long
+    `rate_hz`: samples a second [Hz].
     """
     try:
         content, order = workspace.trajectory.read_bytes(), workspace.read_order()
@@ -83,10 +71,7 @@ def write_trajectory_piece(workspace: TaskWorkspace[Any], rate_hz: float, start:
 def check_trajectory(folder: Path, robot_file: Path) -> None:
     """Read a trajectory that a client sent, as a worker process does it.
 
-    Raises
-    ------
-    ExcitationError
-        if it is not valid, or was made for an arm of another number of joints
+    Raises ExcitationError if it is not valid, or was made for an arm of another number of joints.
     """
     (path,) = folder.iterdir()
     try:

@@ -53,12 +53,8 @@ FleetWork = Callable[[FleetEntry, Path], FleetResult]
 def read_manifest(path: Path) -> Iterator[FleetEntry]:
     """The robots of a manifest, line by line; paths are relative to it.
 
-    A CSV file with the columns `COLUMNS`; several recordings are separated by ``;``, `held_out` may be empty.
-
-    Raises
-    ------
-    RecordingError
-        naming the line
+    A CSV file with the columns `COLUMNS`; several recordings are separated by ``;``, `held_out` may be empty. Raises
+    RecordingError naming the line.
     """
     names: dict[str, int] = {}
     try:
@@ -91,7 +87,7 @@ def analyse_fleet(
             if entry is None:
                 is_exhausted = True
             else:
-                pending[_submitted(executor, work, entry, folder)] = entry
+                pending[_submit(executor, work, entry, folder)] = entry
         done, _ = wait(pending, return_when=FIRST_COMPLETED)
         for future in done:
             entry = pending.pop(future)
@@ -100,20 +96,20 @@ def analyse_fleet(
             else:
                 yield _result(future, entry)
     for entry in suspects:
-        yield _result(_submitted(executor, work, entry, folder), entry)
+        yield _result(_submit(executor, work, entry, folder), entry)
 
 
 def identify_robot(entry: FleetEntry, folder: Path) -> FleetResult:
     """Identify a robot."""
-    return _timed(identify, entry, folder)
+    return _time(identify, entry, folder)
 
 
 def diagnose_robot(entry: FleetEntry, folder: Path) -> FleetResult:
     """Diagnose a robot, against the best model that its recordings allow."""
-    return _timed(diagnose, entry, folder)
+    return _time(diagnose, entry, folder)
 
 
-def _timed(task: ModuleType, entry: FleetEntry, folder: Path) -> FleetResult:
+def _time(task: ModuleType, entry: FleetEntry, folder: Path) -> FleetResult:
     """A result with how long it took."""
     begin = time.monotonic()
     return replace(_perform(task, entry, folder), seconds=time.monotonic() - begin)
@@ -150,7 +146,7 @@ def _figures(found: Any) -> dict[str, str]:
     }
 
 
-def _submitted(executor: Executor, work: FleetWork, entry: FleetEntry, folder: Path) -> "Future[FleetResult]":
+def _submit(executor: Executor, work: FleetWork, entry: FleetEntry, folder: Path) -> "Future[FleetResult]":
     """A robot in the executor; where that takes nothing, a future that says so."""
     try:
         return executor.submit(work, entry, folder)

@@ -16,13 +16,7 @@ class Housekeeping:
     """A thread that does small tasks, one after the other, again and again."""
 
     def __init__(self, tasks: Sequence[Callable[[], object]], period_s: float = PERIOD_S) -> None:
-        """Prepare; nothing is done before `start`.
-
-        Parameters
-        ----------
-        period_s : float
-            pause between two rounds [s]
-        """
+        """Prepare; nothing is done before `start`. `period_s`: pause between two rounds [s]."""
         self._tasks = tasks
         self._period_s = period_s
         self._closing = threading.Event()

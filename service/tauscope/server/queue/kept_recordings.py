@@ -18,7 +18,7 @@ from tauscope.recording import (
     read_recording,
 )
 from tauscope.recording.recording import Array
-from tauscope.report.decimation import envelope_indices
+from tauscope.report.series import envelope_indices
 from tauscope.robot import Robot
 from tauscope.server.queue.record import without_folders
 
@@ -26,15 +26,9 @@ from tauscope.server.queue.record import without_folders
 def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport:
     """Report what a recording in the store holds.
 
-    Parameters
-    ----------
-    joint_count : int or None
-        joints that it must have; None where any number is welcome
+    Raises RecordingError if it cannot be read or breaks a rule; the message calls the file by its name alone.
 
-    Raises
-    ------
-    RecordingError
-        if it cannot be read or breaks a rule; the message calls the file by its name alone
+    `joint_count`: joints that it must have; None where any number is welcome.
     """
     try:
         report = check_recording(path, joint_count)
@@ -47,12 +41,9 @@ def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport
 class Understanding:
     """How a file is understood before anything is computed from it.
 
-    mapping : ColumnMapping or None
-        None for a log, which names its joints itself
-    report : RecordingReport or None
-        None where the file is refused
-    problem : str or None
-        why it is refused
+    `mapping`: None for a log, which names its joints itself.
+    `report`: None where the file is refused.
+    `problem`: why it is refused.
     """
 
     mapping: ColumnMapping | None
@@ -81,18 +72,12 @@ def read_kept_samples(path: Path, most: int) -> bytes:
     """Time, positions and effort of a recording in the store, for a plot.
 
     A recording of more samples than asked for is thinned: of each stretch those are kept at which any joint's position
-    or effort is least or greatest.
+    or effort is least or greatest. Raises RecordingError if it cannot be read; the message calls the file by its name
+    alone.
 
-    Returns
-    -------
-    bytes
-        length of the header (4 bytes, little-endian), the header (JSON, filled with blanks to a multiple of four), then
-        each column that the header names as 32-bit floats, little-endian; time counts from the first sample [s]
-
-    Raises
-    ------
-    RecordingError
-        if it cannot be read; the message calls the file by its name alone
+    Returns bytes: length of the header (4 bytes, little-endian), the header (JSON, filled with blanks to a multiple of
+        four), then each column that the header names as 32-bit floats, little-endian; time counts from the first sample
+        [s].
     """
     try:
         recording = read_recording(path)
@@ -101,7 +86,7 @@ def read_kept_samples(path: Path, most: int) -> bytes:
     samples = recording.samples()
     effort = recording.effort_kind.value
     values = np.hstack([samples.position, samples.effort])
-    kept = _kept(values, most)
+    kept = _choose_rows(values, most)
     joints = range(1, recording.joint_count + 1)
     header = {
         "columns": ["t", *(f"q{j}" for j in joints), *(f"{effort}{j}" for j in joints)],
@@ -116,7 +101,7 @@ def read_kept_samples(path: Path, most: int) -> bytes:
     return len(text).to_bytes(4, "little") + text + columns.tobytes()
 
 
-def _kept(values: Array, most: int) -> NDArray[np.intp]:
+def _choose_rows(values: Array, most: int) -> NDArray[np.intp]:
     """Rows that keep every column's look."""
     if len(values) <= most:
         return np.arange(len(values))

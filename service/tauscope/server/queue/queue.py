@@ -10,8 +10,8 @@ from pathlib import Path
 
 from tauscope.errors import LimitExceededError, NotFoundError, TauscopeError
 from tauscope.server.queue.cluster_executor import ClusterUnavailableError
+from tauscope.server.queue.job_folder import Workspace
 from tauscope.server.queue.record import JobProblem, JobRecord, JobState
-from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.items import ItemStore
 
 Work = Callable[[Path], JobProblem | None]
@@ -32,8 +32,7 @@ TOO_OFTEN = JobProblem(
 class JobKind:
     """A kind of job: where its folders lie and what is done with them.
 
-    is_heavy : bool
-        whether its work takes minutes: where there are several slots, one stays free of such work
+    `is_heavy`: whether its work takes minutes: where there are several slots, one stays free of such work.
     """
 
     items: ItemStore
@@ -64,17 +63,11 @@ class QueuedJob:
     def move(self, state: JobState, problem: JobProblem | None = None) -> bool:
         """Write a new state, if it may follow the present one.
 
-        An earlier attempt may have written it and failed after that, as on a disk that became full in between.
+        An earlier attempt may have written it and failed after that, as on a disk that became full in between. Raises
+        OSError if the disk does not take it.
 
-        Returns
-        -------
-        bool
-            whether the job is in that state now; False where it may not be, its record is damaged, or it is gone
-
-        Raises
-        ------
-        OSError
-            if the disk does not take it
+        Returns bool: whether the job is in that state now; False where it may not be, its record is damaged, or it is
+        gone.
         """
         try:
             workspace = Workspace(self.folder)
@@ -175,10 +168,7 @@ class JobQueue:
     def submit(self, kind: JobKind, staged: Path, caller: str = "") -> str:
         """Take a job; what campaigns and schedules hand in has no caller.
 
-        Raises
-        ------
-        QueueFullError
-            if too many jobs are waiting, or too many of the caller's; the folder stays staged
+        Raises QueueFullError if too many jobs are waiting, or too many of the caller's; the folder stays staged.
         """
         with self._lock:
             if self._is_closed or len(self._waiting) >= self._most_waiting:
@@ -201,17 +191,10 @@ class JobQueue:
     def cancel_or_remove(self, kind: JobKind, identifier: str) -> bool:
         """Cancel a job that has not ended; remove one that has, or whose record is damaged.
 
-        Cancelled work stops at its next step; what it still does until then is dropped.
+        Cancelled work stops at its next step; what it still does until then is dropped. Raises NotFoundError if there
+        is no such job.
 
-        Returns
-        -------
-        bool
-            True where the job was removed
-
-        Raises
-        ------
-        NotFoundError
-            if there is no such job
+        Returns bool: True where the job was removed.
         """
         with self._lock:
             if self.cancel(kind, identifier):
@@ -223,15 +206,9 @@ class JobQueue:
     def cancel(self, kind: JobKind, identifier: str) -> bool:
         """Cancel a job that has not ended.
 
-        Returns
-        -------
-        bool
-            False where it had ended, or its record is damaged
+        Raises NotFoundError if there is no such job.
 
-        Raises
-        ------
-        NotFoundError
-            if there is no such job
+        Returns bool: False where it had ended, or its record is damaged.
         """
         with self._lock:
             job, workspace = QueuedJob(kind, identifier), Workspace(kind.items.folder(identifier))
@@ -255,12 +232,8 @@ class JobQueue:
     def settle(self) -> None:
         """Do what was hindered by a full disk or an executor that was away: write ends, and begin what waits.
 
-        To be called again and again; while nothing is in the way there is nothing to do.
-
-        Raises
-        ------
-        OSError
-            if the disk is in the way still
+        To be called again and again; while nothing is in the way there is nothing to do. Raises OSError if the disk is
+        in the way still.
         """
         with self._lock:
             try:

@@ -76,13 +76,7 @@ class JobRecord(StrictModel):
         return may_follow(self.state, state)
 
     def moved(self, state: JobState, now: datetime, problem: JobProblem | None = None) -> "JobRecord":
-        """The record after a transition.
-
-        Raises
-        ------
-        ValueError
-            if that state may not follow: a fault of the caller's
-        """
+        """The record after a transition. Raises ValueError if that state may not follow: a fault of the caller's."""
         if not self.may_become(state):
             raise ValueError(f"a job that is {self.state} cannot become {state}")
         changes: dict[str, object] = {"ended": now}

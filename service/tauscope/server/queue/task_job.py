@@ -12,15 +12,23 @@ from pydantic import Field
 from tauscope.errors import ExportError, NotFoundError, RecordingError, TauscopeError
 from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.files import write_atomically
+from tauscope.server.queue.job_folder import (
+    Workspace,
+    begin_step,
+    do_work,
+    read_bytes,
+    read_document,
+    read_stored,
+    require_wanted,
+    write_stored,
+)
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.record import JobProblem, without_folders
-from tauscope.server.queue.stored import read_bytes, read_document, read_stored, write_stored
-from tauscope.server.queue.work import begin_step, do_work, require_wanted
-from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.files import hash_file
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.strict_model import StrictModel
+from tauscope.tasks.task import ROLES
 
 TRAJECTORY, SAVED_MODEL = "trajectory.json", "against"
 
@@ -39,10 +47,16 @@ class TaskOrder(StrictModel):
     robot_file: str = Field(description="name of the robot file in the job's robot folder")
     robot_name: str = Field(description="what the robot file calls the robot")
 
+    task: ClassVar[ModuleType]
+
     @property
     def request(self) -> Any:
-        """The request of the task."""
-        raise NotImplementedError
+        """The request of the task; its files are called by their bare names."""
+        fields: dict[str, Any] = {name: getattr(self, name) for name in ("model", "options") if hasattr(self, name)}
+        for role in ROLES:
+            if role != "model" and hasattr(self, role):
+                fields[role] = tuple(entry.name for entry in getattr(self, role))
+        return self.task.Request(robot=self.robot_file, **fields)
 
 
 Order = TypeVar("Order", bound=TaskOrder)
@@ -58,6 +72,7 @@ class TaskWorkspace(Workspace, Generic[Order]):
     order_type: ClassVar[type[TaskOrder]]
     noun: ClassVar[str]
     roles: ClassVar[tuple[str, ...]] = ()
+    takes_model: ClassVar[bool] = False
     outputs: ClassVar[Mapping[str, str | None]]
     formats: ClassVar[Mapping[ExportFormat, ExportFile]] = {}
 
@@ -76,7 +91,7 @@ class TaskWorkspace(Workspace, Generic[Order]):
 
     def prepare(self) -> None:
         """Make the folders that hold a job's input."""
-        for folder in (self.robot, *map(self.uploads, self.roles)):
+        for folder in (self.robot, *map(self.uploads, (*self.roles, *([SAVED_MODEL] if self.takes_model else [])))):
             folder.mkdir()
 
     def uploads(self, role: str) -> Path:
@@ -109,13 +124,7 @@ class TaskWorkspace(Workspace, Generic[Order]):
         return {str(key): str(reason) for key, reason in refused.items()} if isinstance(refused, dict) else {}
 
     def read_export(self, file_name: str) -> bytes:
-        """An export.
-
-        Raises
-        ------
-        NotFoundError
-            if it was not written
-        """
+        """An export. Raises NotFoundError if it was not written."""
         try:
             return (self.exports / file_name).read_bytes()
         except OSError:
@@ -149,10 +158,7 @@ class JobFiles:
     def find(self, role: str, name: str) -> Path:
         """Where an input lies.
 
-        Raises
-        ------
-        RecordingError
-            if a recording was changed or removed after the job was handed in
+        Raises RecordingError if a recording was changed or removed after the job was handed in.
         """
         if role in ("robot", "model"):
             return self._workspace.uploads("robot" if role == "robot" else SAVED_MODEL) / name
@@ -175,13 +181,10 @@ class JobFiles:
         return Path(output) if output == TRAJECTORY else None
 
 
-def perform_job(task: ModuleType, workspace: TaskWorkspace[Any], server_recordings: Path) -> JobProblem | None:
+def perform_job(workspace: TaskWorkspace[Any], server_recordings: Path) -> JobProblem | None:
     """Do a job, as a worker process does it.
 
-    Returns
-    -------
-    JobProblem or None
-        why there is no result; None where there is one
+    Returns JobProblem or None: why there is no result; None where there is one.
     """
     folders = (*map(workspace.uploads, (*workspace.roles, SAVED_MODEL)), workspace.robot, server_recordings)
 
@@ -196,7 +199,7 @@ def perform_job(task: ModuleType, workspace: TaskWorkspace[Any], server_recordin
         order = workspace.read_order()
         if order is None:
             raise TauscopeError(f"the job's order.json is missing or damaged; hand the {workspace.noun} in again")
-        result = task.perform(order.request, JobFiles(workspace, order, server_recordings), tell)
+        result = order.task.perform(order.request, JobFiles(workspace, order, server_recordings), tell)
         tell("write result and exports")
         workspace.write_outputs(result.outputs, *folders)
 
@@ -231,15 +234,9 @@ def submit_job(
 ) -> str:
     """Hand in a job whose files lie on the server already; returns its identifier.
 
-    Parameters
-    ----------
-    put_robot : callable
-        writes the robot's files into a folder
+    Raises QueueFullError if too many jobs are waiting.
 
-    Raises
-    ------
-    QueueFullError
-        if too many jobs are waiting
+    `put_robot`: writes the robot's files into a folder.
     """
     with staged_workspace(kind.items, workspace) as staged:
         put_robot(staged.robot)
@@ -248,11 +245,5 @@ def submit_job(
 
 
 def ordered_on_server(recordings: RecordingStore, names: Sequence[str]) -> tuple[OrderedRecording, ...]:
-    """Recordings that lie on the server, as an order holds them.
-
-    Raises
-    ------
-    NotFoundError
-        if one does not lie there
-    """
+    """Recordings that lie on the server, as an order holds them. Raises NotFoundError if one does not lie there."""
     return tuple(OrderedRecording(name=name, origin="server", sha256=recordings.digest(name)) for name in names)

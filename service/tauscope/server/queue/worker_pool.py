@@ -2,19 +2,70 @@
 
 import atexit
 import os
+import resource
+import signal
 import threading
+import traceback
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import Connection, wait
 from typing import Any, ParamSpec, TypeVar
 
 from tauscope.errors import LimitExceededError
-from tauscope.server.queue.worker_process import serve_connection
+
+NICENESS = 10
+"""Of a worker, so that the service answers a stop on a machine whose processors are all at work."""
+
+
+def serve_connection(connection: Connection, memory_bytes: int | None) -> None:
+    """Call functions until the other side is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the service's to handle
+    os.nice(NICENESS)
+    threading.Thread(target=_end_with_service, daemon=True).start()
+    if memory_bytes is not None:
+        resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, memory_bytes))
+    connection.send(None)
+    while True:
+        try:
+            call = connection.recv()
+        except (EOFError, OSError):
+            return
+        except Exception as error:  # the function cannot be imported here
+            answer = _describe_failure(error)
+        else:
+            answer = _call(*call)
+        try:
+            connection.send(answer)
+        except Exception as error:  # what cannot be sent is described
+            connection.send((False, RuntimeError("".join(traceback.format_exception(error)))))
+
+
+def _call(function: Callable[..., Any], arguments: tuple[Any, ...], options: dict[str, Any]) -> tuple[bool, Any]:
+    """What comes of a call: whether it succeeded, and its result or exception."""
+    try:
+        return True, function(*arguments, **options)
+    except BaseException as error:
+        return _describe_failure(error)
+
+
+def _describe_failure(error: BaseException) -> tuple[bool, BaseException]:
+    """What is sent of an exception: where it happened is part of it."""
+    error.add_note("".join(traceback.format_exception(error)))
+    return False, error
+
+
+def _end_with_service() -> None:
+    """End this process when the service is gone."""
+    parent = parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
+
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
@@ -44,12 +95,7 @@ class WorkerPool(Executor):
     def __init__(self, workers: int, *, deadline_s: float | None = None, memory_bytes: int | None = None) -> None:
         """Make the pool; no process is started before it is needed.
 
-        Parameters
-        ----------
-        deadline_s : float or None
-            how long a call may take [s]
-        memory_bytes : int or None
-            data that a process may hold [bytes]
+        `deadline_s`: how long a call may take [s]; `memory_bytes`: data that a process may hold [bytes].
         """
         self._deadline_s, self._memory_bytes = deadline_s, memory_bytes
         self._condition = threading.Condition()
@@ -65,13 +111,7 @@ class WorkerPool(Executor):
     def submit(
         self, fn: Callable[Arguments, Result], /, *args: Arguments.args, **kwargs: Arguments.kwargs
     ) -> "Future[Result]":
-        """Have a function called in a process.
-
-        Raises
-        ------
-        RuntimeError
-            after `shutdown`
-        """
+        """Have a function called in a process. Raises RuntimeError after `shutdown`."""
         future: Future[Result] = Future()
         with self._condition:
             if self._is_closed:
@@ -211,13 +251,7 @@ class _Worker:
             theirs.close()  # the process has the only other end: when it dies, the connection does
 
     def begin(self, call: tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]) -> None:
-        """Have it call a function.
-
-        Raises
-        ------
-        OSError, EOFError
-            if it has ended
-        """
+        """Have it call a function. Raises OSError, EOFError if it has ended."""
         if not self._is_ready:
             if not self.connection.poll(START_S):
                 raise EOFError("the process did not start")

@@ -14,10 +14,14 @@ from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
 from tauscope.server.control.campaign_manager import CampaignManager
 from tauscope.server.control.campaign_runner import CampaignDependencies
 from tauscope.server.control.leases import FREE, Permit
-from tauscope.server.queue.diagnosis import DiagnosisOrder, DiagnosisWorkspace
-from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace
+from tauscope.server.queue.analyses import (
+    DiagnosisOrder,
+    DiagnosisWorkspace,
+    IdentificationOrder,
+    IdentificationWorkspace,
+)
+from tauscope.server.queue.job_folder import Workspace
 from tauscope.server.queue.task_job import OrderedRecording, ordered_on_server, staged_workspace, submit_job
-from tauscope.server.queue.workspace import Workspace
 from tauscope.server.schedules.definition import RecordingChoice, ScheduleDefinition
 from tauscope.server.schedules.repository import ScheduleEntry
 from tauscope.server.store.items import ItemStore
@@ -42,17 +46,9 @@ class Repeater:
     def start(self, entry: ScheduleEntry, since: datetime | None) -> tuple[str, str]:
         """Start it; returns at once.
 
-        Returns
-        -------
-        (str, str)
-            kind and identifier of what was started
+        Raises NothingToDoError if there is no new recording. Raises TauscopeError if it cannot be started.
 
-        Raises
-        ------
-        NothingToDoError
-            if there is no new recording
-        TauscopeError
-            if it cannot be started
+        Returns (str, str), kind and identifier of what was started.
         """
         definition = ScheduleDefinition.model_validate(dict(entry.definition), strict=False)
         if definition.kind == "campaign":
@@ -99,10 +95,7 @@ def newest_recordings(
 ) -> tuple[tuple[OrderedRecording, ...], tuple[OrderedRecording, ...]]:
     """The recordings that an analysis takes: those to judge by are the newest, the others come before them.
 
-    Raises
-    ------
-    NothingToDoError
-        if there are too few, or none is new
+    Raises NothingToDoError if there are too few, or none is new.
     """
     found = [entry for entry in store.entries() if fnmatchcase(entry.name, choice.pattern)]
     wanted = sorted(found, key=lambda entry: (entry.modified, entry.name))[-(choice.train + choice.held_out) :]
@@ -138,15 +131,9 @@ def make_schedule(
 ) -> ScheduleEntry:
     """A schedule that repeats an item of this site.
 
-    Parameters
-    ----------
-    site : str or None
-        of the data folder whose service does it; None for whichever comes first
+    Raises NotFoundError if there is no such item, or its files are damaged.
 
-    Raises
-    ------
-    NotFoundError
-        if there is no such item, or its files are damaged
+    `site`: of the data folder whose service does it; None for whichever comes first.
     """
     workspace = _WORKSPACES[definition.kind](repeater.items(definition.kind).folder(like))
     order = workspace.read_order()

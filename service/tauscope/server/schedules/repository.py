@@ -21,8 +21,7 @@ UNDECIDED = ("asked", "claimed")
 class ScheduleEntry:
     """A schedule.
 
-    site : str or None
-        of the data folder whose service does it; None for whichever comes first
+    `site`: of the data folder whose service does it; None for whichever comes first.
     """
 
     name: str
@@ -38,8 +37,7 @@ class ScheduleEntry:
 class FiringEntry:
     """One time that a schedule was due.
 
-    item : (str, str) or None
-        kind and identifier of what was started
+    `item`: (str, str), kind and identifier of what was started.
     """
 
     number: int
@@ -96,24 +94,12 @@ class ScheduleRepository:
             row.definition, row.order, row.files = dict(entry.definition), dict(entry.order), dict(entry.files)
 
     def remove(self, name: str) -> None:
-        """Remove a schedule and its firings; what they started stays.
-
-        Raises
-        ------
-        NotFoundError
-            if there is none
-        """
+        """Remove a schedule and its firings; what they started stays. Raises NotFoundError if there is none."""
         with self._database.writing() as session:
             session.execute(delete(Schedule).where(Schedule.id == _schedule(session, name).id))
 
     def find(self, name: str) -> ScheduleEntry:
-        """A schedule.
-
-        Raises
-        ------
-        NotFoundError
-            if there is none
-        """
+        """A schedule. Raises NotFoundError if there is none."""
         with self._database.reading() as session:
             return schedule_entry(_schedule(session, name))
 
@@ -131,10 +117,8 @@ class ScheduleRepository:
     def claim(self, entry: ScheduleEntry, next_due: datetime | None, now: datetime) -> int | None:
         """Take the firing of a schedule on that is due; once only, whoever else tries.
 
-        Returns
-        -------
-        int or None
-            number of the firing; None where somebody else has it, or the schedule was changed meanwhile
+        Returns int or None: number of the firing; None where somebody else has it, or the schedule was changed
+        meanwhile.
         """
         with self._database.writing() as session:
             moved = session.execute(
@@ -152,13 +136,7 @@ class ScheduleRepository:
             return firing.id
 
     def ask(self, name: str, now: datetime) -> int:
-        """Ask the service of a schedule's site to do it now.
-
-        Raises
-        ------
-        NotFoundError
-            if there is no such schedule
-        """
+        """Ask the service of a schedule's site to do it now. Raises NotFoundError if there is no such schedule."""
         with self._database.writing() as session:
             firing = Firing(schedule_id=_schedule(session, name).id, due=now, is_asked=True, state="asked")
             session.add(firing)
@@ -168,10 +146,7 @@ class ScheduleRepository:
     def claim_asked(self, now: datetime, number: int | None = None) -> tuple[int, ScheduleEntry] | None:
         """Take a firing on that was asked for; once only, whoever else tries.
 
-        Returns
-        -------
-        (int, ScheduleEntry) or None
-            number and schedule; None where there is none
+        Returns (int, ScheduleEntry) or None, number and schedule; None where there is none.
         """
         query = select(Firing).join(Schedule).where(Firing.state == "asked", self._is_mine()).order_by(Firing.id)
         if number is not None:
@@ -188,13 +163,7 @@ class ScheduleRepository:
         return self._move(Firing.id == number, "asked", state="withdrawn", reason="nobody took it on in time") > 0
 
     def finish(self, number: int, state: str, reason: str | None = None, item: tuple[str, str] | None = None) -> None:
-        """Write down what came of a firing.
-
-        Parameters
-        ----------
-        item : (str, str) or None
-            kind and identifier of what was started
-        """
+        """Write down what came of a firing. `item`: (str, str), kind and identifier of what was started."""
         kind, identifier = item or (None, None)
         values = {"reason": reason, "item_kind": kind, "item_identifier": identifier}
         self._move(Firing.id == number, "claimed", state=state, **values)
@@ -206,13 +175,7 @@ class ScheduleRepository:
         return self._move(mine, "claimed", state="interrupted", reason=reason)
 
     def firing(self, number: int) -> FiringEntry:
-        """A firing.
-
-        Raises
-        ------
-        NotFoundError
-            if there is none
-        """
+        """A firing. Raises NotFoundError if there is none."""
         with self._database.reading() as session:
             firing = session.get(Firing, number)
             if firing is None:
@@ -220,13 +183,7 @@ class ScheduleRepository:
             return firing_entry(session, firing)
 
     def firings(self, name: str, limit: int) -> list[FiringEntry]:
-        """The firings of a schedule, the newest first.
-
-        Raises
-        ------
-        NotFoundError
-            if there is no such schedule
-        """
+        """The firings of a schedule, the newest first. Raises NotFoundError if there is no such schedule."""
         with self._database.reading() as session:
             query = select(Firing).where(Firing.schedule_id == _schedule(session, name).id)
             rows = session.scalars(query.order_by(Firing.id.desc()).limit(limit)).all()

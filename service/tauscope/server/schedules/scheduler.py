@@ -42,13 +42,7 @@ class Scheduler:
         repository.interrupt_claims()
 
     def tick(self) -> None:
-        """Do what is due, and what was asked for.
-
-        Raises
-        ------
-        StoreError
-            if the database does not answer
-        """
+        """Do what is due, and what was asked for. Raises StoreError if the database does not answer."""
         self._write_outcomes()
         while (asked := self.repository.claim_asked(self._clock())) is not None:
             self._fire(*asked, lateness=None)
@@ -60,13 +54,7 @@ class Scheduler:
                 self._fire(number, entry, lateness=now - due)
 
     def fire_now(self, name: str) -> FiringEntry:
-        """Do a schedule now, in this process.
-
-        Raises
-        ------
-        NotFoundError
-            if there is no such schedule
-        """
+        """Do a schedule now, in this process. Raises NotFoundError if there is no such schedule."""
         number = self.repository.ask(name, self._clock())
         claimed = self.repository.claim_asked(self._clock(), number)
         if claimed is not None:

@@ -31,12 +31,7 @@ def write_backup(data_folder: Path, database: Database, target: Path, version: s
     """Write a backup; the file appears under its name only when it is complete.
 
     The database comes first, and in every folder the state before what it speaks of: what is copied later can only be
-    newer, and the start of a service puts that right as it does after a crash.
-
-    Raises
-    ------
-    OSError
-        if it cannot be written
+    newer, and the start of a service puts that right as it does after a crash. Raises OSError if it cannot be written.
     """
     partial = target.with_name(f".{target.name}-{secrets.token_hex(4)}.partial")
     hashes: dict[str, dict[str, Any]] = {}
@@ -62,12 +57,8 @@ def write_backup(data_folder: Path, database: Database, target: Path, version: s
 def restore_backup(source: Path, data_folder: Path, address: str | None) -> int:
     """Make a data folder and its database from a backup; nothing appears before everything was found sound.
 
-    Raises
-    ------
-    StoreError
-        if the backup is damaged or of a newer program, or there is something already
-    OSError
-        if it cannot be written
+    Raises StoreError if the backup is damaged or of a newer program, or there is something already. Raises OSError if
+    it cannot be written.
     """
     if data_folder.exists() and (not data_folder.is_dir() or any(data_folder.iterdir())):
         raise StoreError(f"{data_folder}: there is something already; name a folder that is not there yet")
@@ -149,7 +140,7 @@ def _unpack(source: Path, staged: Path) -> dict[str, Any]:
         with tarfile.open(source, "r|gz") as archive:
             for entry in archive:
                 if not entry.isreg() or not _is_confined(entry.name) or entry.name in found:
-                    raise _damaged(source, f"{entry.name}: does not belong there")
+                    raise _refuse(source, f"{entry.name}: does not belong there")
                 if entry.name == _MANIFEST:
                     manifest = json.loads(_content(archive, entry).read())
                     continue
@@ -157,13 +148,13 @@ def _unpack(source: Path, staged: Path) -> dict[str, Any]:
     except (tarfile.TarError, EOFError, OSError, ValueError) as error:
         if isinstance(error, OSError) and error.errno is not None and not isinstance(error, gzip.BadGzipFile):
             raise
-        raise _damaged(source, str(error)) from None
+        raise _refuse(source, str(error)) from None
     if manifest is None or manifest.get("form") != FORM:
-        raise _damaged(source, "its manifest is missing, or of another form")
+        raise _refuse(source, "its manifest is missing, or of another form")
     expected = {name: (entry["size"], entry["sha256"]) for name, entry in manifest["files"].items()}
     wrong = sorted(name for name in expected.keys() | found.keys() if expected.get(name) != found.get(name))
     if wrong:
-        raise _damaged(source, f"{wrong[0]} is not what was written")
+        raise _refuse(source, f"{wrong[0]} is not what was written")
     for name, entry in manifest["files"].items():
         os.utime(staged / name, (entry["modified"], entry["modified"]))
     return expected
@@ -213,6 +204,6 @@ def _fill_database(lines: Path, address: Path | str) -> None:
         engine.dispose()
 
 
-def _damaged(source: Path, reason: str) -> StoreError:
+def _refuse(source: Path, reason: str) -> StoreError:
     """A backup that is not used."""
     return StoreError(f"{source}: is damaged or no backup of Tauscope's ({reason}); use another one")

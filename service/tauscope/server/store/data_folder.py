@@ -35,13 +35,7 @@ class FolderLock:
     """Holds a folder for this process; the system lets go of it when the process ends, however it ends."""
 
     def __init__(self, folder: Path) -> None:
-        """Take the folder.
-
-        Raises
-        ------
-        TauscopeError
-            if another process holds it
-        """
+        """Take the folder. Raises TauscopeError if another process holds it."""
         self._descriptor = os.open(folder / LOCK_NAME, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -61,10 +55,7 @@ FILE_NAME = "site.json"
 def site_identifier(data_folder: Path) -> str:
     """The identifier of a data folder; given to it when it is opened for the first time, and kept with it.
 
-    Raises
-    ------
-    StoreError
-        if its ``site.json`` is damaged
+    Raises StoreError if its ``site.json`` is damaged.
     """
     path = data_folder / FILE_NAME
     try:

@@ -16,8 +16,7 @@ _TAIL = 2**16
 class LoggedEvent:
     """One line of a log.
 
-    number : int
-        of the line, from 1: who has read it goes on with the next
+    `number`: of the line, from 1: who has read it goes on with the next.
     """
 
     number: int
@@ -37,10 +36,7 @@ class EventLog:
     def append(self, content: Mapping[str, Any]) -> None:
         """Add a line; a crash of the machine may lose the last ones.
 
-        Raises
-        ------
-        OSError
-            if it cannot be written, or only in part; what is there of it is passed over by readers
+        Raises OSError if it cannot be written, or only in part; what is there of it is passed over by readers.
         """
         line = json.dumps(content, ensure_ascii=False, allow_nan=False).encode() + b"\n"
         descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o640)
@@ -64,7 +60,7 @@ class EventLog:
                 lines = file.read().split(b"\n")
         except OSError:
             return None
-        return _parsed(lines[-2]) if len(lines) > 1 else None
+        return _parse(lines[-2]) if len(lines) > 1 else None
 
     def follow(self, after: int = 0) -> "LogFollower":
         """A reader of what comes after a line."""
@@ -93,13 +89,13 @@ class LogFollower:
         events = []
         for line in whole.split(b"\n")[:-1]:
             self._number += 1
-            parsed = _parsed(line) if self._number > self._after else None
+            parsed = _parse(line) if self._number > self._after else None
             if parsed is not None:
                 events.append(LoggedEvent(self._number, parsed))
         return events
 
 
-def _parsed(line: bytes) -> dict[str, Any] | None:
+def _parse(line: bytes) -> dict[str, Any] | None:
     """The object of a line; None where the line is damaged."""
     try:
         content = json.loads(line)

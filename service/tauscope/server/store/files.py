@@ -36,13 +36,7 @@ def is_identifier(text: str) -> bool:
 
 
 def identifier_time(identifier: str) -> datetime:
-    """The second in which an identifier was made.
-
-    Raises
-    ------
-    ValueError
-        if it is none
-    """
+    """The second in which an identifier was made. Raises ValueError if it is none."""
     return datetime.strptime(identifier[:16], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
 
 
@@ -53,8 +47,7 @@ _PIECE = 2**20
 class KeptFile:
     """A file that arrived as a whole.
 
-    sha256 : str
-        of its bytes, in hexadecimal
+    `sha256`: of its bytes, in hexadecimal.
     """
 
     path: Path
@@ -67,13 +60,7 @@ class IncomingFile:
     """A file that is being written under a hidden name, until `finish` or `discard`."""
 
     def __init__(self, folder: Path, name: str, limit: int) -> None:
-        """Begin an empty file.
-
-        Parameters
-        ----------
-        limit : int
-            largest size that is accepted [bytes]
-        """
+        """Begin an empty file. `limit`: largest size that is accepted [bytes]."""
         descriptor, path = tempfile.mkstemp(dir=folder, prefix=".incoming-")
         self._file = os.fdopen(descriptor, "wb")
         self._hash = hashlib.sha256()
@@ -85,10 +72,7 @@ class IncomingFile:
     def write(self, piece: bytes) -> None:
         """Append some bytes.
 
-        Raises
-        ------
-        LimitExceededError
-            if the file grows beyond its limit; nothing more is written then
+        Raises LimitExceededError if the file grows beyond its limit; nothing more is written then.
         """
         self.size += len(piece)
         if self.size > self.limit:

@@ -36,13 +36,7 @@ class ItemStore:
         return folder
 
     def publish(self, staged: Path) -> str:
-        """Make a staged folder an item.
-
-        Raises
-        ------
-        OSError
-            if the disk does not take it; the folder stays staged
-        """
+        """Make a staged folder an item. Raises OSError if the disk does not take it; the folder stays staged."""
         identifier = staged_identifier(staged)
         published = self.root / identifier
         staged.rename(published)
@@ -63,13 +57,7 @@ class ItemStore:
         return sorted((entry.name for entry in self.root.iterdir() if is_identifier(entry.name)), reverse=True)
 
     def folder(self, identifier: str) -> Path:
-        """The folder of an item.
-
-        Raises
-        ------
-        NotFoundError
-            if there is no such item
-        """
+        """The folder of an item. Raises NotFoundError if there is no such item."""
         folder = self.root / identifier if is_identifier(identifier) else None
         if folder is None or not folder.is_dir():
             hint = "check the identifier, or list what is kept"
@@ -77,13 +65,7 @@ class ItemStore:
         return folder
 
     def remove(self, identifier: str) -> None:
-        """Remove an item and all its files.
-
-        Raises
-        ------
-        NotFoundError
-            if there is no such item
-        """
+        """Remove an item and all its files. Raises NotFoundError if there is no such item."""
         going = self.root / f"{_REMOVED}{identifier}"
         self.folder(identifier).rename(going)
         try:

@@ -27,10 +27,8 @@ _log = logging.getLogger("tauscope.store")
 class KnownHash:
     """What is known of a recording's bytes.
 
-    sha256 : str
-        of the bytes, in hexadecimal
-    kept : str or None
-        of the bytes that were sent or recorded; None for a file that an operator put there, and may change
+    `sha256`: of the bytes, in hexadecimal.
+    `kept`: of the bytes that were sent or recorded; None for a file that an operator put there, and may change.
     """
 
     sha256: str
@@ -66,13 +64,7 @@ class RecordingHashes:
         return content is not None and content.get("kept") is not None
 
     def keep(self, name: str, status: os.stat_result, sha256: str) -> None:
-        """Write down what is about to be kept.
-
-        Raises
-        ------
-        OSError
-            if the disk does not take it
-        """
+        """Write down what is about to be kept. Raises OSError if the disk does not take it."""
         self._write(name, status, KnownHash(sha256, kept=sha256))
 
     def remember(self, name: str, status: os.stat_result, sha256: str) -> KnownHash:
@@ -137,8 +129,7 @@ class NameTakenError(RecordingError):
 class StoredRecording:
     """A recording that lies on the server.
 
-    sha256 : str or None
-        of its bytes, in hexadecimal; None where it was not computed yet
+    `sha256`: of its bytes, in hexadecimal; None where it was not computed yet.
     """
 
     name: str
@@ -171,19 +162,14 @@ class RecordingStore:
     def keep(self, file: KeptFile) -> tuple[StoredRecording, bool]:
         """Give a file in a staged folder its place among the recordings.
 
+        Raises RecordingError if the name is not allowed. Raises NameTakenError if other bytes are kept under that name.
+
         Returns
         -------
         StoredRecording
             the recording
         bool
             False where the very same bytes were already kept under that name
-
-        Raises
-        ------
-        RecordingError
-            if the name is not allowed
-        NameTakenError
-            if other bytes are kept under that name
         """
         if not is_file_name(file.name):
             raise RecordingError(one_line(f"{shown(file.name)}: no name for a recording; {FILE_NAME_RULE}"))
@@ -191,13 +177,7 @@ class RecordingStore:
         return self.find(file.name), is_new
 
     def path(self, name: str) -> Path:
-        """Where a recording lies.
-
-        Raises
-        ------
-        NotFoundError
-            if no regular file of this name is in the folder
-        """
+        """Where a recording lies. Raises NotFoundError if no regular file of this name is in the folder."""
         self._status(name)
         return self.root / name
 
@@ -212,26 +192,18 @@ class RecordingStore:
     def find(self, name: str) -> StoredRecording:
         """A recording with its sha256, which is computed where it is not known.
 
-        Raises
-        ------
-        NotFoundError
-            if there is no such recording
+        Raises NotFoundError if there is no such recording.
         """
         status = self._status(name)
         known = self._hashes.of(name, status)
         if known is None:
             known = self._hashes.remember(name, status, hash_file(self.root / name))
-        return StoredRecording(name, status.st_size, _modified(status), known.sha256, known.is_damaged)
+        return StoredRecording(name, status.st_size, _read_modified(status), known.sha256, known.is_damaged)
 
     def digest(self, name: str) -> str:
         """The sha256 of a recording's bytes, in hexadecimal, for who will work with them.
 
-        Raises
-        ------
-        NotFoundError
-            if there is no such recording
-        RecordingError
-            if it is damaged
+        Raises NotFoundError if there is no such recording. Raises RecordingError if it is damaged.
         """
         found = self.find(name)
         if found.sha256 is None or found.is_damaged:
@@ -252,7 +224,7 @@ class RecordingStore:
             except (NotFoundError, FileNotFoundError):
                 continue
             sha256, is_damaged = (None, False) if known is None else (known.sha256, known.is_damaged)
-            found.append(StoredRecording(entry.name, status.st_size, _modified(status), sha256, is_damaged))
+            found.append(StoredRecording(entry.name, status.st_size, _read_modified(status), sha256, is_damaged))
         return found
 
     def damaged(self, *, deep: bool) -> list[str]:
@@ -264,13 +236,7 @@ class RecordingStore:
         return [entry.name for entry in self.entries() if entry.is_damaged]
 
     def remove(self, name: str) -> None:
-        """Remove a recording.
-
-        Raises
-        ------
-        NotFoundError
-            if there is no such recording
-        """
+        """Remove a recording. Raises NotFoundError if there is no such recording."""
         self.path(name).unlink(missing_ok=True)
         self._hashes.forget(name)
         sync_folder(self.root)
@@ -313,6 +279,6 @@ class RecordingStore:
         return True
 
 
-def _modified(status: os.stat_result) -> datetime:
+def _read_modified(status: os.stat_result) -> datetime:
     """When a file was last written."""
     return datetime.fromtimestamp(status.st_mtime, UTC)

@@ -21,7 +21,7 @@ from tauscope_drivers.canopen.configuration import (
 )
 from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, DeviceFile, read_device_file
 from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects
-from tauscope_drivers.canopen.optional_objects import describe_absent
+from tauscope_drivers.canopen.objects import describe_absent
 from tauscope_drivers.canopen.pdo_plan import MEASURED_WHERE_THERE, plan_pdos
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.inspection import Severity

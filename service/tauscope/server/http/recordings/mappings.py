@@ -3,7 +3,7 @@
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.server.http.documents import JSON, media_type, parse_document, refuse_media_type
+from tauscope.server.http.documents import media_type, parse_document, refuse_media_type
 from tauscope.server.http.form import FORM, PartRule, receive_form
 from tauscope.server.http.openapi import binary_part, form_body, model_reference
 from tauscope.server.http.reading import READING
@@ -23,7 +23,6 @@ _BODY = form_body(
         "request": model_reference(ReadingRequest),
     },
     required=["file"],
-    encoding={"request": {"contentType": JSON}},
 )
 
 

@@ -39,10 +39,7 @@ def robot_part_rules(folder: Path) -> dict[str, PartRule]:
 def keep_inline_robot(folder: Path, robot: Mapping[str, Any]) -> str:
     """Write a robot that came as JSON to a robot file.
 
-    Raises
-    ------
-    RobotFileError
-        if the content is not plain data, or larger than a robot file may be
+    Raises RobotFileError if the content is not plain data, or larger than a robot file may be.
     """
     text = to_json_text(robot)
     if text is None:
@@ -54,32 +51,26 @@ def keep_inline_robot(folder: Path, robot: Mapping[str, Any]) -> str:
 def read_received_robot(folder: Path, file_name: str) -> Robot:
     """The robot of a received file.
 
-    Raises
-    ------
-    RobotFileError
-        if it is not valid, or names a file that was not sent with it
+    Raises RobotFileError if it is not valid, or names a file that was not sent with it.
     """
     try:
         _confine_files(folder, file_name)
         return read_robot(folder / file_name)
     except RobotFileError as error:
-        raise type(error)(_in_user_terms(str(error), folder)) from None
+        raise type(error)(_word_for_user(str(error), folder)) from None
 
 
 def check_received_robot(folder: Path, file_name: str) -> RobotReport:
     """The report on a received file.
 
-    Raises
-    ------
-    RobotFileError
-        if it cannot be read at all, or names a file that was not sent with it
+    Raises RobotFileError if it cannot be read at all, or names a file that was not sent with it.
     """
     try:
         _confine_files(folder, file_name)
         report = check_robot(folder / file_name)
     except RobotFileError as error:
-        raise type(error)(_in_user_terms(str(error), folder)) from None
-    findings = (replace(finding, where=_in_user_terms(finding.where, folder)) for finding in report.findings)
+        raise type(error)(_word_for_user(str(error), folder)) from None
+    findings = (replace(finding, where=_word_for_user(finding.where, folder)) for finding in report.findings)
     return replace(report, source=file_name, findings=tuple(findings))
 
 
@@ -119,13 +110,7 @@ def _confine_xml(data: bytes, label: str) -> None:
 
 
 def _require_modest(root: Any, label: str) -> None:
-    """Refuse an MJCF that has MuJoCo generate far more than it says.
-
-    Raises
-    ------
-    RobotFileError
-        naming the element
-    """
+    """Refuse an MJCF that has MuJoCo generate far more than it says. Raises RobotFileError naming the element."""
     bodies = float(sum(local_name(element) == "body" for element in root.iter()))
     for element in root.iter():
         sizes = [_multiply(element.get(name, "")) for name in ("width", "height", "nrow", "ncol")]
@@ -143,6 +128,6 @@ def _multiply(text: str) -> float:
         return 1.0  # MuJoCo says better what is wrong
 
 
-def _in_user_terms(text: str, folder: Path) -> str:
+def _word_for_user(text: str, folder: Path) -> str:
     """A message without the server's folder; an inline robot has no file and no lines."""
     return without_folders(text, folder).replace(f"{INLINE_NAME}:1: ", "robot: ").replace(f"{INLINE_NAME}: ", "robot: ")

@@ -1,46 +1,53 @@
 """Requests and answers about robots."""
 
+from dataclasses import asdict
+from datetime import datetime
 from typing import Any
 
 from pydantic import Field
 
 from tauscope.robot import JointType, RobotReport, Severity
 from tauscope.server.models import AnswerModel
+from tauscope.server.store.robots import RobotVersion
 from tauscope.strict_model import StrictModel
 
 EXAMPLE_ROBOT: dict[str, Any] = {
-    "name": "two-joint-arm",
-    "kinematics": {
-        "dh": [
-            {"theta": 0.0, "d": 0.3, "a": 0.0, "alpha": 1.5707963267948966},
-            {"theta": 0.0, "d": 0.0, "a": 0.5, "alpha": 0.0},
-        ]
-    },
-    "joints": [
-        {"name": "joint1", "limits": {"position": [-2.9, 2.9], "velocity": 2.0}},
-        {"name": "joint2", "limits": {"position": [-2.9, 2.9], "velocity": 2.0}},
-    ],
+    "name": "pendulum",
+    "kinematics": {"dh": [{"theta": 0, "d": 0, "a": 0.5, "alpha": 0}]},
+    "gravity": [0, -9.81, 0],
+    "joints": [{"name": "hinge", "limits": {"position": [-2.9, 2.9], "velocity": 2}}],
     "model": {
         "links": [
             {
-                "mass": 2.0,
-                "first_moment": [0.0, 0.0, 0.0],
-                "inertia": {"xx": 0.02, "yy": 0.02, "zz": 0.02, "xy": 0.0, "xz": 0.0, "yz": 0.0},
-            },
-            {
-                "mass": 1.0,
-                "first_moment": [-0.25, 0.0, 0.0],
-                "inertia": {"xx": 0.01, "yy": 0.09, "zz": 0.09, "xy": 0.0, "xz": 0.0, "yz": 0.0},
-            },
+                "mass": 1,
+                "first_moment": [-0.25, 0, 0],
+                "inertia": {"xx": 0.01, "yy": 0.1, "zz": 0.1, "xy": 0, "xz": 0, "yz": 0},
+            }
         ]
     },
 }
+"""Every example of a request repeats it: as small as a robot can be."""
 
 
 class RobotCheckRequest(StrictModel):
     """A robot to be checked."""
 
-    robot: dict[str, Any] = Field(description="content of a robot file", examples=[EXAMPLE_ROBOT])
+    robot: dict[str, Any] = Field(description="content of a robot file")
+
+
+class RobotVersionAnswer(AnswerModel):
+    """A robot that is kept."""
+
+    version: str = Field(description="of its content; a request's robot may be {version: …}")
+    name: str = Field(description="as in its file")
+    robot_file: str = Field(description="which of its files is the robot file")
+    created: datetime = Field(description="when it was kept, UTC")
+    link: str = Field(description="path of its resource")
+
+    @classmethod
+    def of(cls, robot: RobotVersion) -> "RobotVersionAnswer":
+        """The answer that holds a version."""
+        return cls(**asdict(robot), link=f"/api/v1/robots/versions/{robot.version}")
 
 
 class LimitsAnswer(AnswerModel):

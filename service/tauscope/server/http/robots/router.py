@@ -2,19 +2,28 @@
 
 import shutil
 import tempfile
-from pathlib import Path
+from pathlib import Path as FilePath
+from typing import Annotated
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Path, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
+from tauscope.server.http.evidence import require_no_identification
 from tauscope.server.http.form import FORM, receive_form
 from tauscope.server.http.openapi import binary_part, form_body, json_body
 from tauscope.server.http.reading import READING
-from tauscope.server.http.robots.files import check_received_robot, keep_inline_robot, robot_part_rules
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT, RobotCheckRequest, RobotReportAnswer
+from tauscope.server.http.robots.files import (
+    check_received_robot,
+    keep_inline_robot,
+    read_received_robot,
+    robot_part_rules,
+)
+from tauscope.server.http.robots.models import EXAMPLE_ROBOT, RobotCheckRequest, RobotReportAnswer, RobotVersionAnswer
 from tauscope.server.http.services import ServicesDep
+from tauscope.server.http.tasks.router import JobRobotAnswer, describe_robot
 from tauscope.server.problems import ProblemError, problem_responses
+from tauscope.server.store.robots import VERSION_PATTERN
 
 router = APIRouter(prefix="/robots", tags=["robots"])
 
@@ -39,7 +48,7 @@ _BODY = {
 )
 async def check_robot_file(request: Request, services: ServicesDep) -> RobotReportAnswer:
     """Summary and findings; nothing is kept. A model that no rigid body can have is among the findings."""
-    folder = Path(await run_in_threadpool(tempfile.mkdtemp, prefix="tauscope-robot-"))
+    folder = FilePath(await run_in_threadpool(tempfile.mkdtemp, prefix="tauscope-robot-"))
     try:
         file_name = await _receive_robot(request, services, folder)
         return RobotReportAnswer.of(await services.reading.call(request, check_received_robot, folder, file_name))
@@ -47,7 +56,57 @@ async def check_robot_file(request: Request, services: ServicesDep) -> RobotRepo
         await run_in_threadpool(shutil.rmtree, folder, ignore_errors=True)
 
 
-async def _receive_robot(request: Request, services: ServicesDep, folder: Path) -> str:
+Version = Annotated[str, Path(description="version of the robot", pattern=VERSION_PATTERN)]
+
+
+@router.post(
+    "",
+    status_code=201,
+    summary="Keep a robot",
+    response_model=RobotVersionAnswer,
+    responses={200: {"model": RobotVersionAnswer}, **problem_responses("robot-file", "media-type", *READING)},
+    openapi_extra={"requestBody": {"required": True, "content": _BODY}},
+)
+async def keep_robot_version(request: Request, response: Response, services: ServicesDep) -> RobotVersionAnswer:
+    """The same content is the same version, kept once. Requests name it as `robot: {version: …}`."""
+    folder = await run_in_threadpool(services.robots.stage)
+    try:
+        file_name = await _receive_robot(request, services, folder)
+        robot = await services.reading.call(request, read_received_robot, folder, file_name)
+        kept, is_new = await run_in_threadpool(services.robots.keep, folder, file_name, robot.name)
+    finally:
+        await run_in_threadpool(services.robots.discard, folder)
+    answer = RobotVersionAnswer.of(kept)
+    response.status_code = 201 if is_new else 200
+    response.headers["Location"] = answer.link
+    return answer
+
+
+@router.get(
+    "/versions/{version}",
+    summary="Fetch a kept robot",
+    responses=problem_responses("not-found", "robot-file", *READING),
+)
+async def get_robot_version(request: Request, version: Version, services: ServicesDep) -> JobRobotAnswer:
+    """Its joints, limits and frames, and its files."""
+    kept = await run_in_threadpool(services.robots.find, version)
+    return await describe_robot(request, services, services.robots.files(version), kept.robot_file)
+
+
+@router.delete(
+    "/versions/{version}",
+    status_code=204,
+    summary="Remove a kept robot",
+    responses=problem_responses("not-found", "in-use"),
+)
+def remove_robot_version(version: Version, services: ServicesDep) -> None:
+    """Not while an active model or a reference was identified with it. Jobs have copies of their own."""
+    services.robots.find(version)
+    require_no_identification(services, version)
+    services.robots.remove(version)
+
+
+async def _receive_robot(request: Request, services: ServicesDep, folder: FilePath) -> str:
     """Write the robot of a request into a folder; returns the robot file's name."""
     if media_type(request) == JSON:
         body = await read_document(request, RobotCheckRequest, services.settings.max_document_bytes)

@@ -7,8 +7,27 @@ from pydantic import Field
 
 from tauscope.server.models import AnswerModel
 from tauscope.server.problems import Problem, ProblemError, make_problem
+from tauscope.server.queue.job_folder import Workspace
 from tauscope.server.queue.record import JobProblem, JobState
-from tauscope.server.queue.workspace import Workspace
+
+
+class Links(AnswerModel):
+    """Where to go on from any item."""
+
+    self_: str = Field(alias="self", description="its state")
+    events: str = Field(description="what happens to it, as server-sent events")
+
+
+class JobLinks(Links):
+    """Where to go on from a job."""
+
+    result: str | None = Field(default=None, description="its result, once it succeeded")
+
+
+class MotionLinks(Links):
+    """Where to go on from what moves an arm."""
+
+    stop: str = Field(description="where a POST stops it")
 
 
 class JobAnswer(AnswerModel):
@@ -23,6 +42,7 @@ class JobAnswer(AnswerModel):
     started: datetime | None = Field(default=None, description="when its work began, UTC")
     ended: datetime | None = Field(default=None, description="when it ended, UTC")
     problem: Problem | None = Field(default=None, description="why it did not succeed")
+    robot: str | None = Field(default=None, description="name of the robot")
 
 
 def job_fields(workspace: Workspace, here: str) -> dict[str, Any]:
@@ -55,10 +75,7 @@ def shown_problem(problem: JobProblem | None, here: str) -> Problem | None:
 def require_success(workspace: Workspace) -> None:
     """Refuse to go on with a job that has no result.
 
-    Raises
-    ------
-    ProblemError
-        if it has not succeeded: the problem that it ended in, or that it has not ended
+    Raises ProblemError if it has not succeeded: the problem that it ended in, or that it has not ended.
     """
     identifier, record = workspace.folder.name, workspace.read_record()
     if record is None:
@@ -73,15 +90,9 @@ def require_success(workspace: Workspace) -> None:
 def require_document(content: bytes | None, identifier: str) -> bytes:
     """The result of a job that succeeded.
 
-    Parameters
-    ----------
-    content : bytes or None
-        as its folder holds it; None where it is damaged
+    Raises ProblemError if it is damaged.
 
-    Raises
-    ------
-    ProblemError
-        if it is damaged
+    `content`: as its folder holds it; None where it is damaged.
     """
     if content is None:
         raise ProblemError("damaged", f"the result of {identifier} is missing or damaged; hand it in again")

@@ -40,6 +40,11 @@ LastEvent = Annotated[
 ]
 
 
+_STREAM = """\
+Kinds: `state`, `step`, `progress` and `ended`, after which the stream ends. An event's id is its number:
+`Last-Event-ID` goes on after it, also after a restart of the service. Comments keep a quiet connection alive."""
+
+
 def add_events_route(router: APIRouter, noun: str, find: Callable[[Services, str], EventSource]) -> None:
     """Give a collection of jobs the route ``/{identifier}/events``."""
 
@@ -54,7 +59,7 @@ def add_events_route(router: APIRouter, noun: str, find: Callable[[Services, str
         responses={
             200: {
                 "content": {"text/event-stream": {"schema": _stream_schema()}},
-                "description": "events, until its end",
+                "description": _STREAM,
             },
             204: {"description": "the job had ended before `Last-Event-ID`: do not connect again"},
             **problem_responses("not-found"),
@@ -66,11 +71,7 @@ def add_events_route(router: APIRouter, noun: str, find: Callable[[Services, str
         source: Annotated[EventSource, Depends(find_source)],
         after: LastEvent = 0,
     ) -> Response:
-        """Server-sent events of the kinds `state`, `step`, `progress` and `ended`, from the first one on.
-
-        Every event has the number of its line as id: who was cut off goes on with `Last-Event-ID`, also after the
-        service was started again. Comments keep a quiet connection alive. The stream ends after `ended`.
-        """
+        """Server-sent events, from the first one on."""
         first = await to_thread.run_sync(_find_end, source, limiter=services.followers)
         if first is not None and after >= first:
             return Response(status_code=204)

@@ -23,7 +23,7 @@ from tauscope.server.http.tasks.router import (
     add_export_route,
     make_router,
 )
-from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request
+from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request, stage_request
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.queue import JobKind
 from tauscope.server.queue.record import JobState
@@ -44,12 +44,10 @@ def no_further(_received: Received[Any], _services: Services, _workspace: Any) -
 class QueuedTask:
     """What is special about such a resource.
 
-    further : callable
-        checks a request whose recordings are listed, and returns further fields of its order
-    further_parts : mapping of str to (str, int)
-        files of a form that are no recordings: their folder, and the largest size [bytes]
-    links : sequence of str
-        further routes that it links to, once it succeeded
+    `further`: checks a request whose recordings are listed, and returns further fields of its order.
+    `further_parts`: mapping of str to (str, int), files of a form that are no recordings: their folder, and the largest
+        size [bytes].
+    `links`: further routes that it links to, once it succeeded.
     """
 
     noun: str
@@ -70,24 +68,14 @@ class QueuedTask:
     further_parts: Mapping[str, tuple[str, int]] = field(default_factory=dict)
 
     def find(self, services: Services, identifier: str) -> TaskWorkspace[Any]:
-        """The folder of a job.
-
-        Raises
-        ------
-        NotFoundError
-            if there is none
-        """
+        """The folder of a job. Raises NotFoundError if there is none."""
         return self.workspace(self.kind(services).items.folder(identifier))
 
     def finished(self, services: Services, identifier: str) -> TaskWorkspace[Any]:
         """The folder of a job that succeeded.
 
-        Raises
-        ------
-        NotFoundError
-            if there is none
-        ProblemError
-            if it has not succeeded: the problem that it ended in, or that it has not ended
+        Raises NotFoundError if there is none. Raises ProblemError if it has not succeeded: the problem that it ended
+        in, or that it has not ended.
         """
         workspace = self.find(services, identifier)
         require_success(workspace)
@@ -119,13 +107,7 @@ class QueuedTask:
         return router
 
     def describe(self, services: Services, identifier: str, root: str) -> Any:
-        """The state of a job; one whose files are damaged is said to be so.
-
-        Raises
-        ------
-        NotFoundError
-            if there is none
-        """
+        """The state of a job; one whose files are damaged is said to be so. Raises NotFoundError if there is none."""
         answer, workspace = self.models[1], self.find(services, identifier)
         here, order = f"{root}/{self.plural}/{identifier}", workspace.read_order()
         links: dict[str, Any] = {"self": here, "events": f"{here}/events"}
@@ -146,30 +128,21 @@ class QueuedTask:
     async def submit(self, request: Request, services: Services) -> str:
         """Take a request: what was sent is kept in a job's folder, and checked as far as that is quick.
 
-        Raises
-        ------
-        ProblemError
-            if the request is not as documented
-        TauscopeError
-            if the robot is not valid, a recording is not there, or something is too large
+        Raises ProblemError if the request is not as documented. Raises TauscopeError if the robot is not valid, a
+        recording is not there, or something is too large.
         """
-        items, settings = self.kind(services).items, services.settings
-        staged = await run_in_threadpool(items.stage)
-        try:
-            workspace = self.workspace(staged)
-            await run_in_threadpool(workspace.prepare)
+        settings = services.settings
+        async with stage_request(self.kind(services).items, self.workspace) as workspace:
             most, largest = settings.max_recordings, settings.max_upload_bytes
             rules = {role: PartRule(largest, workspace.uploads(role), most) for role in workspace.roles}
             for part, (folder, limit) in self.further_parts.items():
                 rules[part] = PartRule(limit, workspace.uploads(folder), default_name=f"{part}.json")
             received = await receive_request(request, self.models[0], settings, workspace.robot, rules)
-            robot_file = await run_in_threadpool(keep_robot, received, workspace.robot)
+            robot_file = await run_in_threadpool(keep_robot, received, workspace.robot, services.robots)
             robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
             wanted = {"robot_file": robot_file, "robot_name": robot.name}
             caller = find_caller(request.scope).name
             return await run_in_threadpool(self._submit, received, services, workspace, wanted, caller)
-        finally:
-            await run_in_threadpool(items.discard, staged)
 
     def _submit(
         self,
@@ -192,12 +165,8 @@ class QueuedTask:
 def ordered_recordings(role: str, received: Received[Any], store: RecordingStore) -> tuple[OrderedRecording, ...]:
     """The recordings of a role: each a file of the form, or else a recording on the server.
 
-    Raises
-    ------
-    ProblemError
-        if a file was sent but is not listed
-    NotFoundError
-        if a recording is neither sent nor on the server
+    Raises ProblemError if a file was sent but is not listed. Raises NotFoundError if a recording is neither sent nor on
+    the server.
     """
     files: dict[str, KeptFile] = {file.name: file for file in received.form.files.get(role, [])}
     listed: Sequence[str] | None = getattr(received.document, role)
@@ -219,12 +188,7 @@ def ordered_recordings(role: str, received: Received[Any], store: RecordingStore
 def check_recordings(recordings: Mapping[str, Sequence[OrderedRecording]], most: int) -> None:
     """There is something to work on, not too much, and no recording is its own judge.
 
-    Raises
-    ------
-    ProblemError
-        naming the recording
-    LimitExceededError
-        for too many
+    Raises ProblemError naming the recording. Raises LimitExceededError for too many.
     """
     if not recordings["recordings"]:
         text = "no recording was sent or named; send part recordings, or name recordings on the server"

@@ -16,7 +16,7 @@ from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
 from tauscope.server.http.evidence import require_no_model
-from tauscope.server.http.leases.router import LeaseToken
+from tauscope.server.http.leases import LeaseToken
 from tauscope.server.http.openapi import Examples, file_contents
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robots.files import check_received_robot
@@ -57,10 +57,8 @@ class JobRobotAnswer(AnswerModel):
 class JobDocument:
     """An output of a task that has a route of its own.
 
-    output : str
-        its name among the outputs
-    missing : str or None
-        what is said where the task made none; None where it always makes one
+    `output`: its name among the outputs.
+    `missing`: what is said where the task made none; None where it always makes one.
     """
 
     name: str
@@ -77,6 +75,27 @@ def text_document(name: str, output: str, media_type: str, summary: str, words: 
     answer = {"content": file_contents(media_type), "description": f"the same {same}"}
     missing = None if media_type == HTML else f"no {name} is kept here; hand it in again"
     return JobDocument(name, output, summary, words, answer, media_type, missing)
+
+
+def result_document(noun: str, verb: str, model: type[BaseModel]) -> JobDocument:
+    """The result of a command that has ``--json``."""
+    answer = {"model": model, "description": f"the same document as `tauscope {verb} --json`"}
+    words = f"The result of {noun} that succeeded; else the problem that it ended in."
+    return JobDocument("result", "result.json", "Fetch the result", words, answer)
+
+
+def report_document(verb: str) -> JobDocument:
+    """The page of a command that has ``--report``."""
+    words = "The report as one page: no script, no request to anywhere, ready to print."
+    return text_document(
+        "report", "report.html", HTML, "Fetch the report", words, f"page as `tauscope {verb} --report`"
+    )
+
+
+def plots_document(noun: str, model: type[BaseModel], words: str) -> JobDocument:
+    """Data of the figures."""
+    answer, summary = {"model": model, "description": words}, "Fetch the data of its figures"
+    return JobDocument("plots", "plots.json", summary, f"What figures of {noun} are drawn from.", answer)
 
 
 class Folder(Protocol):
@@ -97,16 +116,11 @@ class Folder(Protocol):
 class Resource:
     """What is special about a resource.
 
-    submit : callable
-        takes a request; returns the identifier
-    describe : callable
-        the answer, from services, identifier and the path of the interface
-    followed : callable
-        what has events
-    summary, words : str
-        of handing in
-    parts : mapping
-        files of a form beside the robot's
+    `submit`: takes a request; returns the identifier.
+    `describe`: the answer, from services, identifier and the path of the interface.
+    `followed`: what has events.
+    `summary`, `words`: of handing in.
+    `parts`: files of a form beside the robot's.
     """
 
     noun: str
@@ -182,14 +196,12 @@ def make_router(resource: Resource) -> APIRouter:
         responses=problem_responses("not-found", "damaged", "robot-file", *READING),
     )
     async def get_robot(request: Request, identifier: Identifier, services: ServicesDep) -> JobRobotAnswer:
-        """Its joints, limits and frames, and the very files that were sent: they can be handed in again."""
+        """Its joints, limits and frames, and the files that were sent."""
         workspace = await run_in_threadpool(resource.find, services, identifier)
         folder, order = workspace.robot, await run_in_threadpool(workspace.read_order)
         if order is None:
             raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it has no robot any more")
-        report = await services.reading.call(request, check_received_robot, folder, order.robot_file)
-        files = await run_in_threadpool(_read_files, folder)
-        return JobRobotAnswer(report=RobotReportAnswer.of(report), robot_file=order.robot_file, files=files)
+        return await describe_robot(request, services, folder, order.robot_file)
 
     add_events_route(router, noun, resource.followed)
     return router
@@ -218,18 +230,17 @@ def add_stopping(
     router: APIRouter,
     resource: Resource,
     answer: type[BaseModel],
-    stop: Callable[[Services, str], BaseModel],
+    stop: Callable[[Services, str], Any],
+    read_state: Callable[[Services, str], Any],
     remove: Callable[[Services, str], bool],
     words: tuple[str, str],
 ) -> None:
     """Give a resource that moves an arm the routes ``POST /{identifier}/stop`` and ``DELETE /{identifier}``.
 
-    Parameters
-    ----------
-    remove : callable
-        False where it goes on
-    words : (str, str)
-        what is said of either route
+    `stop`: the state in which it was stopped; None where it does not go on.
+    `read_state`: the state in its folder; None where that is damaged.
+    `remove`: False where it goes on.
+    `words`: (str, str), what is said of either route.
     """
 
     @router.post(
@@ -243,8 +254,11 @@ def add_stopping(
         openapi_extra={"requestBody": {"required": False, "content": {}}},
     )
     async def stop_item(identifier: Identifier, services: ServicesDep) -> BaseModel:
-        # Neither a thread of the pool nor a lock is needed: whatever is stuck, this is not.
-        return stop(services, identifier)
+        # Neither a thread of the pool nor a lock nor a disk is needed for one that goes on, whatever is stuck.
+        state = stop(services, identifier) or read_state(services, identifier)
+        if state is None:
+            raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it does not go on")
+        return answer(id=identifier, state=state)
 
     @router.delete(
         "/{identifier}",
@@ -322,6 +336,13 @@ def add_export_route(
         file = formats[ExportFormat(format_)]
         disposition = {"Content-Disposition": f'attachment; filename="{file.name}"'}
         return Response(workspace.read_export(file.name), headers=disposition, media_type=file.media_type)
+
+
+async def describe_robot(request: Request, services: Services, folder: FilePath, robot_file: str) -> JobRobotAnswer:
+    """A robot at a glance, and its files."""
+    report = await services.reading.call(request, check_received_robot, folder, robot_file)
+    files = await run_in_threadpool(_read_files, folder)
+    return JobRobotAnswer(report=RobotReportAnswer.of(report), robot_file=robot_file, files=files)
 
 
 def _lease_header(_lease: LeaseToken = None) -> None:

@@ -1,29 +1,108 @@
 """A request that hands a job in: JSON, or a form with the JSON as part `request` and files beside it."""
 
-from collections.abc import Mapping
+import shutil
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, Self, TypeVar
 
 from fastapi import Request
-from pydantic import Field
+from pydantic import AfterValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+from starlette.concurrency import run_in_threadpool
 
-from tauscope.server.http.documents import JSON, media_type, parse_document, read_document, refuse_media_type
+from tauscope.errors import IdentificationError
+from tauscope.server.http.documents import (
+    JSON,
+    media_type,
+    parse_document,
+    read_document,
+    refuse_media_type,
+    to_json_text,
+)
 from tauscope.server.http.form import FORM, PartRule, ReceivedForm, receive_form
 from tauscope.server.http.openapi import Examples, binary_part, form_body, json_body, model_reference
 from tauscope.server.http.robots.files import keep_inline_robot, robot_part_rules
+from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.server.http.settings import Settings
 from tauscope.server.problems import ProblemError
+from tauscope.server.queue.task_job import SAVED_MODEL, Staged, TaskWorkspace
+from tauscope.server.store.files import FILE_NAME_PATTERN, FILE_NAME_RULE, KeptFile, is_file_name
+from tauscope.server.store.items import ItemStore
+from tauscope.server.store.robots import RobotStore
 from tauscope.strict_model import StrictModel
+from tauscope.tasks.task import ROLES
+
+MODEL_FILE = "model.json"
+
+
+def keep_model(
+    model: str | dict[str, Any] | None,
+    file: KeptFile | None,
+    workspace: TaskWorkspace[Any],
+    read: Callable[[str], bytes],
+) -> str | None:
+    """Put a model into its place in a job's folder; returns its name there.
+
+    Raises ProblemError where it came twice. Raises IdentificationError where it holds what JSON cannot.
+
+    `model`: identifier or document, as the request has it; `file`: part of the form, which lies in its place; `read`:
+    the model of an identifier.
+    """
+    if file is not None and model is not None:
+        raise ProblemError("invalid-request", "the model came twice, as part model and in part request; send it once")
+    if file is not None or model is None:
+        return None if file is None else file.name
+    path: Path = workspace.uploads(SAVED_MODEL) / MODEL_FILE
+    if isinstance(model, str):
+        path.write_bytes(read(model))
+        return MODEL_FILE
+    text = to_json_text(model)
+    if text is None:
+        raise IdentificationError("model: holds NaN, infinity or text that is not Unicode; write plain numbers")
+    path.write_text(text, encoding="utf-8")
+    return MODEL_FILE
 
 
 class RobotRequest(StrictModel):
     """What a request says about a robot."""
 
     robot: dict[str, Any] | None = Field(
-        default=None, description="content of a robot file; in a form, the part `robot` may hold the file instead"
+        default=None,
+        description="content of a robot file, or {version: …} of a kept robot; in a form, the part `robot` may hold"
+        " the file instead",
     )
 
+
+def _check_file_name(value: str) -> str:
+    """Refuse what cannot be a recording's name."""
+    if not is_file_name(value):
+        raise PydanticCustomError("file_name", "is no name of a recording; {rule}", {"rule": FILE_NAME_RULE})
+    return value
+
+
+FileName = Annotated[str, AfterValidator(_check_file_name), Field(json_schema_extra={"pattern": FILE_NAME_PATTERN})]
+Names = Annotated[list[FileName], Field(max_length=1000)]
+
+
+class RecordingsRequest(RobotRequest):
+    """What a request says about recordings: lists of names, each name once a list."""
+
+    @model_validator(mode="after")
+    def _check_once(self) -> Self:
+        """A recording counts once."""
+        for names in (getattr(self, role, None) or [] for role in ROLES if role != "model"):
+            twice = next((name for index, name in enumerate(names) if name in names[:index]), None)
+            if twice is not None:
+                raise PydanticCustomError("twice", "{name} is listed twice; list it once", {"name": twice})
+        return self
+
+
+RECORDINGS_EXAMPLE: tuple[str, Any] = (
+    "Recordings that lie on the server",
+    {"robot": EXAMPLE_ROBOT, "recordings": ["monday.csv", "tuesday.csv"], "held_out": ["wednesday.mcap"]},
+)
 
 Document = TypeVar("Document", bound=RobotRequest)
 
@@ -36,6 +115,18 @@ class Received(Generic[Document]):
     form: ReceivedForm
 
 
+@asynccontextmanager
+async def stage_request(items: ItemStore, kind: Callable[[Path], Staged]) -> AsyncIterator[Staged]:
+    """A new folder that is removed in the end, unless it was handed in meanwhile."""
+    staged = await run_in_threadpool(items.stage)
+    try:
+        workspace = kind(staged)
+        await run_in_threadpool(workspace.prepare)
+        yield workspace
+    finally:
+        await run_in_threadpool(items.discard, staged)
+
+
 async def receive_request(
     request: Request,
     kind: type[Document],
@@ -45,12 +136,7 @@ async def receive_request(
 ) -> Received[Document]:
     """Read the body, whichever of the two media types it is.
 
-    Raises
-    ------
-    ProblemError
-        if the request is not as documented
-    LimitExceededError
-        if something is too large
+    Raises ProblemError if the request is not as documented. Raises LimitExceededError if something is too large.
     """
     if media_type(request) == JSON:
         return Received(await read_document(request, kind, settings.max_document_bytes), ReceivedForm())
@@ -65,15 +151,11 @@ async def receive_request(
     return Received(parse_document(form.texts.get("request", b"{}"), kind, within="part request"), form)
 
 
-def keep_robot(received: Received[Any], folder: Path) -> str:
-    """Name of the robot file in the job's folder, written there if it came as JSON.
+def keep_robot(received: Received[Any], folder: Path, robots: RobotStore) -> str:
+    """Name of the robot file in the job's folder, written there if it came as JSON or is a kept one.
 
-    Raises
-    ------
-    ProblemError
-        if there is no robot, or two
-    RobotFileError
-        if its content is not plain data
+    Raises ProblemError if there is no robot, or two. Raises RobotFileError if its content is not plain data.
+    Raises NotFoundError if it names a version that is not kept.
     """
     file, inline = received.form.file("robot"), received.document.robot
     if file is not None and inline is not None:
@@ -82,6 +164,10 @@ def keep_robot(received: Received[Any], folder: Path) -> str:
         return file.name
     if inline is None:
         raise ProblemError("invalid-request", "no robot was sent; send part robot, or the field robot in the JSON")
+    if inline.keys() == {"version"}:
+        robot = robots.find(str(inline["version"]))
+        shutil.copytree(robots.files(robot.version), folder, dirs_exist_ok=True)
+        return robot.robot_file
     return keep_inline_robot(folder, inline)
 
 
@@ -90,10 +176,7 @@ def request_body(
 ) -> dict[str, Any]:
     """The body of such a request, for the OpenAPI document.
 
-    Parameters
-    ----------
-    examples : mapping of str to (str, plain data)
-        summary and value by name
+    `examples`: mapping of str to (str, plain data), summary and value by name.
     """
     parts = {
         "request": model_reference(kind),
@@ -101,5 +184,5 @@ def request_body(
         "urdf": binary_part("the URDF that the robot file names, by its bare name"),
         **(further_parts or {}),
     }
-    form = form_body(parts, required=[], encoding={"request": {"contentType": JSON}})
+    form = form_body(parts, required=[])
     return {"requestBody": {"required": True, "content": {**json_body(kind, examples), **form}}}

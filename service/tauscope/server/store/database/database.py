@@ -31,14 +31,8 @@ A transaction that only later turns out to write could not wait for the lock, be
 
 
 def open_engine(address: Path | str) -> Engine:
-    """An engine; nothing is connected yet.
-
-    Raises
-    ------
-    StoreError
-        if it is no URL, or one of another kind of database
-    """
-    url = URL.create("sqlite", database=str(address)) if isinstance(address, Path) else _parsed(address)
+    """An engine; nothing is connected yet. Raises StoreError if it is no URL, or one of another kind of database."""
+    url = URL.create("sqlite", database=str(address)) if isinstance(address, Path) else _parse_url(address)
     if url.get_backend_name() == "sqlite":
         engine = create_engine(url, connect_args={"timeout": TIMEOUT_S})
         event.listen(engine, "connect", _prepare_sqlite)
@@ -58,7 +52,7 @@ def shown_address(engine: Engine) -> str:
     return str(url.database) if url.get_backend_name() == "sqlite" else url.render_as_string(hide_password=True)
 
 
-def _parsed(text: str) -> URL:
+def _parse_url(text: str) -> URL:
     """The URL of a text; only the two kinds that are tested are taken."""
     hint = "write postgresql://user@host/name, or leave it out for SQLite in the data folder"
     try:
@@ -91,10 +85,7 @@ _ADVISORY_LOCK = 7_283_462_001
 def upgrade(engine: Engine, target: str = "head") -> None:
     """Bring the tables to this program's form; nothing happens where they have it.
 
-    Raises
-    ------
-    StoreError
-        if the tables have a form that this program does not know
+    Raises StoreError if the tables have a form that this program does not know.
     """
     with engine.execution_options(**{WRITES: True}).begin() as connection:
         if connection.dialect.name == "postgresql":
@@ -141,10 +132,7 @@ class Database:
     def __init__(self, address: Path | str) -> None:
         """Open a database, and bring its tables to this program's form.
 
-        Raises
-        ------
-        StoreError
-            if it cannot be reached, is damaged, or was written by a newer program
+        Raises StoreError if it cannot be reached, is damaged, or was written by a newer program.
         """
         self._engine = open_engine(address)
         try:
@@ -165,13 +153,7 @@ class Database:
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
-        """A transaction that reads.
-
-        Raises
-        ------
-        StoreError
-            if the database does not answer
-        """
+        """A transaction that reads. Raises StoreError if the database does not answer."""
         with self._own_words(), Session(self._engine) as session, session.begin():
             yield session
 
@@ -179,12 +161,8 @@ class Database:
     def writing(self) -> Iterator[Session]:
         """A transaction that writes: all of it is kept, or nothing. Keep it short, others wait meanwhile.
 
-        Raises
-        ------
-        StoreError
-            if the database does not answer, or somebody else writes for longer than we wait
-        IntegrityError
-            if a row that may be there once is there already
+        Raises StoreError if the database does not answer, or somebody else writes for longer than we wait. Raises
+        IntegrityError if a row that may be there once is there already.
         """
         engine = self._engine.execution_options(**{WRITES: True})
         with self._own_words(), Session(engine, expire_on_commit=False) as session, session.begin():
@@ -194,10 +172,7 @@ class Database:
     def check(self) -> None:
         """Look whether it can be used now.
 
-        Raises
-        ------
-        StoreError
-            if it does not answer, is damaged, or is another one than was opened
+        Raises StoreError if it does not answer, is damaged, or is another one than was opened.
         """
         with self._own_words():
             if self._engine.url.get_backend_name() == "sqlite":
@@ -220,7 +195,7 @@ class Database:
         except IntegrityError:
             raise
         except (DBAPIError, PoolTimeoutError) as error:
-            raise StoreError(_described(shown_address(self._engine), error)) from error
+            raise StoreError(_describe_fault(shown_address(self._engine), error)) from error
 
 
 def _check_file(url: URL) -> None:
@@ -239,7 +214,7 @@ def _check_file(url: URL) -> None:
         raise StoreError(f"{path}: is damaged; {_DAMAGE_HINT}")
 
 
-def _described(address: str, error: Exception) -> str:
+def _describe_fault(address: str, error: Exception) -> str:
     """What is wrong with a database, and what to do."""
     reason = one_line(str(getattr(error, "orig", None) or error)).strip()
     lower = reason.lower()

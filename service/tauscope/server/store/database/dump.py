@@ -28,10 +28,7 @@ def dump_lines(engine: Engine) -> Iterator[bytes]:
 def load_lines(engine: Engine, lines: Iterable[bytes]) -> None:
     """Fill an empty database, and bring it to this program's form; all of it, or nothing.
 
-    Raises
-    ------
-    StoreError
-        if there is something in the database, or the lines are of a newer program
+    Raises StoreError if there is something in the database, or the lines are of a newer program.
     """
     rows = (json.loads(line) for line in lines)
     revision = next(rows)["revision"]
@@ -46,7 +43,7 @@ def load_lines(engine: Engine, lines: Iterable[bytes]) -> None:
         tables = {table.name: table for table in _tables(connection)}
         for entry in rows:
             table = tables[entry["table"]]
-            values = {key: _typed(table.columns[key], value, connection) for key, value in entry["row"].items()}
+            values = {key: _convert_type(table.columns[key], value, connection) for key, value in entry["row"].items()}
             connection.execute(insert(table).values(**values))
         _advance_counters(connection, tables.values())
     upgrade(engine)
@@ -70,7 +67,7 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def _typed(column: Column[Any], value: Any, connection: Connection) -> Any:
+def _convert_type(column: Column[Any], value: Any, connection: Connection) -> Any:
     """A value as the database takes it."""
     if value is None or not isinstance(column.type, DateTime):
         return value

@@ -16,8 +16,7 @@ from tauscope.server.store.recordings import StoredRecording
 class FileMetadata:
     """A file of an item.
 
-    sha256 : str
-        of its bytes, in hexadecimal
+    `sha256`: of its bytes, in hexadecimal.
     """
 
     path: str
@@ -39,8 +38,7 @@ class RecordingRole:
 class ItemMetadata:
     """An item as its folder shows it.
 
-    problem : (str, str) or None
-        code and detail: why it has no result
+    `problem`: (str, str), code and detail: why it has no result.
     """
 
     kind: str
@@ -118,10 +116,7 @@ class Index:
     def stamps(self, kind: str) -> dict[str, tuple[str, bool]]:
         """What is indexed of this site.
 
-        Returns
-        -------
-        dict of str to (str, bool)
-            stamp of each item, and whether it is final, by identifier
+        Returns dict of str to (str,), stamp of each item, and whether it is final, by identifier.
         """
         query = select(Item.identifier, Item.stamp, Item.is_final).where(Item.site == self.site, Item.kind == kind)
         with self._database.reading() as session:
@@ -203,10 +198,7 @@ class Index:
     def list_used_recordings(self, except_by: Collection[tuple[str, str]] = ()) -> frozenset[str]:
         """Names of the recordings on the server that items of this site were made from or judged by.
 
-        Parameters
-        ----------
-        except_by : collection of (str, str)
-            kind and identifier of items that do not count
+        `except_by`: collection of (str, str), kind and identifier of items that do not count.
         """
         query = select(Item.kind, Item.identifier, RecordingUse.name).join(RecordingUse)
         query = query.where(Item.site == self.site, RecordingUse.origin == "server")

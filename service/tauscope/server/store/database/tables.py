@@ -22,13 +22,7 @@ class Moment(TypeDecorator[datetime]):
     cache_ok = True
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> Any:
-        """The moment as it is kept.
-
-        Raises
-        ------
-        ValueError
-            for a time without time zone: it could be any moment
-        """
+        """The moment as it is kept. Raises ValueError for a time without time zone: it could be any moment."""
         if value is None:
             return None
         if value.tzinfo is None:

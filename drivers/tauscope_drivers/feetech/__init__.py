@@ -1,0 +1,1 @@
+"""Feetech STS3215 servos on a serial bus: position mode."""

@@ -1,0 +1,218 @@
+"""Instructions and their answers on one bus of servos."""
+
+import time
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+from tauscope_drivers.clock import AnswerTime, Clock, MonotonicClock
+from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.feetech import packets
+from tauscope_drivers.feetech.packets import ANSWER_BYTES, FrameParser, Status
+from tauscope_drivers.feetech.registers import FIRST_IN_RAM, REGISTERS, SPARE_BYTES, Block
+from tauscope_drivers.serial_port import BITS_PER_BYTE, SerialPort
+
+FACTORY_RETURN_DELAY_S = 500e-6
+"""Return Delay Time of 250 [s]."""
+
+ATTEMPTS = 3
+"""How often a single servo is asked outside the control loop."""
+
+PATIENCE_S = 0.02
+"""How much longer a single servo is waited for there [s]."""
+
+_LATEST_ANSWER_NS = 500_000_000
+"""Answers have come 133 ms late where a machine stood still; a control loop gives an arm up long before this."""
+
+_PING_SLOT_S = 0.003
+"""Time that a ping to all leaves each ID [s]."""
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Answers to one question to many servos.
+
+    `asked_ns`: instant at which the question had left [ns, by the bus' clock].
+    `late_ns`: how much later than usual the last answer came [ns].
+    `beyond_ns`: how much longer than bus and adapter should take for it [ns].
+    """
+
+    asked_ns: int
+    late_ns: int
+    statuses: dict[int, Status]
+    beyond_ns: int = 0
+
+
+class FeetechBus:
+    """Speaks to the servos of one port; one thread's own.
+
+    Nothing in an answer says to which question it belongs. After a question that was not answered in time, the next
+    ones ask for another number of bytes: an answer that comes late has the wrong length. A servo that may still owe an
+    answer of the same length is not believed.
+    """
+
+    def __init__(self, port: SerialPort, clock: Clock | None = None) -> None:
+        """Use a port, open or not yet."""
+        self.port = port
+        self.return_delay_s = FACTORY_RETURN_DELAY_S
+        self._clock = MonotonicClock() if clock is None else clock
+        self._missed_ns: dict[tuple[int, int], int] = {}
+        self._owes = False
+        self._answer_times: dict[int, AnswerTime] = {}
+
+    def ping(self, servo: int) -> bool:
+        """Whether a servo answers."""
+        return any(self._ask(servo, packets.encode_ping(servo), 0, PATIENCE_S) for _ in range(ATTEMPTS))
+
+    def ping_all(self) -> list[int]:
+        """IDs of the servos that answer a ping to all."""
+        slots = packets.HIGHEST_ID + 1
+        self.port.send(packets.encode_ping())
+        deadline = self.port.reply_deadline_ns(ANSWER_BYTES * slots, slots * _PING_SLOT_S)
+        parser, found = FrameParser(), set[int]()
+        while received := self.port.receive(deadline):
+            statuses = map(packets.decode_status, parser.feed(received))
+            found |= {status.servo for status in statuses if status is not None and not status.data}
+        return sorted(found)
+
+    def read(self, servo: int, block: Block) -> tuple[int, dict[str, int]]:
+        """Alarms and registers of one servo, asked again while it does not answer.
+
+        Raises DriverError ``cannot-connect`` where it does not answer.
+        """
+        for _ in range(ATTEMPTS):
+            request = packets.encode_read(servo, block.address, block.length)
+            answer = self._ask(servo, request, block.length, PATIENCE_S)
+            if answer is not None:
+                return answer.alarms, block.decode(answer.data)
+        raise DriverError(
+            DriverErrorKind.CANNOT_CONNECT,
+            f"servo {servo} does not answer; check its power, cable, ID and baud rate",
+        )
+
+    def read_once(self, servo: int, block: Block) -> Status | None:
+        """A block and some spare bytes, asked for once; None where no answer came that can be believed."""
+        length = self._choose_length([servo], block)
+        owed = self._owed([servo], length)
+        answer = self._ask(servo, packets.encode_read(servo, block.address, length), length)
+        if answer is None:
+            self._miss([servo], length)
+        return None if owed else answer
+
+    def write(self, servo: int, values: Mapping[str, int]) -> None:
+        """Write neighbouring registers of one servo's RAM and read them back.
+
+        Raises DriverError: ``cannot-connect``: it does not answer; ``refused``: it holds something else.
+        """
+        address, data = encode_registers(values)
+        for _ in range(ATTEMPTS):
+            # A servo whose Response Status Level is 0 does not answer: the registers that it holds now count.
+            self._ask(servo, packets.encode_write(servo, address, data), 0, self.return_delay_s)
+            found = self.read(servo, Block(address, len(data)))[1]
+            if all(found[name] == value for name, value in values.items()):
+                return
+        name, value = next((name, value) for name, value in values.items() if found[name] != value)
+        raise DriverError(
+            DriverErrorKind.REFUSED,
+            f"servo {servo}: {name} was written as {value} and reads {found[name]}; check it with Feetech's FD",
+        )
+
+    def sync_write(self, values: Mapping[int, Mapping[str, int]]) -> None:
+        """Write the same registers of many servos' RAM; no servo answers."""
+        encoded = {servo: encode_registers(own) for servo, own in values.items()}
+        if encoded:
+            (address,) = {start for start, _ in encoded.values()}
+            self.port.send(packets.encode_sync_write({servo: data for servo, (_, data) in encoded.items()}, address))
+
+    def sync_read(self, servos: Sequence[int], block: Block, patience_s: float = 0.0) -> Answers:
+        """Read a block and some spare bytes of many servos."""
+        self._drain()
+        length = self._choose_length(servos, block)
+        owed = self._owed(servos, length)
+        request = packets.encode_sync_read(servos, block.address, length)
+        # Taken before: who is woken by the bytes may run before this process does again.
+        asked_ns = self._clock.now_ns() + round(self._wire_s(len(request)) * 1e9)
+        self.port.send(request)
+        answer_bytes = len(servos) * (ANSWER_BYTES + length)
+        waits_s = len(servos) * self.return_delay_s
+        deadline = self.port.reply_deadline_ns(len(request) + answer_bytes, waits_s + patience_s)
+        found, answered_ns = self._receive_each(servos, length, max(len(request), ANSWER_BYTES + length), deadline)
+        self._miss(set(servos) - found.keys(), length)
+        found = {servo: status for servo, status in found.items() if status is not None and servo not in owed}
+        if not found:
+            return Answers(asked_ns, 0, found)
+        usual_s = self._wire_s(answer_bytes) + waits_s + self.port.latency_s
+        taken_ns = answered_ns - asked_ns - round(usual_s * 1e9)
+        late_ns = self._answer_times.setdefault(len(servos), AnswerTime()).late_ns(taken_ns)
+        return Answers(asked_ns, late_ns, found, max(0, taken_ns))
+
+    def _receive_each(
+        self, servos: Sequence[int], length: int, longest: int, deadline: int
+    ) -> tuple[dict[int, Status | None], int]:
+        """One answer of each servo, None where two differ, and when the last came."""
+        parser, found = FrameParser(longest), dict[int, Status | None]()
+        answered_ns = 0
+        while len(found) < len(servos) and (received := self.port.receive(deadline)):
+            for frame in parser.feed(received):
+                status = packets.decode_status(frame)
+                if status is None or status.servo not in servos or len(status.data) != length:
+                    continue
+                answered_ns = self._clock.now_ns()
+                if found.setdefault(status.servo, status) != status:
+                    found[status.servo] = None
+        return found, answered_ns
+
+    def _ask(self, servo: int, request: bytes, length: int, patience_s: float = 0.0) -> Status | None:
+        """Send an instruction to one servo and wait for its answer; an echo of the instruction is none."""
+        self._drain()
+        self.port.send(request)
+        delay_s = self.return_delay_s + patience_s
+        deadline = self.port.reply_deadline_ns(len(request) + ANSWER_BYTES + length, delay_s)
+        parser = FrameParser(max(len(request), ANSWER_BYTES + length))
+        may_echo = True
+        while received := self.port.receive(deadline):
+            for frame in parser.feed(received):
+                if may_echo and frame == request:
+                    may_echo = False
+                    continue
+                status = packets.decode_status(frame)
+                if status is not None and status.servo == servo and len(status.data) == length:
+                    return status
+        self._owes = True
+        return None
+
+    def _drain(self) -> None:
+        """Let what comes late pass, where something may."""
+        if self._owes:
+            self._owes = False
+            self.port.drain()
+
+    def _choose_length(self, servos: Sequence[int], block: Block) -> int:
+        """The length of which an answer was missed longest ago; the block's own where none was."""
+        lengths = range(block.length, block.length + SPARE_BYTES + 1)
+        return min(lengths, key=lambda length: max(self._missed_ns.get((servo, length), 0) for servo in servos))
+
+    def _owed(self, servos: Sequence[int], length: int) -> set[int]:
+        """Servos whose answer of this length to an earlier question may still be under way."""
+        since_ns = time.monotonic_ns() - _LATEST_ANSWER_NS
+        return {servo for servo in servos if self._missed_ns.get((servo, length), 0) > since_ns}
+
+    def _miss(self, servos: Collection[int], length: int) -> None:
+        """Note who has not answered: that answer may come yet."""
+        self._owes |= bool(servos)
+        self._missed_ns |= dict.fromkeys(((servo, length) for servo in servos), time.monotonic_ns())
+
+    def _wire_s(self, count: int) -> float:
+        """Time of so many bytes on the wire [s]."""
+        return count * BITS_PER_BYTE / self.port.baudrate
+
+
+def encode_registers(values: Mapping[str, int]) -> tuple[int, bytes]:
+    """Address and bytes of neighbouring registers in RAM.
+
+    Raises ValueError where they are no neighbours, or lie in EEPROM.
+    """
+    registers = [REGISTERS[name] for name in values]
+    ends = [register.end for register in registers[:-1]]
+    if registers[0].address < FIRST_IN_RAM or ends != [register.address for register in registers[1:]]:
+        raise ValueError(f"{', '.join(values)} cannot be written at once, or not at all")
+    return registers[0].address, b"".join(REGISTERS[name].encode(value) for name, value in values.items())

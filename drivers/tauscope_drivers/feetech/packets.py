@@ -1,0 +1,121 @@
+"""Frames of Feetech's protocol as bytes: pure functions and one parser, no port.
+
+A frame is FF FF, ID, length, instruction or alarms, parameters, checksum. An instruction looks like an answer: an
+adapter that echoes is found by comparing with the request. Source: Feetech, "FT-SCS communication protocol".
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+HEADER = b"\xff\xff"
+BROADCAST_ID = 0xFE
+HIGHEST_ID = 253
+
+ANSWER_BYTES = 6
+"""Of an answer without data."""
+
+LONGEST_FRAME = 259
+
+_PING, _READ, _WRITE, _SYNC_READ, _SYNC_WRITE = 0x01, 0x02, 0x03, 0x82, 0x83
+_FIXED_BYTES = 4
+
+
+@dataclass(frozen=True)
+class Status:
+    """An answer.
+
+    `alarms`: bits of the register Status.
+    """
+
+    servo: int
+    alarms: int
+    data: bytes
+
+
+def checksum(body: bytes | bytearray) -> int:
+    """Complement of the sum of all bytes from the ID on."""
+    return ~sum(body) & 0xFF
+
+
+def encode_frame(servo: int, code: int, parameters: bytes = b"") -> bytes:
+    """A frame."""
+    body = bytes([servo, len(parameters) + 2, code]) + parameters
+    return HEADER + body + bytes([checksum(body)])
+
+
+def encode_ping(servo: int = BROADCAST_ID) -> bytes:
+    """Ask who is there."""
+    return encode_frame(servo, _PING)
+
+
+def encode_read(servo: int, address: int, length: int) -> bytes:
+    """Read a stretch of the memory table."""
+    return encode_frame(servo, _READ, bytes([address, length]))
+
+
+def encode_write(servo: int, address: int, data: bytes) -> bytes:
+    """Write a stretch of the memory table."""
+    return encode_frame(servo, _WRITE, bytes([address]) + data)
+
+
+def encode_sync_read(servos: Sequence[int], address: int, length: int) -> bytes:
+    """Read the same stretch of many servos, which answer in their order."""
+    return encode_frame(BROADCAST_ID, _SYNC_READ, bytes([address, length, *servos]))
+
+
+def encode_sync_write(values: Mapping[int, bytes], address: int) -> bytes:
+    """Write the same stretch of many servos; none of them answers.
+
+    Raises ValueError where the servos get different numbers of bytes.
+    """
+    length = len(next(iter(values.values())))
+    if any(len(data) != length for data in values.values()):
+        raise ValueError("a Sync Write carries the same number of bytes to every servo")
+    parts = b"".join(bytes([servo]) + data for servo, data in values.items())
+    return encode_frame(BROADCAST_ID, _SYNC_WRITE, bytes([address, length]) + parts)
+
+
+class FrameParser:
+    """Finds whole frames in what comes from a port; noise and damaged frames are passed over."""
+
+    def __init__(self, longest: int = LONGEST_FRAME) -> None:
+        """Begin with nothing.
+
+        `longest`: longest frame that can be meant, so that a damaged length does not swallow what follows [bytes].
+        """
+        self._longest = longest
+        self._buffer = bytearray()
+
+    def feed(self, received: bytes) -> Iterator[bytes]:
+        """Frames that are complete now and whose checksum is right, header included."""
+        self._buffer += received
+        while (frame := self._next_frame()) is not None:
+            yield frame
+
+    def _next_frame(self) -> bytes | None:
+        """The next whole frame whose checksum is right."""
+        buffer = self._buffer
+        while True:
+            start = buffer.find(HEADER)
+            if start < 0:
+                del buffer[: max(0, len(buffer) - 1)]
+                return None
+            del buffer[:start]
+            if len(buffer) < _FIXED_BYTES:
+                return None
+            end = _FIXED_BYTES + buffer[3]
+            if buffer[2] > BROADCAST_ID or not ANSWER_BYTES <= end <= self._longest:
+                del buffer[0]
+            elif len(buffer) < end:
+                return None
+            elif checksum(buffer[2 : end - 1]) != buffer[end - 1]:
+                del buffer[0]
+            else:
+                frame = bytes(buffer[:end])
+                del buffer[:end]
+                return frame
+
+
+def decode_status(frame: bytes) -> Status | None:
+    """A frame as an answer; None where it is addressed to all, as the echo of an instruction to many is."""
+    return None if frame[2] > HIGHEST_ID else Status(frame[2], frame[4], frame[5:-1])

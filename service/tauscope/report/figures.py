@@ -1,0 +1,293 @@
+"""Figures of the reports: parameters, residuals, friction, motion."""
+
+import math
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from markupsafe import Markup, escape
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+
+from tauscope.diagnosis import DiagnosisDocument
+from tauscope.diagnosis.documents.plots import ResidualHistogram
+from tauscope.identification import IdentificationDocument
+from tauscope.identification.result import BaseParameterEntry
+from tauscope.number_text import power_of_ten, significant
+from tauscope.report.friction_curve import FrictionCurve
+from tauscope.report.svg import BAND, HELD_OUT, MEASURED, MUTED, PREDICTED, draw_svg
+from tauscope.report.table import Table
+from tauscope.report.words import base_parameter_unit, noise_ratio
+from tauscope.trajectory import Trajectory
+
+LEVELS = (1.1, 1.3, 1.6, 2.0, 3.0, 5.0, 10.0)
+"""Multiples of the noise between the shades: the lightest is nothing but noise."""
+
+VARIABLES = ("velocity", "position", "load", "acceleration", "time")
+
+_WIDTH, _LABELS, _GAP = 920.0, 104.0, 14.0
+_ROW, _TOP, _LEGEND = 22.0, 24.0, 44.0
+_MOST_LETTERS = 16
+
+
+def heat_map(histograms: Sequence[ResidualHistogram], joints: Sequence[str], *, after: bool) -> Markup:
+    """Draw the map."""
+    height = _TOP + _ROW * len(joints) + _LEGEND
+    group = (_WIDTH - _LABELS - _GAP * (len(VARIABLES) - 1)) / len(VARIABLES)
+    parts = [f'<svg class="heat" viewBox="0 0 {_WIDTH:g} {height:g}">']
+    for place, variable in enumerate(VARIABLES):
+        left = _LABELS + place * (group + _GAP)
+        parts.append(f'<text x="{left:.1f}" y="{_TOP - 9:g}">{variable}</text>')
+        words = ("start", "end") if variable == "time" else ("lowest", "highest")
+        below = _TOP + _ROW * len(joints) + 12
+        parts.append(f'<text class="small" x="{left:.1f}" y="{below:g}">{words[0]}</text>')
+        right = left + group
+        parts.append(f'<text class="small" x="{right:.1f}" y="{below:g}" text-anchor="end">{words[1]}</text>')
+        for row, joint in enumerate(joints):
+            own = next((each for each in histograms if (each.joint, each.variable) == (joint, variable)), None)
+            if own is not None:
+                parts += _cells(own, left, _TOP + _ROW * row, group, after=after)
+    for row, joint in enumerate(joints):
+        name = joint if len(joint) <= _MOST_LETTERS else joint[: _MOST_LETTERS - 1] + "…"
+        parts.append(f'<text x="0" y="{_TOP + _ROW * row + 14:g}">{escape(name)}</text>')
+    parts += _legend(height - 14.0)
+    return Markup("".join([*parts, "</svg>"]))  # noqa: S704 - our own drawing; names are escaped
+
+
+def heat_table(histograms: Sequence[ResidualHistogram]) -> Table:
+    """The numbers of both maps."""
+    rows = [
+        (each.joint, each.variable, *(significant(number, 3) for number in cell), significant(each.noise, 3))
+        for each in histograms
+        for cell in zip(each.edges, each.edges[1:], each.before, each.after, strict=False)
+    ]
+    return Table(("joint", "variable", "from", "to", "rms before", "rms after", "noise"), rows, words=2)
+
+
+def _cells(own: ResidualHistogram, left: float, top: float, width: float, *, after: bool) -> Iterator[str]:
+    """One joint's cells of one variable; a line where the variable changes sign."""
+    values = own.after if after else own.before
+    step = width / len(values)
+    for place, value in enumerate(values):
+        ratio = value / own.noise if own.noise > 0.0 else float("inf")
+        low, high = own.edges[place], own.edges[place + 1]
+        title = f"{own.variable} {significant(low, 3)} … {significant(high, 3)}: {significant(ratio, 3)} × noise"
+        x, level = left + place * step, bisect_right(LEVELS, ratio)
+        yield (
+            f'<rect class="h{level}" x="{x:.2f}" y="{top:g}" width="{step:.2f}" height="{_ROW - 3:g}">'
+            f"<title>{escape(own.joint)}, {title}</title></rect>"
+        )
+    if own.edges[0] < 0.0 < own.edges[-1]:
+        zero = max(place for place, edge in enumerate(own.edges) if edge <= 0.0)
+        share = -own.edges[zero] / max(own.edges[zero + 1] - own.edges[zero], 1e-300)
+        x = left + (zero + share) * step
+        yield f'<path class="zero" d="M{x:.2f} {top:g}v{_ROW - 3:g}"/>'
+
+
+def _legend(top: float) -> Iterator[str]:
+    """The shades, from noise to far above it."""
+    words = ("noise", *(f"> {level:g} ×" for level in LEVELS))
+    x = _LABELS
+    for level, word in enumerate(words):
+        yield f'<rect class="h{level}" x="{x:g}" y="{top - 9:g}" width="16" height="11"/>'
+        yield f'<text class="small" x="{x + 20:g}" y="{top:g}">{word}</text>'
+        x += 78.0
+    yield f'<path class="zero" d="M{x + 4:g} {top - 9:g}v11"/>'
+    yield f'<text class="small" x="{x + 10:g}" y="{top:g}">zero</text>'
+
+
+PARAMETER_ROW_INCHES = 0.19
+DEVIATIONS = 1.96
+"""Standard errors to either side: 95 % of a normal distribution."""
+
+LONGEST_LABEL = 62
+
+
+def parameter_figure(name: str, entries: Sequence[BaseParameterEntry]) -> str:
+    """Draw base parameters with their 95 % intervals."""
+    panels: dict[str, list[BaseParameterEntry]] = {}
+    for entry in entries:
+        panels.setdefault(base_parameter_unit(entry.terms), []).append(entry)
+    heights = [len(panel) + 2.0 for panel in panels.values()]
+
+    def draw(figure: Figure) -> None:
+        axes = np.ravel(figure.subplots(len(panels), 1, squeeze=False, height_ratios=heights))
+        for axis, (unit, panel) in zip(axes, panels.items(), strict=True):
+            _draw_panel(axis, panel)
+            axis.set_xlabel(f"[{unit}]")
+
+    return draw_svg(name, 0.25 * len(panels) + PARAMETER_ROW_INCHES * sum(heights), draw)
+
+
+def _draw_panel(axis: Axes, entries: Sequence[BaseParameterEntry]) -> None:
+    """One row a parameter, from the top."""
+    places = np.arange(len(entries))
+    values = np.array([entry.value for entry in entries])
+    reach = DEVIATIONS * np.array([entry.std or 0.0 for entry in entries])
+    axis.axvline(0.0, color=MUTED, linewidth=0.6)
+    axis.errorbar(
+        values,
+        places,
+        xerr=reach,
+        linestyle="none",
+        marker="o",
+        markersize=3.2,
+        color=PREDICTED,
+        elinewidth=1.1,
+        capsize=2.2,
+    )
+    axis.set_yticks(places, [_shorten(entry.name) for entry in entries])
+    axis.set_ylim(len(entries) - 0.4, -0.6)
+    axis.grid(visible=False, axis="y")
+    axis.tick_params(axis="y", length=0)
+    axis.spines["left"].set_visible(False)
+
+
+def _shorten(name: str) -> str:
+    """A label that leaves room for the drawing; the table has all of it."""
+    return name if len(name) <= LONGEST_LABEL else name[: LONGEST_LABEL - 1] + "…"
+
+
+RESIDUAL_ROW_INCHES = 0.24
+
+
+def residual_figure(name: str, document: IdentificationDocument) -> str:
+    """Draw every joint's residual as a multiple of its noise."""
+    fits = {"own recordings": (document.fit.train, PREDICTED, "o")}
+    if document.fit.held_out is not None:
+        fits["held out"] = (document.fit.held_out, HELD_OUT, "D")
+    places = np.arange(len(document.joints))
+
+    def draw(figure: Figure) -> None:
+        axis = figure.subplots()
+        axis.axvline(1.0, color=MUTED, linewidth=0.9, linestyle=(0, (3, 2)), label="nothing but noise")
+        largest = 1.0
+        for label, (fit, colour, marker) in fits.items():
+            ratios = [noise_ratio(rms, noise) for rms, noise in zip(fit.rms, document.noise_std, strict=True)]
+            largest = max(largest, *ratios)
+            axis.plot(ratios, places, linestyle="none", marker=marker, markersize=4.5, color=colour, label=label)
+        axis.set_yticks(places, document.joints)
+        axis.set_ylim(len(places) - 0.4, -0.6)
+        axis.set_xlim(0.0, 1.15 * largest if np.isfinite(largest) else None)
+        axis.tick_params(axis="y", length=0)
+        axis.spines["left"].set_visible(False)
+        axis.set_xlabel("residual rms / noise σ")
+        handles, labels = axis.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper left", ncols=3, borderpad=0.0)
+
+    return draw_svg(name, 0.8 + RESIDUAL_ROW_INCHES * (len(places) + 1), draw)
+
+
+MOST = 14
+SHIFT_ROW_INCHES = 0.22
+LONGEST_SHIFT_LABEL = 58
+TICKS = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 10000.0)
+"""Standard errors at the ticks: linear up to the first, logarithmic from there."""
+
+
+def shift_figure(name: str, document: DiagnosisDocument) -> str:
+    """Draw how far parameters moved when the findings were added, in standard errors."""
+    entries = document.parameter_shifts[:MOST]
+    return _bars(name, [e.parameter for e in entries], [e.shift_in_std for e in entries])
+
+
+def difference_figure(name: str, document: DiagnosisDocument) -> str:
+    """Draw how far the arm's parameters are from the simulation's, in standard errors."""
+    entries = document.parameter_differences[:MOST]
+    return _bars(name, [e.parameter for e in entries], [e.difference_in_std for e in entries])
+
+
+def _bars(name: str, labels: Sequence[str], values: Sequence[float]) -> str:
+    """One bar a parameter, largest first; within the band nothing has moved."""
+    places = np.arange(len(labels))
+    shown = [label if len(label) <= LONGEST_SHIFT_LABEL else label[: LONGEST_SHIFT_LABEL - 1] + "…" for label in labels]
+
+    def draw(figure: Figure) -> None:
+        axis = figure.subplots()
+        axis.axvspan(-1.96, 1.96, color=BAND, linewidth=0)
+        axis.barh(places, values, height=0.55, color=PREDICTED)
+        axis.axvline(0.0, color=MUTED, linewidth=0.6)
+        axis.set_xscale("symlog", linthresh=TICKS[0])
+        shown_ticks = [tick for tick in TICKS if tick <= 1.2 * np.max(np.abs(values))]
+        axis.set_xticks([*(-tick for tick in reversed(shown_ticks)), 0.0, *shown_ticks])
+        axis.xaxis.set_major_formatter(lambda value, _: power_of_ten(value))
+        axis.xaxis.set_minor_locator(NullLocator())
+        axis.set_yticks(places, shown)
+        axis.set_ylim(len(labels) - 0.4, -0.6)
+        axis.grid(visible=False, axis="y")
+        axis.tick_params(axis="y", length=0)
+        axis.spines["left"].set_visible(False)
+        axis.set_xlabel("standard errors (band: ± 1.96)")
+
+    return draw_svg(name, 0.6 + SHIFT_ROW_INCHES * (len(labels) + 1), draw)
+
+
+MOST_SAMPLES = 700
+MOTION_ROW_INCHES = 0.55
+
+
+def motion_figure(name: str, trajectory: Trajectory, joints: list[str]) -> str:
+    """Draw every joint's position over time."""
+    sampled = trajectory.evaluate(np.linspace(0.0, trajectory.duration_s, MOST_SAMPLES))
+
+    def draw(figure: Figure) -> None:
+        axes = np.atleast_1d(figure.subplots(len(joints), 1, sharex=True))
+        for number, (axis, joint) in enumerate(zip(axes, joints, strict=True)):
+            axis.plot(sampled.time, sampled.position[:, number], color=PREDICTED, linewidth=0.9)
+            axis.set_ylabel(joint if len(joint) <= 12 else joint[:11] + "…", rotation=0, ha="right", va="center")
+            axis.margins(x=0.0)
+        axes[-1].set_xlabel("time [s]")
+
+    return draw_svg(name, 0.5 + MOTION_ROW_INCHES * len(joints), draw)
+
+
+COLUMNS = 3
+FRICTION_ROW_INCHES = 2.25
+
+
+def friction_figure(
+    name: str, curves: Sequence[FrictionCurve], titles: Sequence[str], units: Sequence[tuple[str, str]]
+) -> str:
+    """Draw the friction of every joint over velocity.
+
+    `units`: sequence of (str, str), units of velocity and of torque, one pair a joint.
+    """
+    columns = min(COLUMNS, max(len(curves), 2))
+    rows = math.ceil(len(curves) / columns)
+
+    def draw(figure: Figure) -> None:
+        axes = np.atleast_2d(figure.subplots(rows, columns, squeeze=False)).ravel()
+        for axis in axes[len(curves) :]:
+            axis.set_axis_off()
+        for axis, curve, title, (velocity_unit, torque_unit) in zip(axes, curves, titles, units, strict=False):
+            _draw_curve(axis, curve)
+            axis.set_title(title)
+            axis.set_xlabel(f"velocity [{velocity_unit}]")
+            axis.set_ylabel(f"friction [{torque_unit}]")
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper left", ncols=len(labels), borderpad=0.0)
+
+    return draw_svg(name, 0.3 + FRICTION_ROW_INCHES * rows, draw)
+
+
+def _draw_curve(axis: Axes, curve: FrictionCurve) -> None:
+    """The curve, solid where recordings exist, dashed beyond; its band; and the recordings' own means."""
+    inside = (curve.velocity >= curve.seen[0]) & (curve.velocity <= curve.seen[1])
+    low, high = (curve.torque + sign * DEVIATIONS * curve.std for sign in (-1.0, 1.0))
+    axis.fill_between(curve.velocity, low, high, color=BAND, linewidth=0, label="95 % confidence")
+    axis.plot(
+        curve.bin_velocity,
+        curve.bin_torque,
+        linestyle="none",
+        marker="o",
+        markersize=2.4,
+        markeredgewidth=0,
+        color=MEASURED,
+        label="measured less rigid body, mean a velocity bin",
+    )
+    axis.plot(curve.velocity, curve.torque, color=PREDICTED, linestyle=(0, (2, 2)), linewidth=0.9, label="no data")
+    axis.plot(curve.velocity[inside], curve.torque[inside], color=PREDICTED, linewidth=1.3, label="model")
+    for edge in curve.seen:
+        axis.axvline(edge, color=MUTED, linewidth=0.5)
+    axis.margins(x=0.0)

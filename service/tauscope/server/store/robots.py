@@ -1,0 +1,110 @@
+"""Robots that are kept: a version is a robot file with the files that it names, called by a hash of their content."""
+
+import hashlib
+import json
+import re
+import shutil
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from tauscope.errors import NotFoundError
+from tauscope.files import sync_folder, write_atomically
+from tauscope.robot.messages import one_line, shown
+from tauscope.server.store.items import utc_now
+
+VERSION_PATTERN = "^[0-9a-f]{32}$"
+_STAGED = ".staged-"
+_FILES, _RECORD = "files", "robot.json"
+
+
+@dataclass(frozen=True)
+class RobotVersion:
+    """A robot that is kept; `name` is the one in its file `robot_file`."""
+
+    version: str
+    name: str
+    robot_file: str
+    created: datetime
+
+
+class RobotStore:
+    """Folders named by versions, below one folder."""
+
+    def __init__(self, root: Path, clock: Callable[[], datetime] = utc_now) -> None:
+        """Open the store; its folder is made where it is missing, and what a crash left half made goes."""
+        self._root, self._clock = root, clock
+        root.mkdir(parents=True, exist_ok=True)
+        for entry in root.glob(f"{_STAGED}*"):
+            self.discard(entry)
+
+    def stage(self) -> Path:
+        """A new folder for files of a robot; `keep` or `discard` it."""
+        staged = Path(tempfile.mkdtemp(prefix=_STAGED, dir=self._root)) / _FILES
+        staged.mkdir()
+        return staged
+
+    def keep(self, staged: Path, robot_file: str, name: str) -> tuple[RobotVersion, bool]:
+        """Keep staged files. Returns (RobotVersion,), whether it is new; else the same content was kept before."""
+        robot = RobotVersion(hash_robot(staged, robot_file), name, robot_file, self._clock())
+        record = {"form": "tauscope.robot/1", "name": name, "robot_file": robot_file}
+        write_atomically(staged.parent / _RECORD, json.dumps({**record, "created": robot.created.isoformat()}).encode())
+        with suppress(NotFoundError):  # also where what is kept has lost its record: that is replaced
+            return self.find(robot.version), False
+        target = self._root / robot.version
+        shutil.rmtree(target, ignore_errors=True)
+        staged.parent.rename(target)
+        sync_folder(self._root)
+        return robot, True
+
+    def discard(self, staged: Path) -> None:
+        """Remove a staged folder; nothing happens where it was kept."""
+        shutil.rmtree(staged.parent if staged.name == _FILES else staged, ignore_errors=True)
+
+    def versions(self) -> list[RobotVersion]:
+        """All versions, the newest first."""
+        found = []
+        for entry in self._root.iterdir():
+            try:
+                found.append(self.find(entry.name))
+            except NotFoundError:
+                continue
+        return sorted(found, key=lambda each: (each.created, each.version), reverse=True)
+
+    def find(self, version: str) -> RobotVersion:
+        """A version. Raises NotFoundError if it is not kept, or its record is damaged."""
+        try:
+            record = json.loads((self.files(version).parent / _RECORD).read_bytes())
+            created = datetime.fromisoformat(record["created"])
+            return RobotVersion(version, str(record["name"]), str(record["robot_file"]), created)
+        except (OSError, ValueError, KeyError, TypeError):
+            raise _unknown(version) from None
+
+    def files(self, version: str) -> Path:
+        """The folder of a version's files. Raises NotFoundError if it is not kept."""
+        folder = self._root / version / _FILES
+        if re.fullmatch(VERSION_PATTERN, version) is None or not folder.is_dir():
+            raise _unknown(version)
+        return folder
+
+    def remove(self, version: str) -> None:
+        """Remove a version. Raises NotFoundError if it is not kept."""
+        going = Path(tempfile.mkdtemp(prefix=_STAGED, dir=self._root)) / version
+        self.files(version).parent.rename(going)
+        sync_folder(self._root)
+        shutil.rmtree(going.parent, ignore_errors=True)
+
+
+def hash_robot(folder: Path, robot_file: str) -> str:
+    """What the files of a robot are called: other names or bytes are another version."""
+    total = hashlib.sha256(robot_file.encode())
+    for path in sorted(folder.iterdir()):
+        total.update(f"\n{path.name}\n{hashlib.sha256(path.read_bytes()).hexdigest()}".encode())
+    return total.hexdigest()[:32]
+
+
+def _unknown(version: str) -> NotFoundError:
+    return NotFoundError(one_line(f"no robot version {shown(version)} is kept here; GET /api/v1/robots lists them"))

@@ -1,0 +1,137 @@
+"""The drives' end of a CAN bus: a serial line (Lawicel's ASCII protocol), or a socket of the kernel."""
+
+import binascii
+import contextlib
+import socket
+import struct
+
+from tauscope_sim.canopen_bus.drive import Frame
+
+_END, _ERROR = b"\r", b"\a"
+_STANDARD, _EXTENDED, _REMOTE, _EXTENDED_REMOTE = b"t", b"T", b"r", b"R"
+_IDENTIFIER_DIGITS = {_STANDARD: 3, _EXTENDED: 8, _REMOTE: 3, _EXTENDED_REMOTE: 8}
+_LONGEST_LINE = 32
+
+
+class SerialLine:
+    """Takes commands of the host, and turns frames of the bus into text.
+
+    Commands: ``Sn`` and ``sxxyy`` set the bit rate, ``O`` and ``L`` open the channel, ``C`` closes it, ``V`` and ``N``
+    ask for version and serial number, ``tiiildd…`` sends a frame. A line that is none of these is answered with a bell.
+    """
+
+    def __init__(self) -> None:
+        self.is_open = False
+        self._pending = b""
+
+    def take(self, data: bytes) -> tuple[list[Frame], bytes]:
+        """Frames for the bus, and what the adapter answers.
+
+        Extended and remote frames are acknowledged and go nowhere: no drive listens to them.
+        """
+        *lines, self._pending = (self._pending + data).split(_END)
+        if len(self._pending) > _LONGEST_LINE:
+            self._pending = b""
+        frames: list[Frame] = []
+        answers = b""
+        for line in lines:
+            answers += self._obey(line, frames)
+        return frames, answers
+
+    def text(self, frame: Frame) -> bytes:
+        """A frame of the bus as the host reads it; nothing where the channel is closed."""
+        identifier, payload = frame
+        if not self.is_open:
+            return b""
+        return b"t%03X%d%s" % (identifier, len(payload), binascii.hexlify(payload).upper()) + _END
+
+    def _obey(self, line: bytes, frames: list[Frame]) -> bytes:
+        """Answer to one command."""
+        command = line[:1]
+        if command in (b"O", b"L", b"C"):
+            self.is_open = command != b"C"
+            return _END
+        if command in (b"S", b"s", b"Y", b"Z", b""):
+            return _END
+        if command == b"V":
+            return b"V1013" + _END
+        if command == b"N":
+            return b"NTAUS" + _END
+        if command in _IDENTIFIER_DIGITS and self.is_open:
+            frame = _frame(line)
+            if frame is None:
+                return _ERROR
+            if command == _STANDARD:
+                frames.append(frame)
+            return b"z" + _END
+        return _ERROR
+
+
+def _frame(line: bytes) -> Frame | None:
+    """The frame that a line stands for; None where it is none."""
+    digits = _IDENTIFIER_DIGITS[line[:1]]
+    try:
+        identifier, length = int(line[1 : 1 + digits], 16), int(line[1 + digits : 2 + digits])
+        payload = b"" if line[:1] in (_REMOTE, _EXTENDED_REMOTE) else binascii.unhexlify(line[2 + digits :])
+    except ValueError:
+        return None
+    sent = length if line[:1] in (_REMOTE, _EXTENDED_REMOTE) else len(payload)
+    return (identifier, payload) if sent == length <= 8 else None
+
+
+_FRAME = struct.Struct("=IB3x8s")
+"""The kernel's ``struct can_frame``: identifier with flags, length, padding, data."""
+
+_HIGHEST_IDENTIFIER = 0x7FF
+_LONGEST = 8
+_MOST_FRAMES = 1000
+
+
+class CanSocket:
+    """A raw socket on one interface, as a `Port`: its bytes are whole frames of the kernel's form."""
+
+    baud = 1_000_000
+
+    def __init__(self, interface: str) -> None:
+        self._socket = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+        self._socket.bind((interface,))
+        self._socket.setblocking(False)
+
+    def fileno(self) -> int:
+        """Descriptor to wait on."""
+        return self._socket.fileno()
+
+    def read(self) -> bytes:
+        """What came since the last call; the kernel's bus is there whether anybody else is on it or not."""
+        received = bytearray()
+        with contextlib.suppress(BlockingIOError):
+            for _ in range(_MOST_FRAMES):
+                received += self._socket.recv(_FRAME.size)
+        return bytes(received)
+
+    def write(self, data: bytes) -> None:
+        """Send frames, one after the other; what the kernel has no room for is lost."""
+        for start in range(0, len(data), _FRAME.size):
+            with contextlib.suppress(OSError):
+                self._socket.send(data[start : start + _FRAME.size])
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._socket.close()
+
+
+class SocketLine:
+    """Frames in the kernel's form; implements `Line`."""
+
+    def take(self, data: bytes) -> tuple[list[Frame], bytes]:
+        """Standard data frames for the bus; others go nowhere, for no drive listens to them."""
+        frames = []
+        for identifier, length, payload in _FRAME.iter_unpack(data):
+            if identifier <= _HIGHEST_IDENTIFIER and length <= _LONGEST:
+                frames.append((identifier, payload[:length]))
+        return frames, b""
+
+    def text(self, frame: Frame) -> bytes:
+        """A frame as the kernel takes it."""
+        identifier, payload = frame
+        return _FRAME.pack(identifier, len(payload), payload)

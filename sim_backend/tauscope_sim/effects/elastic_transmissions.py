@@ -1,0 +1,84 @@
+"""Transmissions that give way: elastic joints, and gears with play."""
+
+import math
+from typing import ClassVar
+
+from tauscope.robot.document_fields import Positive
+from tauscope_sim.effects.effect import JointEffect
+from tauscope_sim.effects.fields import NotNegative
+from tauscope_sim.plant.term import Transmission
+
+
+class JointElasticity(JointEffect):
+    """T = K (θ - q) + D (θ̇ - q̇).
+
+    `joint`: its number, counted from 1.
+    `stiffness`: K [Nm/rad or N/m].
+    `damping`: D [Nm s/rad or N s/m].
+    `rotor_inertia`: J [kg m² or kg].
+    """
+
+    effect_id: ClassVar[str] = "joint_elasticity"
+    stiffness: Positive
+    damping: NotNegative = 0.0
+    rotor_inertia: Positive
+
+    def transmission(self) -> Transmission:
+        """Itself."""
+        return self
+
+    def torque(self, twist: float, twist_rate: float) -> float:
+        """T [Nm or N]. `twist`: θ - q [rad or m]; `twist_rate`: θ̇ - q̇ [rad/s or m/s]."""
+        return self.stiffness * twist + self.damping * twist_rate
+
+    def torque_slopes(self, twist: float, twist_rate: float) -> tuple[float, float]:
+        """K and D. `twist`: θ - q [rad or m]; `twist_rate`: θ̇ - q̇ [rad/s or m/s]."""
+        return self.stiffness, self.damping
+
+    def twist_at_rest(self, torque: float) -> float:
+        """Twist T / K [rad or m]. `torque`: T [Nm or N]."""
+        return torque / self.stiffness
+
+
+class Backlash(JointEffect):
+    """T = k x max(0, 1 + c sgn(x) δ̇) beyond a dead zone.
+
+    `joint`: its number, counted from 1.
+    `gap`: b, total lost motion [rad or m].
+    `contact_stiffness`: k, of teeth and transmission together [Nm/rad or N/m].
+    `contact_damping`: c [s/rad or s/m].
+    `rotor_inertia`: reflected inertia of the motor [kg m² or kg].
+    """
+
+    effect_id: ClassVar[str] = "backlash"
+    gap: Positive
+    contact_stiffness: Positive
+    contact_damping: NotNegative = 10.0
+    rotor_inertia: Positive
+
+    def transmission(self) -> Transmission:
+        """Itself."""
+        return self
+
+    def torque(self, twist: float, twist_rate: float) -> float:
+        """T [Nm or N]. `twist`: δ [rad or m]; `twist_rate`: δ̇ [rad/s or m/s]."""
+        overlap = abs(twist) - 0.5 * self.gap
+        if overlap <= 0.0:
+            return 0.0
+        return math.copysign(self.contact_stiffness * overlap * self._damping(twist, twist_rate), twist)
+
+    def torque_slopes(self, twist: float, twist_rate: float) -> tuple[float, float]:
+        """Derivatives of T with respect to δ and δ̇. `twist`: δ [rad or m]; `twist_rate`: δ̇ [rad/s or m/s]."""
+        overlap = abs(twist) - 0.5 * self.gap
+        damping = self._damping(twist, twist_rate)
+        if overlap <= 0.0 or damping == 0.0:
+            return 0.0, 0.0
+        return self.contact_stiffness * damping, self.contact_stiffness * overlap * self.contact_damping
+
+    def twist_at_rest(self, torque: float) -> float:
+        """Twist at which resting teeth hold a torque [rad or m]. `torque`: T [Nm or N]."""
+        return math.copysign(0.5 * self.gap, torque) + torque / self.contact_stiffness if torque else 0.0
+
+    def _damping(self, twist: float, twist_rate: float) -> float:
+        """Factor max(0, 1 + c sgn(δ) δ̇)."""
+        return max(0.0, 1.0 + self.contact_damping * math.copysign(twist_rate, twist * twist_rate))

@@ -1,0 +1,183 @@
+"""Friction laws of a joint, from its velocity, position and load."""
+
+import math
+from typing import ClassVar
+
+from tauscope.robot.document_fields import Number, Positive
+from tauscope.robot.robot import Robot
+from tauscope_sim.effects.effect import FrictionLaw, JointLaw, Law, Side
+from tauscope_sim.effects.fields import Exponent
+from tauscope_sim.friction import smooth_sign, smooth_sign_slope
+
+
+class CoulombFriction(FrictionLaw):
+    """τ = c A(v).
+
+    `joint`: its number, counted from 1.
+    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
+    `level`: c [Nm or N].
+    """
+
+    effect_id: ClassVar[str] = "coulomb_friction"
+    level: Number
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+        k_v = self.steepness(robot)
+
+        def torque(q: float, v: float) -> float:
+            return self.level * smooth_sign(v, k_v)
+
+        def slopes(q: float, v: float) -> tuple[float, float]:
+            return 0.0, self.level * smooth_sign_slope(v, k_v)
+
+        return torque, slopes
+
+
+class ViscousFriction(JointLaw):
+    """τ = c v.
+
+    `joint`: its number, counted from 1.
+    `coefficient`: c [Nm s/rad or N s/m].
+    """
+
+    effect_id: ClassVar[str] = "viscous_friction"
+    side: ClassVar[Side] = Side.FRICTION
+    coefficient: Number
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+        return (lambda q, v: self.coefficient * v), (lambda q, v: (0.0, self.coefficient))
+
+
+class StribeckFriction(FrictionLaw):
+    """τ = c A(v) exp(-(|v|/v_s)^α).
+
+    `joint`: its number, counted from 1.
+    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
+    `amplitude`: c [Nm or N].
+    `velocity`: v_s [rad/s or m/s].
+    """
+
+    effect_id: ClassVar[str] = "stribeck_friction"
+    amplitude: Number
+    velocity: Positive
+    exponent: Exponent = 2.0
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+        k_v = self.steepness(robot)
+
+        def decay(v: float) -> float:
+            return math.exp(-((abs(v) / self.velocity) ** self.exponent))
+
+        def torque(q: float, v: float) -> float:
+            return self.amplitude * smooth_sign(v, k_v) * decay(v)
+
+        def slopes(q: float, v: float) -> tuple[float, float]:
+            # d exp(-x^α)/dv = -α x^α / v exp(-x^α), taken as zero at rest where A(v) vanishes too
+            power = self.exponent * (abs(v) / self.velocity) ** self.exponent
+            fall = smooth_sign(v, k_v) * power / v if v else 0.0
+            return 0.0, self.amplitude * decay(v) * (smooth_sign_slope(v, k_v) - fall)
+
+        return torque, slopes
+
+
+class AsymmetricCoulomb(FrictionLaw):
+    """τ = c A(v) for v > 0, else 0.
+
+    `joint`: its number, counted from 1.
+    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
+    `amplitude`: c: friction of positive motion less that of negative motion [Nm or N].
+    """
+
+    effect_id: ClassVar[str] = "asymmetric_coulomb"
+    amplitude: Number
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+        k_v = self.steepness(robot)
+
+        def torque(q: float, v: float) -> float:
+            return self.amplitude * smooth_sign(v, k_v) if v > 0.0 else 0.0
+
+        def slopes(q: float, v: float) -> tuple[float, float]:
+            return 0.0, self.amplitude * smooth_sign_slope(v, k_v) if v > 0.0 else 0.0
+
+        return torque, slopes
+
+
+class AsymmetricViscous(JointLaw):
+    """τ = c max(v, 0).
+
+    `joint`: its number, counted from 1.
+    `amplitude`: c: coefficient of positive motion less that of negative motion [Nm s/rad or N s/m].
+    """
+
+    effect_id: ClassVar[str] = "asymmetric_viscous"
+    side: ClassVar[Side] = Side.FRICTION
+    amplitude: Number
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+        return (
+            lambda q, v: self.amplitude * max(v, 0.0),
+            lambda q, v: (0.0, self.amplitude if v > 0.0 else 0.0),
+        )
+
+
+LEAST_SPEED = 1e-3
+"""Below this the slope of a root is taken as here: it has none at zero [rad/s or m/s]."""
+
+
+class NonlinearViscous(JointLaw):
+    """τ = c sgn(v) |v|^p.
+
+    `joint`: its number, counted from 1.
+    `amplitude`: c, friction at 1 rad/s or 1 m/s [Nm or N].
+    """
+
+    effect_id: ClassVar[str] = "nonlinear_viscous"
+    side: ClassVar[Side] = Side.FRICTION
+    amplitude: Number
+    exponent: Exponent
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+
+        def torque(q: float, v: float) -> float:
+            return math.copysign(self.amplitude * abs(v) ** self.exponent, self.amplitude * v)
+
+        def slopes(q: float, v: float) -> tuple[float, float]:
+            return 0.0, self.amplitude * self.exponent * max(abs(v), LEAST_SPEED) ** (self.exponent - 1.0)
+
+        return torque, slopes
+
+
+class PositionDependentFriction(FrictionLaw):
+    """τ = c A(v) sin(k q + φ).
+
+    `joint`: its number, counted from 1.
+    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
+    `amplitude`: c [Nm or N].
+    `phase`: φ [rad].
+    """
+
+    effect_id: ClassVar[str] = "position_dependent_friction"
+    amplitude: Number
+    order: Positive = 1.0
+    phase: Number = 0.0
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+        k_v = self.steepness(robot)
+
+        def torque(q: float, v: float) -> float:
+            return self.amplitude * smooth_sign(v, k_v) * math.sin(self.order * q + self.phase)
+
+        def slopes(q: float, v: float) -> tuple[float, float]:
+            angle = self.order * q + self.phase
+            by_position = self.amplitude * smooth_sign(v, k_v) * self.order * math.cos(angle)
+            return by_position, self.amplitude * smooth_sign_slope(v, k_v) * math.sin(angle)
+
+        return torque, slopes

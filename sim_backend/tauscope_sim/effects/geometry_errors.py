@@ -1,0 +1,68 @@
+"""Geometry that the model has wrong: a tilted base, and joints that do not turn as their encoders say."""
+
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+from pydantic import Field
+from scipy.spatial.transform import Rotation
+
+from tauscope.robot.document_fields import Number, Vector
+from tauscope.robot.placement import rotation_about_x, rotation_about_y
+from tauscope.robot.robot import Placement, Robot
+from tauscope_sim.effects.effect import Effect
+from tauscope_sim.effects.fields import JointNumber, zero_vector
+
+
+class BaseTilt(Effect):
+    """g → R_x(α) R_y(β) g.
+
+    `about_x`: α [rad].
+    `about_y`: β [rad].
+    """
+
+    effect_id: ClassVar[str] = "base_tilt"
+    about_x: Number = 0.0
+    about_y: Number = 0.0
+
+    def check(self, robot: Robot) -> None:
+        """Refuse a base that is not tilted."""
+        super().check(robot)
+        if self.about_x == 0.0 and self.about_y == 0.0:
+            raise self.refused("about_x", "and about_y are zero; state one of them [rad]")
+
+    def alter(self, robot: Robot) -> Robot:
+        """The arm on its tilted base."""
+        turned = rotation_about_x(self.about_x) @ rotation_about_y(self.about_y) @ robot.gravity
+        return replace(robot, gravity=turned)
+
+
+class KinematicError(Effect):
+    """A displaced link frame.
+
+    `link`: j, counted from 1.
+    `translation`: d [m].
+    `rotation`: r [rad].
+    """
+
+    effect_id: ClassVar[str] = "kinematic_error"
+    link: JointNumber
+    translation: Vector = Field(default_factory=zero_vector)
+    rotation: Vector = Field(default_factory=zero_vector)
+
+    def check(self, robot: Robot) -> None:
+        """Refuse a link that does not exist and an error of nothing."""
+        super().check(robot)
+        if self.link > robot.joint_count:
+            raise self.refused("link", f"is {self.link}, but the arm has {robot.joint_count} links")
+        if not any(self.translation) and not any(self.rotation):
+            raise self.refused("translation", "and rotation are zero; state one of them")
+
+    def alter(self, robot: Robot) -> Robot:
+        """The arm as it was built."""
+        index = self.link - 1
+        segment = robot.segments[index]
+        rotation = Rotation.from_rotvec(self.rotation).as_matrix() @ segment.after.rotation
+        after = Placement(rotation, segment.after.translation + np.array(self.translation))
+        segments = (*robot.segments[:index], replace(segment, after=after), *robot.segments[index + 1 :])
+        return replace(robot, segments=segments)

@@ -1,0 +1,111 @@
+"""Torques that repeat with a joint's angle: cogging, and the ripple of a gear under load."""
+
+import math
+from collections.abc import Callable
+from typing import Annotated, ClassVar
+
+from pydantic import Field
+
+from tauscope.robot.robot import Robot
+from tauscope_sim.effects.effect import JointEffect, JointLaw, Law
+from tauscope_sim.effects.fields import Numbers, one_of, single_zero
+from tauscope_sim.plant.coordinates import Coordinates
+from tauscope_sim.plant.loads import LARGEST_GAIN
+from tauscope_sim.plant.term import Forces, Moment, Slopes, Term
+
+
+class AngleHarmonics(JointEffect):
+    """s(q) = Σ a_i sin(k_i q' + φ_i), with q' = q, or gear ratio × q where it is periodic in the motor's angle.
+
+    `joint`: its number, counted from 1.
+    `phase`: φ_i, a number or one an order [rad].
+    """
+
+    amplitude: Numbers
+    order: Numbers
+    phase: Numbers = Field(default_factory=single_zero)
+    angle: Annotated[str, one_of("joint", "motor")] = "joint"
+
+    def check(self, robot: Robot) -> None:
+        """Refuse lists that do not match, and a motor's angle without a gear ratio."""
+        super().check(robot)
+        for key in ("amplitude", "phase"):
+            count = len(getattr(self, key))
+            if count not in (1, len(self.order)):
+                raise self.refused(
+                    key, f"holds {count} numbers, order {len(self.order)}; give one each, or one for all"
+                )
+        if self.angle == "motor" and self.joint_of(robot).gear_ratio is None:
+            raise self.refused("angle", "is motor, but the robot file states no gear_ratio for this joint; state it")
+
+    def sine_and_slope(self, robot: Robot) -> tuple[Callable[[float], float], Callable[[float], float]]:
+        """s(q) and ds/dq."""
+        ratio = (self.joint_of(robot).gear_ratio or 1.0) if self.angle == "motor" else 1.0
+        count = len(self.order)
+        amplitude, phase = (value * count if len(value) == 1 else value for value in (self.amplitude, self.phase))
+        parts = [(a, ratio * k, p) for a, k, p in zip(amplitude, self.order, phase, strict=True)]
+
+        def sine(q: float) -> float:
+            return sum(a * math.sin(k * q + p) for a, k, p in parts)
+
+        def slope(q: float) -> float:
+            return sum(a * k * math.cos(k * q + p) for a, k, p in parts)
+
+        return sine, slope
+
+
+class Cogging(AngleHarmonics, JointLaw):
+    """τ = Σ a_i sin(k_i q' + φ_i).
+
+    `joint`: its number, counted from 1.
+    `amplitude`: a_i, a number or one an order [Nm or N].
+    `phase`: φ_i, a number or one an order [rad].
+    """
+
+    effect_id: ClassVar[str] = "cogging"
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+        sine, slope = self.sine_and_slope(robot)
+        return (lambda q, v: sine(q)), (lambda q, v: (slope(q), 0.0))
+
+
+class TorqueRipple(AngleHarmonics):
+    """τ = L Σ a_i sin(k_i q' + φ_i).
+
+    `joint`: its number, counted from 1.
+    `amplitude`: a_i, a number or one an order [Nm/Nm].
+    `phase`: φ_i, a number or one an order [rad].
+    """
+
+    effect_id: ClassVar[str] = "torque_ripple"
+
+    def check(self, robot: Robot) -> None:
+        """Refuse a ripple larger than the load."""
+        super().check(robot)
+        repeats = len(self.order) if len(self.amplitude) == 1 else 1
+        total = repeats * sum(abs(amplitude) for amplitude in self.amplitude)
+        if total > LARGEST_GAIN:
+            raise self.refused("amplitude", f"adds up to {total:g} of the load; make it at most {LARGEST_GAIN:g}")
+
+    def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
+        """The gain of the load."""
+        return (_Ripple(self.index, coordinates.motor(self.index), *self.sine_and_slope(robot)),)
+
+
+class _Ripple(Term):
+    """A gain of the load that depends on the motor's position."""
+
+    depends_on_load = True
+
+    def __init__(self, joint: int, place: int, sine: Callable[[float], float], slope: Callable[[float], float]) -> None:
+        self._joint, self._place, self._sine, self._slope = joint, place, sine, slope
+
+    def act(self, moment: Moment, forces: Forces) -> None:
+        """Add s(q) to the gain."""
+        forces.load_gain[self._joint] += self._sine(moment.position[self._place])
+
+    def linearise(self, moment: Moment, slopes: Slopes) -> None:
+        """Add L ds/dq."""
+        place = self._place
+        slopes.by_position[place, place] += moment.load[self._joint] * self._slope(moment.position[place])

@@ -1,0 +1,159 @@
+"""What sensors and drives make of the torque and the time: gains, limits, delays."""
+
+from collections import deque
+from typing import Annotated, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.robot.document_fields import Nonzero, Positive
+from tauscope.robot.robot import Robot
+from tauscope_sim.effects.effect import ScenarioEntry
+from tauscope_sim.effects.fields import JointNumber, one_of
+
+Array = NDArray[np.float64]
+
+
+class Channel(Protocol):
+    """A sensor effect at work: it sees the samples in the order of time, and only those of the past."""
+
+    def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
+        """What is recorded in place of a sample.
+
+        Parameters
+        ----------
+        time : float
+            of the sample [s]
+        position : (n,) float64
+            [rad or m]
+        torque : (n,) float64
+            [Nm or N]
+
+        Returns
+        -------
+        position : (n,) float64
+            [rad or m]
+        torque : (n,) float64
+            [Nm or N]
+        """
+        ...
+
+
+class SensorEffect(ScenarioEntry):
+    """An effect between the arm and the recording."""
+
+    def channel(self, joint_count: int) -> Channel:
+        """The effect at work on an arm."""
+        raise NotImplementedError
+
+
+class TorqueGainError(SensorEffect):
+    """τ_recorded = gain τ.
+
+    `joint`: its number, counted from 1.
+    """
+
+    effect_id: ClassVar[str] = "torque_gain_error"
+    joint: JointNumber
+    gain: Nonzero
+
+    def channel(self, joint_count: int) -> Channel:
+        """The scaling."""
+        gains = np.ones(joint_count)
+        gains[self.joint - 1] = self.gain
+        return _Gain(gains)
+
+
+class _Gain:
+    """A factor a joint."""
+
+    def __init__(self, gains: Array) -> None:
+        self._gains = gains
+
+    def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
+        """Scale the torque."""
+        return position, self._gains * torque
+
+
+class TorqueSaturation(SensorEffect):
+    """τ_recorded = c tanh(τ/c), or τ clipped to ±c.
+
+    `joint`: its number, counted from 1.
+    `level`: c [Nm or N].
+    """
+
+    effect_id: ClassVar[str] = "torque_saturation"
+    joint: JointNumber
+    level: Positive
+    shape: Annotated[str, one_of("compression", "clip")] = "compression"
+
+    def channel(self, joint_count: int) -> Channel:
+        """The saturation."""
+        return _Saturation(self.joint - 1, self.level, self.shape == "clip")
+
+
+class _Saturation:
+    """A bounded torque of one joint."""
+
+    def __init__(self, joint: int, level: float, clip: bool) -> None:
+        self._joint, self._level, self._clip = joint, level, clip
+
+    def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
+        """Bound the torque."""
+        recorded, joint, level = torque.copy(), self._joint, self._level
+        ratio = torque[joint] / level
+        recorded[joint] = level * (np.clip(ratio, -1.0, 1.0) if self._clip else np.tanh(ratio))
+        return position, recorded
+
+
+LONGEST_DELAY = 1.0
+"""What is late by more is no delay of a channel [s]."""
+
+
+class TimeDelay(SensorEffect):
+    """τ_recorded(t) = τ(t - d).
+
+    `delay`: d, by which torque is late relative to position; negative: position is late [s].
+    `joint`: its number, counted from 1; all joints where None.
+    """
+
+    effect_id: ClassVar[str] = "time_delay"
+    delay: Nonzero
+    joint: JointNumber | None = None
+
+    def check(self, robot: Robot) -> None:
+        """Refuse a delay that no channel has."""
+        super().check(robot)
+        if abs(self.delay) > LONGEST_DELAY:
+            raise self.refused("delay", f"is {self.delay:g} s; state at most {LONGEST_DELAY:g} s")
+
+    def channel(self, joint_count: int) -> Channel:
+        """The delay line."""
+        columns = slice(None) if self.joint is None else slice(self.joint - 1, self.joint)
+        return _DelayLine(self.delay, columns)
+
+
+class _DelayLine:
+    """Remembers samples for as long as the delay."""
+
+    def __init__(self, delay: float, columns: slice) -> None:
+        self._delay, self._columns = delay, columns
+        self._samples: deque[tuple[float, Array]] = deque()
+
+    def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
+        """Replace torque, or position, by what it was."""
+        late = torque if self._delay > 0.0 else position
+        recorded = late.copy()
+        recorded[self._columns] = self._past(time, late[self._columns], abs(self._delay))
+        return (position, recorded) if self._delay > 0.0 else (recorded, torque)
+
+    def _past(self, time: float, value: Array, age: float) -> Array:
+        """The channel as it was, and one more sample to remember."""
+        samples, instant = self._samples, time - age
+        samples.append((time, value.copy()))
+        while len(samples) > 1 and samples[1][0] <= instant:
+            samples.popleft()
+        (before, old), (after, new) = samples[0], samples[min(1, len(samples) - 1)]
+        if instant <= before or after == before:
+            return old
+        return old + (instant - before) / (after - before) * (new - old)

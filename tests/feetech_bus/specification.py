@@ -1,0 +1,26 @@
+"""An emulated servo and the joint that it moves."""
+
+import math
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class ServoSpecification:
+    """One servo.
+
+    `torque_per_permille`: joint torque of 1 ‰ of duty [Nm].
+    `registers`: as they differ from a delivered servo's.
+    """
+
+    servo: int
+    baud: int = 1_000_000
+    torque_per_permille: float = 1.91e-3
+    direction: int = 1
+    reduction: float = 1.0
+    zero_count: int = 2048
+    registers: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def counts_per_radian(self) -> float:
+        """Counts for one radian of the joint, signed."""
+        return self.direction * self.reduction * 4096 / (2.0 * math.pi)
