@@ -178,7 +178,7 @@ def diagnose(
         require_black_box(len(judge))
     found = diagnosis.diagnose(arm, train, judge, options, progress)
     if saved is not None:
-        found = diagnosis.against_saved(found, saved)
+        found = diagnosis.compare_with_saved(found, saved)
     elif simulated:
         found = diagnosis.against_simulation(found, simulated, options)
     elif against == "model":

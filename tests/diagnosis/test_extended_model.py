@@ -15,7 +15,7 @@ import pytest
 from diagnosis.diagnosed_arm import EffectTorque, at_joint, recordings
 from effects.piece_of_motion import SIGNALS, context
 from identification.simulated import Array, SimulatedArm, paper_robot
-from tauscope.diagnosis import Diagnosis, against_saved, diagnose, document
+from tauscope.diagnosis import Diagnosis, compare_with_saved, diagnose, document
 from tauscope.diagnosis.extended_model import ModelDocument, _entry, _term, model_document, restore_model
 from tauscope.diagnosis.model.extended import with_terms
 from tauscope.diagnosis.model.residual import raw_squares
@@ -91,14 +91,14 @@ def test_a_saved_model_predicts_the_same_and_finds_nothing_missing_again(tmp_pat
     np.testing.assert_allclose(
         raw_squares(again, observations)[0], raw_squares(found().selection.fit.model, observations)[0], rtol=1e-12
     )
-    compared = document(against_saved(found(), again))
+    compared = document(compare_with_saved(found(), again))
     assert not compared.findings
     assert not compared.parameter_differences
     assert compared.fit.train.rms_before == pytest.approx(compared.fit.train.rms_after)
     (cable,) = (each for each in again.terms if each.effect.id == "cable_force")
     (cogging,) = (each for each in again.terms if each.effect.id == "cogging")
     weaker = with_terms(again, [replace(cable, coefficients=0.5 * cable.coefficients)])
-    told = document(against_saved(found(), weaker))
+    told = document(compare_with_saved(found(), weaker))
     assert [(each.effect, each.joint) for each in told.findings] == [(cogging.effect.id, "joint3")]
     assert len(told.parameter_differences) == 1
 

@@ -107,3 +107,22 @@ def test_a_small_loss_beside_a_large_gain_is_no_harm() -> None:
 def test_only_a_joint_that_is_clearly_worse_is_harmed(relative: list[float]) -> None:
     found = change(relative)
     assert found.harm <= 0.0 or bool((found.standard > LOST).any())
+
+
+@given(st.lists(RELATIVE, min_size=1, max_size=7), st.floats(1e-3, 0.1), st.floats(0.0, 5.0))
+def test_a_change_says_no_more_than_a_torque_of_its_size_would(
+    relative: list[float], error: float, expected: float
+) -> None:
+    standard = np.array(relative) / error
+    found = HeldOutChange(np.array(relative), np.full(len(relative), error), np.full(len(relative), expected))
+    assert found.log_odds() == pytest.approx(float(np.sum(-2.0 * standard * np.minimum(np.abs(standard), expected))))
+
+
+def test_what_two_models_differ_in_is_expected_in_standard_errors() -> None:
+    rng = np.random.default_rng(4)
+    noise, torque = rng.standard_normal(SAMPLES), 0.2 * np.sin(np.arange(SAMPLES) / 7.0)
+    sums = [sum_stretches(np.square(each)[None]) for each in (noise + torque, noise, torque)]
+    change = HeldOutChange.between(*sums)
+    assert change.expected == pytest.approx(np.sqrt(np.sum(torque**2)) / 2.0, rel=0.25)
+    short = np.ones((1, 10))
+    assert HeldOutChange.between(*[sum_stretches(short)] * 3).log_odds() == 0.0

@@ -94,7 +94,7 @@ class FeetechArm:
 
         Raises DriverError: ``not-connected``, or ``fault`` where a fault stays.
         """
-        session = self._reached()
+        session = self._require_session()
         with self._watching_the_port():
             if self._tasks is not None:
                 self.stop(self._policy)
@@ -120,7 +120,7 @@ class FeetechArm:
         `watchdog_s`: longest silence of the host [s]; `cycle_s`: time between two goals, over which the servos go from
         one to the next; they leap where it is None [s].
         """
-        session = self._reached()
+        session = self._require_session()
         self._require_possible(mode, stop_policy, watchdog_s)
         with self._watching_the_port():
             for joint in range(len(session.servos)):
@@ -142,7 +142,7 @@ class FeetechArm:
 
         Raises DriverError: ``not-enabled``, ``refused`` (nothing is sent), or ``lost``.
         """
-        session = self._reached()
+        session = self._require_session()
         if self._tasks is None:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the arm is not enabled; enable it first")
         require_finite(setpoint, len(session.servos))
@@ -219,7 +219,7 @@ class FeetechArm:
         """State of an arm that cannot be seen."""
         return blind_state(self._clock.now_ns(), len(self._configuration.servos), self._lost)
 
-    def _reached(self) -> Session:
+    def _require_session(self) -> Session:
         if self._session is None:
             raise DriverError(DriverErrorKind.NOT_CONNECTED, "the servos are not reached; connect first")
         return self._session

@@ -92,7 +92,7 @@ class FeetechBus:
     def read_once(self, servo: int, block: Block) -> Status | None:
         """A block and some spare bytes, asked for once; None where no answer came that can be believed."""
         length = self._choose_length([servo], block)
-        owed = self._owed([servo], length)
+        owed = self._find_owing([servo], length)
         answer = self._ask(servo, packets.encode_read(servo, block.address, length), length)
         if answer is None:
             self._miss([servo], length)
@@ -127,7 +127,7 @@ class FeetechBus:
         """Read a block and some spare bytes of many servos."""
         self._drain()
         length = self._choose_length(servos, block)
-        owed = self._owed(servos, length)
+        owed = self._find_owing(servos, length)
         request = packets.encode_sync_read(servos, block.address, length)
         # Taken before: who is woken by the bytes may run before this process does again.
         asked_ns = self._clock.now_ns() + round(self._wire_s(len(request)) * 1e9)
@@ -191,7 +191,7 @@ class FeetechBus:
         lengths = range(block.length, block.length + SPARE_BYTES + 1)
         return min(lengths, key=lambda length: max(self._missed_ns.get((servo, length), 0) for servo in servos))
 
-    def _owed(self, servos: Sequence[int], length: int) -> set[int]:
+    def _find_owing(self, servos: Sequence[int], length: int) -> set[int]:
         """Servos whose answer of this length to an earlier question may still be under way."""
         since_ns = time.monotonic_ns() - _LATEST_ANSWER_NS
         return {servo for servo in servos if self._missed_ns.get((servo, length), 0) > since_ns}

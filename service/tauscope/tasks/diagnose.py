@@ -11,8 +11,8 @@ from tauscope.diagnosis import (
     Diagnosis,
     DiagnosisDocument,
     against_model,
-    against_saved,
     against_simulation,
+    compare_with_saved,
     diagnose,
     document,
 )
@@ -163,7 +163,7 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
         found = against_simulation(found, simulated, options)
     elif saved is not None:
         progress("compare with the saved model")
-        found = against_saved(found, saved)
+        found = compare_with_saved(found, saved)
     elif request.options.against == "model":
         progress("compare with the model")
         found = against_model(found)

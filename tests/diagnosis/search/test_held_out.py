@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from diagnosis.nominal_arm import nominal_rows
 from tauscope.diagnosis.evidence.scales import Scales
 from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.model.held_out_change import STRETCHES, stretches
 from tauscope.diagnosis.noise.floor import white_noise
 from tauscope.diagnosis.search.held_out import HeldOut
 
@@ -66,3 +67,23 @@ def test_the_same_model_changes_nothing() -> None:
     found = HeldOut(observations.with_noise(white_noise(observations, model))).change(at(model), at(model))
     assert found.log_odds() == 0.0
     assert found.harm == 0.0
+
+
+def test_a_stretch_is_predicted_from_training_and_all_other_stretches() -> None:
+    """Against a fit of each stretch's rows left out, one after the other."""
+    observations, model = nominal_rows()
+    held_out = HeldOut(observations.with_noise(white_noise(observations, model)))
+    asked = at(model, known=1.0)
+    columns, residuals = held_out._white.all(model), held_out._white.residual(model)
+    weights = [held_out._weights(joint, asked) for joint in range(3)]
+    for left_out in (0, STRETCHES - 1):
+        matrix, right = np.eye(model.size), np.zeros(model.size)
+        for own, residual, weight in zip(columns, residuals, weights, strict=True):
+            counted = weight.copy()
+            counted[stretches(len(residual))[left_out]] = 0.0
+            matrix[np.ix_(own.index, own.index)] += (counted * own.rows) @ own.rows.T
+            right[own.index] += (counted * own.rows) @ residual
+        step = np.linalg.solve(matrix, right)
+        for own, residual, error in zip(columns, residuals, held_out._errors(asked), strict=True):
+            rows = stretches(len(residual))[left_out]
+            np.testing.assert_allclose(error[rows], (residual - step[own.index] @ own.rows)[rows], atol=1e-6)

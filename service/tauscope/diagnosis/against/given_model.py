@@ -244,7 +244,7 @@ def sort_differences(differences: Sequence[ParameterDifference]) -> tuple[Parame
     return tuple(sorted(differences, key=lambda each: -abs(each.in_std)))
 
 
-def against_saved(diagnosis: Diagnosis, saved: ExtendedModel) -> Diagnosis:
+def compare_with_saved(diagnosis: Diagnosis, saved: ExtendedModel) -> Diagnosis:
     """The diagnosis compared with a saved model: what that has already is no finding, at most another value."""
     values = dict(zip(saved.structure.names, map(float, saved.parameters), strict=True))
     joints = [joint.name for joint in diagnosis.robot.joints]

@@ -77,7 +77,7 @@ class HeldOutChange:
         whole = np.where(whole > 0.0, whole, 1.0)
         ratio = np.where(before.any(axis=1), after.sum(axis=1) / whole, 1.0)
         if stretches == 1:
-            return HeldOutChange(np.sqrt(ratio) - 1.0, np.full(len(before), np.inf))
+            return HeldOutChange(np.sqrt(ratio) - 1.0, np.full(len(before), np.inf), np.zeros(len(before)))
         spread = (after - ratio[:, None] * before).std(axis=1, ddof=1)
         slope = 2.0 * np.sqrt(np.maximum(ratio, np.finfo(float).tiny))
         error, expected = np.sqrt(stretches) * spread / whole, None
@@ -111,7 +111,7 @@ class HeldOutChange:
 
         Where a torque f is there, leaving it out costs Σ f² ± 2σ √(κ Σ f²) in white noise σ whose rows count as 1/κ:
         the change expected is z_e = √(Σ f²/κ) / 2σ, and a change z has the likelihood ratio exp(2 z z_e). So the noise
-        need not be known, and a luck that is larger than the torque says no more than that would.
+        need not be known, and luck that exceeds what the torque can do says no more than the torque would.
 
         Parameters
         ----------

@@ -25,8 +25,6 @@ from tauscope.diagnosis.search.hypothesis import Hypothesis
 from tauscope.effects.computation import LastFew
 from tauscope.recording.recording import Array
 
-FIELDS = ("relative", "error", "expected")
-
 MODELS_KEPT = 16
 """Models whose errors are kept: each is compared with several others."""
 
@@ -54,7 +52,9 @@ class HeldOut:
             )
             for joint, pair in enumerate(zip(before, after, strict=True))
         ]
-        return HeldOutChange(*(np.concatenate([getattr(each, name) for each in found]) for name in FIELDS))
+        return HeldOutChange(
+            *(np.concatenate([getattr(each, name) for each in found]) for name in ("relative", "error", "expected"))
+        )
 
     def _weights(self, joint: int, at: Hypothesis) -> Array:
         """How much each row of a joint counts, (R,): as little as in training near rest and beside friction's step."""

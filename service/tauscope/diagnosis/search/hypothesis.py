@@ -20,7 +20,7 @@ from tauscope.recording.recording import Array
 SLOPE_SPREAD = 1.0
 """Standard deviation of the logarithm of a friction slope that the robot file does not state."""
 
-CERTAIN = 1e-6
+HELD_SPREAD = 1e-6
 """…that is held."""
 
 SHAPE_SPREAD = 1.0
@@ -247,7 +247,7 @@ class Laboratory:
 
     def with_slopes_of(self, at: Hypothesis) -> "Laboratory":
         """The same, sure of friction's slopes."""
-        spreads = np.full(len(self.prior.slopes), CERTAIN)
+        spreads = np.full(len(self.prior.slopes), HELD_SPREAD)
         return replace(self, prior=replace(self.prior, slopes=_slopes(at.model), slope_spreads=spreads))
 
     def _nearer(self, at: Hypothesis) -> Hypothesis | None:

@@ -27,13 +27,14 @@ MOST_EXCHANGES = 4
 """Effects whose place another one takes at most: after each, all are weighed anew."""
 
 NAMED = 3.0
-"""Log odds from which training alone names an effect: nineteen in twenty."""
+"""Log odds from which an effect is named, and from which training asks for it: nineteen in twenty."""
 
 SHOWN = float(np.log(3.0))
 """Log odds of held-out motion alone, of the joints that an effect touches, from which it is shown: three to one."""
 
-CERTAIN = 18.0
-"""…from which either alone does: three standard errors. No other motion can refute a window in time."""
+UNASKED = 18.0
+"""…of held-out motion where training does not ask for it, and of a window in time, which no other motion can refute:
+three standard errors."""
 
 CATALOGUED = 3.0
 """Log odds before the data that torque which is left out has a name: one in twenty laws is in no catalogue."""
@@ -78,11 +79,11 @@ class Search:
             proposals = self.proposer.propose(at, _Wanted(_places(at), refused))
             tried, found = self._best(at, proposals)
             steps += tried
-            refused |= {step.proposal.place: _touched(step) for step in tried if not step.is_confirmed}
+            refused |= {step.proposal.place: _find_joints(step) for step in tried if not step.is_confirmed}
             if found is None:
                 break
             at = self._drop_superfluous(found, first)
-            for place in [each for each, own in refused.items() if own & _touched(tried[-1])]:
+            for place in [each for each, own in refused.items() if own & _find_joints(tried[-1])]:
                 del refused[place]
             refused |= dict.fromkeys(_places(found) - _places(at), frozenset())
         return at, steps
@@ -215,8 +216,8 @@ class Search:
                 step, found = self._try(at, form, proposals)
                 if step.is_confirmed:
                     break
-            if step.is_confirmed:  # under the noise that is left with it, its optimum may be elsewhere
-                return [*refusals, step], self.laboratory.settle(found, proposal.term.effect.touched(len(at.scales)))
+            if step.is_confirmed:
+                return [*refusals, step], found
             refusals.append(step)
         return refusals, None
 
@@ -254,8 +255,8 @@ class Search:
         if passes:
             trained = min(trained, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
         log_odds = trained + (0.0 if change is None else change.log_odds())
-        confirmed = log_odds > (CERTAIN if passes else NAMED) and _is_possible(found.model)
-        least = SHOWN if trained > NAMED else CERTAIN
+        confirmed = log_odds > (UNASKED if passes else NAMED) and _is_possible(found.model)
+        least = SHOWN if trained > NAMED else UNASKED
         if self.held_out is not None:
             confirmed &= self.held_out.trained_change(at, found).harm <= 0.0
         confirmed = confirmed and self._agrees(at, found, [len(found.model.terms) - 1], least)
@@ -388,7 +389,7 @@ class _Wanted:
         return bool(joints) if effect.joint is None else bool(joints & {None, effect.joint})
 
 
-def _touched(step: Step) -> frozenset[int]:
+def _find_joints(step: Step) -> frozenset[int]:
     """Joints at which a step's effect acts."""
     return frozenset(step.proposal.term.effect.touched(step.after.structure.robot.joint_count))
 
