@@ -7,11 +7,13 @@
 b = XᵀC⁻¹(y - Xμ): Θ is integrated out (MacKay 1992; Kass & Raftery 1995). Scales of C are those of highest evidence.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
+from scipy.linalg.lapack import dpotri
 from scipy.optimize import minimize
 
 from tauscope.diagnosis.evidence.moments import Index, JointMoments, factor
@@ -65,7 +67,8 @@ class Posterior:
     @property
     def covariance(self) -> Array:
         """A⁻¹, (p, p)."""
-        return self.solve(np.eye(len(self.mean)))
+        lower, _ = dpotri(self.factor, lower=True)
+        return np.asarray((lower + np.tril(lower, -1).T) / np.outer(self.scale, self.scale))
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,28 +144,32 @@ class LinearModel:
         """Log evidence of data and scales."""
         return self.posterior(scales).log_evidence - sum(each.penalty() for each in scales)
 
-    def most_probable(self, scales: Sequence[Scales], joints: Collection[int]) -> tuple[Scales, ...]:
+    def most_probable(
+        self, scales: Sequence[Scales], joints: Collection[int], *, anew: bool = True
+    ) -> tuple[Scales, ...]:
         """The scales of highest evidence at some joints, one joint after the other.
 
         Parameters
         ----------
         joints : collection of int
             joint indices, from 0
+        anew : bool
+            whether to look also from a covariance without discrepancy: one optimum has what another has not
         """
         found = list(scales)
         for joint in joints:
             others = [place for place in range(len(self.joints)) if place != joint]
             rest = self._sum(found, others, self._sum_prior())
-            found[joint] = self._tune(joint, found[joint], rest)
+            found[joint] = self._tune(joint, found[joint], rest, anew=anew)
         return tuple(found)
 
-    def _tune(self, joint: int, start: Scales, rest: "_Sum") -> Scales:
-        """Scales of one joint beside what the others say, from those at hand and from none of the discrepancy."""
+    def _tune(self, joint: int, start: Scales, rest: "_Sum", *, anew: bool) -> Scales:
+        """Scales of one joint beside what the others say."""
         own = self.joints[joint]
 
         def objective(values: Array) -> tuple[float, Array]:
             scales = replace(start, values=values)
-            posterior = self._solve(self._add(joint, scales, rest))
+            posterior = self._solve(self._sum({joint: scales}, [joint], rest))
             direction = np.concatenate([[1.0], -posterior.mean[own.index]])
             covariance = posterior.covariance[np.ix_(own.index, own.index)]
             slopes = 0.5 * own.slopes(scales, direction, covariance) + scales.penalty_slopes()
@@ -170,6 +177,9 @@ class LinearModel:
 
         limits = start.bounds()
         low, high = np.array(limits).T
+        starts = [start.values]
+        if anew:
+            starts.append(start.without_discrepancy(float(np.exp(start.values[0]))).values)
         ends = [
             minimize(
                 objective,
@@ -179,41 +189,39 @@ class LinearModel:
                 bounds=limits,
                 options={"maxiter": STEPS, "ftol": SETTLED / 1e4},
             )
-            for values in _starts(start)
+            for values in starts
         ]
         return replace(start, values=min(ends, key=lambda each: float(each.fun)).x)
+
+    @cached_property
+    def _log_believed(self) -> float:
+        """½ log det P."""
+        scale = np.sqrt(np.diag(self.precision))
+        return float(np.log(np.diag(factor(self.precision, scale)) * scale).sum())
 
     def _sum_prior(self) -> "_Sum":
         """The prior alone."""
         inner = self.precision @ self.mean
         return _Sum(self.precision, inner, float(self.mean @ inner), 0.0)
 
-    def _sum(self, scales: Sequence[Scales], joints: Collection[int], start: "_Sum") -> "_Sum":
-        """A, its right-hand side, energy and log det C over some joints."""
-        total = start
+    def _sum(self, scales: Sequence[Scales] | Mapping[int, Scales], joints: Collection[int], start: "_Sum") -> "_Sum":
+        """A, its right-hand side, energy and log det C with some joints more."""
+        matrix, right, energy, determinant = start.matrix.copy(), start.right.copy(), start.energy, start.determinant
         for joint in joints:
-            total = self._add(joint, scales[joint], total)
-        return total
-
-    def _add(self, joint: int, scales: Scales, total: "_Sum") -> "_Sum":
-        """The same with one joint more."""
-        own = self.joints[joint]
-        found, index = own.weighted(scales), own.index
-        matrix, right = total.matrix.copy(), total.right.copy()
-        matrix[np.ix_(index, index)] += found.products[1:, 1:]
-        right[index] += found.products[1:, 0]
-        return _Sum(
-            matrix, right, total.energy + float(found.products[0, 0]), total.determinant + found.log_determinant
-        )
+            own = self.joints[joint]
+            found = own.weighted(scales[joint])
+            matrix[np.ix_(own.index, own.index)] += found.products[1:, 1:]
+            right[own.index] += found.products[1:, 0]
+            energy, determinant = energy + float(found.products[0, 0]), determinant + found.log_determinant
+        return _Sum(matrix, right, energy, determinant)
 
     def _solve(self, total: "_Sum") -> Posterior:
         scale = np.sqrt(np.diag(total.matrix))
         root = factor(total.matrix, scale)
         right = total.right / scale
         mean = cho_solve((root, True), right)
-        believed = np.sqrt(np.diag(self.precision))
-        gained = np.log(np.diag(factor(self.precision, believed)) * believed) - np.log(np.diag(root) * scale)
-        value = 0.5 * (float(right @ mean) - total.energy - total.determinant) + float(gained.sum())
+        gained = self._log_believed - float(np.log(np.diag(root) * scale).sum())
+        value = 0.5 * (float(right @ mean) - total.energy - total.determinant) + gained
         return Posterior(mean / scale, root, scale, value)
 
 
@@ -225,9 +233,3 @@ class _Sum:
     right: Array
     energy: float
     determinant: float
-
-
-def _starts(scales: Scales) -> Iterator[Array]:
-    """Where the search for scales begins: one optimum has the discrepancy that another has not."""
-    yield scales.values
-    yield scales.without_discrepancy(float(np.exp(scales.values[0]))).values

@@ -1,18 +1,24 @@
 """Products of one joint's rows: all that evidence asks of them, whatever the scales of the covariance."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dpotri
 
 from tauscope.diagnosis.evidence.scales import Scales
+from tauscope.effects.computation import LastFew
 from tauscope.recording.recording import Array
 
 Index = NDArray[np.intp]
 
 ROUNDING = 1e-12
 """Added to the diagonal of a correlation matrix: what rounding takes off it."""
+
+
+KEPT = 2
+"""Scales whose products are kept: many hypotheses ask for the same."""
 
 
 def factor(matrix: Array, scale: Array) -> Array:
@@ -31,10 +37,25 @@ def factor(matrix: Array, scale: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Weighted:
-    """Zᵀ C⁻¹ Z of a joint's target and columns, and log det C."""
+    """A joint's rows under scales.
+
+    products : (1 + k, 1 + k) float64
+        Zᵀ C⁻¹ Z of target and columns
+    log_determinant : float
+        log det C
+    whole : (1 + k + b, 1 + k + b) float64
+        Zᵀ W Z with W = 1 / σ² D
+    half : (b, 1 + k) float64
+        K^(-1/2) A Bᵀ W Z of target and columns, K = 1 + A Bᵀ W B A
+    root : (b, b) float64
+        K^(1/2)
+    """
 
     products: Array
     log_determinant: float
+    whole: Array
+    half: Array
+    root: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +82,7 @@ class JointMoments:
     products: Array
     counts: Array
     groups: Index
+    _known: LastFew[bytes, Weighted] = field(default_factory=lambda: LastFew(KEPT), init=False)
 
     @staticmethod
     def of(
@@ -151,13 +173,17 @@ class JointMoments:
 
         C = σ² D + B A² Bᵀ with D = 1 + r² c² of a row's class, A the amplitudes of the features B.
         """
-        visible = self.visible
-        weights = scales.weights()
+        return self._known.get(scales.values.tobytes(), lambda: self._weigh(scales))
+
+    def _weigh(self, scales: Scales) -> Weighted:
+        visible, weights, amplitudes = self.visible, scales.weights(), scales.amplitudes(self.groups)
         whole = np.tensordot(weights, self.products, axes=1)
-        half, root = self._half(whole, scales)
-        products = whole[:visible, :visible] - half.T @ half
+        inner = amplitudes[:, None] * whole[visible:, visible:] * amplitudes
+        scale = np.sqrt(1.0 + np.diag(inner))
+        root = scale[:, None] * factor(np.eye(len(scale)) + inner, scale)
+        half = solve_triangular(root, amplitudes[:, None] * whole[visible:, :visible], lower=True)
         determinant = 2.0 * float(np.log(np.diag(root)).sum()) - float(self.counts @ np.log(weights))
-        return Weighted(products, determinant)
+        return Weighted(whole[:visible, :visible] - half.T @ half, determinant, whole, half, root)
 
     def discrepancy(self, scales: Scales, direction: Array) -> Array:
         """Most probable torque without a name, (R,).
@@ -167,22 +193,9 @@ class JointMoments:
         direction : (1 + k,) float64
             1, then minus the columns' parameters
         """
-        visible, amplitudes = self.visible, scales.amplitudes(self.groups)
-        whole = np.tensordot(scales.weights(), self.products, axes=1)
-        inner = np.eye(len(amplitudes)) + amplitudes[:, None] * whole[visible:, visible:] * amplitudes
-        seen = amplitudes * (whole[visible:, :visible] @ direction)
-        return (amplitudes * np.linalg.solve(inner, seen)) @ self.rows[visible:]
-
-    def _half(self, whole: Array, scales: Scales) -> tuple[Array, Array]:
-        """K^(-1/2) A Bᵀ W Z of target and columns, and K^(1/2) with K = 1 + A Bᵀ W B A."""
-        visible = self.visible
-        amplitudes = scales.amplitudes(self.groups)
-        inner = amplitudes[:, None] * whole[visible:, visible:] * amplitudes
-        scale = np.sqrt(1.0 + np.diag(inner))
-        root = scale[:, None] * factor(np.eye(len(scale)) + inner, scale)
-        outer = amplitudes[:, None] * whole[visible:, :visible]
-        half = solve_triangular(root, outer, lower=True)
-        return np.asarray(half, dtype=np.float64), np.asarray(root, dtype=np.float64)
+        known = self.weighted(scales)
+        seen = solve_triangular(known.root, known.half @ direction, lower=True, trans="T")
+        return np.asarray((scales.amplitudes(self.groups) * seen) @ self.rows[self.visible :])
 
     def reduced(self, scales: Scales, crossed: Array, mutual: Array) -> tuple[Array, Array]:
         """Products of other columns with target and columns, (g, 1 + k), and of their fellows, (s, c, c), after C⁻¹.
@@ -193,12 +206,12 @@ class JointMoments:
             as of `against`
         """
         visible, weights = self.visible, scales.weights()
-        half, root = self._half(np.tensordot(weights, self.products, axes=1), scales)
+        known = self.weighted(scales)
         own, fellows = np.tensordot(weights, crossed, axes=1), np.tensordot(weights, mutual, axes=1)
         amplitudes = scales.amplitudes(self.groups)
-        seen = solve_triangular(root, amplitudes[:, None] * own[:, visible:].T, lower=True)
+        seen = solve_triangular(known.root, amplitudes[:, None] * own[:, visible:].T, lower=True)
         by_shape = seen.reshape(len(seen), *fellows.shape[:2])
-        return own[:, :visible] - seen.T @ half, fellows - np.einsum("bsc,bsd->scd", by_shape, by_shape)
+        return own[:, :visible] - seen.T @ known.half, fellows - np.einsum("bsc,bsd->scd", by_shape, by_shape)
 
     def slopes(self, scales: Scales, direction: Array, covariance: Array) -> Array:
         """Slopes of uᵀ Z C⁻¹ Zᵀ u + tr(V X C⁻¹ Xᵀ) + log det C in each of the scales, (s,).
@@ -212,20 +225,26 @@ class JointMoments:
         """
         visible, weights, counts = self.visible, scales.weights(), self.counts
         amplitudes = scales.amplitudes(self.groups)
-        whole = np.tensordot(weights, self.products, axes=1)
-        inner = np.eye(len(amplitudes)) + amplitudes[:, None] * whole[visible:, visible:] * amplitudes
-        inverse = np.linalg.inv(inner)
-        kernel = amplitudes[:, None] * inverse * amplitudes
+        known = self.weighted(scales)
+        whole = known.whole
+        inverse, _ = dpotri(known.root, lower=True)
+        kernel = amplitudes[:, None] * (inverse + np.tril(inverse, -1).T) * amplitudes
         taken = kernel @ whole[visible:, :visible]
         spread = np.zeros((visible, visible))
         spread[1:, 1:] = covariance
         spread += np.outer(direction, direction)
-        by_class = np.empty(len(weights))
-        for place, (weight, own) in enumerate(zip(weights, self.products, strict=True)):
-            mixed = own[:visible, visible:] @ taken
-            seen = own[:visible, :visible] - mixed - mixed.T + taken.T @ own[visible:, visible:] @ taken
-            trace = counts[place] - weight * float(np.sum(own[visible:, visible:] * kernel))
-            by_class[place] = trace * weight - weight**2 * float(np.sum(seen * spread))
+        spilled = taken @ spread
+        squares = spilled @ taken.T
+        seen = np.array(
+            [
+                np.vdot(own[:visible, :visible], spread)
+                - 2.0 * np.vdot(own[visible:, :visible], spilled)
+                + np.vdot(own[visible:, visible:], squares)
+                for own in self.products
+            ]
+        )
+        traces = np.array([np.vdot(own[visible:, visible:], kernel) for own in self.products])
+        by_class = weights * (counts - weights * (traces + seen))
         inside = whole[visible:, :visible] - whole[visible:, visible:] @ taken
         energy = np.sum((inside @ spread) * inside, axis=1)
         mutual = whole[visible:, visible:]
