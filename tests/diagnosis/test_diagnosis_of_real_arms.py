@@ -94,13 +94,16 @@ def test_the_tx40_is_predicted_far_better_than_by_the_plain_model() -> None:
 
 
 @pytest.mark.slow
-def test_where_training_leaves_torque_open_nothing_is_named_and_no_verdict_turns() -> None:
-    """The LWR4+ excited poorly: what its last joint lacks is seen, what joints 5 and 6 lack may be parameters."""
+def test_what_training_leaves_open_leaves_the_verdict_open_and_predicts_no_joint_worse() -> None:
+    """The LWR4+ excited poorly: it is told what training lacks, whatever held-out motion shows beside."""
     found = told("kuka-lwr4")
     assert found.verdict == "inconclusive"
     open_joints = {each.joint for each in found.warnings if each.code == "extrapolation" and "uncertain" in each.text}
     assert open_joints == {"lwr_4_joint", "lwr_5_joint"}
-    assert open_joints.isdisjoint(each.joint for each in found.findings)
+    assert found.fit.held_out is not None
+    pairs = zip(found.fit.held_out.rms_before, found.fit.held_out.rms_after, strict=True)
+    assert all(after < before for before, after in pairs)
+    assert all(each.probability > 0.5 for each in found.findings)
     assert {"lwr_1_joint", "lwr_3_joint"} <= {each.joint for each in found.warnings if each.code == "extrapolation"}
     assert "poor-excitation" in {each.code for each in found.warnings}
     assert found.next_experiment is not None

@@ -80,7 +80,7 @@ class Deciding(Search):
     odds: dict[Place, float] = field(default_factory=dict)
     refuted: frozenset[Place] = frozenset()
 
-    def _weigh(self, at: Any, places: tuple[int, ...]) -> Weighed:
+    def _weigh(self, at: Any, places: tuple[int, ...], known: Any = None) -> Weighed:
         own = at.model.terms[places[0]]
         others = [each for each in (JointSpring(0), CableForce(0)) if each.id != own.effect.id]
         rivals = tuple(rival(odds, each) for each in others if (odds := self.odds[each.id, 0]) > -1.0)
@@ -105,13 +105,15 @@ def holding(*effects: Effect) -> Any:
     return SimpleNamespace(model=SimpleNamespace(terms=[term(each) for each in effects]), scales=(NOTHING,))
 
 
+def deciding(odds: dict[Place, float], *nominal: Effect, refuted: frozenset[Place] = frozenset()) -> Deciding:
+    return Deciding(holding(*nominal), NOTHING, NOTHING, None, odds=odds, refuted=refuted)
+
+
 @pytest.mark.parametrize("refuted", [False, True])
 def test_a_more_probable_rival_takes_the_place_where_held_out_motion_lets_it(refuted: bool) -> None:
     odds: dict[Place, float] = {("joint_spring", 0): 20.0, ("cable_force", 0): 60.0}
-    asked = Deciding(
-        NOTHING, NOTHING, None, odds=odds, refuted=frozenset({("cable_force", 0)}) if refuted else frozenset[Place]()
-    )
-    at, (found,), exchanges = asked._exchange(holding(JointSpring(0)), 0, 1)
+    asked = deciding(odds, refuted=frozenset({("cable_force", 0)}) if refuted else frozenset[Place]())
+    at, (found,), exchanges = asked._exchange(holding(JointSpring(0)), 1)
     assert at.model.terms[0].effect.id == ("joint_spring" if refuted else "cable_force")
     assert exchanges == (not refuted)
     assert bool(found.rivals) is not refuted, "one that is refuted is no alternative"
@@ -122,7 +124,7 @@ def test_a_more_probable_rival_takes_the_place_where_held_out_motion_lets_it(ref
 
 def test_the_more_probable_of_two_stays() -> None:
     odds: dict[Place, float] = {("joint_spring", 0): 60.0, ("cable_force", 0): 20.0}
-    at, (found,), _ = Deciding(NOTHING, NOTHING, None, odds=odds)._exchange(holding(JointSpring(0)), 0, 1)
+    at, (found,), _ = deciding(odds)._exchange(holding(JointSpring(0)), 1)
     assert at.model.terms[0].effect.id == "joint_spring"
     assert found.rivals[0].log_odds == 20.0
 
@@ -130,15 +132,23 @@ def test_the_more_probable_of_two_stays() -> None:
 @pytest.mark.parametrize(("log_odds", "named"), [(2.0, False), (4.0, True)])
 def test_what_every_geared_joint_has_must_stand_out_to_be_a_finding(log_odds: float, named: bool) -> None:
     odds: dict[Place, float] = {("rotor_inertia", 0): log_odds, ("joint_spring", 0): -9.0, ("cable_force", 0): -9.0}
-    _, found, _ = Deciding(NOTHING, NOTHING, None, odds=odds)._exchange(holding(RotorInertia(0)), 0, 1)
+    _, found, _ = deciding(odds)._exchange(holding(RotorInertia(0)), 1)
     assert bool(found) is named
     odds = {("joint_spring", 0): log_odds, ("cable_force", 0): -9.0}
-    _, found, _ = Deciding(NOTHING, NOTHING, None, odds=odds)._exchange(holding(JointSpring(0)), 0, 1)
+    _, found, _ = deciding(odds)._exchange(holding(JointSpring(0)), 1)
     assert found
 
 
 def test_what_is_improbable_is_dropped_beside_a_nominal_effect_that_is_less_probable_still() -> None:
     odds: dict[Place, float] = {("rotor_inertia", 0): -5.0, ("joint_spring", 0): -1.0, ("cable_force", 0): -9.0}
-    at, found, _ = Deciding(NOTHING, NOTHING, None, odds=odds)._exchange(holding(RotorInertia(0), JointSpring(0)), 1, 1)
+    at, found, _ = deciding(odds, RotorInertia(0))._exchange(holding(RotorInertia(0), JointSpring(0)), 1)
     assert [each.effect.id for each in at.model.terms] == ["rotor_inertia"]
     assert not found
+
+
+def test_what_takes_the_place_of_a_nominal_effect_is_added_and_what_stands_beside_it_is_not_nominal() -> None:
+    odds: dict[Place, float] = {("rotor_inertia", 0): 2.0, ("joint_spring", 0): 60.0, ("cable_force", 0): -9.0}
+    asked = deciding(odds, RotorInertia(0))
+    at, _, exchanges = asked._exchange(holding(RotorInertia(0)), 1)
+    assert exchanges == 1
+    assert asked._added(at) == [0]

@@ -85,12 +85,12 @@ def search(
     confirming = None if unseen is None else HeldOut(unseen.with_noise(white_noise(unseen, model)))
     farther = tuple(farther_effects(setting))
     near, far = Proposer(laboratory, effects), Proposer(laboratory, [*effects, *farther])
-    search_near = Search(laboratory, near, confirming, farther)
-    found = search_near.run(nominal)
+    search_near = Search(nominal, laboratory, near, confirming, farther)
+    found = search_near.run()
     named = any(not term.effect.is_expected for term in found.hypothesis.model.terms)
     if not named and is_left(found.hypothesis, white, pure_error=repeated is not None):
         progress("look farther")
-        found = replace(search_near, proposer=far, farther=()).run(nominal, found)
+        found = replace(search_near, proposer=far, farther=()).run(found)
     return Searched(found, laboratory, effects, setting, white, unseen, deflections, cutoff, repeated is not None)
 
 

@@ -208,16 +208,16 @@ class Laboratory:
         """The same with all effects believed, so that the discrepancy takes no part of them, and independent rows."""
         return self.at(at.model, at.sizes, at.scales, [1.0] * len(at.scales), owned=True)
 
-    def tune(self, at: Hypothesis, joints: Collection[int]) -> Hypothesis:
+    def tune(self, at: Hypothesis, joints: Collection[int], *, anew: bool = True) -> Hypothesis:
         """The same model under scales of highest evidence."""
-        return replace(at, scales=at.linear.most_probable(at.scales, joints))
+        return replace(at, scales=at.linear.most_probable(at.scales, joints, anew=anew))
 
     def weigh(self, at: Hypothesis, joints: Collection[int]) -> Hypothesis:
         """The same model under scales of highest evidence, rows counting as much as its best residual lets them."""
-        for _ in range(WEIGHINGS):
+        for weighing in range(WEIGHINGS):
             dependence = self._dependence(at, joints)
             moved = max(abs(np.log(dependence[joint] / at.dependence[joint])) for joint in joints)
-            at = self.tune(self.under(at, dependence, joints), joints)
+            at = self.tune(self.under(at, dependence, joints), joints, anew=weighing == 0)
             if moved < ALIKE:
                 break
         return at
@@ -254,7 +254,8 @@ class Laboratory:
         """The model after a step under which data and parameters are more probable; None where there is none."""
         step, links = self._step(at)
         for part in HALVINGS:
-            moved = replace(stepped(at.model, part * step), links=at.model.links + part * links)
+            own = np.clip(part * step, *_bounds(at.model))
+            moved = replace(stepped(at.model, own), links=at.model.links + part * links)
             found = self.at(moved, at.sizes, at.scales, at.dependence, owned=True)
             if found.misfit < at.misfit:
                 return found

@@ -44,70 +44,78 @@ CATALOGUED = 3.0
 class Search:
     """A search among effects on the same rows.
 
+    nominal : Hypothesis
+        model without what is looked for
     farther : sequence of Effect
         forms that say more than what they refine
     """
 
+    nominal: Hypothesis
     laboratory: Laboratory
     proposer: Proposer
     held_out: HeldOut | None
     farther: Sequence[Effect] = ()
 
-    def run(self, nominal: Hypothesis, before: Found | None = None) -> Found:
+    def run(self, before: Found | None = None) -> Found:
         """Add what makes the data most probable and held-out motion no worse, to what was found before."""
-        at, steps, refused = nominal, list[Step](), dict[Place, frozenset[int]]()
+        at, steps, refused, exchanges = self.nominal, list[Step](), dict[Place, frozenset[int]](), 0
         if before is not None:
             at, steps = before.hypothesis, list(before.steps)
-        first, exchanges = len(nominal.model.terms), 0
         while True:
-            at, tried = self._grow(at, first, refused)
+            at, tried = self._grow(at, refused)
             steps += tried
-            at = self._refine(self._drop_harmful(at, nominal), first)
-            at, weighed, exchanged = self._exchange(at, first, MOST_EXCHANGES - exchanges)
+            at = self._refine(self._drop_harmful(at))
+            at, weighed, exchanged = self._exchange(at, MOST_EXCHANGES - exchanges)
             if not exchanged:
-                return Found(nominal, at, tuple(steps), weighed)
+                return Found(self.nominal, at, tuple(steps), weighed)
             exchanges += exchanged
-            at = self._drop_superfluous(at, first)
+            at = self._drop_superfluous(at)
 
-    def _grow(self, at: Hypothesis, first: int, refused: dict[Place, frozenset[int]]) -> tuple[Hypothesis, list[Step]]:
+    def _added(self, at: Hypothesis) -> list[int]:
+        """Places of the terms that the nominal model has not."""
+        known = _places(self.nominal)
+        return [place for place, term in enumerate(at.model.terms) if term.place not in known]
+
+    def _grow(self, at: Hypothesis, refused: dict[Place, frozenset[int]]) -> tuple[Hypothesis, list[Step]]:
         """One more effect, and without those that it makes superfluous, until nothing helps.
 
         What was refused is tried again after something else was found at its joints.
         """
         steps: list[Step] = []
-        while len(at.model.terms) - first < MOST_EFFECTS:
+        while len(self._added(at)) < MOST_EFFECTS:
             proposals = self.proposer.propose(at, _Wanted(_places(at), refused))
             tried, found = self._best(at, proposals)
             steps += tried
             refused |= {step.proposal.place: _find_joints(step) for step in tried if not step.is_confirmed}
             if found is None:
                 break
-            at = self._drop_superfluous(found, first)
+            at = self._drop_superfluous(found)
             for place in [each for each, own in refused.items() if own & _find_joints(tried[-1])]:
                 del refused[place]
             refused |= dict.fromkeys(_places(found) - _places(at), frozenset())
         return at, steps
 
-    def _refine(self, at: Hypothesis, first: int) -> Hypothesis:
+    def _refine(self, at: Hypothesis) -> Hypothesis:
         """Farther forms in the place of effects that they refine, where they are more probable."""
         for effect in self.farther:
-            places = [term.place for term in at.model.terms]
-            refined = [place for place in places[first:] if place[0] in effect.refines and place[1] == effect.joint]
-            if refined:
-                at = self._refine_by(effect, places.index(refined[0]), at, first)
+            terms = at.model.terms
+            own = (place for place in self._added(at) if terms[place].effect.joint == effect.joint)
+            refined = next((place for place in own if terms[place].effect.id in effect.refines), None)
+            if refined is not None:
+                at = self._refine_by(effect, refined, at)
         return at
 
-    def _refine_by(self, effect: Effect, place: int, at: Hypothesis, first: int) -> Hypothesis:
+    def _refine_by(self, effect: Effect, place: int, at: Hypothesis) -> Hypothesis:
         """One of them in the place of a term, and of all others that it makes superfluous."""
         touched, without = effect.touched(len(at.scales)), self._settle_without(at, place)
         for proposal in Proposer(self.laboratory, [effect]).propose(without, lambda _: True):
             found = self._settle(self._add(without, proposal), touched)
-            found = self._drop_superfluous(found, first)
+            found = self._drop_superfluous(found)
             if self._compare(at, found, touched) > 0.0 and _is_possible(found.model):
                 return found
         return at
 
-    def _exchange(self, at: Hypothesis, first: int, most: int) -> tuple[Hypothesis, tuple[Weighed, ...], int]:
+    def _exchange(self, at: Hypothesis, most: int) -> tuple[Hypothesis, tuple[Weighed, ...], int]:
         """Each effect weighed beside all others, a more probable one in its place, and none that does not hold."""
         weighed = {own: self._weigh(at, places) for own, places in _groups(at.model).items()}
         exchanges, stale = 0, set[Place]()
@@ -116,7 +124,7 @@ class Search:
             if weighed[own].lead <= 0.0 or len(weighed[own].places) > 1 or exchanges >= most:
                 own = next(iter(stale), None)
             if own is None:
-                added = {each: found for each, found in weighed.items() if found.places[0] >= first}
+                added = {each: found for each, found in weighed.items() if each not in _places(self.nominal)}
                 doubtful: list[Place] = [each for each, found in added.items() if not self._holds(at, found)]
                 if not doubtful:
                     break
@@ -126,7 +134,8 @@ class Search:
                 continue
             if own in stale:
                 stale.remove(own)
-                weighed[own] = self._weigh(at, _groups(at.model)[own])
+                known = {each.place for each in weighed[own].proposals}
+                weighed[own] = self._weigh(at, _groups(at.model)[own], known)
                 continue
             other, rival = self._try_rival(at, weighed[own]), weighed[own].rivals[0].term.place
             if other is None:
@@ -162,8 +171,8 @@ class Search:
         gained = self.laboratory.under(found, at.dependence, touched).log_evidence - at.log_evidence
         return gained + (0.0 if self.held_out is None else self.held_out.change(at, found).log_odds())
 
-    def _weigh(self, at: Hypothesis, places: tuple[int, ...]) -> Weighed:
-        """An effect's odds against none and against others in its place."""
+    def _weigh(self, at: Hypothesis, places: tuple[int, ...], known: Collection[Place] | None = None) -> Weighed:
+        """An effect's odds against none and against others in its place: all, or those that are known to compete."""
         without, touched = at, at.model.terms[places[0]].effect.touched(len(at.scales))
         for place in reversed(places):
             without = self.laboratory.without_term(without, place)
@@ -179,7 +188,8 @@ class Search:
             place = each.id, each.joint
             is_new = (each.repeats and place != own) or place not in others  # itself in another shape, too
             is_like = lasts != isinstance(each, TimeLocalEffect)
-            return is_new and is_like and not shared.isdisjoint(each.touched(len(at.scales)))
+            is_known = known is None or place in known
+            return is_known and is_new and is_like and not shared.isdisjoint(each.touched(len(at.scales)))
 
         proposals = self.proposer.propose(without, competes, WEIGHED)
         rivals = []
@@ -191,14 +201,13 @@ class Search:
         rivals.sort(key=lambda each: -each.log_odds)
         return Weighed(places, without, log_odds, tuple(rivals), tuple(proposals))
 
-    def _drop_harmful(self, at: Hypothesis, nominal: Hypothesis) -> Hypothesis:
+    def _drop_harmful(self, at: Hypothesis) -> Hypothesis:
         """The same without the effects at whose cost joints are predicted worse than by the nominal model."""
-        first = len(nominal.model.terms)
-        while self.held_out is not None and len(at.model.terms) > first:
-            if self.held_out.trained_change(nominal, at).harm <= 0.0:
+        while self.held_out is not None and (added := self._added(at)):
+            if self.held_out.trained_change(self.nominal, at).harm <= 0.0:
                 break
-            others = [self._settle_without(at, place) for place in range(first, len(at.model.terms))]
-            harms = [self.held_out.trained_change(nominal, each).harm for each in others]
+            others = [self._settle_without(at, place) for place in added]
+            harms = [self.held_out.trained_change(self.nominal, each).harm for each in others]
             at = others[int(np.argmin(harms))]
         return at
 
@@ -328,16 +337,10 @@ class Search:
         joints = self.laboratory.rows.observations.robot.joint_count
         return float(np.clip(unnamed, 0.0, CATALOGUED + np.log(joints)) - np.log(sites))
 
-    def _drop_superfluous(self, at: Hypothesis, first: int) -> Hypothesis:
-        """The same without effects that the later ones made superfluous.
-
-        Parameters
-        ----------
-        first : int
-            number of terms that the nominal model has
-        """
+    def _drop_superfluous(self, at: Hypothesis) -> Hypothesis:
+        """The same without effects that the later ones made superfluous."""
         while True:
-            places = range(first, len(at.model.terms) - 1)
+            places = [place for place in self._added(at) if place < len(at.model.terms) - 1]
             gains = side_by_side(lambda place, at=at: self._weigh_absence(at, place), places)
             pairs = sorted(zip(gains, places, strict=True), reverse=True)
             others = (self._leave_out(at, place, gain) for gain, place in pairs if gain > CATALOGUED)
