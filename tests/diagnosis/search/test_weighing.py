@@ -152,3 +152,22 @@ def test_what_takes_the_place_of_a_nominal_effect_is_added_and_what_stands_besid
     at, _, exchanges = asked._exchange(holding(RotorInertia(0)), 1)
     assert exchanges == 1
     assert asked._added(at) == [0]
+
+
+class Wavering(Deciding):
+    """…in which each effect in another shape seems to lead, and gains a little in its own place."""
+
+    def _weigh(self, at: Any, places: tuple[int, ...], known: Any = None) -> Weighed:
+        own = rival(25.0, at.model.terms[places[0]].effect)
+        proposals: Any = (SimpleNamespace(term=own.term),)
+        return Weighed(places, holding(), 20.0, (own,), proposals)
+
+    def _compare(self, at: Any, found: Any, touched: Any) -> float:
+        return 1.0
+
+
+def test_an_effect_takes_its_own_place_in_another_shape_only_where_that_is_clearly_more_probable() -> None:
+    asked = Wavering(holding(), NOTHING, NOTHING, None, odds={("joint_spring", 0): 20.0})
+    _, found, exchanges = asked._exchange(holding(JointSpring(0)), 4)
+    assert exchanges == 0
+    assert found[0].log_odds == 20.0

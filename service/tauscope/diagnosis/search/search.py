@@ -163,7 +163,7 @@ class Search:
         proposal = next(each for each in weighed.proposals if each.term.effect is rival)
         step, found = self._try(weighed.without, proposal, weighed.proposals)
         gained = self._compare(at, found, {*rival.touched(len(at.scales)), *own.touched(len(at.scales))})
-        gained += self._prior_odds(rival, 0.0) - self._prior_odds(own, 0.0)
+        gained += self._prior_odds(rival, 0.0) - self._prior_odds(own, 0.0) - (CATALOGUED if rival is own else 0.0)
         return found if step.is_confirmed and gained > 0.0 else None
 
     def _compare(self, at: Hypothesis, found: Hypothesis, touched: Collection[int]) -> float:

@@ -1,0 +1,96 @@
+"""What training and held-out motion must say before an effect is named, each gate by a trial on either side of it."""
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tauscope.diagnosis.model.held_out_change import HeldOutChange
+from tauscope.diagnosis.model.term import Term
+from tauscope.diagnosis.search.search import Search
+from tauscope.effects.joint_spring import JointSpring
+
+NOTHING: Any = None
+JOINTS = 2
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What is said of a spring at the first of two joints, in log odds."""
+
+    training: float
+    held_out: float
+    beside_friction: float = 0.0
+    predicted: float = 10.0
+    harm: float = 0.0
+
+
+def change(log_odds: float, harm: float = 0.0) -> HeldOutChange:
+    """Of the first joint by log odds, of the second a loss in its rms."""
+    size = np.sqrt(abs(log_odds) / 2.0)
+    return HeldOutChange(
+        np.array([-np.sign(log_odds) * 0.01 * size, harm]),
+        np.array([0.01, 0.1 * harm]),
+        np.array([size, 0.0]),
+    )
+
+
+class Asking(Search):
+    """A search whose odds are given."""
+
+    def _add(self, at: Any, proposal: Any) -> Any:
+        return holding("found")
+
+    def _settle(self, at: Any, touched: Any) -> Any:
+        return at
+
+    def _hold_friction(self, at: Any, places: Any) -> Any:
+        return holding("friction")
+
+    def _log_odds(self, proposal: Any) -> float:
+        return float(proposal.log_factor)
+
+
+def holding(name: str) -> Any:
+    spring = JointSpring(0)
+    term = Term(spring, np.zeros(len(spring.shapes)), np.ones(len(spring.coefficients)))
+    structure = SimpleNamespace(terms=[SimpleNamespace(k_v=100.0)] * JOINTS)
+    model = SimpleNamespace(terms=[term], structure=structure)
+    return SimpleNamespace(
+        name=name, model=model, scales=(NOTHING,) * JOINTS, posterior=SimpleNamespace(covariance=np.eye(1))
+    )
+
+
+def is_named(trial: Trial) -> bool:
+    said = {"at": change(trial.held_out), "friction": change(trial.beside_friction)}
+    held_out: Any = SimpleNamespace(
+        change=lambda before, after: said[before.name],
+        trained_change=lambda before, after: change(trial.predicted, trial.harm),
+    )
+    proposal: Any = SimpleNamespace(term=holding("found").model.terms[0], log_factor=trial.training)
+    step, _ = Asking(NOTHING, NOTHING, NOTHING, held_out)._try(holding("at"), proposal, [proposal])
+    return step.is_confirmed
+
+
+ASKED = Trial(training=4.0, held_out=1.5)
+UNASKED = Trial(training=2.0, held_out=20.0)
+
+
+@pytest.mark.parametrize(
+    ("trial", "named"),
+    [
+        (ASKED, True),
+        (replace(ASKED, training=2.0), False),  # nineteen in twenty after training
+        (replace(ASKED, held_out=0.5), False),  # three to one of held-out motion
+        (replace(ASKED, held_out=0.5, beside_friction=1.5), True),  # where friction's slopes take its place
+        (replace(ASKED, predicted=-1.0), False),  # by training alone no worse
+        (replace(ASKED, harm=0.5), False),  # at no other joint's cost
+        (UNASKED, True),
+        (replace(UNASKED, held_out=16.0), False),  # three standard errors
+        (replace(UNASKED, training=-20.0), False),  # what training is sure is not there
+    ],
+)
+def test_an_effect_is_named_where_training_asks_and_held_out_motion_shows_it(trial: Trial, named: bool) -> None:
+    assert is_named(trial) is named
