@@ -12,7 +12,7 @@ from hardware_emulated.robot_servos import servos_of
 from tauscope.recording import read_recording
 from tauscope.recording.recording import EffortKind
 from tauscope.robot import read_robot
-from tauscope_drivers.dynamixel.packets import FrameParser
+from tauscope_drivers.dynamixel.packets import DynamixelParser
 from tauscope_drivers.inspection import PHASES
 from tauscope_sim.dynamixel_bus import DynamixelOrder
 from tauscope_sim.emulation import FaultKind, InjectedFault
@@ -110,7 +110,7 @@ def test_dry_run_shows_frames_and_needs_no_port(tauscope: Tauscope, folder: Path
     assert phases == sorted(phases, key=PHASES.index)
     assert set(phases) == set(PHASES)
     for _, wire, _ in rows:
-        assert list(FrameParser().feed(bytes.fromhex(wire))) == [bytes.fromhex(wire)]
+        assert list(DynamixelParser().feed(bytes.fromhex(wire))) == [bytes.fromhex(wire)]
     order = [meaning for phase, _, meaning in rows if phase == "enable" and "servo 1," in meaning]
     assert "Bus Watchdog := 5" in order[-2]
     assert "Torque Enable := 1" in order[-1]

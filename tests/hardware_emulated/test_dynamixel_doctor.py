@@ -10,7 +10,7 @@ from tauscope_drivers import ControlMode, DriverError
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.doctor import examine, scan_bus
 from tauscope_drivers.dynamixel.dry_run import plan_frames
-from tauscope_drivers.dynamixel.packets import FrameParser
+from tauscope_drivers.dynamixel.packets import DynamixelParser
 from tauscope_drivers.inspection import PHASES, FoundDevice, FrameRequest, Severity
 from tauscope_sim.dynamixel_bus import ServoSpecification
 from tauscope_sim.emulation import FaultKind, InjectedFault
@@ -102,7 +102,7 @@ def test_dry_run_plans_what_a_run_sends(tmp_path: Path, mode: ControlMode) -> No
     assert [frame.phase for frame in planned] == sorted((frame.phase for frame in planned), key=PHASES.index)
     for frame in planned:
         raw = bytes.fromhex(frame.wire)
-        assert list(FrameParser().feed(raw)) == [raw]
+        assert list(DynamixelParser().feed(raw)) == [raw]
     enabling = [frame.meaning for frame in planned if frame.phase == "enable" and "(servo 1," in frame.meaning]
     assert "Torque Enable := 1" in enabling[-1]
     assert any("Bus Watchdog := 5" in meaning for meaning in enabling)

@@ -15,7 +15,7 @@ from hardware_emulated.campaign_arms import three_joints
 from hardware_emulated.commands import Tauscope, write_short_motion
 from tauscope.recording import read_recording
 from tauscope.recording.recording import EffortKind
-from tauscope_drivers.feetech.packets import FrameParser
+from tauscope_drivers.feetech.packets import FeetechParser
 from tauscope_drivers.inspection import PHASES
 
 pytestmark = pytest.mark.realtime
@@ -107,7 +107,7 @@ def test_dry_run_shows_frames_and_needs_no_port(tauscope: Tauscope, folder: Path
     assert phases == sorted(phases, key=PHASES.index)
     assert set(phases) == set(PHASES)
     for _, wire, _ in rows:
-        assert list(FrameParser().feed(bytes.fromhex(wire))) == [bytes.fromhex(wire)]
+        assert list(FeetechParser().feed(bytes.fromhex(wire))) == [bytes.fromhex(wire)]
     first, last = [meaning for phase, _, meaning in rows if phase == "enable" and "servo 1)" in meaning]
     assert "Torque Limit :=" in first
     assert "Torque Enable := 1" in last
@@ -154,6 +154,6 @@ def test_run_beyond_the_bus_is_refused(tauscope: Tauscope, folder: Path, emulato
 
 def test_adapters_of_several_buses_are_listed_once(tauscope: Tauscope, monkeypatch: pytest.MonkeyPatch) -> None:
     adapter = SimpleNamespace(device="/dev/ttyNONE", description="USB serial")
-    monkeypatch.setattr("tauscope_drivers.serial_adapters.comports", lambda: [adapter])
+    monkeypatch.setattr("tauscope_drivers.serial_port.comports", lambda: [adapter])
     _, out, _ = tauscope("doctor")
     assert sum("/dev/ttyNONE" in line for line in out.splitlines()) == 1

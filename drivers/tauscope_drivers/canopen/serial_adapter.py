@@ -14,7 +14,7 @@ from can import CanInitializationError, CanOperationError
 from can.exceptions import error_check
 from can.interfaces.slcan import slcanBus
 
-from tauscope_drivers.port_holder import find_holder
+from tauscope_drivers.serial_port import find_holder
 
 RESTART_S = 2.0
 """Time that an adapter takes to restart after its port was opened, as python-can has it."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope_drivers.dynamixel.bus import FACTORY_RETURN_DELAY_S, PATIENCE_S, ServoBus
+from tauscope_drivers.dynamixel.bus import ServoBus
 from tauscope_drivers.dynamixel.configuration import ServoConfiguration
 from tauscope_drivers.dynamixel.group import ServoGroup
 from tauscope_drivers.dynamixel.health import Health
@@ -15,13 +15,10 @@ from tauscope_drivers.dynamixel.original_settings import CHANGED, OriginalSettin
 from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, SETTINGS, RegisterWrite, commissioning_writes
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.errors import DriverError, DriverErrorKind
-
-SHORTEST_RETURN_DELAY_S = 2e-6
-"""Of a servo whose Return Delay Time is 0 [s]."""
+from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S
+from tauscope_drivers.serial_servos.bus import FACTORY_RETURN_DELAY_S, PATIENCE_S, learn_latency
 
 ELECTRONIC_GEAR = ("Electronic GearRatio Numerator", "Electronic GearRatio Denominator")
-
-_RETURN_DELAY_UNIT_S = 2e-6
 
 
 @dataclass
@@ -110,11 +107,10 @@ def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) ->
     for joint, servo in enumerate(servos):
         holds = bool(session.health.has_torque[joint])
         session.carry_out(joint, commissioning_writes(servo, settings[joint], holds=holds))
-    slowest = max(values["Return Delay Time"] for values in settings) * _RETURN_DELAY_UNIT_S
+    slowest = max(values["Return Delay Time"] for values in settings) * RETURN_DELAY_UNIT_S
     bus.return_delay_s = max(SHORTEST_RETURN_DELAY_S, slowest)
     session.group.probe_fast()
-    # an adapter that is slow by a constant is no slower than that in any answer
-    bus.port.latency_s += session.group.beyond_ns() * 1e-9
+    learn_latency(bus.port, session.group.probe())
     return session
 
 

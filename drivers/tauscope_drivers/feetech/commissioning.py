@@ -11,7 +11,6 @@ import numpy as np
 
 from tauscope_drivers.backend import DriveLimits
 from tauscope_drivers.errors import DriverError
-from tauscope_drivers.feetech.faults import alarm_faults
 from tauscope_drivers.feetech.registers import (
     COUNTS_PER_TURN,
     FULL_ANGLE,
@@ -19,13 +18,13 @@ from tauscope_drivers.feetech.registers import (
     POSITION_MODE,
     PROTECTIONS,
     PROTECTIVE,
-    RETURN_DELAY_UNIT_S,
     VOLT,
 )
 from tauscope_drivers.feetech.servo import JointServo
-from tauscope_drivers.feetech.session import Session
+from tauscope_drivers.feetech.session import Session, alarm_faults
 from tauscope_drivers.inspection import Finding, Severity, failure
 from tauscope_drivers.limits import require_sensible
+from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S
 
 _TOOL = "with Feetech's FD: Tauscope writes nothing to EEPROM"
 

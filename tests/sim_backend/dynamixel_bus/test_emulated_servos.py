@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tauscope_drivers.dynamixel import packets
-from tauscope_drivers.dynamixel.packets import FrameParser, Status, decode_fast, decode_status
+from tauscope_drivers.dynamixel.packets import DynamixelParser, Status, decode_fast, decode_status
 from tauscope_sim.dynamixel_bus import DynamixelEmulator, ServoSpecification
 from tauscope_sim.dynamixel_bus.arm import Pendulums
 from tauscope_sim.dynamixel_bus.bus import EmulatedBus
@@ -37,7 +37,7 @@ class Master:
 
     def ask(self, request: bytes, seconds: float = 0.004) -> list[Status]:
         self.emulator.receive(request, self.time)
-        statuses = [decode_status(frame) for frame in FrameParser().feed(self.wait(seconds))]
+        statuses = [decode_status(frame) for frame in DynamixelParser().feed(self.wait(seconds))]
         return [status for status in statuses if status is not None]
 
     def read(self, servo: int, address: int, size: int = 1) -> int:

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from emulated_data_sheet import GAIN, LABEL, OFFSET, Sections, sections, text_of, write_file
 from tauscope_drivers import ControlMode
 from tauscope_drivers.canopen import objects
-from tauscope_drivers.canopen.block_check import check_blocks
 from tauscope_drivers.canopen.configuration import (
     BusConfiguration,
     DriveJoint,
     NodeConfiguration,
+    check_blocks,
     read_configuration,
     require_targets,
 )
