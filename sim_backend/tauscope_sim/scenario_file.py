@@ -29,7 +29,7 @@ from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot import Robot
 from tauscope.robot.yaml_text import Place, read_yaml
 from tauscope_sim.effects import EFFECTS, Effect, ScenarioEntry, SensorEffect
-from tauscope_sim.effects.fields import NotNegative, NotNegativeNumbers, Seed, single_zero
+from tauscope_sim.effects.effect import NotNegative, NotNegativeNumbers, Seed, single_zero
 from tauscope_sim.scenario import Scenario
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from feetech_bus.servo import FeetechServo
 from feetech_bus.specification import ServoSpecification
 from tauscope_sim.dynamixel_bus.arm import MovedArm, Pendulums
 from tauscope_sim.dynamixel_bus.emulator import DynamixelEmulator
-from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal
+from tauscope_sim.emulation.server import PseudoTerminal
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from feetech_bus.memory import Memory
 from feetech_bus.specification import ServoSpecification
-from tauscope_sim.dynamixel_bus.servo_loop import RELEASED, Demand
+from tauscope_sim.dynamixel_bus.servo import RELEASED, Demand
 
 VOLTAGE, ENCODER, HEAT, CURRENT, OVERLOAD = 0x01, 0x02, 0x04, 0x08, 0x20
 

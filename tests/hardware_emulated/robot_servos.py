@@ -1,7 +1,7 @@
 """The servos that a robot file speaks of."""
 
 from tauscope.robot import Robot
-from tauscope_sim.dynamixel_bus.specification import ServoSpecification
+from tauscope_sim.dynamixel_bus.control_memory import ServoSpecification
 
 _MODEL_NUMBERS = {"XM430-W350": 1020, "XM540-W270": 1120, "XL330-M288": 1200, "PH54-200-S500": 2020}
 

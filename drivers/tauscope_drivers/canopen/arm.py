@@ -15,8 +15,7 @@ from tauscope_drivers.canopen.configuration import BusConfiguration, read_config
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST
 from tauscope_drivers.canopen.enabling import power_up
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.observation import blind_state, listed
-from tauscope_drivers.canopen.session import Session, possible_rate_hz, rate_limited_by
+from tauscope_drivers.canopen.session import Session, blind_state, listed, possible_rate_hz, rate_limited_by
 from tauscope_drivers.canopen.state_machine import Goal
 from tauscope_drivers.canopen.stopping import (
     POLICY_GOALS,

@@ -12,9 +12,8 @@ import can
 import canopen
 
 from tauscope_drivers.canopen.configuration import BusConfiguration
-from tauscope_drivers.canopen.interfaces import ONE_PROCESS, BusClaim, ClaimedError, open_interface
+from tauscope_drivers.canopen.interfaces import ONE_PROCESS, BusClaim, ClaimedError, SerialAdapterBus, open_interface
 from tauscope_drivers.canopen.sdo import NodeDictionary, PumpedSdoClient
-from tauscope_drivers.canopen.serial_adapter import SerialAdapterBus
 from tauscope_drivers.clock import Clock, MonotonicClock
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 

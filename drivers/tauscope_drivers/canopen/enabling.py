@@ -4,8 +4,7 @@ from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import NMT_START
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.observation import listed
-from tauscope_drivers.canopen.session import Session, stay_at
+from tauscope_drivers.canopen.session import Session, listed, stay_at
 from tauscope_drivers.canopen.state_machine import DriveState, Goal
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.state import ArmState, Array

@@ -18,16 +18,18 @@ from tauscope_drivers.canopen.objects import (
     describe_absent,
     select_modes,
 )
-from tauscope_drivers.canopen.pdo_plan import (
+from tauscope_drivers.canopen.process_data import (
     MEASURED,
     MEASURED_WHERE_THERE,
+    PdoLayout,
     PdoPlan,
     PdoSlots,
+    decode_pdo,
+    encode_pdo,
     plan_pdos,
     received_identifier,
     sent_identifier,
 )
-from tauscope_drivers.canopen.process_data import PdoLayout, decode_pdo, encode_pdo
 from tauscope_drivers.canopen.sdo import NodeDictionary
 from tauscope_drivers.canopen.state_machine import ENABLE_OPERATION, DriveState, Goal, decode_state, next_controlword
 from tauscope_drivers.canopen.units import DriveUnits, drive_units, read_rated_torque

@@ -6,20 +6,18 @@ from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import DriveObject
-from tauscope_drivers.canopen.pdo_plan import (
+from tauscope_drivers.canopen.process_data import (
     PDO_COUNT,
     Pdo,
+    PdoParameters,
     PdoPlan,
     PdoSlot,
     PdoSlots,
     decode_mapping,
-    received_identifier,
-    sent_identifier,
-)
-from tauscope_drivers.canopen.process_data import (
-    PdoParameters,
     mapping_entries,
+    received_identifier,
     received_parameters,
+    sent_identifier,
     sent_parameters,
 )
 from tauscope_drivers.errors import DriverError, DriverErrorKind

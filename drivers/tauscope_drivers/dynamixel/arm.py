@@ -12,9 +12,9 @@ from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.bus import ServoBus
 from tauscope_drivers.dynamixel.bus_budget import DynamixelTraffic, found_budget, has_room_for_speeds, planned_budget
 from tauscope_drivers.dynamixel.configuration import read_configuration
+from tauscope_drivers.dynamixel.control_table import WATCHDOG_MOST, WATCHDOG_STEP_S
 from tauscope_drivers.dynamixel.enabling import Bounds, enable_servos, goals_of
 from tauscope_drivers.dynamixel.group import GroupReading
-from tauscope_drivers.dynamixel.models import WATCHDOG_MOST, WATCHDOG_STEP_S
 from tauscope_drivers.dynamixel.preparation import commissioning_writes
 from tauscope_drivers.dynamixel.session import Session, open_session
 from tauscope_drivers.dynamixel.stopping import clear_errors, clear_watchdogs, stop_servos

@@ -1,7 +1,7 @@
 """What a cycle takes of the bus: a Sync Write of the goals, a (Fast) Sync Read of all servos, one servo's health."""
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 from tauscope_drivers.dynamixel.session import Session
 from tauscope_drivers.serial_port import expect_latency_s
@@ -29,7 +29,7 @@ class DynamixelTraffic:
     health_bytes: int = 3
     fast: bool = False
     families: int = 1
-    delay_remedy: ClassVar[str] = "write Return Delay Time = 0"
+    delay_remedy: str = "write Return Delay Time = 0"
 
     @property
     def bytes(self) -> int:

@@ -9,10 +9,9 @@ from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.bus import ServoBus
 from tauscope_drivers.dynamixel.bus_budget import DynamixelTraffic
 from tauscope_drivers.dynamixel.configuration import ServoConfiguration, read_configuration
-from tauscope_drivers.dynamixel.control_table import model_names
+from tauscope_drivers.dynamixel.control_table import WATCHDOG_MOST, WATCHDOG_STEP_S, model_names
 from tauscope_drivers.dynamixel.enabling import plan_tasks
 from tauscope_drivers.dynamixel.health import Health, hardware_faults, watchdog_fault
-from tauscope_drivers.dynamixel.models import WATCHDOG_MOST, WATCHDOG_STEP_S
 from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, drive_mode, operating_mode
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.dynamixel.session import Session, make_session, read_items, read_settings

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from tauscope_drivers.dynamixel.control_table import ServoModel
-from tauscope_drivers.dynamixel.models import WATCHDOG_MOST
+from tauscope_drivers.dynamixel.control_table import WATCHDOG_MOST, ServoModel
 from tauscope_drivers.dynamixel.servo import JointServo
 from tauscope_drivers.errors import Fault
 

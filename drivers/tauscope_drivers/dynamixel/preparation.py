@@ -5,8 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tauscope_drivers.backend import ControlMode
-from tauscope_drivers.dynamixel.control_table import Item
-from tauscope_drivers.dynamixel.models import CURRENT_MODE, WATCHDOG_MOST, WATCHDOG_STEP_S
+from tauscope_drivers.dynamixel.control_table import CURRENT_MODE, WATCHDOG_MOST, WATCHDOG_STEP_S, Item
 from tauscope_drivers.dynamixel.servo import JointServo
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from tauscope_drivers.dynamixel.bus import ServoBus
 from tauscope_drivers.dynamixel.configuration import ServoConfiguration
+from tauscope_drivers.dynamixel.control_table import CURRENT_MODE, gear_ratio_of
 from tauscope_drivers.dynamixel.group import ServoGroup
 from tauscope_drivers.dynamixel.health import Health
-from tauscope_drivers.dynamixel.models import CURRENT_MODE, gear_ratio_of
 from tauscope_drivers.dynamixel.original_settings import CHANGED, OriginalSettings
 from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, SETTINGS, RegisterWrite, commissioning_writes
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 
 from tauscope_drivers.backend import ControlMode, StopPolicy
+from tauscope_drivers.dynamixel.control_table import CURRENT_MODE
 from tauscope_drivers.dynamixel.group import GroupReading
-from tauscope_drivers.dynamixel.models import CURRENT_MODE
 from tauscope_drivers.dynamixel.preparation import operating_mode
 from tauscope_drivers.dynamixel.session import Session
 from tauscope_drivers.errors import DriverError, DriverErrorKind

@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 from tauscope_drivers.clock import Clock
 from tauscope_drivers.errors import DriverError, DriverErrorKind
@@ -22,8 +21,8 @@ class FeetechTraffic:
     """A cycle: Sync Write of the goals, Sync Read of all servos, a read of one servo's torque and limits."""
 
     servos: int
-    reads: ClassVar[int] = 2
-    delay_remedy: ClassVar[str] = "set Return Delay Time to 0 with Feetech's FD"
+    reads: int = 2
+    delay_remedy: str = "set Return Delay Time to 0 with Feetech's FD"
 
     @property
     def bytes(self) -> int:

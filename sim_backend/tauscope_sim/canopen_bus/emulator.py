@@ -5,9 +5,9 @@ from typing import Any, Protocol
 
 from tauscope_sim.canopen_bus.drive import EmulatedDrive, Frame
 from tauscope_sim.canopen_bus.driven_arm import DrivenArm
+from tauscope_sim.canopen_bus.lines import Wire
 from tauscope_sim.canopen_bus.power_state import PowerState
-from tauscope_sim.canopen_bus.wire import Wire
-from tauscope_sim.emulation.device_clock import MOST_STEPS, STEP_S, DeviceClock
+from tauscope_sim.emulation.emulator import MOST_STEPS, STEP_S, DeviceClock
 from tauscope_sim.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault, faults_from
 
 

@@ -9,14 +9,12 @@ from typing import Any, ClassVar
 
 from tauscope.robot import read_robot
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
-from tauscope_sim.canopen_bus.axis import AxisScale
-from tauscope_sim.canopen_bus.drive import EmulatedDrive
+from tauscope_sim.canopen_bus.drive import AxisScale, EmulatedDrive
 from tauscope_sim.canopen_bus.driven_arm import DrivenArm
 from tauscope_sim.canopen_bus.emulator import CanEmulator
 from tauscope_sim.canopen_bus.lines import CanSocket, SerialLine, SocketLine
-from tauscope_sim.emulation.device_clock import STEP_S
-from tauscope_sim.emulation.emulator import Port
-from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal
+from tauscope_sim.emulation.emulator import STEP_S, Port
+from tauscope_sim.emulation.server import PseudoTerminal
 from tauscope_sim.scenario import Scenario
 from tauscope_sim.scenario_file import read_scenario
 

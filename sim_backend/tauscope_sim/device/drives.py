@@ -9,8 +9,7 @@ from tauscope.robot.robot import Robot
 from tauscope_drivers import DriveLimits, Setpoint
 from tauscope_sim.device.activity import Activity
 from tauscope_sim.device.faults import FaultCode
-from tauscope_sim.device.inertia import InertiaSchedule
-from tauscope_sim.device.servo import Servo
+from tauscope_sim.device.servo import InertiaSchedule, Servo
 from tauscope_sim.device.target import STOP_TIME_S, Target, catching_up_acceleration
 from tauscope_sim.scenario import Scenario
 

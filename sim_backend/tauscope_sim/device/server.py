@@ -12,9 +12,13 @@ from tauscope_drivers import DriverError
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device.activity import Activity
 from tauscope_sim.device.device import SimulatedDevice
-from tauscope_sim.device.frames import PROTOCOL, BrokenFrameError, Frame, FrameBuffer, FrameKind
 from tauscope_sim.device.messages import (
+    PROTOCOL,
     BadMessageError,
+    BrokenFrameError,
+    Frame,
+    FrameBuffer,
+    FrameKind,
     decode_document,
     decode_enable,
     decode_injection,

@@ -23,10 +23,14 @@ from tauscope_drivers import (
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device.device import WATCHDOG_RANGE_S
 from tauscope_sim.device.faults import Injection
-from tauscope_sim.device.frames import PROTOCOL, BrokenFrameError, Frame, FrameBuffer, FrameKind
 from tauscope_sim.device.limits import checked_setpoint
 from tauscope_sim.device.messages import (
+    PROTOCOL,
     BadMessageError,
+    BrokenFrameError,
+    Frame,
+    FrameBuffer,
+    FrameKind,
     decode_document,
     decode_error,
     decode_state,

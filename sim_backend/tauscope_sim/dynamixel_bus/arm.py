@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tauscope_sim.dynamixel_bus.servo_loop import Demand
+from tauscope_sim.dynamixel_bus.servo import Demand
 
 Array = NDArray[np.float64]
 

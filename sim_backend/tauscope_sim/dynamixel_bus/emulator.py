@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tauscope_sim.dynamixel_bus.arm import MovedArm
 from tauscope_sim.dynamixel_bus.bus import EmulatedBus
 from tauscope_sim.dynamixel_bus.servo import EmulatedServo
-from tauscope_sim.emulation.device_clock import ALL_STEPS, MOST_STEPS, STEP_S, DeviceClock
+from tauscope_sim.emulation.emulator import ALL_STEPS, MOST_STEPS, STEP_S, DeviceClock
 from tauscope_sim.emulation.fault_kit import faults_from
 
 Array = NDArray[np.float64]

@@ -7,10 +7,10 @@ from typing import ClassVar
 
 from tauscope_sim.dynamixel_bus.arm import MovedArm, Pendulums
 from tauscope_sim.dynamixel_bus.bus import EmulatedBus
+from tauscope_sim.dynamixel_bus.control_memory import ServoSpecification
 from tauscope_sim.dynamixel_bus.emulator import DynamixelEmulator
 from tauscope_sim.dynamixel_bus.servo import EmulatedServo
-from tauscope_sim.dynamixel_bus.specification import ServoSpecification
-from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal
+from tauscope_sim.emulation.server import PseudoTerminal
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauscope.robot import Robot
-from tauscope_sim.device.inertia import InertiaSchedule
-from tauscope_sim.dynamixel_bus.servo_loop import Demand
+from tauscope_sim.device.servo import InertiaSchedule
+from tauscope_sim.dynamixel_bus.servo import Demand
 from tauscope_sim.scenario import Scenario
 
 Array = NDArray[np.float64]

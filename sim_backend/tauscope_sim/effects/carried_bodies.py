@@ -9,11 +9,9 @@ from pydantic import Field
 
 from tauscope.robot.document_fields import Number, Positive, Vector
 from tauscope.robot.robot import LinkInertia, Robot
-from tauscope_sim.effects.effect import Effect, JointEffect
-from tauscope_sim.effects.fields import zero_vector
-from tauscope_sim.plant.coordinates import Coordinates
+from tauscope_sim.effects.effect import Effect, JointEffect, zero_vector
 from tauscope_sim.plant.rigid_bodies import RigidBodies
-from tauscope_sim.plant.term import Term
+from tauscope_sim.plant.term import Coordinates, Term
 
 Array = NDArray[np.float64]
 

@@ -4,8 +4,7 @@ import math
 from typing import ClassVar
 
 from tauscope.robot.document_fields import Positive
-from tauscope_sim.effects.effect import JointEffect
-from tauscope_sim.effects.fields import NotNegative
+from tauscope_sim.effects.effect import JointEffect, NotNegative
 from tauscope_sim.plant.term import Transmission
 
 

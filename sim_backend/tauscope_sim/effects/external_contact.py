@@ -16,11 +16,9 @@ from pydantic import Field
 
 from tauscope.robot.document_fields import Number, Positive, Vector
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import Effect
-from tauscope_sim.effects.fields import JointNumber, NotNegative, one_of, zero_vector
-from tauscope_sim.plant.coordinates import Coordinates
+from tauscope_sim.effects.effect import Effect, JointNumber, NotNegative, one_of, zero_vector
 from tauscope_sim.plant.rigid_bodies import RigidBodies
-from tauscope_sim.plant.term import Forces, Moment, Term
+from tauscope_sim.plant.term import Coordinates, Forces, Moment, Term
 
 Array = NDArray[np.float64]
 

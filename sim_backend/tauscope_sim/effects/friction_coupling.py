@@ -8,11 +8,9 @@ from typing import Annotated, ClassVar
 
 from tauscope.robot.document_fields import Number
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import SmoothSignEffect
-from tauscope_sim.effects.fields import JointNumber, one_of
+from tauscope_sim.effects.effect import JointNumber, SmoothSignEffect, one_of
 from tauscope_sim.friction import smooth_sign, smooth_sign_slope
-from tauscope_sim.plant.coordinates import Coordinates
-from tauscope_sim.plant.term import Forces, Moment, Slopes, Term
+from tauscope_sim.plant.term import Coordinates, Forces, Moment, Slopes, Term
 
 
 class FrictionCoupling(SmoothSignEffect):

@@ -20,8 +20,7 @@ from tauscope.robot.document_fields import Number, Positive
 from tauscope.robot.robot import Robot
 from tauscope_sim.effects.effect import JointEffect
 from tauscope_sim.friction import shape_constants, smooth_sign, smooth_sign_slope
-from tauscope_sim.plant.coordinates import Coordinates
-from tauscope_sim.plant.term import AMBIENT, Forces, Moment, Slopes, Term
+from tauscope_sim.plant.term import AMBIENT, Coordinates, Forces, Moment, Slopes, Term
 
 Array = NDArray[np.float64]
 

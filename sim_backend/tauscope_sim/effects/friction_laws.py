@@ -5,8 +5,7 @@ from typing import ClassVar
 
 from tauscope.robot.document_fields import Number, Positive
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import FrictionLaw, JointLaw, Law, Side
-from tauscope_sim.effects.fields import Exponent
+from tauscope_sim.effects.effect import Exponent, FrictionLaw, JointLaw, Law, Side
 from tauscope_sim.friction import smooth_sign, smooth_sign_slope
 
 

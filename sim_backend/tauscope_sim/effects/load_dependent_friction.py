@@ -1,7 +1,7 @@
 """Friction that grows with the transmitted torque: τ = μ |L| A(v), μ without unit, A(v) = (2/π) arctan(K_v v).
 
 L is the torque that the transmission hands to the link: rigid bodies, springs and contacts, but not the motor's own
-inertia. It depends on the acceleration, which depends on the friction: `tauscope_sim.plant.loads` solves that loop.
+inertia. It depends on the acceleration, which depends on the friction: `tauscope_sim.plant.term` solves that loop.
 """
 
 from typing import ClassVar
@@ -10,9 +10,7 @@ from tauscope.robot.document_fields import Positive
 from tauscope.robot.robot import Robot
 from tauscope_sim.effects.effect import SmoothSignEffect
 from tauscope_sim.friction import smooth_sign, smooth_sign_slope
-from tauscope_sim.plant.coordinates import Coordinates
-from tauscope_sim.plant.loads import LARGEST_GAIN
-from tauscope_sim.plant.term import Forces, Moment, Slopes, Term
+from tauscope_sim.plant.term import LARGEST_GAIN, Coordinates, Forces, Moment, Slopes, Term
 
 
 class LoadDependentFriction(SmoothSignEffect):

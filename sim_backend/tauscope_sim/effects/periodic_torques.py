@@ -1,4 +1,4 @@
-"""Torques that repeat with a joint's angle: cogging, and the ripple of a gear under load."""
+"""Torques that follow a joint's angle: cogging and the ripple of a gear under load, springs, cables, a constant."""
 
 import math
 from collections.abc import Callable
@@ -6,12 +6,10 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
+from tauscope.robot.document_fields import Number, Positive
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import JointEffect, JointLaw, Law
-from tauscope_sim.effects.fields import Numbers, one_of, single_zero
-from tauscope_sim.plant.coordinates import Coordinates
-from tauscope_sim.plant.loads import LARGEST_GAIN
-from tauscope_sim.plant.term import Forces, Moment, Slopes, Term
+from tauscope_sim.effects.effect import Exponent, JointEffect, JointLaw, Law, Numbers, Side, one_of, single_zero
+from tauscope_sim.plant.term import LARGEST_GAIN, Coordinates, Forces, Moment, Slopes, Term
 
 
 class AngleHarmonics(JointEffect):
@@ -109,3 +107,72 @@ class _Ripple(Term):
         """Add L ds/dq."""
         place = self._place
         slopes.by_position[place, place] += moment.load[self._joint] * self._slope(moment.position[place])
+
+
+class JointSpring(JointLaw):
+    """τ = k (q - q₀), between two links: the transmission carries it.
+
+    `joint`: its number, counted from 1.
+    `stiffness`: k [Nm/rad or N/m].
+    `rest`: q₀, where the spring is slack [rad or m].
+    """
+
+    effect_id: ClassVar[str] = "joint_spring"
+    side: ClassVar[Side] = Side.LINK
+    stiffness: Number
+    rest: Number = 0.0
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+        return (lambda q, v: self.stiffness * (q - self.rest)), (lambda q, v: (self.stiffness, 0.0))
+
+
+LEAST_STRETCH = 1e-6
+"""Below this the slope of a root is taken as here [rad or m]."""
+
+
+class CableForce(JointLaw):
+    """τ = ±k max(±(q - q_c), 0)^p, between two links: the transmission carries it.
+
+    `joint`: its number, counted from 1.
+    `stiffness`: k [Nm/rad^p or N/m^p].
+    `angle`: q_c, where it begins [rad or m].
+    """
+
+    effect_id: ClassVar[str] = "cable_force"
+    side: ClassVar[Side] = Side.LINK
+    stiffness: Positive
+    angle: Number
+    side_of_angle: Annotated[str, one_of("above", "below")] = "above"
+    exponent: Exponent = 1.5
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+        sign = 1.0 if self.side_of_angle == "above" else -1.0
+
+        def torque(q: float, v: float) -> float:
+            return sign * self.stiffness * max(sign * (q - self.angle), 0.0) ** self.exponent
+
+        def slopes(q: float, v: float) -> tuple[float, float]:
+            stretch = sign * (q - self.angle)
+            if stretch <= 0.0:
+                return 0.0, 0.0
+            # below p = 1 the slope has no bound at the beginning; the implicit part needs none
+            return self.stiffness * self.exponent * max(stretch, LEAST_STRETCH) ** (self.exponent - 1.0), 0.0
+
+        return torque, slopes
+
+
+class TorqueOffset(JointLaw):
+    """τ = c.
+
+    `joint`: its number, counted from 1.
+    `torque`: c [Nm or N].
+    """
+
+    effect_id: ClassVar[str] = "torque_offset"
+    torque: Number
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+        return (lambda q, v: self.torque), (lambda q, v: (0.0, 0.0))

@@ -18,11 +18,9 @@ from numpy.typing import NDArray
 
 from tauscope.robot.document_fields import Positive
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import JointEffect
-from tauscope_sim.effects.fields import NotNegative, one_of
+from tauscope_sim.effects.effect import JointEffect, NotNegative, one_of
 from tauscope_sim.friction import shape_constants, smooth_sign, smooth_sign_slope
-from tauscope_sim.plant.coordinates import Coordinates
-from tauscope_sim.plant.term import Forces, Moment, Slopes, Term
+from tauscope_sim.plant.term import Coordinates, Forces, Moment, Slopes, Term
 
 Array = NDArray[np.float64]
 

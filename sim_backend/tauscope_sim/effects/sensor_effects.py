@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from tauscope.robot.document_fields import Nonzero, Positive
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import ScenarioEntry
-from tauscope_sim.effects.fields import JointNumber, one_of
+from tauscope_sim.effects.effect import JointNumber, ScenarioEntry, one_of
 
 Array = NDArray[np.float64]
 

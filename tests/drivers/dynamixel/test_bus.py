@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from tauscope_drivers.clock import MonotonicClock
 from tauscope_drivers.dynamixel.bus import ServoBus
-from tauscope_drivers.dynamixel.control_table import BYTES_BEFORE_STATE, find_model, model_names
-from tauscope_drivers.dynamixel.models import family_of
+from tauscope_drivers.dynamixel.control_table import BYTES_BEFORE_STATE, family_of, find_model, model_names
 from tauscope_drivers.dynamixel.packets import encode_write
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_sim.dynamixel_bus.framing import status_frame

@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from tauscope_drivers.dynamixel.control_table import find_model, find_model_by_name, model_names
-from tauscope_drivers.dynamixel.models import family_of
+from tauscope_drivers.dynamixel.control_table import family_of, find_model, find_model_by_name, model_names
 from tauscope_drivers.errors import DriverError
 
 # ROBOTIS e-Manual: number, label, torque, goal current, present current, watchdog, counts a turn, mA a unit.

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauscope_sim.device.setpoint_spline import SetpointSpline
+from tauscope_sim.device.target import SetpointSpline
 
 
 def feed(spline: SetpointSpline, function, arrivals, ticks):

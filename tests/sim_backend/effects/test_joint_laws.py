@@ -17,8 +17,7 @@ from tauscope_sim.effects.friction_laws import (
     StribeckFriction,
     ViscousFriction,
 )
-from tauscope_sim.effects.periodic_torques import Cogging
-from tauscope_sim.effects.position_torques import CableForce, JointSpring, TorqueOffset
+from tauscope_sim.effects.periodic_torques import CableForce, Cogging, JointSpring, TorqueOffset
 
 
 def smooth_sign(v: float, k_v: float = 500.0) -> float:

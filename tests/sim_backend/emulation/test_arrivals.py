@@ -7,8 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal
-from tauscope_sim.emulation.server import Arrivals
+from tauscope_sim.emulation.server import Arrivals, PseudoTerminal
 
 BUSY_S = 0.2
 DEADLINE_S = 10.0

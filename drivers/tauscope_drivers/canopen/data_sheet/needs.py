@@ -7,7 +7,7 @@ from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.data_sheet.device_file import TYPE_NAMES, DataSheetError, DescribedObject, DeviceFile
 from tauscope_drivers.canopen.objects import SUBSTITUTES, TARGETS, WRITTEN, DriveObject, select_modes
-from tauscope_drivers.canopen.pdo_plan import (
+from tauscope_drivers.canopen.process_data import (
     MEASURED,
     MEASURED_WHERE_THERE,
     PDO_COUNT,

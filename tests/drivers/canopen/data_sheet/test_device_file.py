@@ -22,7 +22,7 @@ from tauscope_drivers.canopen.configuration import (
 from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, DeviceFile, read_device_file
 from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects
 from tauscope_drivers.canopen.objects import describe_absent
-from tauscope_drivers.canopen.pdo_plan import MEASURED_WHERE_THERE, plan_pdos
+from tauscope_drivers.canopen.process_data import MEASURED_WHERE_THERE, plan_pdos
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.inspection import Severity
 
