@@ -11,7 +11,7 @@ from tauscope_sim.dynamixel_bus.framing import (
     fast_status_frame,
     status_frame,
 )
-from tauscope_sim.dynamixel_bus.servo import ENCODER, OVERHEATING, OVERLOAD, EmulatedServo
+from tauscope_sim.dynamixel_bus.servo import EmulatedServo
 from tauscope_sim.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault
 
 
@@ -94,11 +94,13 @@ class EmulatedBus:
         deliveries: list[Delivery] = []
         for instruction in instructions:
             end_s = max(now_s, self._free_s) + self._wire_s(instruction.length)
-            handler = self._handlers.get(instruction.code, self._refuse)
-            answers = handler(instruction, end_s)
+            answers = self._obey(instruction, end_s)
             self._free_s = max([end_s, *(due for due, _ in answers)])
             deliveries += answers
         return deliveries
+
+    def _obey(self, instruction: Instruction, end_s: float) -> list[Delivery]:
+        return self._handlers.get(instruction.code, self._refuse)(instruction, end_s)
 
     def run_faults(self, now_s: float) -> None:
         """Let the faults happen that are due. `now_s`: present instant [s]."""
@@ -116,14 +118,12 @@ class EmulatedBus:
                 self._away_until_s[fault.device] = now_s + fault.seconds
             case FaultKind.RESET:
                 self._restart(fault.device, now_s + fault.seconds)
-            case FaultKind.OVER_TEMPERATURE:
-                servo.fail(OVERHEATING)
-            case FaultKind.OVERLOAD:
-                servo.fail(OVERLOAD)
+            case FaultKind.OVER_TEMPERATURE | FaultKind.OVERLOAD:
+                servo.fail(servo.alarms[fault.kind])
             case FaultKind.ENCODER_JUMP:
                 servo.encoder_offset_counts += fault.counts
                 if not fault.counts:
-                    servo.fail(ENCODER)
+                    servo.fail(servo.alarms[fault.kind])
             case _:
                 self._answer_faults[fault.device] = AnswerFaults(fault.kind, fault.count, fault.seconds)
 
@@ -197,11 +197,17 @@ class EmulatedBus:
         return deliveries
 
     def _act(self, instruction: Instruction, end_s: float) -> list[Delivery]:
+        return self._try(instruction, end_s, EmulatedServo.act)
+
+    def _clear(self, instruction: Instruction, end_s: float) -> list[Delivery]:
+        return self._try(instruction, end_s, lambda servo: servo.clear(instruction.parameters))
+
+    def _try(self, instruction: Instruction, end_s: float, attempt: Callable[[EmulatedServo], None]) -> list[Delivery]:
         parts: list[tuple[EmulatedServo, int, bytes]] = []
         for servo in self._find_addressed(instruction, end_s):
             error = 0
             try:
-                servo.act()
+                attempt(servo)
             except WriteRefusedError as refusal:
                 error = refusal.error
             parts.append((servo, error, b""))
@@ -214,17 +220,6 @@ class EmulatedBus:
         for servo in servos:
             self._restart(servo.servo, end_s + _REBOOT_S)
         return answers
-
-    def _clear(self, instruction: Instruction, end_s: float) -> list[Delivery]:
-        parts: list[tuple[EmulatedServo, int, bytes]] = []
-        for servo in self._find_addressed(instruction, end_s):
-            error = 0
-            try:
-                servo.clear(instruction.parameters)
-            except WriteRefusedError as refusal:
-                error = refusal.error
-            parts.append((servo, error, b""))
-        return [] if instruction.servo == BROADCAST_ID else self._answers(parts, end_s)
 
     def _refuse(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         servos = [] if instruction.servo == BROADCAST_ID else self._find_addressed(instruction, end_s)

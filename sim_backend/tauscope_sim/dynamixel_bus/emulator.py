@@ -1,7 +1,6 @@
 """Servos, the arm that they move, and a clock: everything of the emulator but its pseudo terminal."""
 
 import heapq
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,9 +18,7 @@ Array = NDArray[np.float64]
 class DynamixelEmulator:
     """An arm of emulated servos on one bus; the instants are those of the caller's clock."""
 
-    def __init__(
-        self, bus: EmulatedBus, order: Sequence[int], arm: MovedArm, now_s: float, *, latency_s: float = 0.0
-    ) -> None:
+    def __init__(self, bus: EmulatedBus, arm: MovedArm, now_s: float, *, latency_s: float = 0.0) -> None:
         """Everything at rest. The arm stands on a stand until all its servos have had torque once.
 
         `now_s`: present instant [s]; `latency_s`: how much later than over the wire an answer reaches the master: the
@@ -31,7 +28,7 @@ class DynamixelEmulator:
         self.arm = arm
         self.torque = np.zeros(arm.joint_count)
         self.stands_on_stand = True
-        self._servos = [bus.servos[servo] for servo in order]
+        self._servos = list(bus.servos.values())
         self._bauds = {servo.specification.baud for servo in self._servos}
         self._latency_s = latency_s
         self._clock = DeviceClock(now_s)

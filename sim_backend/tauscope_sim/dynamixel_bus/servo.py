@@ -7,7 +7,9 @@ another servo's register too, keeps its watchdog content.
 
 import random
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from tauscope_sim.dynamixel_bus.control_memory import (
     GOALS,
@@ -16,6 +18,7 @@ from tauscope_sim.dynamixel_bus.control_memory import (
     ServoSpecification,
     WriteRefusedError,
 )
+from tauscope_sim.emulation.fault_kit import FaultKind
 
 CURRENT_MODE, POSITION_MODE, EXTENDED_MODE, CURRENT_BASED_MODE = 0, 3, 4, 5
 
@@ -125,6 +128,12 @@ _FILTERED_STEPS = 5
 
 class EmulatedServo:
     """A servo on the bus and at its joint."""
+
+    alarms: ClassVar[Mapping[FaultKind, int]] = {
+        FaultKind.OVER_TEMPERATURE: OVERHEATING,
+        FaultKind.OVERLOAD: OVERLOAD,
+        FaultKind.ENCODER_JUMP: ENCODER,
+    }
 
     def __init__(self, specification: ServoSpecification, *, seed: int = 0) -> None:
         self.specification = specification

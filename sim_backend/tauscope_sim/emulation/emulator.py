@@ -1,8 +1,17 @@
-"""What the server runs: anything that takes bytes of a master, lets time pass, and answers; and its clock."""
+"""What the server runs: emulated devices with their clock and their port, and the order that starts them."""
 
+import contextlib
+import errno
+import fcntl
+import json
+import os
+import struct
+import tty
+from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import asdict
 from math import ceil
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol, Self
 
 STEP_S = 1e-3
 """Period of the devices' own loops and of the physics [s]."""
@@ -113,35 +122,92 @@ class Port(Protocol):
         ...
 
 
-class EmulatorOrder(Protocol):
-    """What the server needs of the order that started it."""
+_TCGETS2 = 0x802C542A
+_TERMIOS2 = "=4I20B2I"
 
-    module: ClassVar[str]
-    """What runs as the process: the package of the bus."""
+
+class PseudoTerminal:
+    """The near end, a `Port`; a master opens the far end by the name that was linked to it.
+
+    The far end is not kept open here, so that whoever has it open is a master.
+    """
+
+    def __init__(self, link: str) -> None:
+        self._near, far = os.openpty()
+        tty.setraw(far)
+        self._link = link
+        temporary = f"{link}.{os.getpid()}"
+        os.symlink(os.ttyname(far), temporary)
+        os.replace(temporary, link)
+        os.close(far)
+        os.set_blocking(self._near, False)
+
+    def fileno(self) -> int:
+        """Descriptor to wait on."""
+        return self._near
+
+    def read(self) -> bytes | None:
+        """What a master sent; None where no master has it open."""
+        try:
+            return os.read(self._near, 4096)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            if error.errno == errno.EIO:
+                return None
+            raise
+
+    def write(self, data: bytes) -> None:
+        """Send to the master; lost where there is none, or where it reads nothing."""
+        with contextlib.suppress(BlockingIOError, OSError):
+            os.write(self._near, data)
 
     @property
-    def control(self) -> str:
-        """Unix socket for the test."""
-        ...
+    def baud(self) -> int:
+        """What the master has set [bit/s]."""
+        settings = fcntl.ioctl(self._near, _TCGETS2, bytes(struct.calcsize(_TERMIOS2)))
+        return struct.unpack(_TERMIOS2, settings)[-1]
+
+    def close(self) -> None:
+        """Hang up."""
+        os.close(self._near)
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(self._link)
+
+
+class EmulatorOrder(ABC):
+    """The order that starts an emulator process; subclasses are frozen dataclasses that JSON can hold.
+
+    `port`: what the master opens.
+    `control`: Unix socket for the test.
+    `stepped`: whether time passes only when a test says so; else it is the machine's.
+    `trace`: file that what the devices do is appended to.
+    """
+
+    port: str
+    control: str
+    stepped: bool
+    trace: str | None
 
     @property
-    def trace(self) -> str | None:
-        """File that what the devices do is appended to."""
-        ...
-
-    @property
-    def stepped(self) -> bool:
-        """Whether time passes only when a test says so; else it is the machine's."""
-        ...
+    def kind(self) -> str:
+        """Module and name of the order, by which the process finds it."""
+        return f"{type(self).__module__}:{type(self).__qualname__}"
 
     def to_json(self) -> str:
         """The order as text, which the process is started with."""
-        ...
+        return json.dumps(vars(self), default=asdict)
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """The order in a text."""
+        document = json.loads(text)
+        return cls(**{key: tuple(value) if isinstance(value, list) else value for key, value in document.items()})
 
     def open_port(self) -> Port:
-        """What the master opens."""
-        ...
+        """What the master opens: a pseudo terminal."""
+        return PseudoTerminal(self.port)
 
+    @abstractmethod
     def build(self, now_s: float) -> Emulator:
         """The emulator. `now_s`: present instant [s]."""
-        ...

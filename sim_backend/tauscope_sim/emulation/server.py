@@ -1,76 +1,19 @@
-"""An emulator as a process: a pseudo terminal for the master, a socket for the test, a trace of what was done."""
+"""An emulator as a process: a port for the master, a socket for the test, a trace of what was done."""
 
 import contextlib
-import errno
-import fcntl
 import json
 import os
 import select
 import socket
-import struct
 import sys
 import threading
 import time
-import tty
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from tauscope_sim.emulation.emulator import MOST_STEPS, EmulatorOrder, Port
 from tauscope_sim.own_process import take_precedence
-
-_TCGETS2 = 0x802C542A
-_TERMIOS2 = "=4I20B2I"
-
-
-class PseudoTerminal:
-    """The near end, a `Port`; a master opens the far end by the name that was linked to it.
-
-    The far end is not kept open here, so that whoever has it open is a master.
-    """
-
-    def __init__(self, link: str) -> None:
-        self._near, far = os.openpty()
-        tty.setraw(far)
-        self._link = link
-        temporary = f"{link}.{os.getpid()}"
-        os.symlink(os.ttyname(far), temporary)
-        os.replace(temporary, link)
-        os.close(far)
-        os.set_blocking(self._near, False)
-
-    def fileno(self) -> int:
-        """Descriptor to wait on."""
-        return self._near
-
-    def read(self) -> bytes | None:
-        """What a master sent; None where no master has it open."""
-        try:
-            return os.read(self._near, 4096)
-        except BlockingIOError:
-            return b""
-        except OSError as error:
-            if error.errno == errno.EIO:
-                return None
-            raise
-
-    def write(self, data: bytes) -> None:
-        """Send to the master; lost where there is none, or where it reads nothing."""
-        with contextlib.suppress(BlockingIOError, OSError):
-            os.write(self._near, data)
-
-    @property
-    def baud(self) -> int:
-        """What the master has set [bit/s]."""
-        settings = fcntl.ioctl(self._near, _TCGETS2, bytes(struct.calcsize(_TERMIOS2)))
-        return struct.unpack(_TERMIOS2, settings)[-1]
-
-    def close(self) -> None:
-        """Hang up."""
-        os.close(self._near)
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(self._link)
-
 
 _SWITCH_S = 5e-5
 """How long the thread waits for the interpreter at most [s]."""

@@ -24,7 +24,7 @@ class Master:
         specifications = [ServoSpecification(number, **specification) for number in range(1, count + 1)]  # pyright: ignore[reportArgumentType]
         arm = Pendulums([start] * count, weight=weight)
         servos = [EmulatedServo(one) for one in specifications]
-        self.emulator = DynamixelEmulator(EmulatedBus(servos), [one.servo for one in specifications], arm, 0.0)
+        self.emulator = DynamixelEmulator(EmulatedBus(servos), arm, 0.0)
         self.time = 0.0
 
     def wait(self, seconds: float) -> bytes:
