@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hardware_emulated.dynamixel_bench import SLACK_S, Bench, bench, limits
+from hardware_emulated.servo_bench import SLACK_S, Bench, bench, limits
 from tauscope_drivers import ControlMode, DriverError
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.doctor import examine, scan_bus

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hardware_emulated.dynamixel_bench import WATCHDOG_S, Bench, drive, limits, setpoint
+from hardware_emulated.servo_bench import WATCHDOG_S, Bench, drive, limits, setpoint
 from tauscope_drivers import ArmState, ControlMode, DriverError, StopPolicy
 from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_sim.emulation import FaultKind, InjectedFault

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hardware_emulated.dynamixel_bench import drive, limits, setpoint
-from hardware_emulated.feetech_bench import FeetechBench, feetech_bench
+from hardware_emulated.servo_bench import Bench, drive, feetech_bench, limits, setpoint
 from prompt_process import prompt_process
 from tauscope_drivers import ArmState, ControlMode, DriverError, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
@@ -22,13 +21,13 @@ POSITION_STEP = 2.0 * np.pi / 4096
 
 
 @pytest.fixture(scope="module")
-def servos(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FeetechBench]:
+def servos(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     with feetech_bench(tmp_path_factory.mktemp("servos")) as one:
         yield one
 
 
 @pytest.fixture
-def three(servos: FeetechBench) -> Iterator[FeetechBench]:
+def three(servos: Bench) -> Iterator[Bench]:
     with prompt_process():
         yield servos.anew()
         servos.clear()
@@ -38,7 +37,7 @@ def still(_: float):
     return setpoint(np.full(3, START))
 
 
-def running(three: FeetechBench) -> FeetechArm:
+def running(three: Bench) -> FeetechArm:
     arm = three.enabled_arm()
     drive(arm, still, 0.1)
     return arm
@@ -57,7 +56,7 @@ def states_until_fault(arm: FeetechArm) -> ArmState:
 
 
 @pytest.mark.parametrize("kind", [FaultKind.LOSE, FaultKind.CORRUPT, FaultKind.LATE])
-def test_an_answer_that_does_not_come_is_not_a_number(three: FeetechBench, kind: FaultKind) -> None:
+def test_an_answer_that_does_not_come_is_not_a_number(three: Bench, kind: FaultKind) -> None:
     arm = running(three)
     three.emulator.inject(InjectedFault(kind, 2, count=3, seconds=0.06))
     states = drive(arm, still, 0.4)
@@ -69,7 +68,7 @@ def test_an_answer_that_does_not_come_is_not_a_number(three: FeetechBench, kind:
     assert later[-1].faults == ()
 
 
-def test_late_answers_are_never_taken_for_new_ones(three: FeetechBench) -> None:
+def test_late_answers_are_never_taken_for_new_ones(three: Bench) -> None:
     arm = running(three)
     late = InjectedFault(FaultKind.LATE, 2, count=1, seconds=0.06)
     three.emulator.inject(*(replace(late, at_s=0.05 * k) for k in range(1, 12)))
@@ -83,7 +82,7 @@ def test_late_answers_are_never_taken_for_new_ones(three: FeetechBench) -> None:
         np.testing.assert_allclose(state.position[state.fresh], near[state.fresh], atol=0.03)
 
 
-def test_a_silent_servo_costs_its_own_samples_and_is_told_to_let_go_at_the_stop(three: FeetechBench) -> None:
+def test_a_silent_servo_costs_its_own_samples_and_is_told_to_let_go_at_the_stop(three: Bench) -> None:
     arm = running(three)
     three.emulator.inject(InjectedFault(FaultKind.SILENT, 2, seconds=0.6))
     states = drive(arm, still, 0.3)[2:]
@@ -92,23 +91,23 @@ def test_a_silent_servo_costs_its_own_samples_and_is_told_to_let_go_at_the_stop(
     assert min(fresh[0], fresh[2]) > 0.5
     state = arm.stop(StopPolicy.HOLD)
     assert codes(state)[-1:] == [("silent", None)]
-    assert three.state["enabled"][0]
-    assert three.state["enabled"][2], "the others hold"
+    assert three.emulator.state["enabled"][0]
+    assert three.emulator.state["enabled"][2], "the others hold"
     assert not state.enabled[1], "nobody knows that it holds"
 
 
-def test_a_servo_that_hears_and_does_not_answer_lets_go(three: FeetechBench) -> None:
+def test_a_servo_that_hears_and_does_not_answer_lets_go(three: Bench) -> None:
     arm = running(three)
     three.emulator.inject(InjectedFault(FaultKind.LOSE, 2, count=500))
     drive(arm, still, 0.1)
     assert codes(arm.stop(StopPolicy.HOLD))[-1:] == [("silent", None)]
-    assert three.state["enabled"] == [True, False, True]
+    assert three.emulator.state["enabled"] == [True, False, True]
 
 
 @pytest.mark.parametrize(
     ("kind", "code"), [(FaultKind.OVERLOAD, "overload"), (FaultKind.OVER_TEMPERATURE, "over-temperature")]
 )
-def test_an_alarm_is_decoded_and_stays_until_its_cause_is_gone(three: FeetechBench, kind: FaultKind, code: str) -> None:
+def test_an_alarm_is_decoded_and_stays_until_its_cause_is_gone(three: Bench, kind: FaultKind, code: str) -> None:
     arm = running(three)
     three.emulator.inject(InjectedFault(kind, 2))
     state = states_until_fault(arm)
@@ -123,17 +122,17 @@ def test_an_alarm_is_decoded_and_stays_until_its_cause_is_gone(three: FeetechBen
     assert not arm.acknowledge_faults().faults
 
 
-def test_a_restart_is_noticed_and_no_goal_switches_torque_on_again(three: FeetechBench) -> None:
+def test_a_restart_is_noticed_and_no_goal_switches_torque_on_again(three: Bench) -> None:
     arm = running(three)
     three.emulator.inject(InjectedFault(FaultKind.RESET, 2, seconds=0.05))
     states = drive(arm, still, 0.5)
     assert codes(states[-1]) == [("restarted", 2)]
     assert three.emulator.get(2, "torque_enable") == 0, "a goal would have switched it on"
     arm.stop(StopPolicy.TORQUE_OFF)
-    assert not any(three.state["enabled"])
+    assert not any(three.emulator.state["enabled"])
 
 
-def test_a_jump_of_the_encoder_is_what_the_servo_reports(three: FeetechBench) -> None:
+def test_a_jump_of_the_encoder_is_what_the_servo_reports(three: Bench) -> None:
     arm = running(three)
     three.emulator.inject(InjectedFault(FaultKind.ENCODER_JUMP, 2, counts=300))
     state = arm.exchange(still(0.0))
@@ -151,7 +150,7 @@ def test_a_lost_bus_is_said_and_the_servos_hold(tmp_path: Path) -> None:
         assert codes(arm.stop(StopPolicy.HOLD)) == [("lost-bus", None)]
 
 
-def test_no_run_writes_to_eeprom(three: FeetechBench) -> None:
+def test_no_run_writes_to_eeprom(three: Bench) -> None:
     before = [three.emulator.get(servo, name) for servo in (1, 2, 3) for name in ("return_delay", "mode", "lock")]
     arm = running(three)
     arm.stop(StopPolicy.HOLD)

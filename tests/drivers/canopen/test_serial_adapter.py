@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tauscope_drivers.canopen.interfaces import SerialAdapterBus
-from tauscope_sim.emulation.server import PseudoTerminal
+from tauscope_sim.emulation.emulator import PseudoTerminal
 
 FRAME = b"t1818370200011D0C0000\r"
 """Identifier 0x181, eight bytes."""
