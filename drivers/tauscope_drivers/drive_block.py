@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 
 _KEYS_OF_ANY_BUS = ("stop_policy",)
 
@@ -101,4 +101,4 @@ def read_text(joint: DriveJoint, key: str, what: str) -> str:
 
 def refusal(joint: DriveJoint, key: str, reason: str) -> DriverError:
     """Why a block is not usable."""
-    return DriverError(DriverErrorKind.REFUSED, f"joint {joint.name}: drive.{key} {reason}")
+    return DriverError.refusal(f"joint {joint.name}: drive.{key} {reason}")

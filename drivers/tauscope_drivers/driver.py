@@ -14,7 +14,7 @@ from typing import Any
 
 from tauscope_drivers.backend import Backend
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 from tauscope_drivers.inspection import Finding, FoundDevice, FrameRequest, PlannedFrame, failure
 
 _LONGEST_PATIENCE_S = 1.0
@@ -150,7 +150,7 @@ class BusDriver(Driver):
         is_number = isinstance(patience_s, int | float) and not isinstance(patience_s, bool)
         if not (is_number and 0.0 < patience_s <= _LONGEST_PATIENCE_S):
             text = f"backend {self.name}: patience_s is {patience_s!r:.60}; give seconds up to 1"
-            raise DriverError(DriverErrorKind.REFUSED, text)
+            raise DriverError.refusal(text)
         return float(patience_s)
 
 

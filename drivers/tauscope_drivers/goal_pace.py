@@ -39,12 +39,7 @@ class GoalPace:
     """Speed for each goal; keeps account of where the servos' own targets are."""
 
     def __init__(
-        self,
-        servos: Sequence[PacedServo],
-        goals: Sequence[int],
-        caps: Sequence[int],
-        cycle_s: float,
-        now_ns: int,
+        self, servos: Sequence[PacedServo], goals: Sequence[int], caps: Sequence[int], cycle_s: float, now_ns: int
     ) -> None:
         """Begin with servos that hold their goals.
 

@@ -116,7 +116,6 @@ class SerialPort:
         return self.ser
 
     def _refusal(self, error: Exception) -> DriverError:
-        """Why a port cannot be opened, and what to do."""
         holder = find_holder(self.path) if os.path.exists(self.path) else None
         self.close()
         if not os.path.exists(self.path):
@@ -127,7 +126,7 @@ class SerialPort:
             reason, remedy = _FORBIDDEN
         else:
             reason, remedy = f"cannot be opened ({' '.join(str(error).split())})", "check the device and its baud rate"
-        return DriverError(DriverErrorKind.CANNOT_CONNECT, f"port {self.path} {reason}; {remedy}")
+        return DriverError.no_connection(f"port {self.path} {reason}; {remedy}")
 
     def _report_loss(self, error: Exception) -> DriverError:
         reason = " ".join(str(error).split())
@@ -166,7 +165,6 @@ def find_holder(path: str) -> str | None:
 
 
 def _has_open(process: Path, device: int) -> bool:
-    """Whether a process has a device open."""
     try:
         return any(_device(descriptor) == device for descriptor in (process / "fd").iterdir())
     except OSError:
@@ -214,7 +212,6 @@ def latency_finding(path: str) -> Finding:
 
 
 def _access(path: str, what: str) -> Finding:
-    """Whether this program may open a port."""
     if not os.access(path, os.R_OK | os.W_OK):
         reason, remedy = _FORBIDDEN
         return Finding(Severity.FAILURE, path, f"{what}; {reason}", remedy)

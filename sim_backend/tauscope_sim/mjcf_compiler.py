@@ -61,7 +61,6 @@ def _drop_shapes(spec: mujoco.MjSpec) -> None:
 
 
 def _moves(body: mujoco.MjsBody) -> bool:
-    """Whether a joint moves a body."""
     while body is not None:
         if body.joints:
             return True

@@ -75,11 +75,9 @@ class MujocoLog:
 
     @staticmethod
     def _places(groups: Sequence[str]) -> list[int]:
-        """Where each group stands in a row."""
         return [("q", "tau", "qd", "qref").index(group) for group in groups]
 
     def _actuator_of(self, joint: int) -> int | None:
-        """The joint's actuator; None where it has none."""
         model, on_joint = self._model, int(mujoco.mjtTrn.mjTRN_JOINT)
         for index in range(model.nu):
             if model.actuator_trntype[index] == on_joint and model.actuator_trnid[index, 0] == joint:

@@ -14,7 +14,6 @@ Array = NDArray[np.float64]
 
 
 def _zero() -> Array:
-    """Zero for every joint."""
     return np.zeros(())
 
 

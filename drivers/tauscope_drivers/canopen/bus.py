@@ -62,10 +62,9 @@ class CanBus:
         except (can.CanError, OSError, ValueError, NotImplementedError, ImportError, TypeError) as error:
             self._release()
             text = " ".join(str(error).split())
-            raise DriverError(
-                DriverErrorKind.CANNOT_CONNECT,
+            raise DriverError.no_connection(
                 f"CAN bus {self._name} cannot be opened ({text}); check the adapter, its name, who else uses it, and "
-                "drive.options",
+                "drive.options"
             ) from error
         self._network.bus = self._bus
 
@@ -162,7 +161,6 @@ class CanBus:
         self._release()
 
     def _release(self) -> None:
-        """Let another process have the bus."""
         if self._claim is not None:
             self._claim.release()
             self._claim = None
@@ -184,7 +182,6 @@ def _claim_interface(configuration: BusConfiguration) -> BusClaim | None:
     try:
         return BusClaim(name)
     except ClaimedError as error:
-        raise DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
-            f"CAN bus {configuration.channel} is driven by {error} already; end that first",
+        raise DriverError.no_connection(
+            f"CAN bus {configuration.channel} is driven by {error} already; end that first"
         ) from error

@@ -33,7 +33,7 @@ from tauscope_drivers.drive_block import (
     require_distinct,
     require_known_keys,
 )
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 from tauscope_drivers.inspection import Finding, Severity, failure
 
 _HIGHEST_NODE = 127
@@ -106,7 +106,7 @@ def require_targets(configuration: BusConfiguration, mode: ControlMode) -> None:
             require_target(node.device_file, mode)
         except DataSheetError as error:
             text = f"joint {joint} (node {node.node_id}): {node.device_file.name}: {error}"
-            raise DriverError(DriverErrorKind.REFUSED, text) from error
+            raise DriverError.refusal(text) from error
 
 
 def read_node(joint: DriveJoint) -> NodeConfiguration:
@@ -129,7 +129,6 @@ def read_node(joint: DriveJoint) -> NodeConfiguration:
 
 
 def _options(joint: DriveJoint) -> Mapping[str, Any]:
-    """What python-can's interface is given besides."""
     options = joint.drive.get("options", {})
     if not isinstance(options, Mapping) or not all(isinstance(value, str | int | float) for value in options.values()):
         raise refusal(joint, "options", f"= {options!r}; give what python-can takes, as in {{host: 192.168.1.5}}")
@@ -185,7 +184,6 @@ def check_blocks(joints: Sequence[DriveJoint]) -> list[Finding]:
 
 
 def _describe_file(place: str, node: NodeConfiguration) -> list[Finding]:
-    """What a drive's file states."""
     file = node.device_file
     if file is None:
         return []

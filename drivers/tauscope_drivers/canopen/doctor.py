@@ -87,7 +87,6 @@ def _examine_drives(
 
 
 def _examine_drive(node: DriveNode, joint: DriveJoint) -> list[Finding]:
-    """Name, modes, units, and what stands in the way of a run."""
     modes = node.identify()
     dictionary = node.dictionary
     name = dictionary.read_text(objects.DEVICE_NAME) or "a drive without a name"
@@ -147,7 +146,6 @@ def _list_places(described: Sequence[DescribedObject]) -> str:
 
 
 def _loop_rate(configuration: BusConfiguration, nodes: Sequence[DriveNode], subject: str) -> Finding:
-    """How long a question takes, measured, beside what a whole cycle gets."""
     begin_ns = time.monotonic_ns()
     for read in range(MEASURED_READS):
         nodes[read % len(nodes)].dictionary.read(objects.STATUSWORD)
@@ -201,7 +199,6 @@ def scan_bus(interface: str, channel: str, bit_rates: Sequence[int] | None = Non
 
 
 def _answers(bus: CanBus) -> dict[int, int]:
-    """Device type of every node that answers."""
     found: dict[int, int] = {}
 
     def take(identifier: int, data: bytes) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.driver import PATIENCE, ArmDescription, BusDriver, Connection, Option
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 from tauscope_drivers.inspection import Finding, FoundDevice
 
 
@@ -46,7 +46,7 @@ class CanopenDriver(BusDriver):
         interface, _, channel = port.partition(":")
         if not interface or not channel:
             text = f"{port!r:.60} names no CAN bus; write INTERFACE:CHANNEL, as in socketcan:can0"
-            raise DriverError(DriverErrorKind.REFUSED, text)
+            raise DriverError.refusal(text)
         return self.load("doctor").scan_bus(interface, channel, bit_rates)
 
 

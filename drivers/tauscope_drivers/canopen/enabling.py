@@ -79,7 +79,6 @@ def _read_settled_place(session: Session, mode: ControlMode) -> Array:
 
 
 def _is_up(node: DriveNode) -> bool:
-    """Whether a drive was in *operation enabled* when it last answered."""
     return node.last_state is DriveState.OPERATION_ENABLED
 
 

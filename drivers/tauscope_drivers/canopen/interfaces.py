@@ -93,7 +93,6 @@ class BusClaim:
 
 
 def _holder(name: str) -> str:
-    """The process that has a name, as ``process 123 (name)``."""
     with socket.socket(socket.AF_UNIX) as visitor:
         visitor.setblocking(False)
         try:

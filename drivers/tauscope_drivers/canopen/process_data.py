@@ -84,7 +84,6 @@ def sent_parameters(number: int, entries: int) -> PdoParameters:
 
 
 def _parameters(communication: int, mapping: int, entries: int) -> PdoParameters:
-    """Communication and mapping parameter, CiA 301."""
     return PdoParameters(
         identifier=DriveObject("PDO COB-ID", communication, 1, 32),
         kind=DriveObject("PDO transmission type", communication, 2, 8),

@@ -28,10 +28,7 @@ from tauscope_drivers.state import ArmState, Setpoint
 
 Array = NDArray[np.float64]
 
-_POLICIES = {
-    ControlMode.POSITION: frozenset([StopPolicy.HOLD]),
-    ControlMode.TORQUE: frozenset([StopPolicy.TORQUE_OFF]),
-}
+_POLICIES = {ControlMode.POSITION: frozenset([StopPolicy.HOLD]), ControlMode.TORQUE: frozenset([StopPolicy.TORQUE_OFF])}
 """What the servos do by themselves when their watchdog fires."""
 
 _SUSPECT_SILENCE = 0.8

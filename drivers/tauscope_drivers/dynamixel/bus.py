@@ -9,7 +9,7 @@ from tauscope_drivers.clock import Clock
 from tauscope_drivers.dynamixel import packets
 from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
 from tauscope_drivers.dynamixel.packets import DynamixelParser, Status
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 from tauscope_drivers.serial_port import SerialPort
 from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers, SerialServoBus
 
@@ -133,9 +133,7 @@ class ServoBus(SerialServoBus[Status]):
             # A write whose answer was lost may have arrived: what counts is what the servo holds now.
             if self.read(servo, item) == value:
                 return
-        raise DriverError(
-            DriverErrorKind.REFUSED, f"servo {servo}: {item.name} was written as {value} and reads otherwise; check it"
-        )
+        raise DriverError.refusal(f"servo {servo}: {item.name} was written as {value} and reads otherwise; check it")
 
     def clear_error(self, servo: int) -> None:
         """Let a servo of the Y series forget its error; whether it did is what its Error Code says."""
@@ -222,7 +220,6 @@ class ServoBus(SerialServoBus[Status]):
         return answers
 
     def _ask(self, servo: int, request: bytes, length: int, patience_s: float) -> Status | None:
-        """Send an instruction to one servo and wait for its answer."""
         if self._find_owing([servo], length):
             self.port.drain()
         self.port.send(request)
@@ -240,16 +237,13 @@ class ServoBus(SerialServoBus[Status]):
 
 
 def _fast_bytes(servos: Sequence[int], length: int) -> int:
-    """Length of the packet with which all answer at once, each with so many bytes."""
     return _FAST_BYTES + len(servos) * (length + _FAST_SERVO_BYTES)
 
 
 def _failure(servo: int, what: str, answer: Status | None) -> DriverError:
-    """Error of an instruction that was not carried out."""
     if answer is None:
-        return DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
-            f"servo {servo} does not answer ({what}); check its power, cable, ID and baud rate",
+        return DriverError.no_connection(
+            f"servo {servo} does not answer ({what}); check its power, cable, ID and baud rate"
         )
     reason = packets.describe_refusal(answer.refusal)
-    return DriverError(DriverErrorKind.REFUSED, f"servo {servo}: {what}: {reason}; check the servo with its wizard")
+    return DriverError.refusal(f"servo {servo}: {what}: {reason}; check the servo with its wizard")

@@ -71,9 +71,6 @@ def found_budget(session: Session) -> tuple[DynamixelTraffic, BusTiming]:
     port = session.bus.port
     longest = max(block.length for servo in session.servos for block in servo.model.watched_blocks)
     traffic = DynamixelTraffic(
-        len(session.servos),
-        health_bytes=longest,
-        fast=session.group.fast,
-        families=session.group.family_count,
+        len(session.servos), health_bytes=longest, fast=session.group.fast, families=session.group.family_count
     )
     return traffic, BusTiming(port.baudrate, session.bus.return_delay_s, port.latency_s)

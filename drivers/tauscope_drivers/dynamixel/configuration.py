@@ -55,7 +55,6 @@ def _read_servo(joint: DriveJoint) -> ServoConfiguration:
 
 
 def _model(joint: DriveJoint) -> str | None:
-    """The model that a robot file promises."""
     model = joint.drive.get("model")
     if model is None:
         return None

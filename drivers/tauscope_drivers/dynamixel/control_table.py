@@ -8,7 +8,7 @@ from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 
 CURRENT_MODE = 0
 POSITION_MODE = 3
@@ -258,7 +258,6 @@ class ServoModel:
         return tuple(_block(items) for items in stretches)
 
     def _item_before(self, address: int) -> Item:
-        """The item that ends where another begins."""
         return next(item for item in self.items.values() if item.address + item.size == address)
 
 
@@ -284,10 +283,9 @@ def find_model(number: int, firmware: int = 0) -> ServoModel:
     name = model_names().get(number)
     family = None if name is None else family_of(name)
     if name is None or family is None:
-        raise DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
+        raise DriverError.no_connection(
             f"a servo states the model number {number}, of which no control table is known; "
-            "use a servo of the X, MX(2.0), P, PRO(A) or Y series, or a newer dynamixel-sdk",
+            "use a servo of the X, MX(2.0), P, PRO(A) or Y series, or a newer dynamixel-sdk"
         )
     sections = _sections(_table_text(name, firmware))
     items = {row[2]: _item(row) for row in sections["control table"] if row[0].isdigit()}
@@ -318,7 +316,7 @@ def find_model_by_name(name: str) -> ServoModel:
     for number, known in model_names().items():
         if wanted == known or wanted.startswith(f"{known}_"):
             return find_model(number)
-    raise DriverError(DriverErrorKind.REFUSED, f"model {name!r} is not known; write it as on the case, like XM430-W350")
+    raise DriverError.refusal(f"model {name!r} is not known; write it as on the case, like XM430-W350")
 
 
 def _folder() -> Traversable:

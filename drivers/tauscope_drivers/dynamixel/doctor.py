@@ -112,7 +112,6 @@ def _turn_offset(session: Session, joint: DriveJoint) -> list[Finding]:
 
 
 def _count_turns(turns: int) -> str:
-    """Turns in words."""
     return f"{turns} turn{'s' if abs(turns) > 1 else ''}"
 
 
@@ -142,7 +141,6 @@ def _examine_secondary(servos: Sequence[JointServo], settings: Sequence[dict[str
 
 
 def _examine_servo(servo: JointServo, settings: dict[str, int]) -> list[Finding]:
-    """Model, firmware, and what stands in the way of a run."""
     unit = f"{abs(servo.units.milliampere):g} mA a unit ({servo.units.source})"
     findings = [Finding(Severity.GOOD, servo.label, f"answers, firmware {servo.firmware}, {unit}")]
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from tauscope_drivers.driver import ArmDescription, Connection, Option, SerialBusDriver
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 
 
 class DynamixelDriver(SerialBusDriver):
@@ -27,7 +27,7 @@ class DynamixelDriver(SerialBusDriver):
         keeps = settings.get("keep_settings", False)
         if not isinstance(keeps, bool):
             text = f"backend {self.name}: keep_settings is {keeps!r:.60}; give true or false"
-            raise DriverError(DriverErrorKind.REFUSED, text)
+            raise DriverError.refusal(text)
         servos = DynamixelArm(arm.joints, slack_s=self.read_patience_s(settings), keeps_settings=keeps)
         return Connection(servos, is_real_time=True)
 

@@ -21,7 +21,7 @@ from tauscope_drivers.dynamixel.preparation import (
 )
 from tauscope_drivers.dynamixel.servo import JointServo
 from tauscope_drivers.dynamixel.session import Session
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 from tauscope_drivers.limits import require_sensible
 from tauscope_drivers.state import Setpoint
 
@@ -146,7 +146,6 @@ def _take(session: Session, joint: int, task: ServoTask) -> int:
 
 
 def _present_position(session: Session, joint: int) -> int:
-    """Present Position of a servo [counts]; one that does not answer is asked again."""
     return session.read(joint, ["Present Position"])["Present Position"]
 
 
@@ -156,9 +155,8 @@ def _range(session: Session, joint: int, limits: DriveLimits, mode: ControlMode)
     servo = session.servos[joint]
     lowest, highest = position_counts(servo, session.settings[joint], low, high, mode)
     if lowest >= highest:
-        raise DriverError(
-            DriverErrorKind.REFUSED,
-            f"{servo.label}: its own Position Limits leave nothing of the range {low:.4g} to {high:.4g}; widen them",
+        raise DriverError.refusal(
+            f"{servo.label}: its own Position Limits leave nothing of the range {low:.4g} to {high:.4g}; widen them"
         )
     return lowest, highest
 
@@ -170,10 +168,9 @@ def _require_in_own_range(session: Session, joint: int, mode: ControlMode, prese
     if not lowest <= present <= highest:
         place = servo.units.position(present)
         ends = sorted((servo.units.position(lowest), servo.units.position(highest)))
-        raise DriverError(
-            DriverErrorKind.REFUSED,
+        raise DriverError.refusal(
             f"{servo.label} stands at {place:.4g}, its own Position Limits are {ends[0]:.4g} to {ends[1]:.4g}; move it "
-            "back by hand, or widen them",
+            "back by hand, or widen them"
         )
 
 
@@ -182,7 +179,6 @@ def _require_adoptable(session: Session, joint: int, mode: ControlMode) -> None:
     servo, settings = session.servos[joint], session.settings[joint]
     wrong_mode = settings["Operating Mode"] != operating_mode(servo, mode)
     if wrong_mode or settings["Drive Mode"] != drive_mode(servo, settings["Drive Mode"]):
-        raise DriverError(
-            DriverErrorKind.REFUSED,
-            f"{servo.label} is under torque in another mode; support the arm, stop it with torque_off, then enable",
+        raise DriverError.refusal(
+            f"{servo.label} is under torque in another mode; support the arm, stop it with torque_off, then enable"
         )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from tauscope_drivers.dynamixel.configuration import ServoConfiguration
 from tauscope_drivers.dynamixel.control_table import ServoModel, find_model, find_model_by_name
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 
 MULTI_TURN_COUNTS = 1_048_575
 """Goal Position reaches this far both ways in the current-based position mode of X and MX."""
@@ -159,7 +159,7 @@ def make_servo(number: int, configuration: ServoConfiguration, identity: tuple[i
     elif configuration.model is not None:
         model, firmware = find_model_by_name(configuration.model), 0
     else:
-        raise DriverError(DriverErrorKind.REFUSED, f"{place}: drive.model is missing; a dry run needs it")
+        raise DriverError.refusal(f"{place}: drive.model is missing; a dry run needs it")
     if configuration.model is not None and find_model_by_name(configuration.model).name != model.name:
         raise _unfit(place, f"is a {model.label}, the robot file says {configuration.model}; correct one of them")
     if not model.senses_current:
@@ -178,15 +178,9 @@ def make_servo(number: int, configuration: ServoConfiguration, identity: tuple[i
     except ValueError as error:
         raise _unfit(place, f"{error}; state drive.milliampere_per_unit") from error
     return JointServo(
-        number,
-        configuration.joint,
-        configuration.servo,
-        model,
-        firmware,
-        units,
-        configuration.current_limit_ma,
+        number, configuration.joint, configuration.servo, model, firmware, units, configuration.current_limit_ma
     )
 
 
 def _unfit(place: str, reason: str) -> DriverError:
-    return DriverError(DriverErrorKind.CANNOT_CONNECT, f"{place} {reason}")
+    return DriverError.no_connection(f"{place} {reason}")

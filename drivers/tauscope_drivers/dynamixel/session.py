@@ -14,7 +14,7 @@ from tauscope_drivers.dynamixel.health import Health
 from tauscope_drivers.dynamixel.original_settings import CHANGED, OriginalSettings
 from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, SETTINGS, RegisterWrite, commissioning_writes
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S
 from tauscope_drivers.serial_servos.bus import FACTORY_RETURN_DELAY_S, PATIENCE_S, learn_latency
 
@@ -140,10 +140,9 @@ def _require_delivered_gear(bus: ServoBus, servo: JointServo) -> None:
     numerator, denominator = (gear[name] for name in ELECTRONIC_GEAR)
     ratio = gear_ratio_of(servo.model.name)
     if numerator != ratio * denominator:
-        raise DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
+        raise DriverError.no_connection(
             f"{servo.label}: its Electronic GearRatio is {numerator}:{denominator}, its counts are right at {ratio}:1; "
-            "set it back with the wizard, and state a reduction of your own as drive.reduction",
+            "set it back with the wizard, and state a reduction of your own as drive.reduction"
         )
 
 
@@ -163,10 +162,9 @@ def read_items(bus: ServoBus, servo: JointServo, names: Iterable[str]) -> dict[s
 def _reach(bus: ServoBus, number: int, configuration: ServoConfiguration) -> JointServo:
     identity = bus.ping(configuration.servo)
     if identity is None:
-        raise DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
+        raise DriverError.no_connection(
             f"joint {configuration.joint}: servo {configuration.servo} does not answer on {bus.port.path} at "
-            f"{bus.port.baudrate} baud; check its power, cable, ID and baud rate",
+            f"{bus.port.baudrate} baud; check its power, cable, ID and baud rate"
         )
     servo = make_servo(number, configuration, identity)
     _let_answer(bus, servo)

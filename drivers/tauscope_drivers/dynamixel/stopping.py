@@ -133,7 +133,6 @@ def _change_to_holding(session: Session, joints: Sequence[int], caps: Sequence[i
 
 
 def _present_counts(session: Session, reading: GroupReading) -> list[int | None]:
-    """Where each servo stands [counts]; None for who did not answer."""
     return [
         None if reading.alerts[joint] is None else servo.units.counts(float(reading.position[joint]))
         for joint, servo in enumerate(session.servos)

@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from tauscope_drivers.clock import Clock
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 from tauscope_drivers.feetech import packets
 from tauscope_drivers.feetech.packets import ANSWER_BYTES, FeetechParser, Status
 from tauscope_drivers.feetech.registers import FEEDBACK, FIRST_IN_RAM, REGISTERS, SPARE_BYTES, TARGETS, Block
@@ -68,10 +68,7 @@ class FeetechBus(SerialServoBus[Status]):
             answer = self._ask(servo, request, block.length, PATIENCE_S)
             if answer is not None:
                 return answer.alarms, block.decode(answer.data)
-        raise DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
-            f"servo {servo} does not answer; check its power, cable, ID and baud rate",
-        )
+        raise DriverError.no_connection(f"servo {servo} does not answer; check its power, cable, ID and baud rate")
 
     def read_once(self, servo: int, block: Block) -> Status | None:
         """A block and some spare bytes, asked for once; None where no answer came that can be believed."""
@@ -95,9 +92,8 @@ class FeetechBus(SerialServoBus[Status]):
             if all(found[name] == value for name, value in values.items()):
                 return
         name, value = next((name, value) for name, value in values.items() if found[name] != value)
-        raise DriverError(
-            DriverErrorKind.REFUSED,
-            f"servo {servo}: {name} was written as {value} and reads {found[name]}; check it with Feetech's FD",
+        raise DriverError.refusal(
+            f"servo {servo}: {name} was written as {value} and reads {found[name]}; check it with Feetech's FD"
         )
 
     def sync_write(self, values: Mapping[int, Mapping[str, int]]) -> None:

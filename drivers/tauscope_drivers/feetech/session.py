@@ -203,15 +203,14 @@ def reach(bus: FeetechBus, number: int, configuration: ServoConfiguration) -> tu
     """
     servo = JointServo(number, configuration)
     if not bus.ping(servo.servo):
-        raise DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
+        raise DriverError.no_connection(
             f"{servo.label} does not answer on {bus.port.path} at {bus.port.baudrate} baud; "
-            "check its power, cable, ID and baud rate",
+            "check its power, cable, ID and baud rate"
         )
     with naming(servo):
         identity = bus.read(servo.servo, IDENTITY)[1]
         if not is_supported(servo.servo, identity):
             device = describe_device(servo.servo, identity)
-            raise DriverError(DriverErrorKind.CANNOT_CONNECT, f"is {device}; this driver knows the STS3215 alone")
+            raise DriverError.no_connection(f"is {device}; this driver knows the STS3215 alone")
         settings = bus.read(servo.servo, SETTINGS)[1]
     return replace(servo, counts_per_speed_unit=speed_unit(settings["Phase"])), settings

@@ -77,14 +77,14 @@ class SerialServoArm(ABC, Generic[_Session]):
         the wrong kind.
         """
         if self._session is not None:
-            raise DriverError(DriverErrorKind.CANNOT_CONNECT, "the arm is connected already; disconnect it first")
+            raise DriverError.no_connection("the arm is connected already; disconnect it first")
         self._lost = ()
         self._port.open()
         try:
             self._session = self._open_session()
         except DriverError as error:
             self._port.close()
-            raise DriverError(DriverErrorKind.CANNOT_CONNECT, str(error), error.faults) from error
+            raise DriverError.no_connection(str(error), error.faults) from error
         return self._observe(self._session, is_health_fresh=True)
 
     def acknowledge_faults(self) -> ArmState:
@@ -117,9 +117,9 @@ class SerialServoArm(ABC, Generic[_Session]):
         """
         session = self._require_session()
         if self._mode is not None:
-            raise DriverError(DriverErrorKind.REFUSED, "the arm is enabled already; stop it first")
+            raise DriverError.refusal("the arm is enabled already; stop it first")
         if reason := self._find_obstacle(mode, stop_policy, watchdog_s):
-            raise DriverError(DriverErrorKind.REFUSED, reason)
+            raise DriverError.refusal(reason)
         with self._watching_the_port():
             self._read_health(session)
             _require_no_faults(session)
@@ -212,7 +212,6 @@ class SerialServoArm(ABC, Generic[_Session]):
             return self._read_state(session, is_health_fresh=is_health_fresh)
 
     def _blind(self) -> ArmState:
-        """State of an arm that cannot be seen."""
         unknown = np.full(len(self._configuration.servos), np.nan)
         nobody = np.zeros(len(unknown), dtype=np.bool_)
         return ArmState(self._clock.now_ns(), unknown, unknown, unknown, unknown, nobody, self._lost)

@@ -7,7 +7,7 @@ packet on only when its latency timer ends.
 from dataclasses import dataclass
 from typing import Protocol
 
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 from tauscope_drivers.serial_port import BITS_PER_BYTE
 
 LARGEST_LOAD = 0.85
@@ -85,9 +85,8 @@ def require_rate(rate_hz: float, traffic: CycleTraffic, timing: BusTiming) -> No
     if rate_hz <= most:
         return
     reason, remedy = largest_part(traffic, timing)
-    raise DriverError(
-        DriverErrorKind.REFUSED,
-        f"{rate_hz:g} Hz: {reason} and {traffic.servos} servos get {most:.0f} Hz at most; {remedy}, or ask for less",
+    raise DriverError.refusal(
+        f"{rate_hz:g} Hz: {reason} and {traffic.servos} servos get {most:.0f} Hz at most; {remedy}, or ask for less"
     )
 
 

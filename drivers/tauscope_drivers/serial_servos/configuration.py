@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from tauscope_drivers.drive_block import DriveJoint, read_text, read_whole, require_distinct, require_known_keys
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 
 DEFAULT_BAUD = 1_000_000
 
@@ -51,5 +51,5 @@ def read_torque_constant(joint: DriveJoint) -> float | None:
     constant = joint.torque_per_unit
     if constant is not None and (not math.isfinite(constant) or constant == 0.0):
         text = f"joint {joint.name}: torque_constant = {constant}; give one that is not zero"
-        raise DriverError(DriverErrorKind.REFUSED, text)
+        raise DriverError.refusal(text)
     return constant

@@ -208,7 +208,6 @@ class EmulatedDrive:
 
     @property
     def _interpolation_s(self) -> float:
-        """Time from one target to the next; 0 where the drive has no such object and finds it from SYNC."""
         if not self.dictionary.has(0x60C2, 1):
             return 0.0
         return self.dictionary.get(0x60C2, 1) * 10.0 ** self.dictionary.get(0x60C2, 2)
@@ -230,7 +229,6 @@ class EmulatedDrive:
         self._nmt = _PRE_OPERATIONAL
 
     def _abort_connection(self) -> None:
-        """Do what 0x6007 says of a connection that is gone."""
         if self.power.state is not PowerState.OPERATION_ENABLED:
             return
         match self.dictionary.get(0x6007):
@@ -242,7 +240,6 @@ class EmulatedDrive:
                 self.power.fail()
 
     def _report(self, error_code: int) -> None:
-        """Keep the error code and send an emergency."""
         self.dictionary.put(0x603F, error_code)
         register = 0x11 if error_code in (HEARTBEAT_LOST, _BUS_OFF_RECOVERED) else 0x01
         self.dictionary.put(0x1001, register)
@@ -251,7 +248,6 @@ class EmulatedDrive:
         self._show_status()
 
     def _follow_network(self, command: int) -> None:
-        """Follow a network-management command."""
         if command in _NMT_RESETS:
             self.power_up()
         else:
@@ -260,7 +256,6 @@ class EmulatedDrive:
             self.power.quick_stop()
 
     def _show_status(self) -> None:
-        """Compose the statusword."""
         word = self.power.state.value
         if self.power.state not in (PowerState.QUICK_STOP_ACTIVE, PowerState.NOT_READY):
             word |= 0x20 if word & 0x07 else 0

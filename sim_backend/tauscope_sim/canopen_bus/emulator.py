@@ -138,7 +138,6 @@ class CanEmulator:
         return None
 
     def _step(self) -> None:
-        """One period of the drives' loops."""
         now_s = self.now_s
         self.schedule.run(now_s, self._carry_out)
         self.driven.step(self._clock.tick)
@@ -157,7 +156,6 @@ class CanEmulator:
                 self._wire.carry(frames, now_s)
 
     def _carry_out(self, fault: InjectedFault) -> None:
-        """Do what a fault does."""
         until_s = self.now_s + fault.seconds
         concerned = [self._drive(fault.device)] if fault.device else list(self.drives)
         match fault.kind:

@@ -48,7 +48,6 @@ class SerialLine:
         return b"t%03X%d%s" % (identifier, len(payload), binascii.hexlify(payload).upper()) + _END
 
     def _obey(self, line: bytes, frames: list[Frame]) -> bytes:
-        """Answer to one command."""
         command = line[:1]
         if command in (b"O", b"L", b"C"):
             self.is_open = command != b"C"
@@ -70,7 +69,6 @@ class SerialLine:
 
 
 def _frame(line: bytes) -> Frame | None:
-    """The frame that a line stands for; None where it is none."""
     digits = _IDENTIFIER_DIGITS[line[:1]]
     try:
         identifier, length = int(line[1 : 1 + digits], 16), int(line[1 + digits : 2 + digits])
@@ -197,7 +195,6 @@ class Wire:
         return (bits + bits / (4.0 * _BITS_PER_STUFFED_BIT)) * self._bit_s
 
     def _arrivals(self, frame: Frame) -> list[float]:
-        """Instants at which a frame arrives: none, one or two."""
         node = frame[0] & 0x7F
         kind, count, seconds = self._faults.get(node, (None, 0, 0.0))
         if kind is None or count <= 0 or not 0x180 <= frame[0] < 0x580:

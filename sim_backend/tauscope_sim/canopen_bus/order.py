@@ -61,11 +61,9 @@ class CanOrder(EmulatorOrder):
         return CanEmulator(drives, driven, now_s, bit_rate, line)
 
     def _file(self, block: Mapping[str, Any]) -> DeviceFile | None:
-        """The EDS or DCF file of a drive, beside the robot file; None where it names none."""
         eds = block.get("eds")
         return None if eds is None else read_device_file(Path(self.robot).parent / eds, block["node_id"])
 
     @property
     def _interface(self) -> str | None:
-        """Of SocketCAN; None for a serial adapter."""
         return self.port.removeprefix(_SOCKET) if self.port.startswith(_SOCKET) else None

@@ -74,12 +74,10 @@ class ProcessData:
         return frames
 
     def _entries(self, mapping: int) -> list[tuple[int, int, int]]:
-        """Index, subindex and bytes of what a PDO holds."""
         words = self._words(mapping, self._dictionary.get(mapping, 0))
         return [(word >> 16, word >> 8 & 0xFF, (word & 0xFF) // 8) for word in words]
 
     def _words(self, mapping: int, count: int) -> list[int]:
-        """The first entries of a mapping, as they were written."""
         return [self._dictionary.get(mapping, subindex) for subindex in range(1, count + 1)]
 
     def _require_mappable(self, mapping: int, word: int) -> None:
@@ -114,5 +112,4 @@ class ProcessData:
             start += size
 
     def _sample(self, pdo: _Pdo) -> bytes:
-        """Payload of a TPDO."""
         return b"".join(self._dictionary.encode(index, subindex) for index, subindex, _ in self._entries(pdo.mapping))

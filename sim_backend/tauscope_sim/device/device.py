@@ -237,13 +237,11 @@ class SimulatedDevice:
             self._trip(*overrun)
 
     def _motion(self) -> Motion:
-        """What the drives' loop sees of the motors."""
         true = self._mechanism.true
         position = true.motor_position + self._disturbances.slip if self._disturbances.any else true.motor_position
         return Motion(position, true.motor_velocity)
 
     def _stop(self, policy: StopPolicy) -> None:
-        """Carry out a stop policy."""
         before, self._activity = self._activity, stopped_by(self._activity, policy)
         self._pending.clear()
         if self._activity is Activity.HOLDING and before is not Activity.HOLDING:
@@ -256,7 +254,6 @@ class SimulatedDevice:
             self._stop(self._enabling.stop_policy)
 
     def _look_for_faults(self) -> None:
-        """Latch what is wrong with the motors now."""
         temperature = self._mechanism.true.temperature + self._disturbances.heat
         for column in np.flatnonzero(temperature > HOTTEST).tolist():
             detail = f"motor at {temperature[column]:.0f} °C, above {HOTTEST:.0f} °C"
@@ -265,6 +262,5 @@ class SimulatedDevice:
             self._trip(FaultCode.OVERLOAD, column + 1, "the drive reports an overload")
 
     def _refuse_faults(self) -> None:
-        """Refuse while a fault is latched."""
         if faults := self._latch.faults:
             raise DriverError(DriverErrorKind.FAULT, "; ".join(str(fault) for fault in faults), faults)

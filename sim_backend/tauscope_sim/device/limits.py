@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope_drivers import DriveLimits, DriverError, Setpoint
-from tauscope_drivers.errors import DriverErrorKind
 
 Array = NDArray[np.float64]
 
@@ -58,10 +57,9 @@ def checked_setpoint(setpoint: Setpoint, joint_count: int) -> Setpoint:
 
 def refused(message: str) -> DriverError:
     """The error of a request that the device does not carry out."""
-    return DriverError(DriverErrorKind.REFUSED, message)
+    return DriverError.refusal(message)
 
 
 def _refuse_first(faulty: NDArray[np.bool_], message: str) -> None:
-    """Name the first joint that is at fault, if there is one."""
     if faulty.any():
         raise refused(f"joint {int(np.argmax(faulty)) + 1}: {message}")

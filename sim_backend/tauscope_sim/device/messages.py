@@ -87,7 +87,6 @@ class FrameBuffer:
 
 
 def _find_kind(kind: int) -> FrameKind:
-    """The kind of a number."""
     try:
         return FrameKind(kind)
     except ValueError as error:
@@ -245,7 +244,6 @@ def _number_out(value: float) -> float | str:
 
 
 def _number_in(value: Any) -> float:
-    """Read a number, or the text of one that JSON cannot hold."""
     if isinstance(value, str) and value in ("inf", "-inf", "nan"):
         return float(value)
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -254,12 +252,10 @@ def _number_in(value: Any) -> float:
 
 
 def _fault_document(fault: Fault) -> dict[str, Any]:
-    """A fault as plain data."""
     return {"code": fault.code, "joint": fault.joint, "detail": fault.detail, "remedy": fault.remedy}
 
 
 def _faults(documents: Any) -> tuple[Fault, ...]:
-    """Faults from plain data."""
     return tuple(
         Fault(
             str(one["code"]),

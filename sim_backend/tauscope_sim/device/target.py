@@ -154,7 +154,6 @@ class SetpointSpline:
         return max(int(waited + _EARLIEST), 0)
 
     def _begin_grid(self, arrival: float) -> int:
-        """Let an arrival be the first of the grid."""
         self._grid, self._arrivals, self._off = arrival, _TOLD if self._is_told else 1, 0
         return 1
 

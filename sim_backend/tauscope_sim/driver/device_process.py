@@ -12,7 +12,6 @@ from types import TracebackType
 
 from tauscope.robot import Robot, robot_to_dict
 from tauscope_drivers import DriverError
-from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.own_process import process_environment
 
 START_TIMEOUT_S = 60.0
@@ -86,7 +85,6 @@ def start_device(
 
 
 def _robot_file(robot: Robot | Path, folder: Path) -> Path:
-    """The robot file, written where the arm is not one already."""
     if isinstance(robot, Path):
         return robot
     file = folder / "device-robot.json"
@@ -95,7 +93,6 @@ def _robot_file(robot: Robot | Path, folder: Path) -> Path:
 
 
 def _await_ready(device: DeviceProcess, log: Path) -> None:
-    """Wait for the process' word that hosts can connect."""
     word = b""
     if (output := device.process.stdout) is not None:
         with output, selectors.DefaultSelector() as selector:
@@ -110,5 +107,4 @@ def _await_ready(device: DeviceProcess, log: Path) -> None:
 
 
 def _cannot_start(message: str) -> DriverError:
-    """The error of a device that cannot be reached."""
-    return DriverError(DriverErrorKind.CANNOT_CONNECT, message)
+    return DriverError.no_connection(message)

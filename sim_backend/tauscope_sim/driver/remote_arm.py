@@ -173,7 +173,6 @@ class RemoteSimulatedArm:
         self._close()
 
     def _state_after(self, kind: FrameKind, body: bytes = b"") -> ArmState:
-        """State that answers a request outside the cycle."""
         return self._state_of(self._patiently(kind, body))
 
     def _patiently(self, kind: FrameKind, body: bytes = b"") -> Frame:
@@ -203,7 +202,6 @@ class RemoteSimulatedArm:
         return reply
 
     def _require_connection(self) -> socket.socket:
-        """The connection; refuses where there is none."""
         if self._socket is None:
             raise DriverError(DriverErrorKind.NOT_CONNECTED, "the arm is not connected; connect it first")
         return self._socket
@@ -222,7 +220,6 @@ class RemoteSimulatedArm:
         raise TimeoutError
 
     def _state_of(self, reply: Frame) -> ArmState:
-        """The reading in a reply."""
         try:
             state = decode_state(reply.body)
         except BadMessageError as error:
@@ -231,12 +228,10 @@ class RemoteSimulatedArm:
         return state
 
     def _miss(self) -> ArmState:
-        """State of a cycle without an answer."""
         nothing = np.full(self._count, np.nan)
         return ArmState(self._clock.now_ns(), nothing, nothing, nothing, nothing, self._enabled)
 
     def _lose(self, reason: str) -> DriverError:
-        """Give the connection up."""
         self._close()
         return DriverError(
             DriverErrorKind.LOST,
@@ -244,7 +239,6 @@ class RemoteSimulatedArm:
         )
 
     def _close(self) -> None:
-        """Close the socket."""
         if self._socket is not None:
             self._socket.close()
         self._socket = None
@@ -252,5 +246,4 @@ class RemoteSimulatedArm:
 
 
 def _cannot_connect(message: str) -> DriverError:
-    """The error of a connection that does not come about."""
-    return DriverError(DriverErrorKind.CANNOT_CONNECT, message)
+    return DriverError.no_connection(message)

@@ -47,12 +47,7 @@ class Pendulums:
     """
 
     def __init__(
-        self,
-        position: ArrayLike,
-        *,
-        inertia: float = 0.05,
-        damping: float = 0.05,
-        weight: float = 0.5,
+        self, position: ArrayLike, *, inertia: float = 0.05, damping: float = 0.05, weight: float = 0.5
     ) -> None:
         """Place them at rest.
 

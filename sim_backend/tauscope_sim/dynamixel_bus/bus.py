@@ -107,7 +107,6 @@ class EmulatedBus:
         self.schedule.run(now_s, lambda fault: self._carry_out(fault, now_s))
 
     def _carry_out(self, fault: InjectedFault, now_s: float) -> None:
-        """Do what a fault does."""
         if fault.kind is FaultKind.POWER_DIP:
             for servo in self.servos:
                 self._restart(servo, now_s + fault.seconds)
@@ -140,7 +139,6 @@ class EmulatedBus:
         return [servo for servo in present if instruction.servo in (servo.servo, BROADCAST_ID)]
 
     def _find_present(self, servos: Sequence[int], now_s: float) -> list[EmulatedServo]:
-        """Present ones of a list, in its order."""
         present = {servo.servo: servo for servo in self._present(now_s)}
         return [present[key] for key in servos if key in present]
 
@@ -281,7 +279,6 @@ class EmulatedBus:
         return [servo for servo in self._present(now_s) if number in (servo.servo, servo.secondary)]
 
     def _write_quietly(self, servo: EmulatedServo, address: int, data: bytes) -> None:
-        """A write that nobody answers, refused or not."""
         try:
             servo.write(address, data)
         except WriteRefusedError:

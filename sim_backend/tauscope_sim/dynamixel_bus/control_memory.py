@@ -264,7 +264,6 @@ class ControlMemory:
         return any(first <= address < after for first, after in self._specification.figures.eeprom)
 
     def _check(self, name: str, value: int) -> None:
-        """Refuse what the servo would refuse."""
         if _READ_ONLY.match(name):
             raise WriteRefusedError(ACCESS_ERROR)
         if self.is_eeprom(name) and self.get("Torque Enable"):
@@ -280,7 +279,6 @@ class ControlMemory:
         return "Bus Watchdog" in self.items and self.get("Bus Watchdog") > 127
 
     def _allows(self, name: str, value: int) -> bool:
-        """Whether a value is within the range of an item."""
         if name in _SYMMETRIC:
             return abs(value) <= self.get(_SYMMETRIC[name])
         if name == "Profile Velocity":

@@ -122,7 +122,6 @@ class DynamixelEmulator:
         return None
 
     def _step(self) -> None:
-        """One period of the servos' loops."""
         self.bus.run_faults(self.now_s)
         position, _ = self.arm.motion
         demands = [
@@ -136,7 +135,6 @@ class DynamixelEmulator:
         self._look()
 
     def _look(self) -> None:
-        """Let the servos see their joints."""
         position, velocity = self.arm.motion
         for servo, *seen in zip(self._servos, position, velocity, self.torque, strict=True):
             servo.take_motion(*map(float, seen))

@@ -54,7 +54,6 @@ class PlantArm:
         return np.clip(wanted, -cap, cap)
 
     def _track(self, error: Array) -> Array:
-        """Torque of the position loops."""
         if self._age == 0:
             matrix, _, load = self._inertia.at(self._position)
             self._own_inertia, self._load = matrix.diagonal().copy(), load.copy()

@@ -80,7 +80,6 @@ class ServoLoop:
         return Demand(tracks=False, torque=current * self._specification.torque_per_unit, cap=limit * unit)
 
     def _position_cap(self) -> int:
-        """Largest current while positions are tracked."""
         memory = self._memory
         if memory.get("Goal PWM") == 0:
             return 0
@@ -106,7 +105,6 @@ class ServoLoop:
 
     @property
     def _velocity_unit(self) -> float:
-        """Joint speed of one unit of velocity [rad/s or m/s]."""
         return self._specification.figures.velocity_unit / self._specification.reduction
 
 

@@ -19,7 +19,6 @@ LARGEST_EXPONENT = 10.0
 
 
 def _not_negative(value: float) -> float:
-    """Zero or more."""
     if value < 0.0:
         raise refusal(f"must be zero or more, but is {value:g}")
     return value
@@ -40,14 +39,12 @@ def _whole(value: Any) -> int:
 
 
 def _seed(value: Any) -> int:
-    """A seed of a random number generator."""
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**63:
         raise refusal(f"must be a whole number of zero or more, but is {shown(value)}")
     return value
 
 
 def _list(value: Any) -> Any:
-    """A list, also where a single number is written."""
     if isinstance(value, list | tuple):
         if not value:
             raise refusal("must not be an empty list; write a number or a list of numbers")
@@ -211,8 +208,6 @@ class FrictionLaw(SmoothSignEffect, JointLaw):
 
 
 class _LawTerm(Term):
-    """A law at its place."""
-
     def __init__(self, joint: int, place: int, side: Side, law: Law) -> None:
         self._joint, self._place, self._side = joint, place, side.value
         self._torque, self._slopes = law

@@ -59,8 +59,6 @@ class ExternalContact(Effect):
 
 
 class _Contact(Term):
-    """Torque on the links within the window."""
-
     def __init__(self, contact: ExternalContact) -> None:
         self._force = None if contact.force is None else np.array(contact.force)
         self._offset = np.array(contact.offset)

@@ -46,8 +46,6 @@ class FrictionCoupling(SmoothSignEffect):
 
 
 class _Coupling(Term):
-    """Friction between two joints."""
-
     def __init__(
         self, joints: tuple[int, int], places: tuple[int, int], sign: float, coulomb: float, viscous: float, k_v: float
     ) -> None:
@@ -71,5 +69,4 @@ class _Coupling(Term):
         slopes.by_velocity[second, first] += self._sign * slope
 
     def _motion(self, moment: Moment) -> float:
-        """Sum or difference of the velocities, w."""
         return moment.velocity[self._places[0]] + self._sign * moment.velocity[self._places[1]]

@@ -106,7 +106,6 @@ class _WarmingFriction(Term):
         temperature[self._joint] = AMBIENT + states[self.first_state]
 
     def _changes(self, moment: Moment) -> tuple[float, float]:
-        """Relative change of the Coulomb and of the viscous part."""
         rise = moment.states[self.first_state]
         coulomb, viscous = (math.expm1(min(c * rise, LARGEST_EXPONENT)) for c in self._coefficients)
         return coulomb, viscous

@@ -119,10 +119,7 @@ class AsymmetricViscous(JointLaw):
 
     def law(self, robot: Robot) -> Law:
         """τ and its derivatives."""
-        return (
-            lambda q, v: self.amplitude * max(v, 0.0),
-            lambda q, v: (0.0, self.amplitude if v > 0.0 else 0.0),
-        )
+        return (lambda q, v: self.amplitude * max(v, 0.0), lambda q, v: (0.0, self.amplitude if v > 0.0 else 0.0))
 
 
 LEAST_SPEED = 1e-3

@@ -92,8 +92,6 @@ class TorqueRipple(AngleHarmonics):
 
 
 class _Ripple(Term):
-    """A gain of the load that depends on the motor's position."""
-
     depends_on_load = True
 
     def __init__(self, joint: int, place: int, sine: Callable[[float], float], slope: Callable[[float], float]) -> None:

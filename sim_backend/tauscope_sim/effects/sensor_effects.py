@@ -64,8 +64,6 @@ class TorqueGainError(SensorEffect):
 
 
 class _Gain:
-    """A factor a joint."""
-
     def __init__(self, gains: Array) -> None:
         self._gains = gains
 
@@ -92,8 +90,6 @@ class TorqueSaturation(SensorEffect):
 
 
 class _Saturation:
-    """A bounded torque of one joint."""
-
     def __init__(self, joint: int, level: float, clip: bool) -> None:
         self._joint, self._level, self._clip = joint, level, clip
 
@@ -133,8 +129,6 @@ class TimeDelay(SensorEffect):
 
 
 class _DelayLine:
-    """Remembers samples for as long as the delay."""
-
     def __init__(self, delay: float, columns: slice) -> None:
         self._delay, self._columns = delay, columns
         self._samples: deque[tuple[float, Array]] = deque()

@@ -167,7 +167,6 @@ class EmulatorServer:
         self._send()
 
     def _send(self) -> None:
-        """What has arrived at the master by now."""
         if arrived := self._emulator.due(self._now_s + (_AT_ONCE_S if self._order.stepped else 0.0)):
             self._port.write(arrived)
 
@@ -181,7 +180,6 @@ class EmulatorServer:
         return [(piece, self._stepped_s)] if piece else [], self._stepped_s
 
     def _instant(self, monotonic_ns: int) -> float:
-        """By the devices' clock [s]."""
         return max(0.0, (monotonic_ns - self._start_ns) * 1e-9)
 
     def _serve_test(self, ready: list[Any]) -> None:
@@ -212,14 +210,12 @@ class EmulatorServer:
             self._test.setblocking(False)
 
     def _step_to(self, instant_s: float) -> None:
-        """Let time pass where only that makes it pass."""
         while self._stepped_s < instant_s:
             self._stepped_s = min(instant_s, self._stepped_s + _PERIOD_S)
             self._emulator.advance_to(self._stepped_s + _ROUNDING_S)
             self._write_trace()
 
     def _describe(self) -> dict[str, Any]:
-        """What the devices are doing, and when, by the machine's clock."""
         return {**self._emulator.describe(), "monotonic_ns": time.monotonic_ns()}
 
     def _write_trace(self) -> None:

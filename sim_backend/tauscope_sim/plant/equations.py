@@ -87,11 +87,7 @@ class Compliance:
 
 
 def _twist(moment: Moment, joint: int, motor: int) -> tuple[float, float]:
-    """Lead of a motor over its link, and its rate."""
-    return (
-        moment.position[motor] - moment.position[joint],
-        moment.velocity[motor] - moment.velocity[joint],
-    )
+    return (moment.position[motor] - moment.position[joint], moment.velocity[motor] - moment.velocity[joint])
 
 
 _SCALE = 2.0 / pi
@@ -278,7 +274,6 @@ class EquationsOfMotion:
 
 
 def _terms(robot: Robot, effects: Sequence[PhysicalEffect], coordinates: Coordinates) -> tuple[Term, ...]:
-    """The robot file's own friction, and what the effects add."""
     own: tuple[Term, ...] = ()
     if robot.model.friction is not None:
         shape = [joint.friction_shape for joint in robot.joints]

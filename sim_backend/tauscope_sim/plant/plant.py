@@ -206,7 +206,6 @@ class Plant:
             self._part = min(max(part * _change(attempt.error), self._shortest), self._longest)
 
     def _number_motors(self, first: int) -> Array:
-        """Numbers of the motors among the coordinates that begin at a place of the vector, (n,)."""
         return np.array([self._vector[first + place] for place in self._motors])
 
 

@@ -16,7 +16,7 @@ from tauscope_drivers.canopen.process_data import (
     decode_mapping,
     plan_pdos,
 )
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 
 _READ = (objects.DEVICE_TYPE, objects.SUPPORTED_MODES, objects.MODE_DISPLAY)
 _WRITTEN = (objects.CONTROLWORD, objects.MODE_OF_OPERATION)
@@ -93,7 +93,6 @@ def _slot(file: DeviceFile, number: int, communication: int, mapping: int) -> Pd
 
 
 def _entries(file: DeviceFile, mapping: int) -> Iterator[DescribedObject]:
-    """Entries of a mapping parameter, in their order."""
     subindex = 1
     while (entry := file.objects.get((mapping, subindex))) is not None:
         yield entry
@@ -165,10 +164,9 @@ def require_identity(file: DeviceFile, dictionary: OptionalReader, place: str) -
         told = dictionary.read_optional(entry)
         is_same = told in (None, stated) or (entry is objects.REVISION and _behaves_alike(told, stated))
         if not is_same:
-            raise DriverError(
-                DriverErrorKind.REFUSED,
+            raise DriverError.refusal(
                 f"{place}: {entry} reads 0x{told:X}, and {file.name} states 0x{stated:X}; "
-                "check drive.node_id, or give the file of this drive",
+                "check drive.node_id, or give the file of this drive"
             )
 
 
