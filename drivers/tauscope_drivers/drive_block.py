@@ -35,7 +35,6 @@ def require_known_keys(joints: Sequence[DriveJoint], bus_keys: Sequence[str], ow
     """Refuse keys that nobody knows, and several buses.
 
     Raises DriverError ``refused``, which names the joint and the key.
-
     `joints`: base first; what they say of the bus stands on the first.
     """
     first = joints[0]
@@ -61,7 +60,6 @@ def read_whole(joint: DriveJoint, key: str, default: int | None, *, least: int, 
     """A whole number.
 
     Raises DriverError ``refused`` where it is none, or out of range.
-
     `default`: where the key is missing; None where it has to be there.
     """
     value = joint.drive.get(key, default)

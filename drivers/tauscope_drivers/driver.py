@@ -125,7 +125,6 @@ class BusDriver(Driver):
         """Devices that answer, whoever they belong to.
 
         Raises DriverError where the port is missing, not permitted or taken.
-
         `bit_rates`: to try [bit/s]; the usual ones where None.
         """
         return self.load("doctor").scan_bus(port, bit_rates)

@@ -46,7 +46,6 @@ def require_sensible(limits: DriveLimits, position: Array, labels: Sequence[str]
     """Refuse limits that leave no motion, are no numbers, or are those of another place.
 
     Raises DriverError ``refused``, which names the joint and the limit.
-
     `position`: (n,), where the arm stands [rad or m].
     """
     joint_count = len(position)

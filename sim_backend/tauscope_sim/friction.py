@@ -58,7 +58,6 @@ def shape_constants(
     """K_v and δ of each joint; zero where the coefficient that they shape is zero and the robot file states none.
 
     Raises RobotFileError where a shape constant that is needed is None.
-
     `friction_shape`: K_v and δ, one entry a joint [s/rad or s/m].
     """
     constants: list[tuple[float, float]] = []

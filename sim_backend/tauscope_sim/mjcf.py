@@ -43,7 +43,6 @@ def read_chain(
     """The chain from body `base` to body `tip`; by default from the root to the deepest body.
 
     Raises RobotFileError if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip.
-
     `path`: where the file lies, for the files that it names; None for text without files beside it; `locked`: position
     of joints that do not move [rad or m].
     """

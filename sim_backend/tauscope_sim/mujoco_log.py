@@ -32,7 +32,6 @@ class MujocoLog:
         """Take a simulation; nothing of it is changed.
 
         Raises RecordingError where a joint is not there, or is no hinge or slide.
-
         `joints`: hinges and slides, base first; None: all of them, as the file has them.
         """
         every = [model.joint(index).name for index in range(model.njnt) if model.jnt_type[index] in HINGE_OR_SLIDE]

@@ -40,7 +40,6 @@ class Scenario:
 
         Raises RobotFileError where the robot file lacks what the simulation needs. Raises ScenarioError where effects
         contradict one another or the robot.
-
         `step_s`: longest step of the integration [s].
         """
         for effect in self.effects:

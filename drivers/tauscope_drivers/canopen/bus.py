@@ -92,7 +92,6 @@ class CanBus:
         """Send frames one after the other, with one write where the adapter takes that.
 
         Raises DriverError ``lost`` where the bus does not take them.
-
         `frames`: iterable of (int, bytes), identifier and payload of each, in their order.
         """
         gathering = self._bus.gathering() if isinstance(self._bus, SerialAdapterBus) else nullcontext()

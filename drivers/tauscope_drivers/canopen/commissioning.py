@@ -98,7 +98,6 @@ def commission_drive(
     """Write all of it by SDO; each value is read back.
 
     Raises DriverError ``refused`` where the drive does not take a value.
-
     `cycle_s`: time between two SYNCs; the drive keeps the one that it knows where None [s].
     """
     write = node.dictionary.write

@@ -226,7 +226,6 @@ class DriveNode:
         """Identifier and payload of its target frames.
 
         Raises DriverError ``refused`` where the target is beyond what the drive can be told.
-
         `position`: of the joint, finite [rad or m]; `torque`: of the joint, finite [Nm or N].
         """
         target = TARGETS[mode][self.mode_numbers[mode]]

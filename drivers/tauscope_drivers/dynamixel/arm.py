@@ -55,7 +55,6 @@ class DynamixelArm(SerialServoArm[Session]):
         """Nothing is opened yet.
 
         Raises DriverError: ``refused``: a ``drive`` block is not valid.
-
         `keeps_settings`: whether changes of EEPROM stay after the arm is let go.
         """
         super().__init__(read_configuration(joints), slack_s, clock)

@@ -128,7 +128,6 @@ def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -
     """Most current within a torque limit, the robot file's limit and the servo's own Current Limit [units].
 
     Raises DriverError ``refused`` where the limit cannot be turned into current, or leaves none.
-
     `torque`: limit of the joint, infinite where there is none [Nm or N].
     """
     cap = settings["Current Limit"]
@@ -151,7 +150,6 @@ def velocity_cap(servo: JointServo, settings: Mapping[str, int], velocity: float
     """Profile Velocity within a speed limit and the servo's own Velocity Limit, beyond which it refuses it [units].
 
     Raises DriverError ``refused`` where the servo's own limit leaves no motion.
-
     `velocity`: limit of the joint, infinite where there is none [rad/s or m/s].
     """
     cap, own = servo.units.velocity_cap(velocity), settings.get("Velocity Limit")

@@ -99,7 +99,6 @@ def servo_units(
     """Units of a servo of this model at its joint.
 
     Raises ValueError where no unit of current is known for the model, and none is given.
-
     `reduction`: turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints.
     `zero_count`: count at which the joint stands at zero; None for the model's own.
     `milliampere`: one unit of Present Current, in place of the model's [mA].
@@ -150,7 +149,6 @@ def make_servo(number: int, configuration: ServoConfiguration, identity: tuple[i
 
     Raises DriverError ``cannot-connect`` where not the model that the robot file names, one that senses no current or
     has no watchdog.
-
     `number`: of the joint, from 1.
     """
     place = f"joint {configuration.joint} (servo {configuration.servo})"

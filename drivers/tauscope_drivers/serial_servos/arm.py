@@ -111,7 +111,6 @@ class SerialServoArm(ABC, Generic[_Session]):
         """Take the arm under power where it stands.
 
         Raises DriverError: ``not-connected``, ``refused`` or ``fault``.
-
         `watchdog_s`: longest silence of the host [s]; `cycle_s`: time between two goals, over which the servos go from
         one to the next; they leap where it is None, or too short for a bus that has to carry the speeds as well [s].
         """

@@ -33,7 +33,6 @@ def read_bus(
     """Bus and servos of an arm.
 
     Raises DriverError ``refused`` where a key is missing, unknown or not usable; names the joint and the key.
-
     `keys`: of a joint's block, that of its ID first; `bauds`: lowest and highest rate [bit/s]; `device`: as an example.
     """
     require_known_keys(joints, ("port", "baud"), keys)

@@ -69,7 +69,6 @@ def scan_bauds(
     """Every servo that answers a ping to all, one baud rate after the other; about a second each.
 
     Raises DriverError ``cannot-connect`` where the port is missing, not permitted or taken.
-
     `bauds`: [bit/s]; `list_servos`: ID, model and firmware of each.
     """
     for baud in bauds:

@@ -133,7 +133,6 @@ class SimulatedDevice:
         """Take the arm under power where it stands.
 
         Raises DriverError: ``refused`` or ``fault``.
-
         `watchdog_s`: time without setpoints after which it does [s].
         """
         if self._activity in COMMANDED:
@@ -152,7 +151,6 @@ class SimulatedDevice:
         """Take the host's setpoint, and feed the watchdog; drives that stopped by a fault do not follow it.
 
         Raises DriverError: ``not-enabled`` or ``refused``.
-
         `sent_ns`: when it was sent, by the device's clock; None for now [ns].
         """
         if self._enabling is None:

@@ -16,7 +16,6 @@ def checked_limits(limits: DriveLimits, position: Array) -> DriveLimits:
 
     Raises DriverError ``refused``: wrong shapes, not-a-number, an empty range, no room to move, or an arm outside its
     range.
-
     `position`: (n,), where the arm stands [rad or m].
     """
     count = len(position)

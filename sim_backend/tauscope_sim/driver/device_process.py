@@ -57,7 +57,6 @@ def start_device(
     """Start a simulated arm in real time, in a session of its own: signals to the caller's group do not reach it.
 
     Raises DriverError ``cannot-connect`` where the process did not start, with its own message.
-
     `start_position`: where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m];
     `linger_s`: how long the process goes on without a host [s].
     """

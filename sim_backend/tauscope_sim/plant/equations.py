@@ -30,7 +30,6 @@ def compliant_transmissions(effects: Sequence[PhysicalEffect], rotor_inertia: Ar
     """Compliant transmissions by joint, counted from 0.
 
     Raises ScenarioError where two effects make the same joint compliant, or both give it a rotor.
-
     `rotor_inertia`: (n,), that effects give to the motors of rigid joints [kg m² or kg].
     """
     found: dict[int, Transmission] = {}
