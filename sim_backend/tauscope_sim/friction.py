@@ -20,21 +20,9 @@ def static_friction_torque(
     Raises RobotFileError where a shape constant that is needed is None, or where the number of entries is not the
     number of joints.
 
-    Parameters
-    ----------
-    velocity : (N, n) float64
-        v = q̇ [rad/s or m/s]
-    friction_shape : sequence of FrictionShape
-        K_v and δ, one entry a joint [s/rad or s/m]; may be None where the coefficient that it shapes is zero
-
-    Returns
-    -------
-    (N, n) float64
-        τ_f, positive where the drive has to overcome it in the positive direction [Nm or N]
-
-    Notes
-    -----
-    The paper's equations (7) and (8); its (7) prints the viscous part without v, its (9) has it.
+    `velocity`: (N, n), v = q̇ [rad/s or m/s]; `friction_shape`: K_v and δ, one entry a joint [s/rad or s/m]; may be None
+    where the coefficient that it shapes is zero. Returns τ_f, (N, n), positive where the drive has to overcome it in
+    the positive direction [Nm or N]. The paper's equations (7) and (8); its (7) prints the viscous part without v.
     """
     joint_count = velocity.shape[1]
     if len(friction) != joint_count or len(friction_shape) != joint_count:

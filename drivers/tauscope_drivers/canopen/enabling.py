@@ -21,14 +21,8 @@ STILL_CYCLES = 4
 def power_up(session: Session, mode: ControlMode) -> tuple[ArmState, Array]:
     """Take all drives to *operation enabled*; targets are where the joints are when their drives get there.
 
-    Raises DriverError: ``fault`` or ``refused``: a drive does not get there.
-
-    Returns
-    -------
-    ArmState
-        of the last cycle
-    (n,) float64
-        targets that the drives stand at [rad or m]
+    Raises DriverError: ``fault`` or ``refused``: a drive does not get there. Returns the state of the last cycle, and
+    the targets that the drives stand at, (n,) [rad or m].
     """
     place = _read_settled_place(session, mode)
 

@@ -10,7 +10,7 @@ from tauscope_drivers.backend import Capabilities, ControlMode, DriveLimits, Sto
 from tauscope_drivers.clock import Clock
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.bus import ServoBus
-from tauscope_drivers.dynamixel.bus_budget import DynamixelTraffic, found_budget, has_room_for_speeds, planned_budget
+from tauscope_drivers.dynamixel.bus_budget import found_budget, has_room_for_speeds, planned_budget
 from tauscope_drivers.dynamixel.configuration import read_configuration
 from tauscope_drivers.dynamixel.control_table import WATCHDOG_MOST, WATCHDOG_STEP_S
 from tauscope_drivers.dynamixel.enabling import Bounds, enable_servos, goals_of
@@ -18,11 +18,11 @@ from tauscope_drivers.dynamixel.group import GroupReading
 from tauscope_drivers.dynamixel.preparation import commissioning_writes
 from tauscope_drivers.dynamixel.session import Session, open_session
 from tauscope_drivers.dynamixel.stopping import clear_errors, clear_watchdogs, stop_servos
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
 from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.limits import RunawayWatch
 from tauscope_drivers.serial_servos.arm import SerialServoArm
-from tauscope_drivers.serial_servos.budget import BusTiming, largest_part, largest_rate_hz
+from tauscope_drivers.serial_servos.budget import BusTiming, CycleTraffic, largest_part, largest_rate_hz
 from tauscope_drivers.serial_servos.bus import PATIENCE_S
 from tauscope_drivers.state import ArmState, Setpoint
 
@@ -93,10 +93,11 @@ class DynamixelArm(SerialServoArm[Session]):
             return f"in {mode} mode the servos' watchdog ends in {wanted}, not in {policy}; ask for {wanted}{other}"
         return None
 
-    def _read_health(self, session: Session) -> None:
+    def _read_faults(self, session: Session) -> tuple[Fault, ...]:
         session.read_health()
+        return session.health.faults
 
-    def _clear_faults(self, session: Session) -> None:
+    def _clear_faults(self, session: Session) -> tuple[Fault, ...]:
         """Clear watchdogs that have fired.
 
         A hardware error (overload, heat …) stays until the servo was switched off and on: it is never restarted from
@@ -111,7 +112,7 @@ class DynamixelArm(SerialServoArm[Session]):
             session.settings[joint] |= session.read(joint, ["Status Return Level"])
             holds = bool(session.health.has_torque[joint])
             session.carry_out(joint, commissioning_writes(servo, session.settings[joint], holds=holds))
-        session.read_health()
+        return self._read_faults(session)
 
     def _take_under_power(
         self, session: Session, mode: ControlMode, limits: DriveLimits, watchdog_s: float, cycle_s: float | None
@@ -182,7 +183,7 @@ class DynamixelArm(SerialServoArm[Session]):
                     session.health.take(joint, {item.name: item.decode(answer.data, item.address)})
         return _arm_state(session, reading, temperature)
 
-    def _budget(self) -> tuple[DynamixelTraffic, BusTiming]:
+    def _budget(self) -> tuple[CycleTraffic, BusTiming]:
         return planned_budget(self._configuration) if self._session is None else found_budget(self._session)
 
 

@@ -7,7 +7,7 @@ from functools import partial
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.bus import ServoBus
-from tauscope_drivers.dynamixel.bus_budget import DynamixelTraffic
+from tauscope_drivers.dynamixel.bus_budget import count_traffic
 from tauscope_drivers.dynamixel.configuration import ServoConfiguration, read_configuration
 from tauscope_drivers.dynamixel.control_table import WATCHDOG_MOST, WATCHDOG_STEP_S, model_names
 from tauscope_drivers.dynamixel.enabling import plan_tasks
@@ -66,7 +66,7 @@ def _examine_servos(
         findings += _rehearse(make_session(bus, servos, found), joints)
         bus.return_delay_s = max(settings["Return Delay Time"] for settings in found) * RETURN_DELAY_UNIT_S
         identifiers, block = [servo.servo for servo in servos], servos[0].model.state_block
-        traffic = DynamixelTraffic(len(servos))
+        traffic = count_traffic(len(servos))
         ask = partial(bus.sync_read, identifiers, block)
         findings.append(measure_loop_rate(bus, ask, traffic, SHORTEST_RETURN_DELAY_S))
     return findings

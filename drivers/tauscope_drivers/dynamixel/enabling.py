@@ -64,14 +64,8 @@ def enable_servos(
 
     An arm may fall meanwhile: each servo is asked where it is at the last moment, and catches its joint there. A servo
     that holds its joint already, in the mode that is asked for, is taken over without letting go. Raises DriverError:
-    ``refused`` or ``cannot-connect``: no servo has torque that had none before.
-
-    Returns
-    -------
-    Bounds
-        for the cyclic exchange
-    list of int
-        Goal Position that each servo was given where positions are tracked [counts]
+    ``refused`` or ``cannot-connect``: no servo has torque that had none before. Returns the bounds of the cyclic
+    exchange, and the Goal Position that each servo was given where positions are tracked [counts].
     """
     tasks, ranges = plan_tasks(session, mode, limits, watchdog_s)
     taken = _give_torque(session, tasks)
@@ -85,14 +79,8 @@ def plan_tasks(
 ) -> tuple[list[ServoTask], list[tuple[int, int]]]:
     """Check everything that enabling needs, and plan it; only reads.
 
-    Raises DriverError: ``refused`` or ``cannot-connect``: names the joint.
-
-    Returns
-    -------
-    list of ServoTask
-        one a joint
-    list of tuple of two int
-        lowest and highest Goal Position, one a joint [counts]
+    Raises DriverError: ``refused`` or ``cannot-connect``: names the joint. Returns one task a joint, and the lowest and
+    highest Goal Position of each [counts].
     """
     steps = watchdog_steps(watchdog_s)
     present = [_present_position(session, joint) for joint in range(len(session.servos))]

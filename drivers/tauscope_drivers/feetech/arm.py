@@ -7,7 +7,8 @@ import numpy as np
 from tauscope_drivers.backend import Capabilities, ControlMode, DriveLimits, StopPolicy
 from tauscope_drivers.clock import Clock
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.feetech.bus import FeetechBus, FeetechTraffic
+from tauscope_drivers.errors import Fault
+from tauscope_drivers.feetech.bus import FeetechBus, count_traffic
 from tauscope_drivers.feetech.commissioning import ServoTask
 from tauscope_drivers.feetech.configuration import read_configuration
 from tauscope_drivers.feetech.enabling import enable_servos, goal_writes, plan_tasks, stop_servos
@@ -17,7 +18,13 @@ from tauscope_drivers.feetech.session import Session, open_session
 from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.serial_port import expect_latency_s
 from tauscope_drivers.serial_servos.arm import SerialServoArm
-from tauscope_drivers.serial_servos.budget import SHORTEST_RETURN_DELAY_S, BusTiming, largest_part, largest_rate_hz
+from tauscope_drivers.serial_servos.budget import (
+    SHORTEST_RETURN_DELAY_S,
+    BusTiming,
+    CycleTraffic,
+    largest_part,
+    largest_rate_hz,
+)
 from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers
 from tauscope_drivers.state import ArmState, Setpoint
 
@@ -71,13 +78,14 @@ class FeetechArm(SerialServoArm[Session]):
             return f"a watchdog of {watchdog_s:g} s; give {shortest:g} to {longest:g} s"
         return None
 
-    def _read_health(self, session: Session) -> None:
+    def _read_faults(self, session: Session) -> tuple[Fault, ...]:
         for joint in range(len(session.servos)):
             session.read_targets(joint)
+        return session.health.faults
 
-    def _clear_faults(self, session: Session) -> None:
+    def _clear_faults(self, session: Session) -> tuple[Fault, ...]:
         session.health.forget()
-        self._read_health(session)
+        return self._read_faults(session)
 
     def _take_under_power(
         self, session: Session, mode: ControlMode, limits: DriveLimits, watchdog_s: float, cycle_s: float | None
@@ -123,8 +131,8 @@ class FeetechArm(SerialServoArm[Session]):
                 break
         return _arm_state(session, answers)
 
-    def _budget(self) -> tuple[FeetechTraffic, BusTiming]:
-        traffic = FeetechTraffic(len(self._configuration.servos))
+    def _budget(self) -> tuple[CycleTraffic, BusTiming]:
+        traffic = count_traffic(len(self._configuration.servos))
         if self._session is None:
             latency_s = expect_latency_s(self._port.path)
             return traffic, BusTiming(self._port.baudrate, SHORTEST_RETURN_DELAY_S, latency_s)

@@ -1,7 +1,6 @@
 """Instructions and their answers on one bus of servos, and what a cycle of them takes."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 
 from tauscope_drivers.clock import Clock
 from tauscope_drivers.errors import DriverError
@@ -9,6 +8,7 @@ from tauscope_drivers.feetech import packets
 from tauscope_drivers.feetech.packets import ANSWER_BYTES, FeetechParser, Status
 from tauscope_drivers.feetech.registers import FEEDBACK, FIRST_IN_RAM, REGISTERS, SPARE_BYTES, TARGETS, Block
 from tauscope_drivers.serial_port import SerialPort
+from tauscope_drivers.serial_servos.budget import CycleTraffic
 from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers, SerialServoBus
 
 _ASK_BYTES = 8
@@ -16,24 +16,11 @@ _GOAL_BYTES = 7
 """ID, position, time and speed."""
 
 
-@dataclass(frozen=True)
-class FeetechTraffic:
+def count_traffic(servos: int) -> CycleTraffic:
     """A cycle: Sync Write of the goals, Sync Read of all servos, a read of one servo's torque and limits."""
-
-    servos: int
-    reads: int = 2
-    delay_remedy: str = "set Return Delay Time to 0 with Feetech's FD"
-
-    @property
-    def bytes(self) -> int:
-        """All bytes of a cycle."""
-        each = _GOAL_BYTES + 1 + ANSWER_BYTES + FEEDBACK.length
-        return 3 * _ASK_BYTES + self.servos * each + ANSWER_BYTES + TARGETS.length
-
-    @property
-    def answers(self) -> int:
-        """Packets that wait for a return delay."""
-        return self.servos + 1
+    each = _GOAL_BYTES + 1 + ANSWER_BYTES + FEEDBACK.length
+    count = 3 * _ASK_BYTES + servos * each + ANSWER_BYTES + TARGETS.length
+    return CycleTraffic(servos, count, servos + 1, 2, "set Return Delay Time to 0 with Feetech's FD")
 
 
 class FeetechBus(SerialServoBus[Status]):

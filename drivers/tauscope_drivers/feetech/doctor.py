@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError
-from tauscope_drivers.feetech.bus import FeetechBus, FeetechTraffic
+from tauscope_drivers.feetech.bus import FeetechBus, count_traffic
 from tauscope_drivers.feetech.commissioning import find_doubts, read_servo, rehearse
 from tauscope_drivers.feetech.configuration import ServoConfiguration, read_configuration
 from tauscope_drivers.feetech.registers import FEEDBACK, IDENTITY, describe_device
@@ -44,7 +44,7 @@ def _examine_servos(
         reading, targets = read_servo(session, joint), session.read_targets(joint)
         findings += find_doubts(servo, reading, limits, targets)
         findings += rehearse(servo, reading, limits)
-    traffic, identifiers = FeetechTraffic(len(servos)), session.identifiers
+    traffic, identifiers = count_traffic(len(servos)), session.identifiers
     rate = measure_loop_rate(bus, lambda: bus.sync_read(identifiers, FEEDBACK), traffic, bus.return_delay_s)
     return [*findings, rate]
 

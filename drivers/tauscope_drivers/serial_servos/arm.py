@@ -4,7 +4,7 @@ import contextlib
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -18,26 +18,7 @@ from tauscope_drivers.serial_servos.budget import BusTiming, CycleTraffic, requi
 from tauscope_drivers.serial_servos.configuration import BusConfiguration
 from tauscope_drivers.state import ArmState, Setpoint
 
-
-class ServoHealth(Protocol):
-    """What is known of the servos' health."""
-
-    @property
-    def faults(self) -> tuple[Fault, ...]:
-        """Of the arm, then joint by joint."""
-        ...
-
-
-class ServoSession(Protocol):
-    """An arm's servos, reached."""
-
-    @property
-    def health(self) -> ServoHealth:
-        """As last read."""
-        ...
-
-
-_Session = TypeVar("_Session", bound=ServoSession)
+_Session = TypeVar("_Session")
 
 
 class SerialServoArm(ABC, Generic[_Session]):
@@ -96,8 +77,7 @@ class SerialServoArm(ABC, Generic[_Session]):
         with self._watching_the_port():
             if self._mode is not None:
                 self.stop(self._policy)
-            self._clear_faults(session)
-        _require_no_faults(session)
+            _require_none(self._clear_faults(session))
         return self._observe(session, is_health_fresh=True)
 
     def enable(
@@ -120,8 +100,7 @@ class SerialServoArm(ABC, Generic[_Session]):
         if reason := self._find_obstacle(mode, stop_policy, watchdog_s):
             raise DriverError.refusal(reason)
         with self._watching_the_port():
-            self._read_health(session)
-            _require_no_faults(session)
+            _require_none(self._read_faults(session))
             self._pace = self._take_under_power(session, mode, limits, watchdog_s, cycle_s)
         self._mode, self._policy, self._watchdog_s = mode, stop_policy, watchdog_s
         self._last_exchange_ns = self._clock.now_ns()
@@ -176,11 +155,11 @@ class SerialServoArm(ABC, Generic[_Session]):
         """Why the servos cannot do by themselves what is asked when the host is gone; None where they can."""
 
     @abstractmethod
-    def _read_health(self, session: _Session) -> None: ...
+    def _read_faults(self, session: _Session) -> tuple[Fault, ...]: ...
 
     @abstractmethod
-    def _clear_faults(self, session: _Session) -> None:
-        """Clear what the operator knows of, and read the health anew; moves nothing."""
+    def _clear_faults(self, session: _Session) -> tuple[Fault, ...]:
+        """Clear what the operator knows of, and read what stays; moves nothing."""
 
     @abstractmethod
     def _take_under_power(
@@ -235,6 +214,6 @@ class SerialServoArm(ABC, Generic[_Session]):
             raise
 
 
-def _require_no_faults(session: ServoSession) -> None:
-    if faults := session.health.faults:
+def _require_none(faults: tuple[Fault, ...]) -> None:
+    if faults:
         raise DriverError(DriverErrorKind.FAULT, f"{faults[0]}", faults)

@@ -5,7 +5,6 @@ packet on only when its latency timer ends.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 from tauscope_drivers.errors import DriverError
 from tauscope_drivers.serial_port import BITS_PER_BYTE
@@ -20,33 +19,19 @@ SHORTEST_RETURN_DELAY_S = 2e-6
 """Of a servo whose Return Delay Time is 0 [s]."""
 
 
-class CycleTraffic(Protocol):
-    """What goes over the bus in one cycle."""
+@dataclass(frozen=True)
+class CycleTraffic:
+    """What goes over the bus in one cycle.
 
-    @property
-    def servos(self) -> int:
-        """Number of servos."""
-        ...
+    `bytes`: without stuffing; `answers`: packets that wait for a return delay; `reads`: that wait for the adapter.
+    `delay_remedy`: what to do about a long return delay.
+    """
 
-    @property
-    def bytes(self) -> int:
-        """All bytes, without stuffing."""
-        ...
-
-    @property
-    def answers(self) -> int:
-        """Packets that wait for a return delay."""
-        ...
-
-    @property
-    def reads(self) -> int:
-        """Reads that wait for the adapter."""
-        ...
-
-    @property
-    def delay_remedy(self) -> str:
-        """What to do about a long return delay."""
-        ...
+    servos: int
+    bytes: int
+    answers: int
+    reads: int
+    delay_remedy: str
 
 
 @dataclass(frozen=True)

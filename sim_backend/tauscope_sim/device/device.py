@@ -13,7 +13,7 @@ from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device.activity import COMMANDED, POWERED, Activity, commanded_by, stopped_by
 from tauscope_sim.device.drives import Drives, Motion
 from tauscope_sim.device.faults import Disturbances, FaultCode, FaultLatch, Injection, device_fault
-from tauscope_sim.device.limits import checked_limits, checked_setpoint, refused
+from tauscope_sim.device.limits import checked_limits, checked_setpoint
 from tauscope_sim.device.mechanism import Mechanism
 from tauscope_sim.scenario import Scenario
 
@@ -136,11 +136,13 @@ class SimulatedDevice:
         `watchdog_s`: time without setpoints after which it does [s].
         """
         if self._activity in COMMANDED:
-            raise refused("the arm is enabled already; stop it before enabling it again")
+            raise DriverError.refusal("the arm is enabled already; stop it before enabling it again")
         self._refuse_faults()
         shortest, longest = WATCHDOG_RANGE_S
         if not shortest <= watchdog_s <= longest:
-            raise refused(f"the watchdog's time {watchdog_s} s is not within {shortest} to {longest} s; choose another")
+            raise DriverError.refusal(
+                f"the watchdog's time {watchdog_s} s is not within {shortest} to {longest} s; choose another"
+            )
         motion = self._motion()
         self._drives.enable(self._activity, motion, checked_limits(limits, motion.position))
         self._enabling = _Enabling(stop_policy, round(watchdog_s * 1e9))
@@ -188,7 +190,7 @@ class SimulatedDevice:
         Faults and disturbances are gone afterwards. Raises DriverError: ``refused`` while the arm is enabled.
         """
         if self._activity in COMMANDED:
-            raise refused("the arm is enabled; stop it before carrying it back")
+            raise DriverError.refusal("the arm is enabled; stop it before carrying it back")
         self._enabling = None
         self._activity = Activity.BRAKED
         self._latch.clear()
@@ -198,7 +200,7 @@ class SimulatedDevice:
     def inject(self, injection: Injection) -> None:
         """Make a disturbance happen. Raises DriverError ``refused`` where no such joint."""
         if not 1 <= injection.joint <= self.capabilities.joint_count:
-            raise refused(
+            raise DriverError.refusal(
                 f"joint {injection.joint}: the arm has {self.capabilities.joint_count} joints; name one of them"
             )
         begins = max(injection.start_ns, self._sample_ns + TICK_NS)

@@ -3,7 +3,8 @@
 import json
 import math
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -111,10 +112,8 @@ def encode_document(document: Mapping[str, Any]) -> bytes:
 
 def decode_document(body: bytes) -> dict[str, Any]:
     """Plain data from JSON. Raises BadMessageError where it is not a JSON object."""
-    try:
+    with _expecting("JSON"):
         document = json.loads(body)
-    except (ValueError, RecursionError) as error:
-        raise BadMessageError("the body is not JSON") from error
     if not isinstance(document, dict):
         raise BadMessageError("the body is not a JSON object")
     return document
@@ -149,14 +148,12 @@ def encode_state(state: ArmState) -> bytes:
 
 def decode_state(body: bytes) -> ArmState:
     """The reading that `encode_state` wrote. Raises BadMessageError where it does not hold a reading."""
-    try:
+    with _expecting("a reading of the arm"):
         time_ns, count = _STATE_HEAD.unpack_from(body)
         numbers = np.frombuffer(body, "<f8", 4 * count, _STATE_HEAD.size).astype(np.float64).reshape(4, count)
         end = _STATE_HEAD.size + 33 * count
         enabled = np.frombuffer(body, np.uint8, count, end - count).astype(np.bool_)
         faults = _faults(json.loads(body[end:])) if len(body) > end else ()
-    except (struct.error, ValueError, TypeError, KeyError) as error:
-        raise BadMessageError("the body is not a reading of the arm") from error
     position, velocity, effort, temperature = numbers
     return ArmState(time_ns, position, velocity, effort, temperature, enabled, faults)
 
@@ -170,11 +167,9 @@ def encode_error(error: DriverError) -> bytes:
 def decode_error(body: bytes) -> DriverError:
     """The error that `encode_error` wrote. Raises BadMessageError where it does not hold one."""
     document = decode_document(body)
-    try:
+    with _expecting("an error"):
         kind = DriverErrorKind(document["kind"])
         return DriverError(kind, str(document["message"]), _faults(document["faults"]))
-    except (ValueError, TypeError, KeyError) as error:
-        raise BadMessageError("the body is not an error") from error
 
 
 def encode_enable(mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> bytes:
@@ -191,14 +186,12 @@ def encode_enable(mode: ControlMode, limits: DriveLimits, stop_policy: StopPolic
 def decode_enable(body: bytes) -> tuple[ControlMode, DriveLimits, StopPolicy, float]:
     """The arguments of `encode_enable`. Raises BadMessageError where a field is missing or of the wrong kind."""
     document = decode_document(body)
-    try:
+    with _expecting("a request to enable"):
         limits = DriveLimits(
             **{name: np.array([_number_in(x) for x in document["limits"][name]]) for name in _LIMIT_FIELDS}
         )
         mode, policy = ControlMode(document["mode"]), StopPolicy(document["stop_policy"])
         return mode, limits, policy, _number_in(document["watchdog_s"])
-    except (ValueError, TypeError, KeyError, OverflowError) as error:
-        raise BadMessageError("the body is not a request to enable") from error
 
 
 def encode_stop(policy: StopPolicy) -> bytes:
@@ -208,10 +201,8 @@ def encode_stop(policy: StopPolicy) -> bytes:
 
 def decode_stop(body: bytes) -> StopPolicy:
     """The policy of `encode_stop`. Raises BadMessageError where it names no policy."""
-    try:
+    with _expecting("a request to stop"):
         return StopPolicy(decode_document(body)["policy"])
-    except (ValueError, KeyError) as error:
-        raise BadMessageError("the body is not a request to stop") from error
 
 
 def encode_injection(injection: Injection) -> bytes:
@@ -225,7 +216,7 @@ def decode_injection(body: bytes) -> Injection:
     Raises BadMessageError where a field is missing or of the wrong kind.
     """
     document = decode_document(body)
-    try:
+    with _expecting("a disturbance"):
         duration = document["duration_ns"]
         return Injection(
             kind=Disturbance(document["kind"]),
@@ -234,8 +225,15 @@ def decode_injection(body: bytes) -> Injection:
             duration_ns=None if duration is None else int(duration),
             size=float(document["size"]),
         )
-    except (ValueError, TypeError, KeyError, OverflowError) as error:
-        raise BadMessageError("the body is not a disturbance") from error
+
+
+@contextmanager
+def _expecting(what: str) -> Iterator[None]:
+    """Whatever else is found is a bad message."""
+    try:
+        yield
+    except (struct.error, ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
+        raise BadMessageError(f"the body is not {what}") from error
 
 
 def _number_out(value: float) -> float | str:

@@ -54,19 +54,8 @@ class InertiaSchedule:
     def at(self, position: Array) -> tuple[Array, Array, Array]:
         """What scales damping and stiffness, and what carries the resting arm; overwritten by the next call.
 
-        Parameters
-        ----------
-        position : (n,) float64
-            q [rad or m]
-
-        Returns
-        -------
-        damping : (n, n) float64
-            H(q), scaled down where transmissions are compliant [kg m² or kg]
-        stiffness : (n, n) float64
-            likewise, less so [kg m² or kg]
-        load : (n,) float64
-            gravity's torque [Nm or N]
+        `position`: (n,), q [rad or m]. Returns H(q), scaled down where transmissions are compliant, (n, n) [kg m² or
+        kg]; likewise, less so, (n, n); gravity's torque, (n,) [Nm or N].
         """
         self._bodies.update(position, self._rest)
         matrix, load = self._bodies.mass_matrix(), self._bodies.bias

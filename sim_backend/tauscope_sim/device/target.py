@@ -84,19 +84,9 @@ class SetpointSpline:
         self._points[:] = position
 
     def at(self, time: float) -> tuple[Array, Array]:
-        """Target at an instant.
+        """Target [rad or m] and its rate [per tick] at an instant, each (n,).
 
-        Parameters
-        ----------
-        time : float
-            not long before the last setpoint [ticks]
-
-        Returns
-        -------
-        position : (n,) float64
-            target [rad or m]
-        velocity : (n,) float64
-            its rate [rad or m, per tick]
+        `time`: not long before the last setpoint [ticks].
         """
         overdue = (time - self._grid) / self._period
         rate = 1.0 / self._period

@@ -62,7 +62,9 @@ def start_device(
     """
     socket, trace, log = folder / "device.sock", folder / "device.csv", folder / "device.log"
     if len(os.fsencode(socket)) > _LONGEST_SOCKET_PATH:
-        raise _cannot_start(f"{socket}: longer than a socket's path can be; choose a folder with a shorter path")
+        raise DriverError.no_connection(
+            f"{socket}: longer than a socket's path can be; choose a folder with a shorter path"
+        )
     command = [sys.executable, "-m", "tauscope_sim.device", "--linger", str(linger_s)]
     command += ["--robot", str(_robot_file(robot, folder)), "--socket", str(socket), "--trace", str(trace)]
     if scenario is not None:
@@ -102,8 +104,4 @@ def _await_ready(device: DeviceProcess, log: Path) -> None:
     device.end()
     lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
     reason = lines[-1].removeprefix("error: ") if lines else f"not ready within {START_TIMEOUT_S:.0f} s"
-    raise _cannot_start(f"the simulated arm's process did not start: {reason}")
-
-
-def _cannot_start(message: str) -> DriverError:
-    return DriverError.no_connection(message)
+    raise DriverError.no_connection(f"the simulated arm's process did not start: {reason}")

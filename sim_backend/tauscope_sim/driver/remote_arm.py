@@ -88,14 +88,14 @@ class RemoteSimulatedArm:
         of joints.
         """
         if self._socket is not None:
-            raise _cannot_connect("the arm is connected already; disconnect it first")
+            raise DriverError.no_connection("the arm is connected already; disconnect it first")
         connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             connection.settimeout(_PATIENCE_S)
             connection.connect(str(self._path))
         except OSError as error:
             connection.close()
-            raise _cannot_connect(
+            raise DriverError.no_connection(
                 f"{self._path}: no simulated arm answers there ({error.strerror}); start it"
             ) from error
         self._socket, self._buffer = connection, FrameBuffer()
@@ -103,14 +103,14 @@ class RemoteSimulatedArm:
             hello = encode_document({"protocol": PROTOCOL, "process": os.getpid()})
             welcome = decode_document(self._request(FrameKind.HELLO, hello).body)
             if welcome.get("joint_count") != self._count:
-                raise _cannot_connect(
+                raise DriverError.no_connection(
                     f"{self._path}: the simulated arm has {welcome.get('joint_count')} joints, the robot file "
                     f"{self._count}; start the device with this robot file"
                 )
             return self._state_after(FrameKind.READ)
         except (DriverError, BadMessageError) as error:
             self._close()
-            raise _cannot_connect(str(error)) from error
+            raise DriverError.no_connection(str(error)) from error
 
     def acknowledge_faults(self) -> ArmState:
         """Clear the latched faults; see `drivers.Backend`."""
@@ -243,7 +243,3 @@ class RemoteSimulatedArm:
             self._socket.close()
         self._socket = None
         self._enabled = np.zeros(self._count, dtype=np.bool_)
-
-
-def _cannot_connect(message: str) -> DriverError:
-    return DriverError.no_connection(message)

@@ -31,43 +31,11 @@ class ModelFigures:
     gear_ratio: int = 1
 
 
-_X = ModelFigures(
-    counts_per_turn=4096,
-    zero_count=2048,
-    velocity_unit=0.0239691227,
-    milliampere=2.69,
-    current_limit=1193,
-    velocity_limit=200,
-    pwm_limit=885,
-    modes=(0, 1, 3, 4, 5, 16),
-    goal_current_caps_position=False,
-    eeprom=((0, 64),),
-)
-_P = ModelFigures(
-    counts_per_turn=1_003_846,
-    zero_count=0,
-    velocity_unit=0.0010471976,
-    milliampere=1.0,
-    current_limit=22_740,
-    velocity_limit=2_900,
-    pwm_limit=2_009,
-    modes=(0, 1, 3, 4, 16),
-    goal_current_caps_position=True,
-    eeprom=((0, 512),),
-)
-_Y = ModelFigures(
-    counts_per_turn=524_288,
-    zero_count=0,
-    velocity_unit=0.0010471976,
-    milliampere=10.0,
-    current_limit=2_080,
-    velocity_limit=2_020,
-    pwm_limit=1_000,
-    modes=(0, 1, 3),
-    goal_current_caps_position=True,
-    eeprom=((0, 8), (10, 15), (32, 152), (256, 512)),
-    gear_ratio=99,
-)
+# counts a turn, at zero, units of velocity and current, limits of current, velocity and PWM, modes, cap, EEPROM, gear
+_X = ModelFigures(4096, 2048, 0.0239691227, 2.69, 1193, 200, 885, (0, 1, 3, 4, 5, 16), False, ((0, 64),))
+_P = ModelFigures(1_003_846, 0, 0.0010471976, 1.0, 22_740, 2_900, 2_009, (0, 1, 3, 4, 16), True, ((0, 512),))
+_Y_EEPROM = ((0, 8), (10, 15), (32, 152), (256, 512))
+_Y = ModelFigures(524_288, 0, 0.0010471976, 10.0, 2_080, 2_020, 1_000, (0, 1, 3), True, _Y_EEPROM, 99)
 
 MODELS: dict[int, ModelFigures] = {
     1020: _X,

@@ -98,7 +98,6 @@ class _Change(Term):
 class RotorInertia(JointEffect):
     """τ = J q̈.
 
-    `joint`: its number, counted from 1.
     `inertia`: J, the rotor's inertia times the square of the gear ratio [kg m² or kg].
     """
 

@@ -180,10 +180,7 @@ class Side(StrEnum):
 
 
 class JointLaw(JointEffect):
-    """An effect τ(q, v) of one joint; q and v are the motor's, or the link's where it acts on that side.
-
-    `joint`: its number, counted from 1.
-    """
+    """An effect τ(q, v) of one joint; q and v are the motor's, or the link's where it acts on that side."""
 
     side: ClassVar[Side] = Side.MOTOR
 
@@ -198,11 +195,7 @@ class JointLaw(JointEffect):
 
 
 class FrictionLaw(SmoothSignEffect, JointLaw):
-    """A friction law τ(q, v) of one joint that uses A(v).
-
-    `joint`: its number, counted from 1.
-    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
-    """
+    """A friction law τ(q, v) of one joint that uses A(v)."""
 
     side: ClassVar[Side] = Side.FRICTION
 

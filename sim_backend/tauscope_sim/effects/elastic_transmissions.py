@@ -11,7 +11,6 @@ from tauscope_sim.plant.term import Transmission
 class JointElasticity(JointEffect):
     """T = K (θ - q) + D (θ̇ - q̇).
 
-    `joint`: its number, counted from 1.
     `stiffness`: K [Nm/rad or N/m].
     `damping`: D [Nm s/rad or N s/m].
     `rotor_inertia`: J [kg m² or kg].
@@ -42,7 +41,6 @@ class JointElasticity(JointEffect):
 class Backlash(JointEffect):
     """T = k x max(0, 1 + c sgn(x) δ̇) beyond a dead zone.
 
-    `joint`: its number, counted from 1.
     `gap`: b, total lost motion [rad or m].
     `contact_stiffness`: k, of teeth and transmission together [Nm/rad or N/m].
     `contact_damping`: c [s/rad or s/m].

@@ -17,7 +17,6 @@ class FrictionCoupling(SmoothSignEffect):
     """τ_j = f, τ_k = s f with f = c A(v_j + s v_k) + d (v_j + s v_k).
 
     `joint`: j, counted from 1.
-    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
     `other_joint`: k, counted from 1.
     `coulomb`: c [Nm or N].
     `viscous`: d [Nm s/rad or N s/m].

@@ -31,7 +31,6 @@ LARGEST_EXPONENT = 20.0
 class FrictionDrift(JointEffect):
     """Static friction times e^{c ϑ}, with ϑ from dissipated heat.
 
-    `joint`: its number, counted from 1.
     `thermal_resistance`: R [K/W].
     `time_constant`: T [s].
     `coulomb_per_kelvin`: c_c [1/K].

@@ -16,8 +16,6 @@ from tauscope_sim.plant.term import LARGEST_GAIN, Coordinates, Forces, Moment, S
 class LoadDependentFriction(SmoothSignEffect):
     """τ = μ |L| A(v).
 
-    `joint`: its number, counted from 1.
-    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
     `mu`: μ [Nm/Nm].
     """
 

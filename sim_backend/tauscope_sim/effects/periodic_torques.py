@@ -15,7 +15,6 @@ from tauscope_sim.plant.term import LARGEST_GAIN, Coordinates, Forces, Moment, S
 class AngleHarmonics(JointEffect):
     """s(q) = Σ a_i sin(k_i q' + φ_i), with q' = q, or gear ratio × q where it is periodic in the motor's angle.
 
-    `joint`: its number, counted from 1.
     `phase`: φ_i, a number or one an order [rad].
     """
 
@@ -55,7 +54,6 @@ class AngleHarmonics(JointEffect):
 class Cogging(AngleHarmonics, JointLaw):
     """τ = Σ a_i sin(k_i q' + φ_i).
 
-    `joint`: its number, counted from 1.
     `amplitude`: a_i, a number or one an order [Nm or N].
     `phase`: φ_i, a number or one an order [rad].
     """
@@ -71,7 +69,6 @@ class Cogging(AngleHarmonics, JointLaw):
 class TorqueRipple(AngleHarmonics):
     """τ = L Σ a_i sin(k_i q' + φ_i).
 
-    `joint`: its number, counted from 1.
     `amplitude`: a_i, a number or one an order [Nm/Nm].
     `phase`: φ_i, a number or one an order [rad].
     """
@@ -110,7 +107,6 @@ class _Ripple(Term):
 class JointSpring(JointLaw):
     """τ = k (q - q₀), between two links: the transmission carries it.
 
-    `joint`: its number, counted from 1.
     `stiffness`: k [Nm/rad or N/m].
     `rest`: q₀, where the spring is slack [rad or m].
     """
@@ -132,7 +128,6 @@ LEAST_STRETCH = 1e-6
 class CableForce(JointLaw):
     """τ = ±k max(±(q - q_c), 0)^p, between two links: the transmission carries it.
 
-    `joint`: its number, counted from 1.
     `stiffness`: k [Nm/rad^p or N/m^p].
     `angle`: q_c, where it begins [rad or m].
     """
@@ -164,7 +159,6 @@ class CableForce(JointLaw):
 class TorqueOffset(JointLaw):
     """τ = c.
 
-    `joint`: its number, counted from 1.
     `torque`: c [Nm or N].
     """
 

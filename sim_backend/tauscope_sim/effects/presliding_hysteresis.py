@@ -28,7 +28,6 @@ Array = NDArray[np.float64]
 class PreslidingHysteresis(JointEffect):
     """Dahl's or the LuGre model in place of the joint's Coulomb friction.
 
-    `joint`: its number, counted from 1.
     `distance`: x_s, over which friction builds up [rad or m].
     `damping`: σ₁ of the LuGre model [Nm s/rad or N s/m].
     """

@@ -17,23 +17,9 @@ class Channel(Protocol):
     """A sensor effect at work: it sees the samples in the order of time, and only those of the past."""
 
     def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        """What is recorded in place of a sample.
+        """Position and torque that are recorded in place of a sample's, each (n,) [rad or m; Nm or N].
 
-        Parameters
-        ----------
-        time : float
-            of the sample [s]
-        position : (n,) float64
-            [rad or m]
-        torque : (n,) float64
-            [Nm or N]
-
-        Returns
-        -------
-        position : (n,) float64
-            [rad or m]
-        torque : (n,) float64
-            [Nm or N]
+        `time`: of the sample [s]; `position`: (n,) [rad or m]; `torque`: (n,) [Nm or N].
         """
         ...
 
@@ -47,10 +33,7 @@ class SensorEffect(ScenarioEntry):
 
 
 class TorqueGainError(SensorEffect):
-    """τ_recorded = gain τ.
-
-    `joint`: its number, counted from 1.
-    """
+    """τ_recorded = gain τ."""
 
     effect_id: ClassVar[str] = "torque_gain_error"
     joint: JointNumber
@@ -75,7 +58,6 @@ class _Gain:
 class TorqueSaturation(SensorEffect):
     """τ_recorded = c tanh(τ/c), or τ clipped to ±c.
 
-    `joint`: its number, counted from 1.
     `level`: c [Nm or N].
     """
 

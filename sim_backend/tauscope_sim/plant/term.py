@@ -225,29 +225,12 @@ def loaded_accelerations(
     solution, without a lag of one step. Raises ScenarioError where a transmission would lose more than `LARGEST_GAIN`
     of its load.
 
-    Parameters
-    ----------
-    mass_matrix : (2, n, n) float64
-        H with the rotors J on its diagonal, and H - J without [kg m² or kg]
-    drive : (n,) float64
-        u less what does not depend on the load [Nm or N]
-    link_side : (n,) float64
-        h, torque on the link's side [Nm or N]
-    gain : (n,) float64
-        g of each joint
-    friction : (n,) float64
-        f of each joint, zero or of any sign; |g| + |f| below 1
-    load : (n,) float64
-        L, a first guess of which only the signs count [Nm or N]
-
-    Returns
-    -------
-    acceleration : (n,) float64
-        q̈ [rad/s² or m/s²]
-    load : (n,) float64
-        L [Nm or N]
-    matrix : (n, n) float64
-        H + D (H - J) at the solution [kg m² or kg]
+    `mass_matrix`: (2, n, n), H with the rotors J on its diagonal, and H - J without [kg m² or kg].
+    `drive`: (n,), u less what does not depend on the load [Nm or N].
+    `link_side`: (n,), h, torque on the link's side [Nm or N].
+    `gain`, `friction`: (n,), g and f of each joint, f zero or of any sign; |g| + |f| below 1.
+    `load`: (n,), L, a first guess of which only the signs count [Nm or N].
+    Returns q̈, (n,) [rad/s² or m/s²]; L, (n,) [Nm or N]; H + D (H - J) at the solution, (n, n) [kg m² or kg].
     """
     worst = int(np.argmax(np.abs(gain) + np.abs(friction)))
     if not abs(gain[worst]) + abs(friction[worst]) <= LARGEST_GAIN:
