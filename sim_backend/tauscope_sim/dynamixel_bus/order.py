@@ -3,14 +3,17 @@
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
-from tauscope_sim.dynamixel_bus.arm import MovedArm, Pendulums
+from tauscope_sim.dynamixel_bus.arm import Pendulums
 from tauscope_sim.dynamixel_bus.bus import EmulatedBus
 from tauscope_sim.dynamixel_bus.control_memory import ServoSpecification
 from tauscope_sim.dynamixel_bus.emulator import DynamixelEmulator
 from tauscope_sim.dynamixel_bus.servo import EmulatedServo
 from tauscope_sim.emulation.emulator import EmulatorOrder
+
+if TYPE_CHECKING:
+    from tauscope_sim.dynamixel_bus.plant_arm import PlantArm
 
 _Servo = TypeVar("_Servo")
 
@@ -52,7 +55,7 @@ class ServoOrder(EmulatorOrder, Generic[_Servo]):
         """The emulator. `now_s`: present instant [s]."""
         return DynamixelEmulator(self.make_bus(), self._arm(), now_s, latency_s=self.latency_s)
 
-    def _arm(self) -> MovedArm:
+    def _arm(self) -> "Pendulums | PlantArm":
         if self.robot is None:
             return Pendulums(self.start, weight=self.weight)
         # The physics take seconds to import; a test of the bus alone does without.

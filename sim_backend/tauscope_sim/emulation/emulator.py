@@ -13,6 +13,8 @@ from dataclasses import asdict
 from math import ceil
 from typing import Any, Protocol, Self
 
+from tauscope_sim.emulation.fault_kit import InjectedFault, faults_from
+
 STEP_S = 1e-3
 """Period of the devices' own loops and of the physics [s]."""
 
@@ -56,45 +58,82 @@ class DeviceClock:
             step()
 
 
-class Emulator(Protocol):
+class Emulator(ABC):
     """Devices on one bus with the arm that they move; the instants are those of the server's clock."""
+
+    def __init__(self, now_s: float) -> None:
+        """Everything at rest; the arm stands on a stand until all its devices have had torque once."""
+        self._clock = DeviceClock(now_s)
 
     @property
     def now_s(self) -> float:
         """Instant up to which the devices have come [s]."""
-        ...
+        return self._clock.now_s
 
     @property
+    @abstractmethod
     def next_due_s(self) -> float:
         """When the next bytes reach the master; infinite where none are under way [s]."""
-        ...
 
+    @abstractmethod
     def hears(self, baud: int) -> bool:
         """Whether a master that has set this baud rate is understood. `baud`: of the master's port [bit/s]."""
-        ...
 
+    @abstractmethod
     def receive(self, data: bytes, now_s: float) -> None:
         """Take bytes of the master. `now_s`: when [s]."""
-        ...
 
     def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
         """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
 
         `now_s`: present instant [s].
         """
-        ...
+        self._clock.catch_up(now_s, self._step, most_steps)
 
+    @abstractmethod
     def due(self, now_s: float) -> bytes:
         """Bytes that have reached the master by now. `now_s`: present instant [s]."""
-        ...
 
+    @abstractmethod
     def describe(self) -> dict[str, Any]:
         """What the devices are doing, as plain data."""
-        ...
 
     def answer(self, request: dict[str, Any]) -> dict[str, int] | None:
-        """Do what a test asks; returns ``{"value": …}`` where it asks for one."""
-        ...
+        """Do what a test asks.
+
+        `request`: ``{"inject": [fault, …]}``, ``{"get": [device, place]}``, ``{"put": [device, place, value]}``,
+        ``{"stand": bool}`` (put the stand under it, or take it away), or nothing of these. A place is an item's name,
+        or index and subindex.
+        """
+        if "inject" in request:
+            self.inject(faults_from(request["inject"], self.now_s))
+        elif "get" in request:
+            return {"value": self.get(*request["get"])}
+        elif "put" in request:
+            self.put(*request["put"])
+        elif "stand" in request:
+            self.set_stand(request["stand"])
+        return None
+
+    @abstractmethod
+    def inject(self, faults: list[InjectedFault]) -> None:
+        """Plan faults, and carry out those that are due."""
+
+    @abstractmethod
+    def get(self, device: int, place: Any) -> int:
+        """What a device holds."""
+
+    @abstractmethod
+    def put(self, device: int, place: Any, value: int) -> None:
+        """Set what a device holds, behind the master's back."""
+
+    @abstractmethod
+    def set_stand(self, is_there: bool) -> None:
+        """Put the stand under the arm, or take it away."""
+
+    @abstractmethod
+    def _step(self) -> None:
+        """One period of the devices' loops."""
 
 
 class Port(Protocol):

@@ -1,7 +1,6 @@
 """Whether a drive is what the driver needs and what its EDS or DCF file states."""
 
 from collections.abc import Iterator
-from typing import Protocol
 
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
@@ -16,6 +15,7 @@ from tauscope_drivers.canopen.process_data import (
     decode_mapping,
     plan_pdos,
 )
+from tauscope_drivers.canopen.sdo import NodeDictionary
 from tauscope_drivers.errors import DriverError
 
 _READ = (objects.DEVICE_TYPE, objects.SUPPORTED_MODES, objects.MODE_DISPLAY)
@@ -141,15 +141,7 @@ def _refuse(flaws: list[str]) -> None:
         raise DataSheetError(f"{'; '.join(flaws)}; check that it is the file of this drive, or use another drive")
 
 
-class OptionalReader(Protocol):
-    """What reads a drive's entries."""
-
-    def read_optional(self, entry: DriveObject) -> int | None:
-        """Value of an entry; None where the drive has none."""
-        ...
-
-
-def require_identity(file: DeviceFile, dictionary: OptionalReader, place: str) -> None:
+def require_identity(file: DeviceFile, dictionary: NodeDictionary, place: str) -> None:
     """Refuse a drive of another vendor, product or revision than its file states; what it does not tell passes.
 
     Raises DriverError ``refused``, which names what differs.
