@@ -69,7 +69,6 @@ class GoalPace:
         return list(self._speeds)
 
     def _time_left_s(self, now_ns: int) -> float:
-        """Time until the goal of this cycle shall be reached [s]."""
         self._grid.cycles_until(now_ns)
         late_s = self._grid.late_ns(now_ns) * 1e-9
         return max(_AHEAD_CYCLES * self._cycle_s - late_s, _LEAST_CYCLES * self._cycle_s)

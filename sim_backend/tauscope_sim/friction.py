@@ -57,7 +57,6 @@ def shape_constants(
 
 
 def _require(slope: float | None, level: float, place: str) -> float:
-    """Return the slope, which may be missing only where the level that it shapes is zero."""
     if slope is None and level != 0.0:
         raise RobotFileError(f"{place} is missing; a simulation with friction needs it [s/rad or s/m]")
     return 0.0 if slope is None else slope

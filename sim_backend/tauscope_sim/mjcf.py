@@ -301,7 +301,6 @@ class _Reader:
     def _branches(
         self, members: list[tuple[int, list[tuple[int, Placement, bool]]]], moving: list[_Joint]
     ) -> ResultWarning | None:
-        """The note on joints beside the chain, which count as rigid."""
         names, following, mass = [], [], 0.0
         chain = {joint.index for joint in moving}
         for _, placed in members:
@@ -315,7 +314,6 @@ class _Reader:
         return rigid_branch_note(self._label, names, mass, following) if names and mass > 0.0 else None
 
     def _limits(self, joint: _Joint) -> JointLimits:
-        """Range, and the largest torque that the joint or its actuators state."""
         model, index = self._model, joint.index
         low, high = (float(value) for value in model.jnt_range[index])
         torques = [abs(float(value)) for value in model.jnt_actfrcrange[index] if model.jnt_actfrclimited[index]]

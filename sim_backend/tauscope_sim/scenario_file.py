@@ -79,7 +79,6 @@ class _Reader:
         self._label, self._lines, self._robot = label, lines, robot
 
     def scenario(self, data: Any) -> Scenario:
-        """The scenario of plain data."""
         document = self._validate(ScenarioDocument, data, (), "")
         entries = [self._entry(value, number) for number, value in enumerate(document.effects)]
         scenario = Scenario(
@@ -125,7 +124,6 @@ class _Reader:
         return np.broadcast_to(np.array(values), (count,)).copy()
 
     def _try_out(self, scenario: Scenario) -> None:
-        """Build the plant once: effects may contradict one another."""
         try:
             scenario.plant(self._robot)
         except ScenarioError as error:

@@ -80,10 +80,7 @@ def test_scan_finds_servos_at_their_baud_rate(tmp_path: Path) -> None:
     servos = (ServoSpecification(1, baud=3_000_000), ServoSpecification(7, model_number=2020, baud=3_000_000))
     with bench(tmp_path, servos) as one:
         found = list(scan_bus(one.emulator.order.port, [1_000_000, 3_000_000], slack_s=SLACK_S))
-    assert found == [
-        FoundDevice(1, 3_000_000, "XM430-W350", "52"),
-        FoundDevice(7, 3_000_000, "PH54-200-S500", "52"),
-    ]
+    assert found == [FoundDevice(1, 3_000_000, "XM430-W350", "52"), FoundDevice(7, 3_000_000, "PH54-200-S500", "52")]
 
 
 @pytest.mark.parametrize("baud", [57_600, 4_500_000])

@@ -64,13 +64,7 @@ def site(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     motion = design_excitation(robot, design).trajectory
     write_trajectory(motion, folder / "motion.json")
     options = RunOptions(
-        rate_hz=RATE_HZ,
-        watchdog_s=WATCHDOG_S,
-        following_error=1.0,
-        missed=20,
-        lost_s=0.3,
-        settle_s=0.0,
-        least_kept=0.0,
+        rate_hz=RATE_HZ, watchdog_s=WATCHDOG_S, following_error=1.0, missed=20, lost_s=0.3, settle_s=0.0, least_kept=0.0
     )
     backend = BackendOrder(name=kind.name, settings={"patience_s": SLACK_S})
     run = RunOrder(robot=str(path), trajectory=str(folder / "motion.json"), backend=backend, options=options)

@@ -138,7 +138,6 @@ def _examine_file(file: DeviceFile, place: str) -> list[Finding]:
 
 
 def _list_places(described: Sequence[DescribedObject]) -> str:
-    """Places in the object dictionary, the subindices of an index together."""
     subindices: dict[int, list[str]] = {}
     for one in described:
         subindices.setdefault(one.index, []).append(f"{one.subindex:02X}")
@@ -248,14 +247,12 @@ def _examine_settings(node: DriveNode) -> list[Finding]:
 
 
 def _examine_place(node: DriveNode, joint: DriveJoint) -> list[Finding]:
-    """The joint stands within its range."""
     place = node.units.position(node.dictionary.read(objects.POSITION_ACTUAL))
     require_sensible(stated_limits([joint]), np.array([place]), [node.place])
     return []
 
 
 def _examine_torque(node: DriveNode, joint: DriveJoint) -> list[Finding]:
-    """The drive's limit and the joint's leave torque."""
     limits = stated_limits([joint])
     if not node.has(objects.LARGEST_TORQUE):
         return []
@@ -283,7 +280,6 @@ def _examine_mapping(node: DriveNode) -> list[Finding]:
 
 
 def _compare_fixed(node: DriveNode) -> list[Finding]:
-    """PDOs of fixed mapping hold what its file states."""
     plan = node.plan_for(ControlMode.POSITION)
     uses = [*((pdo, received_parameters) for pdo in plan.received), *((pdo, sent_parameters) for pdo in plan.sent)]
     for pdo, parameters in uses:

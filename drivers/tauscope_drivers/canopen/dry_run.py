@@ -37,32 +37,26 @@ class _PlannedDictionary:
         self._data: dict[DriveObject, bytes] = {}
 
     def read(self, entry: DriveObject) -> int:
-        """What was written, or what drives have as delivered."""
         request = bytes([_UPLOAD]) + _place(entry) + bytes(4)
         self._add(f"{entry}?", request)
         return self._values.get(entry, 0)
 
     def read_data(self, entry: DriveObject) -> bytes:
-        """Nothing that a drive was not given yet."""
         self.read(entry)
         return self._data.get(entry, b"")
 
     def read_optional(self, entry: DriveObject) -> int:
-        """As `read`: the drive has everything."""
         return self.read(entry)
 
     def write(self, entry: DriveObject, value: int) -> None:
-        """Keep a value, and read it back as the driver does."""
         self.send(entry, value)
         self.read(entry)
 
     def send(self, entry: DriveObject, value: int) -> None:
-        """Keep a value."""
         self._values[entry] = value
         self.send_data(entry, value.to_bytes(entry.bits // 8, "little", signed=entry.signed), str(value))
 
     def send_data(self, entry: DriveObject, data: bytes, text: str) -> None:
-        """Keep a value as transferred; a long one is announced by its size, and follows in segments."""
         self._data[entry] = data
         if len(data) > 4:
             payload = bytes([_LONG_DOWNLOAD]) + _place(entry) + len(data).to_bytes(4, "little")

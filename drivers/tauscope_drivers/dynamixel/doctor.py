@@ -97,7 +97,6 @@ def _rehearse(session: Session, joints: Sequence[DriveJoint]) -> list[Finding]:
 
 
 def _turn_offset(session: Session, joint: DriveJoint) -> list[Finding]:
-    """Whether a joint would stand within its range but for whole turns of its servo."""
     servo = session.servos[0]
     counts = session.read(0, ["Present Position"])["Present Position"]
     turn = servo.model.counts_per_radian * 2.0 * math.pi
@@ -116,7 +115,6 @@ def _count_turns(turns: int) -> str:
 
 
 def _slow_servo(servo: JointServo, settings: dict[str, int], joint: DriveJoint) -> list[Finding]:
-    """Whether the servo's own Velocity Limit (44 on X) is below the speed that the joint may have."""
     own = settings.get("Velocity Limit", 0)
     wanted = 0 if joint.velocity_limit is None else servo.units.velocity_cap(joint.velocity_limit)
     if not own or own >= wanted:
@@ -128,7 +126,6 @@ def _slow_servo(servo: JointServo, settings: dict[str, int], joint: DriveJoint) 
 
 
 def _examine_secondary(servos: Sequence[JointServo], settings: Sequence[dict[str, int]]) -> list[Finding]:
-    """A servo that listens to a second ID follows the instructions of that servo as well."""
     own = {servo.servo: servo.label for servo in servos}
     findings: list[Finding] = []
     for servo, values in zip(servos, settings, strict=True):

@@ -78,7 +78,6 @@ def _connection(servos: Sequence[JointServo]) -> Iterator[PlannedFrame]:
 
 
 def _enabling(servos: Sequence[JointServo], tasks: Sequence[ServoTask]) -> Iterator[PlannedFrame]:
-    """Mode and limits of all servos; then, one servo after the other, its place for a goal, watchdog, torque."""
     for servo, task in zip(servos, tasks, strict=True):
         for write in preparing_writes(servo, _DELIVERED, task, holds=False):
             yield _write(servo, "enable", write.item.name, write.value, write.reason)
@@ -88,7 +87,6 @@ def _enabling(servos: Sequence[JointServo], tasks: Sequence[ServoTask]) -> Itera
 
 
 def _bounds(servos: Sequence[JointServo], limits: DriveLimits, tasks: Sequence[ServoTask]) -> Bounds:
-    """Ranges of the goals; the servos' own Position Limits are not known."""
     ends = [
         servo.units.counts_within(float(limits.position_low[joint]), float(limits.position_high[joint]))
         for joint, servo in enumerate(servos)
@@ -114,7 +112,6 @@ def _cycles(
 
 
 def _stop(servos: Sequence[JointServo], mode: ControlMode) -> Iterator[PlannedFrame]:
-    """Servos that track positions hold the last one; those that are given current are let go."""
     for servo in servos:
         if mode is ControlMode.TORQUE:
             yield _write(servo, "stop", "Torque Enable", 0, "torque off")

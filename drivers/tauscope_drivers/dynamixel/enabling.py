@@ -138,7 +138,6 @@ def _present_position(session: Session, joint: int) -> int:
 
 
 def _range(session: Session, joint: int, limits: DriveLimits, mode: ControlMode) -> tuple[int, int]:
-    """Goal Positions that are allowed by the joint's limits and, where it applies them, the servo's own."""
     low, high = float(limits.position_low[joint]), float(limits.position_high[joint])
     servo = session.servos[joint]
     lowest, highest = position_counts(servo, session.settings[joint], low, high, mode)

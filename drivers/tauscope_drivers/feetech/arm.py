@@ -140,7 +140,6 @@ class FeetechArm(SerialServoArm[Session]):
 
 
 def _arm_state(session: Session, answers: Answers[Status]) -> ArmState:
-    """State of a cycle; NaN for who did not answer in it."""
     position, velocity, load, temperature, voltage = np.full((5, len(session.servos)), np.nan)
     for joint, servo in enumerate(session.servos):
         if (status := answers.statuses.get(servo.servo)) is None:

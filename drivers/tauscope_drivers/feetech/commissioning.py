@@ -105,7 +105,6 @@ def find_flaws(servo: JointServo, reading: Reading, limits: DriveLimits, joint: 
 
 
 def _find_supply(servo: JointServo, reading: Reading) -> list[Finding]:
-    """A supply outside the servo's own limits: it lets go of the joint."""
     volts = reading.feedback["Present Voltage"]
     low, high = reading.settings["Min Voltage Limit"], reading.settings["Max Voltage Limit"]
     if low <= volts <= high:
@@ -115,7 +114,6 @@ def _find_supply(servo: JointServo, reading: Reading) -> list[Finding]:
 
 
 def _find_limits(servo: JointServo, reading: Reading, task: ServoTask) -> list[Finding]:
-    """Limits that leave nothing, or are those of another place."""
     if not task.torque:
         remedy = "raise limits.torque, or state joints[].torque_constant as Nm for 1 ‰ of load"
         return [Finding(Severity.FAILURE, servo.label, "the torque limit is below 1 ‰ of its duty", remedy)]

@@ -119,7 +119,6 @@ def stop_servos(session: Session, policy: StopPolicy) -> None:
 
 
 def _hold(session: Session, joint: int) -> None:
-    """Hold a joint that is held, where it is."""
     targets = session.read_targets(joint)
     if not targets["Torque Enable"]:
         return

@@ -149,7 +149,6 @@ class SerialServoBus(Generic[_Status]):
         self._missed_ns |= dict.fromkeys(((servo, length) for servo in servos), time.monotonic_ns())
 
     def _wire_s(self, count: int) -> float:
-        """Time of so many bytes on the wire [s]."""
         return count * BITS_PER_BYTE / self.port.baudrate
 
 

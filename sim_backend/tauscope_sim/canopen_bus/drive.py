@@ -194,7 +194,6 @@ class EmulatedDrive:
 
     @property
     def _target_count(self) -> int:
-        """Where the drive is sent; in interpolated mode to where it is, as long as bit 4 does not start it."""
         if self._mode_taken == CYCLIC_POSITION:
             return self.dictionary.get(0x607A)
         starts = self.dictionary.get(0x6040) & _INTERPOLATE
@@ -202,7 +201,6 @@ class EmulatedDrive:
 
     @property
     def _watched_node(self) -> int:
-        """Node whose heartbeat is watched; -1 for none."""
         word = self.dictionary.get(0x1016, 1)
         return (word >> 16 & 0x7F) if word & 0xFFFF and word >> 16 & 0x7F else -1
 

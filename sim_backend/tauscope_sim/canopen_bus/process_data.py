@@ -23,7 +23,6 @@ class _Pdo:
 
     @property
     def identifier(self) -> int | None:
-        """Of its frames; None where it is off."""
         word = self.cob_id.value
         return None if word & _OFF else word & 0x7FF
 
@@ -39,7 +38,6 @@ class ProcessData:
         self._sent = [self._add(0x1800 + number, 0x180 + 0x100 * number + node_id) for number in range(PDOS)]
 
     def _add(self, communication: int, identifier: int) -> _Pdo:
-        """Communication and mapping parameters of a PDO that is off."""
         add, mapping = self._dictionary.add, communication + _TO_MAPPING
         add(communication, 0, 1, 2, writable=False)
         cob_id = add(communication, 1, 4, _OFF | identifier)

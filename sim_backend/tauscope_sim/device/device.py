@@ -207,7 +207,6 @@ class SimulatedDevice:
         self._disturbances.add(replace(injection, start_ns=begins))
 
     def _carry_out_tick(self) -> None:
-        """Run the drives at the present tick, take the reading, and move the arm on to the next."""
         self._sample_ns = self._start_ns + self._tick * TICK_NS
         if self._disturbances.waiting or self._tick % _TICKS_PER_TEMPERATURE == 0:
             self._disturbances.update(self._sample_ns)

@@ -113,9 +113,7 @@ class Drives:
         return FaultCode.POSITION_LIMIT, column + 1, detail
 
     def _target_at(self, motion: Motion) -> Target:
-        """A target that begins where the motors are, and comes to rest from there."""
         return Target(motion.position, motion.velocity, self._acceleration, self._tick_s)
 
     def _waits_for_torque(self, activity: Activity) -> bool:
-        """Whether the arm is in torque control but held, because no setpoint came yet."""
         return activity is Activity.TORQUE and self._commanded_torque is None

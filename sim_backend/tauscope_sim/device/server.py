@@ -166,13 +166,11 @@ class DeviceServer:
         self._trace.note()
 
     def _serve(self) -> None:
-        """Answer the host that is there, then take a new one."""
         if self._host is not None:
             self._hear(self._host)
         self._accept()
 
     def _hear(self, host: _Host) -> None:
-        """Answer what a host asks for; notice that it has gone."""
         try:
             data = host.connection.recv(65536)
         except BlockingIOError:

@@ -268,7 +268,6 @@ class Target:
             self.position = np.minimum(np.maximum(moved, self._low), self._high)
 
     def _follow_spline(self, tick: int) -> None:
-        """Move with the spline; catch up with it where a limit kept the target behind."""
         point, point_rate = self._spline.at(tick)
         count = len(self.position)
         position, rate, self.feed_forward = point[:count], point_rate[:count], point[count:]

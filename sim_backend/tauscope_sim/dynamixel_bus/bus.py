@@ -131,7 +131,6 @@ class EmulatedBus:
         self._away_until_s[servo] = back_s
 
     def _present(self, now_s: float) -> list[EmulatedServo]:
-        """Servos that hear now, in the order of their IDs."""
         return [self.servos[key] for key in sorted(self.servos) if now_s >= self._away_until_s[key]]
 
     def _find_addressed(self, instruction: Instruction, now_s: float) -> list[EmulatedServo]:
@@ -147,13 +146,11 @@ class EmulatedBus:
         return length * _BITS_PER_BYTE / baud if self._paced else 0.0
 
     def _answer(self, servo: EmulatedServo, error: int, data: bytes, after_s: float) -> list[Delivery]:
-        """A status packet of one servo, whose last byte arrives in time."""
         frame = status_frame(servo.servo, error | servo.error_byte, data)
         due = after_s + servo.return_delay_s + self._wire_s(len(frame))
         return self._answer_faults[servo.servo].apply(frame, due)
 
     def _answers(self, parts: list[tuple[EmulatedServo, int, bytes]], after_s: float) -> list[Delivery]:
-        """Status packets one after the other; who is silent lets its time pass."""
         deliveries: list[Delivery] = []
         for servo, error, data in parts:
             deliveries += self._answer(servo, error, data, after_s)

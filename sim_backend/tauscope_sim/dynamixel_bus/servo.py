@@ -299,7 +299,6 @@ class EmulatedServo:
 
     @property
     def _is_shut_down(self) -> bool:
-        """Whether an error keeps torque off until the servo restarts."""
         if "Error Code" in self.memory:
             return self.memory.get("Error Code") not in (0, _Y_WATCHDOG_CODE)
         return bool(self.memory.get("Hardware Error Status") & self.memory.get("Shutdown"))

@@ -82,15 +82,12 @@ class PayloadChange(Payload):
 
 
 class _Change(Term):
-    """Picks up and drops."""
-
     def __init__(self, change: PayloadChange) -> None:
         self._payload = change.standard_parameters()
         self._start, self._end = change.start, change.end
         self.event_times = (change.start,) if change.end is None else (change.start, change.end)
 
     def begin(self, time: float, bodies: RigidBodies) -> None:
-        """Carry the body, or not."""
         present = self._start <= time and (self._end is None or time < self._end)
         bodies.carry(self, self._payload if present else None)
 

@@ -25,14 +25,12 @@ def _not_negative(value: float) -> float:
 
 
 def _exponent(value: float) -> float:
-    """An exponent that no speed makes overflow."""
     if not 0.0 < value <= LARGEST_EXPONENT:
         raise refusal(f"must be above 0 and at most {LARGEST_EXPONENT:g}, but is {value:g}")
     return value
 
 
 def _whole(value: Any) -> int:
-    """A joint's or link's number; names are replaced before."""
     if isinstance(value, bool) or not isinstance(value, int) or value < 1:
         raise refusal(f"must be a number counted from 1 or a joint's name, but is {shown(value)}")
     return value
@@ -206,12 +204,10 @@ class _LawTerm(Term):
         self._torque, self._slopes = law
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add τ(q, v)."""
         torque = self._torque(moment.position[self._place], moment.velocity[self._place])
         getattr(forces, self._side)[self._joint] += torque
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        """Add dτ/dq and dτ/dv."""
         place = self._place
         by_position, by_velocity = self._slopes(moment.position[place], moment.velocity[place])
         slopes.by_position[place, place] += by_position

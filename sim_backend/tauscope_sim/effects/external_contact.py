@@ -69,11 +69,9 @@ class _Contact(Term):
         self._touching = False
 
     def begin(self, time: float, bodies: RigidBodies) -> None:
-        """Take note whether the window is open."""
         self._touching = self.event_times[0] <= time < self.event_times[1]
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add the torque on the links."""
         if not self._touching:
             return
         share = math.sin(math.pi * (moment.time - self._start) / self._duration) if self._smooth else 1.0

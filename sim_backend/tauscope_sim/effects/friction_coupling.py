@@ -52,14 +52,12 @@ class _Coupling(Term):
         self._coulomb, self._viscous, self._k_v = coulomb, viscous, k_v
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add f to the one joint and s f to the other."""
         w = self._motion(moment)
         friction = self._coulomb * smooth_sign(w, self._k_v) + self._viscous * w
         forces.friction[self._joints[0]] += friction
         forces.friction[self._joints[1]] += self._sign * friction
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        """Add df/dw, times s for each time that the other joint is concerned."""
         slope = self._coulomb * smooth_sign_slope(self._motion(moment), self._k_v) + self._viscous
         first, second = self._places
         slopes.by_velocity[first, first] += slope

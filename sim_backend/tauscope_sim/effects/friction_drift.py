@@ -61,8 +61,6 @@ class FrictionDrift(JointEffect):
 
 
 class _WarmingFriction(Term):
-    """Friction with a temperature as its state."""
-
     state_count = 1
 
     def __init__(
@@ -76,24 +74,20 @@ class _WarmingFriction(Term):
         self._start = drift.initial_temperature - AMBIENT
 
     def initial_states(self) -> tuple[float, ...]:
-        """The temperature at which the arm is placed, above ambient."""
         return (self._start,)
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add the change of friction."""
         v = moment.velocity[self._place]
         coulomb, viscous = self._changes(moment)
         level = self._stiction * smooth_sign(v, self._k_v) + self._stribeck * smooth_sign(v, self._delta)
         forces.friction[self._joint] += coulomb * level + viscous * self._viscous * v
 
     def rates(self, moment: Moment, rates: list[float]) -> None:
-        """Write ϑ̇."""
         heat = moment.friction[self._joint] * moment.velocity[self._place]
         rise = moment.states[self.first_state]
         rates[self.first_state] = (self._resistance * heat - rise) / self._time_constant
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        """Add the derivatives with respect to velocity; temperature is slow."""
         v, place = moment.velocity[self._place], self._place
         coulomb, viscous = self._changes(moment)
         level = self._stiction * smooth_sign_slope(v, self._k_v) + self._stribeck * smooth_sign_slope(v, self._delta)
@@ -101,7 +95,6 @@ class _WarmingFriction(Term):
         slopes.rate_by_state[self.first_state, self.first_state] -= 1.0 / self._time_constant
 
     def report_temperature(self, states: list[float], temperature: Array) -> None:
-        """Write the joint's temperature."""
         temperature[self._joint] = AMBIENT + states[self.first_state]
 
     def _changes(self, moment: Moment) -> tuple[float, float]:

@@ -34,19 +34,15 @@ class LoadDependentFriction(SmoothSignEffect):
 
 
 class _LoadFriction(Term):
-    """Friction on the magnitude of the load."""
-
     depends_on_load = True
 
     def __init__(self, joint: int, place: int, mu: float, k_v: float) -> None:
         self._joint, self._place, self._mu, self._k_v = joint, place, mu, k_v
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add μ A(v) to the load's friction."""
         forces.load_friction[self._joint] += self._mu * smooth_sign(moment.velocity[self._place], self._k_v)
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        """Add μ |L| dA/dv."""
         place = self._place
         slope = smooth_sign_slope(moment.velocity[place], self._k_v)
         slopes.by_velocity[place, place] += self._mu * abs(moment.load[self._joint]) * slope

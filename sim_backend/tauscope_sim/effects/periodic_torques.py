@@ -95,11 +95,9 @@ class _Ripple(Term):
         self._joint, self._place, self._sine, self._slope = joint, place, sine, slope
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add s(q) to the gain."""
         forces.load_gain[self._joint] += self._sine(moment.position[self._place])
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        """Add L ds/dq."""
         place = self._place
         slopes.by_position[place, place] += moment.load[self._joint] * self._slope(moment.position[place])
 

@@ -76,21 +76,17 @@ class _Bristles(Term):
         self._distance, self._damping = distance, damping * distance
 
     def initial_states(self) -> tuple[float, ...]:
-        """Bristles that stand upright."""
         return (0.0,)
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add the bristles' torque less the static friction that they replace."""
         v, z = moment.velocity[self._place], moment.states[self.first_state]
         replaced = self._stiction * smooth_sign(v, self._k_v) + self._stribeck * smooth_sign(v, self._delta)
         forces.friction[self._joint] += self._stiction * z + self._damping * self._rate(v, z) - replaced
 
     def rates(self, moment: Moment, rates: list[float]) -> None:
-        """Write ż."""
         rates[self.first_state] = self._rate(moment.velocity[self._place], moment.states[self.first_state])
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        """Add the derivatives of torque and ż."""
         place, state = self._place, self.first_state
         v, z = moment.velocity[place], moment.states[state]
         level = self._level(v)
@@ -103,9 +99,7 @@ class _Bristles(Term):
         slopes.by_state[place, state] += self._stiction + self._damping * by_state
 
     def _level(self, v: float) -> float:
-        """Steady deflection at a speed, g(v)."""
         return 1.0 + self._stribeck / self._stiction * smooth_sign(abs(v), self._delta)
 
     def _rate(self, v: float, z: float) -> float:
-        """Rate of deflection, ż."""
         return (v - abs(v) * z / self._level(v)) / self._distance

@@ -51,7 +51,6 @@ class _Gain:
         self._gains = gains
 
     def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        """Scale the torque."""
         return position, self._gains * torque
 
 
@@ -76,7 +75,6 @@ class _Saturation:
         self._joint, self._level, self._clip = joint, level, clip
 
     def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        """Bound the torque."""
         recorded, joint, level = torque.copy(), self._joint, self._level
         ratio = torque[joint] / level
         recorded[joint] = level * (np.clip(ratio, -1.0, 1.0) if self._clip else np.tanh(ratio))
@@ -116,14 +114,12 @@ class _DelayLine:
         self._samples: deque[tuple[float, Array]] = deque()
 
     def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        """Replace torque, or position, by what it was."""
         late = torque if self._delay > 0.0 else position
         recorded = late.copy()
         recorded[self._columns] = self._past(time, late[self._columns], abs(self._delay))
         return (position, recorded) if self._delay > 0.0 else (recorded, torque)
 
     def _past(self, time: float, value: Array, age: float) -> Array:
-        """The channel as it was, and one more sample to remember."""
         samples, instant = self._samples, time - age
         samples.append((time, value.copy()))
         while len(samples) > 1 and samples[1][0] <= instant:

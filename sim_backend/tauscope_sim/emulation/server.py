@@ -62,7 +62,6 @@ class Arrivals:
             return pieces, time.monotonic_ns()
 
     def _receive(self) -> None:
-        """Wait, note the instant, read."""
         with contextlib.suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)
         while self._end not in select.select([self._port, self._end], [], [])[0]:
@@ -134,7 +133,6 @@ class EmulatorServer:
         return self._stepped_s if self._order.stepped else self._instant(time.monotonic_ns())
 
     def _wait(self) -> list[Any]:
-        """Until something comes, an answer is due, or the physics want their step; what can be read then."""
         due_s = self._emulator.next_due_s
         if not self._order.stepped:
             due_s = min(due_s, self._emulator.now_s + _PERIOD_S)
@@ -171,7 +169,6 @@ class EmulatorServer:
             self._port.write(arrived)
 
     def _receive(self) -> tuple[list[tuple[bytes, float]], float]:
-        """What the master sent since the last call, each piece with its instant, and until when that is all [s]."""
         if self._arrivals is not None:
             pieces, until_ns = self._arrivals.take()
             return [(piece, self._instant(at_ns)) for piece, at_ns in pieces], self._instant(until_ns)

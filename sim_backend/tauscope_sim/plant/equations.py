@@ -281,7 +281,6 @@ def _terms(robot: Robot, effects: Sequence[PhysicalEffect], coordinates: Coordin
 
 
 def _allot_states(terms: Sequence[Term]) -> int:
-    """Give each term the place of its internal states; returns their number m."""
     count = 0
     for term in terms:
         term.first_state = count
