@@ -11,8 +11,7 @@ import can
 
 from tauscope_drivers.canopen.data_sheet.device_file import read_device_file
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_sim.canopen_bus.axis import AxisMeasurement, AxisMode, AxisScale
-from tauscope_sim.canopen_bus.drive import EmulatedDrive
+from tauscope_sim.canopen_bus.drive import AxisMeasurement, AxisMode, AxisScale, EmulatedDrive
 
 GEAR = 50.0
 COUNTS_PER_TURN = 65536

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from itertools import groupby
 from pathlib import Path
 
-from tauscope_sim.canopen_bus.axis import AxisScale
-from tauscope_sim.canopen_bus.drive import EmulatedDrive
+from tauscope_sim.canopen_bus.drive import AxisScale, EmulatedDrive
 
 VENDOR, PRODUCT, REVISION = 0x3A1, 0x402, 0x00020005
 GAIN, OFFSET, LABEL, COMMAND = "2001", "2002", "2003", "2004"

@@ -122,7 +122,6 @@ class Backend(Protocol):
 
         Raises DriverError: ``not-connected``, ``refused`` (a mode, policy or time that the backend cannot do), or
         ``fault`` (latched and not acknowledged).
-
         `cycle_s`: time between two calls of `exchange`, for drives that interpolate between targets; None where it is
         not known [s].
         """

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 
 _KEYS_OF_ANY_BUS = ("stop_policy",)
 
@@ -35,7 +35,6 @@ def require_known_keys(joints: Sequence[DriveJoint], bus_keys: Sequence[str], ow
     """Refuse keys that nobody knows, and several buses.
 
     Raises DriverError ``refused``, which names the joint and the key.
-
     `joints`: base first; what they say of the bus stands on the first.
     """
     first = joints[0]
@@ -61,7 +60,6 @@ def read_whole(joint: DriveJoint, key: str, default: int | None, *, least: int, 
     """A whole number.
 
     Raises DriverError ``refused`` where it is none, or out of range.
-
     `default`: where the key is missing; None where it has to be there.
     """
     value = joint.drive.get(key, default)
@@ -101,4 +99,4 @@ def read_text(joint: DriveJoint, key: str, what: str) -> str:
 
 def refusal(joint: DriveJoint, key: str, reason: str) -> DriverError:
     """Why a block is not usable."""
-    return DriverError(DriverErrorKind.REFUSED, f"joint {joint.name}: drive.{key} {reason}")
+    return DriverError.refusal(f"joint {joint.name}: drive.{key} {reason}")

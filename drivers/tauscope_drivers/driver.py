@@ -1,19 +1,21 @@
 """The description of a driver: its words, its options, and what it does beside moving an arm.
 
-A driver is one package. It names one `Driver` object by the entry point ``tauscope.drivers``. The module of that object
-imports bus libraries only inside its methods: choices and help read its words alone.
+A driver is one package, whose module ``driver`` holds one `Driver` object, ``DRIVER``. A package of `tauscope_drivers`
+is found by that, any other by an entry point ``tauscope.drivers``. The module imports bus libraries only inside its
+methods: choices and help read its words alone.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from tauscope_drivers.backend import Backend
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.errors import DriverError, DriverErrorKind
-from tauscope_drivers.inspection import Finding, FoundDevice, FrameRequest, PlannedFrame
+from tauscope_drivers.errors import DriverError
+from tauscope_drivers.inspection import Finding, FoundDevice, FrameRequest, PlannedFrame, failure
 
 _LONGEST_PATIENCE_S = 1.0
 
@@ -77,51 +79,66 @@ class Driver(ABC):
 
 
 class BusDriver(Driver):
-    """Drives on a field bus. Nothing here moves an arm or writes to a drive; every joint needs a ``drive`` block."""
+    """Drives on a field bus. Nothing here moves an arm or writes to a drive; every joint needs a ``drive`` block.
 
+    The driver's folder holds ``configuration.read_configuration``, ``doctor.examine`` and ``doctor.scan_bus``, and
+    ``dry_run.plan_frames``, with the arguments of the methods here that call them.
+    """
+
+    id_key: str
+    """Key by which a ``drive`` block speaks of this bus."""
     block_example: str
     """The least ``drive`` block, as a message shows it."""
     port_help: str
-    """What ``bus scan`` takes as port."""
+    """What ``bus scan`` takes as port; drivers that state the same share a kind of bus."""
+    answering: str = ""
+    """Devices that answer a scan, for who finds nobody with another driver of the same kind of bus."""
     neighbours: str = ""
-    """Devices that hang on such a bus and do not answer this driver, in a sentence for who finds nobody."""
+    """Devices that hang on such a bus and answer no driver, in a sentence for who finds nobody."""
     bus_options: tuple[str, ...] = ()
     """Names of the options that replace a key of the first joint's ``drive`` block."""
 
-    @abstractmethod
     def is_meant(self, block: Mapping[str, Any]) -> bool:
         """Whether a ``drive`` block speaks of this bus."""
+        return self.id_key in block
 
     @abstractmethod
     def list_adapters(self) -> list[Finding]:
         """Adapters of this machine that the bus may hang on: permissions, settings."""
 
-    @abstractmethod
     def check_blocks(self, joints: Sequence[DriveJoint]) -> list[Finding]:
         """Everything doubtful in the ``drive`` blocks and the files that they name, without a port."""
+        try:
+            self.load("configuration").read_configuration(joints)
+        except DriverError as error:
+            return [failure(self.name, str(error))]
+        return []
 
-    @abstractmethod
     def examine(self, joints: Sequence[DriveJoint]) -> list[Finding]:
         """Adapter and every drive that the robot file names.
 
         Raises DriverError: ``refused``: a ``drive`` block is not valid.
         """
+        return self.load("doctor").examine(joints)
 
-    @abstractmethod
     def scan(self, port: str, bit_rates: Sequence[int] | None) -> Iterator[FoundDevice]:
         """Devices that answer, whoever they belong to.
 
         Raises DriverError where the port is missing, not permitted or taken.
-
         `bit_rates`: to try [bit/s]; the usual ones where None.
         """
+        return self.load("doctor").scan_bus(port, bit_rates)
 
-    @abstractmethod
     def plan_frames(self, joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:
         """The frames of a run, without a port.
 
         Raises DriverError: ``refused``: a ``drive`` block or a limit is not possible.
         """
+        return self.load("dry_run").plan_frames(joints, request)
+
+    def load(self, module: str) -> Any:
+        """A module of the driver's own folder, loaded when it is needed."""
+        return import_module(f".{module}", type(self).__module__.rpartition(".")[0])
 
     def read_patience_s(self, settings: Mapping[str, Any]) -> float:
         """How much longer than it takes an answer is waited for [s].
@@ -132,5 +149,17 @@ class BusDriver(Driver):
         is_number = isinstance(patience_s, int | float) and not isinstance(patience_s, bool)
         if not (is_number and 0.0 < patience_s <= _LONGEST_PATIENCE_S):
             text = f"backend {self.name}: patience_s is {patience_s!r:.60}; give seconds up to 1"
-            raise DriverError(DriverErrorKind.REFUSED, text)
+            raise DriverError.refusal(text)
         return float(patience_s)
+
+
+class SerialBusDriver(BusDriver):
+    """Servos on a serial bus."""
+
+    options = (Option("port", "serial device, in place of the robot file's"), PATIENCE)
+    port_help = "serial device"
+    bus_options = ("port",)
+
+    def list_adapters(self) -> list[Finding]:
+        """Serial ports of this machine."""
+        return import_module("tauscope_drivers.serial_port").serial_adapters()

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Self
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,6 @@ class Fault:
     remedy: str
 
     def __str__(self) -> str:
-        """One line for a message."""
         place = "arm" if self.joint is None else f"joint {self.joint}"
         return f"{place}: {self.detail} ({self.code}); {self.remedy}"
 
@@ -40,3 +40,13 @@ class DriverError(RuntimeError):
         super().__init__(message)
         self.kind = kind
         self.faults = faults
+
+    @classmethod
+    def refusal(cls, message: str) -> Self:
+        """``refused``: what was asked for cannot be done, or may not be."""
+        return cls(DriverErrorKind.REFUSED, message)
+
+    @classmethod
+    def no_connection(cls, message: str, faults: tuple[Fault, ...] = ()) -> Self:
+        """``cannot-connect``: a device is missing, taken or of the wrong kind."""
+        return cls(DriverErrorKind.CANNOT_CONNECT, message, faults)

@@ -39,12 +39,7 @@ class GoalPace:
     """Speed for each goal; keeps account of where the servos' own targets are."""
 
     def __init__(
-        self,
-        servos: Sequence[PacedServo],
-        goals: Sequence[int],
-        caps: Sequence[int],
-        cycle_s: float,
-        now_ns: int,
+        self, servos: Sequence[PacedServo], goals: Sequence[int], caps: Sequence[int], cycle_s: float, now_ns: int
     ) -> None:
         """Begin with servos that hold their goals.
 
@@ -74,7 +69,6 @@ class GoalPace:
         return list(self._speeds)
 
     def _time_left_s(self, now_ns: int) -> float:
-        """Time until the goal of this cycle shall be reached [s]."""
         self._grid.cycles_until(now_ns)
         late_s = self._grid.late_ns(now_ns) * 1e-9
         return max(_AHEAD_CYCLES * self._cycle_s - late_s, _LEAST_CYCLES * self._cycle_s)

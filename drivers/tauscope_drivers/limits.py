@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tauscope_drivers.backend import DriveLimits
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
+from tauscope_drivers.errors import DriverError, Fault
 from tauscope_drivers.state import Setpoint
 
 Array = NDArray[np.float64]
@@ -46,7 +46,6 @@ def require_sensible(limits: DriveLimits, position: Array, labels: Sequence[str]
     """Refuse limits that leave no motion, are no numbers, or are those of another place.
 
     Raises DriverError ``refused``, which names the joint and the limit.
-
     `position`: (n,), where the arm stands [rad or m].
     """
     joint_count = len(position)
@@ -58,10 +57,9 @@ def require_sensible(limits: DriveLimits, position: Array, labels: Sequence[str]
         if not low < high:
             raise _senseless(f"{label}: position limits {low:g} to {high:g} leave no motion")
         if not low - ENABLE_MARGIN <= position[joint] <= high + ENABLE_MARGIN:
-            raise DriverError(
-                DriverErrorKind.REFUSED,
+            raise DriverError.refusal(
                 f"{label} stands at {position[joint]:.4g}, outside its limits {low:g} to {high:g}; "
-                "move it into its range by hand, or widen the limits",
+                "move it into its range by hand, or widen the limits"
             )
         for name in ("velocity", "torque"):
             value = float(getattr(limits, name)[joint])
@@ -73,9 +71,7 @@ def require_finite(setpoint: Setpoint, joint_count: int) -> None:
     """Refuse targets that are missing or no numbers. Raises DriverError: ``refused``."""
     for targets in (setpoint.position, setpoint.torque):
         if np.shape(targets) != (joint_count,) or not np.isfinite(targets).all():
-            raise DriverError(
-                DriverErrorKind.REFUSED, "a target is missing or not a finite number; nothing was sent to the drives"
-            )
+            raise DriverError.refusal("a target is missing or not a finite number; nothing was sent to the drives")
 
 
 class RunawayWatch:
@@ -133,4 +129,4 @@ class TorqueWatch:
 
 
 def _senseless(what: str) -> DriverError:
-    return DriverError(DriverErrorKind.REFUSED, f"{what}; correct them")
+    return DriverError.refusal(f"{what}; correct them")

@@ -1,4 +1,4 @@
-"""A serial port that one process owns, and what a bus of servos needs of it."""
+"""A serial port that one process owns, and serial adapters: who may open and who holds them, how late they answer."""
 
 import contextlib
 import fcntl
@@ -10,9 +10,10 @@ import time
 from pathlib import Path
 
 import serial
+from serial.tools.list_ports import comports
 
 from tauscope_drivers.errors import DriverError, DriverErrorKind
-from tauscope_drivers.port_holder import find_holder
+from tauscope_drivers.inspection import Finding, Severity
 
 BITS_PER_BYTE = 10
 """Start bit, eight bits, stop bit."""
@@ -21,9 +22,11 @@ LEAST_LATENCY_S = 0.001
 """What an adapter adds to every answer at least [s]: one USB frame."""
 
 _TTY_DEVICES = Path("/sys/class/tty")
+_PROCESSES = Path("/proc")
 _LONGEST_DRAIN_NS = 2_000_000
 _QUIET_NS = 500_000
 _PSEUDO_TERMINALS = range(136, 144)
+_FORBIDDEN = "may not be opened", "add your account to the group that owns it (dialout), then log in again"
 
 
 class SerialPort:
@@ -50,8 +53,7 @@ class SerialPort:
             self._claim(self.baudrate)
         except (OSError, serial.SerialException, ValueError) as error:
             raise self._refusal(error) from error
-        latency_ms = read_latency_timer_ms(self.path)
-        self.latency_s = LEAST_LATENCY_S if latency_ms is None else max(LEAST_LATENCY_S, latency_ms * 1e-3)
+        self.latency_s = expect_latency_s(self.path)
 
     def close(self) -> None:
         """Let go of the port; legal at any time."""
@@ -114,7 +116,6 @@ class SerialPort:
         return self.ser
 
     def _refusal(self, error: Exception) -> DriverError:
-        """Why a port cannot be opened, and what to do."""
         holder = find_holder(self.path) if os.path.exists(self.path) else None
         self.close()
         if not os.path.exists(self.path):
@@ -122,13 +123,10 @@ class SerialPort:
         elif holder is not None:
             reason, remedy = f"is held by {holder}", "end that program first"
         elif not os.access(self.path, os.R_OK | os.W_OK):
-            reason, remedy = (
-                "may not be opened",
-                "add your account to the group that owns it (dialout), then log in again",
-            )
+            reason, remedy = _FORBIDDEN
         else:
             reason, remedy = f"cannot be opened ({' '.join(str(error).split())})", "check the device and its baud rate"
-        return DriverError(DriverErrorKind.CANNOT_CONNECT, f"port {self.path} {reason}; {remedy}")
+        return DriverError.no_connection(f"port {self.path} {reason}; {remedy}")
 
     def _report_loss(self, error: Exception) -> DriverError:
         reason = " ".join(str(error).split())
@@ -144,3 +142,80 @@ def read_latency_timer_ms(path: str) -> int | None:
         return int((_TTY_DEVICES / name / "device" / "latency_timer").read_text())
     except (OSError, ValueError):
         return None
+
+
+def expect_latency_s(path: str) -> float:
+    """What an adapter adds to every answer, by its timer: one USB frame at least [s]."""
+    return max(LEAST_LATENCY_S, (read_latency_timer_ms(path) or 0) * 1e-3)
+
+
+def find_holder(path: str) -> str | None:
+    """The process that has a port open, as ``process 123 (name)``; None where none is seen.
+
+    Processes of other users show their open files only to the superuser.
+    """
+    try:
+        wanted = os.stat(path).st_rdev
+    except OSError:
+        return None
+    for entry in _PROCESSES.iterdir():
+        if entry.name.isdigit() and _has_open(entry, wanted):
+            return f"process {entry.name} ({_name(entry)})"
+    return None
+
+
+def _has_open(process: Path, device: int) -> bool:
+    try:
+        return any(_device(descriptor) == device for descriptor in (process / "fd").iterdir())
+    except OSError:
+        return False
+
+
+def _device(descriptor: Path) -> int | None:
+    try:
+        return os.stat(descriptor).st_rdev or None
+    except OSError:
+        return None
+
+
+def _name(process: Path) -> str:
+    try:
+        return (process / "comm").read_text().strip() or "unnamed"
+    except OSError:
+        return "unnamed"
+
+
+def serial_adapters() -> list[Finding]:
+    """Every serial adapter: whether it may be opened, who holds it, and its latency timer."""
+    found: list[Finding] = []
+    for adapter in sorted(comports(), key=lambda one: one.device):
+        what = adapter.description if adapter.description not in (None, "n/a", "") else "serial port"
+        found.append(_access(adapter.device, what))
+        if read_latency_timer_ms(adapter.device) is not None:
+            found.append(latency_finding(adapter.device))
+    return found
+
+
+def latency_finding(path: str) -> Finding:
+    """The adapter's latency timer, which caps every rate where it is long."""
+    latency_ms = read_latency_timer_ms(path)
+    if latency_ms is None:
+        return Finding(Severity.GOOD, path, "the adapter has no latency timer")
+    if latency_ms <= 1:
+        return Finding(Severity.GOOD, path, f"latency timer {latency_ms} ms")
+    name = os.path.basename(os.path.realpath(path))
+    remedy = f"write 1 to /sys/class/tty/{name}/device/latency_timer, for good by a udev rule"
+    # Two reads a cycle wait for it.
+    return Finding(
+        Severity.WARNING, path, f"latency timer {latency_ms} ms: no more than {500 / latency_ms:.0f} Hz", remedy
+    )
+
+
+def _access(path: str, what: str) -> Finding:
+    if not os.access(path, os.R_OK | os.W_OK):
+        reason, remedy = _FORBIDDEN
+        return Finding(Severity.FAILURE, path, f"{what}; {reason}", remedy)
+    holder = find_holder(path)
+    if holder is not None:
+        return Finding(Severity.WARNING, path, f"{what}; held by {holder}", "end that program first")
+    return Finding(Severity.GOOD, path, what)

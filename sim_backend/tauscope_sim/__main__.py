@@ -30,7 +30,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _simulate(options: argparse.Namespace) -> int:
-    """Do what the options say; returns the number of samples."""
     robot = read_robot(options.robot)
     motion_rng, noise_rng = np.random.default_rng(options.seed).spawn(2)
     motion = random_fourier_motion(robot.joints, motion_rng, period_s=options.period, harmonics=options.harmonics)
@@ -49,7 +48,6 @@ def _simulate(options: argparse.Namespace) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    """Command line of ``python -m tauscope_sim``."""
     parser = argparse.ArgumentParser(
         prog="python -m tauscope_sim",
         description="Write a simulated recording of an arm on a random Fourier motion within its joint limits.",
@@ -72,7 +70,6 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _positive(text: str) -> float:
-    """Read a finite number above zero."""
     value = _not_negative(text)
     if value == 0.0:
         raise argparse.ArgumentTypeError(f"{text!r} is not above zero")
@@ -80,7 +77,6 @@ def _positive(text: str) -> float:
 
 
 def _not_negative(text: str) -> float:
-    """Read a finite number, zero or more."""
     try:
         value = float(text)
     except ValueError:
@@ -91,8 +87,6 @@ def _not_negative(text: str) -> float:
 
 
 def _count(least: int) -> Callable[[str], int]:
-    """Return the parser of a whole number of at least `least`."""
-
     def parse(text: str) -> int:
         try:
             value = int(text)

@@ -20,21 +20,9 @@ def static_friction_torque(
     Raises RobotFileError where a shape constant that is needed is None, or where the number of entries is not the
     number of joints.
 
-    Parameters
-    ----------
-    velocity : (N, n) float64
-        v = q̇ [rad/s or m/s]
-    friction_shape : sequence of FrictionShape
-        K_v and δ, one entry a joint [s/rad or s/m]; may be None where the coefficient that it shapes is zero
-
-    Returns
-    -------
-    (N, n) float64
-        τ_f, positive where the drive has to overcome it in the positive direction [Nm or N]
-
-    Notes
-    -----
-    The paper's equations (7) and (8); its (7) prints the viscous part without v, its (9) has it.
+    `velocity`: (N, n), v = q̇ [rad/s or m/s]; `friction_shape`: K_v and δ, one entry a joint [s/rad or s/m]; may be None
+    where the coefficient that it shapes is zero. Returns τ_f, (N, n), positive where the drive has to overcome it in
+    the positive direction [Nm or N]. The paper's equations (7) and (8); its (7) prints the viscous part without v.
     """
     joint_count = velocity.shape[1]
     if len(friction) != joint_count or len(friction_shape) != joint_count:
@@ -58,7 +46,6 @@ def shape_constants(
     """K_v and δ of each joint; zero where the coefficient that they shape is zero and the robot file states none.
 
     Raises RobotFileError where a shape constant that is needed is None.
-
     `friction_shape`: K_v and δ, one entry a joint [s/rad or s/m].
     """
     constants: list[tuple[float, float]] = []
@@ -70,7 +57,6 @@ def shape_constants(
 
 
 def _require(slope: float | None, level: float, place: str) -> float:
-    """Return the slope, which may be missing only where the level that it shapes is zero."""
     if slope is None and level != 0.0:
         raise RobotFileError(f"{place} is missing; a simulation with friction needs it [s/rad or s/m]")
     return 0.0 if slope is None else slope

@@ -24,15 +24,7 @@ from tauscope.robot.chain import Chain, ResultWarning, default_ends_note, rigid_
 from tauscope.robot.document import MOST_JOINTS
 from tauscope.robot.messages import Finding, Severity, nearest, one_line, shown
 from tauscope.robot.placement import compose, rotation_of_z_to
-from tauscope.robot.robot import (
-    Coupling,
-    FrictionCoefficients,
-    JointLimits,
-    JointType,
-    LinkInertia,
-    Placement,
-    Segment,
-)
+from tauscope.robot.robot import Coupling, FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
 from tauscope.robot.urdf_inertia import inertia_about_frame
 from tauscope_sim.mjcf_compiler import compile_model
 
@@ -51,7 +43,6 @@ def read_chain(
     """The chain from body `base` to body `tip`; by default from the root to the deepest body.
 
     Raises RobotFileError if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip.
-
     `path`: where the file lies, for the files that it names; None for text without files beside it; `locked`: position
     of joints that do not move [rad or m].
     """
@@ -70,8 +61,6 @@ class _Joint:
 
 
 class _Reader:
-    """Reads chains from a compiled model."""
-
     def __init__(self, model: mujoco.MjModel, label: str, locked: Mapping[str, float]) -> None:
         self._model, self._label, self._locked = model, label, locked
         self._data = mujoco.MjData(model)
@@ -150,7 +139,6 @@ class _Reader:
         self._findings.append(Finding(severity, one_line(f"{self._label}: joint {shown(joint.name)}"), text))
 
     def _gravity(self, base: int) -> Array:
-        """Gravity in the base's frame, (3,) [m/s²]."""
         if self._model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
             return np.zeros(3)
         return self._data.xmat[base].reshape(3, 3).T @ self._model.opt.gravity
@@ -216,7 +204,6 @@ class _Reader:
         return chain[::-1] if base is None or body == base else []
 
     def _path(self, base: int, tip: int) -> list[int]:
-        """Bodies from below the base to the tip."""
         path, body = [], tip
         while body != base:
             if not body:
@@ -280,7 +267,6 @@ class _Reader:
                 waiting.append((below, at, on_joint or bool(joints)))
 
     def _placement(self, body: int) -> Placement:
-        """A body's frame in its parent's, joints at their reference."""
         return Placement(_rotation(self._model.body_quat[body]), np.array(self._model.body_pos[body]))
 
     def _rigid_position(self, joint: _Joint) -> float:
@@ -294,7 +280,6 @@ class _Reader:
         return ratio * self._locked[self._joints[master].name] + offset
 
     def _rigid_motion(self, joint: _Joint) -> Placement:
-        """Displacement of a joint that rests, from its reference."""
         if joint.kind not in (HINGE, SLIDE):
             return Placement()
         rest = float(self._model.qpos0[self._model.jnt_qposadr[joint.index]])
@@ -305,7 +290,6 @@ class _Reader:
         return compose(turned, Placement(translation=-anchor))
 
     def _link(self, body: int, members: Iterable[tuple[int, Placement, bool]]) -> LinkInertia:
-        """Bodies of one link about its frame."""
         model, total = self._model, np.zeros(10)
         for each, placement, _ in members:
             centre = Placement(_rotation(model.body_iquat[each]), np.array(model.body_ipos[each]))
@@ -317,7 +301,6 @@ class _Reader:
     def _branches(
         self, members: list[tuple[int, list[tuple[int, Placement, bool]]]], moving: list[_Joint]
     ) -> ResultWarning | None:
-        """The note on joints beside the chain, which count as rigid."""
         names, following, mass = [], [], 0.0
         chain = {joint.index for joint in moving}
         for _, placed in members:
@@ -331,7 +314,6 @@ class _Reader:
         return rigid_branch_note(self._label, names, mass, following) if names and mass > 0.0 else None
 
     def _limits(self, joint: _Joint) -> JointLimits:
-        """Range, and the largest torque that the joint or its actuators state."""
         model, index = self._model, joint.index
         low, high = (float(value) for value in model.jnt_range[index])
         torques = [abs(float(value)) for value in model.jnt_actfrcrange[index] if model.jnt_actfrclimited[index]]
@@ -411,12 +393,10 @@ def _joint_type(joint: _Joint) -> JointType:
 
 
 def _rotation(quaternion: Array) -> Array:
-    """Rotation matrix of a quaternion (w, x, y, z), (3, 3)."""
     return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
 
 
 def _motion(kind: int, position: float) -> Placement:
-    """Turn about z, or slide along it."""
     if kind == SLIDE:
         return Placement(translation=np.array([0.0, 0.0, position]))
     return Placement(_rotation(np.array([np.cos(position / 2), 0.0, 0.0, np.sin(position / 2)])))

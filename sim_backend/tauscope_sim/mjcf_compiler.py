@@ -17,7 +17,6 @@ def compile_model(data: bytes, label: str, path: Path | None) -> mujoco.MjModel:
     """The compiled model; where files of shapes or textures are missing, without the shapes that carry no mass.
 
     Raises RobotFileError if MuJoCo refuses the file.
-
     `path`: where the file lies, for the files that it names; None for text without files beside it.
     """
     try:
@@ -61,7 +60,6 @@ def _drop_shapes(spec: mujoco.MjSpec) -> None:
 
 
 def _moves(body: mujoco.MjsBody) -> bool:
-    """Whether a joint moves a body."""
     while body is not None:
         if body.joints:
             return True

@@ -24,10 +24,7 @@ LEAST_INERTIA = 1e-12
 LEAST_MASS = 1e-12
 """Mass given to a massless link [kg], for the same reason."""
 
-_JOINT_TYPES = {
-    JointType.REVOLUTE: mujoco.mjtJoint.mjJNT_HINGE,
-    JointType.PRISMATIC: mujoco.mjtJoint.mjJNT_SLIDE,
-}
+_JOINT_TYPES = {JointType.REVOLUTE: mujoco.mjtJoint.mjJNT_HINGE, JointType.PRISMATIC: mujoco.mjtJoint.mjJNT_SLIDE}
 
 
 def build_spec(robot: Robot) -> mujoco.MjSpec:
@@ -86,7 +83,6 @@ def _mujoco_refusals(robot: Robot) -> Iterator[None]:
 
 
 def _origin(robot: Robot) -> str:
-    """Return what a message calls the robot."""
     return str(robot.source) if robot.source is not None else robot.name
 
 
@@ -106,7 +102,6 @@ def _place(body: mujoco.MjsBody, name: str, segment: Segment) -> None:
 
 
 def _weigh(body: mujoco.MjsBody, link: LinkInertia) -> None:
-    """Give the body its inertia."""
     inertia = body_inertia(link)
     body.explicitinertial = True
     body.mass = inertia.mass
@@ -155,5 +150,4 @@ def _regularise(moments: Array, scale: float) -> Array:
 
 
 def _quaternion(rotation: Array) -> Array:
-    """Compute the unit quaternion (w, x, y, z) of a rotation matrix."""
     return Rotation.from_matrix(rotation).as_quat(scalar_first=True)

@@ -91,7 +91,6 @@ def random_fourier_motion(
 def _fit_into_limits(
     shape: FourierMotion, joints: Sequence[Joint], limit_fraction: float, rng: np.random.Generator
 ) -> FourierMotion:
-    """Scale and shift each joint's series so that it stays within its limits."""
     harmonics = shape.cosine.shape[1]
     count = 64 * harmonics
     samples = shape.evaluate(np.arange(count) * (shape.period_s / count))
@@ -118,7 +117,6 @@ def _fit_into_limits(
 
 
 def _largest_scale(joint: Joint, reach: float, speed: float, acceleration: float) -> float:
-    """Factor at which the first of the joint's limits is reached."""
     factors: list[float] = []
     if joint.limits.position is not None:
         low, high = joint.limits.position

@@ -32,7 +32,6 @@ class MujocoLog:
         """Take a simulation; nothing of it is changed.
 
         Raises RecordingError where a joint is not there, or is no hinge or slide.
-
         `joints`: hinges and slides, base first; None: all of them, as the file has them.
         """
         every = [model.joint(index).name for index in range(model.njnt) if model.jnt_type[index] in HINGE_OR_SLIDE]
@@ -75,11 +74,9 @@ class MujocoLog:
 
     @staticmethod
     def _places(groups: Sequence[str]) -> list[int]:
-        """Where each group stands in a row."""
         return [("q", "tau", "qd", "qref").index(group) for group in groups]
 
     def _actuator_of(self, joint: int) -> int | None:
-        """The joint's actuator; None where it has none."""
         model, on_joint = self._model, int(mujoco.mjtTrn.mjTRN_JOINT)
         for index in range(model.nu):
             if model.actuator_trntype[index] == on_joint and model.actuator_trnid[index, 0] == joint:

@@ -125,7 +125,6 @@ def _samples_per_period(period_s: float, rate_hz: float) -> int:
 
 
 def _per_joint(value: ArrayLike, robot: Robot, name: str) -> Array:
-    """One non-negative number a joint, shape (n,)."""
     array = np.asarray(value, dtype=np.float64)
     if array.shape not in ((), (1,), (robot.joint_count,)):
         raise RecordingError(f"{name} has {array.size} values; give one, or one for each of {robot.joint_count} joints")
@@ -140,7 +139,6 @@ def _torque(
     friction: Sequence[FrictionCoefficients] | None,
     friction_shape: Sequence[FrictionShape] | None,
 ) -> Array:
-    """Rigid-body torque plus friction, (N, n)."""
     ratios, offsets = robot.ratios, np.array([coupling.offset for coupling in robot.couplings])
     position, velocity, acceleration = (
         each @ ratios.T for each in (samples.position, samples.velocity, samples.acceleration)
@@ -154,7 +152,6 @@ def _torque(
 
 
 def _quantise(position: Array, step: Array) -> Array:
-    """Positions rounded to the encoder's step; joints with step zero as they are."""
     rounded = position.copy()
     coarse = step > 0.0
     rounded[:, coarse] = np.rint(position[:, coarse] / step[coarse]) * step[coarse]
@@ -189,6 +186,5 @@ def write_recording_csv(
 
 
 def _header(joint_count: int, effort: str) -> list[str]:
-    """Column names of the recording file."""
     numbers = range(1, joint_count + 1)
     return ["t", *(f"q{number}" for number in numbers), *(f"{effort}{number}" for number in numbers), "period"]

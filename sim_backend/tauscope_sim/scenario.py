@@ -14,7 +14,6 @@ Array = NDArray[np.float64]
 
 
 def _zero() -> Array:
-    """Zero for every joint."""
     return np.zeros(())
 
 
@@ -41,7 +40,6 @@ class Scenario:
 
         Raises RobotFileError where the robot file lacks what the simulation needs. Raises ScenarioError where effects
         contradict one another or the robot.
-
         `step_s`: longest step of the integration [s].
         """
         for effect in self.effects:
@@ -69,23 +67,10 @@ class Sensors:
         self._rng = rng
 
     def measure(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        """What is recorded of one instant; instants have to come in order, at the rate of the recording or faster.
+        """Position and torque as recorded of one instant, each (n,); instants come in order, at the recording's rate.
 
-        Parameters
-        ----------
-        time : float
-            of the sample [s]
-        position : (n,) float64
-            true position of the encoder's side [rad or m]
-        torque : (n,) float64
-            true torque of the drive, on the joint's side of the gear [Nm or N]
-
-        Returns
-        -------
-        position : (n,) float64
-            as recorded [rad or m]
-        torque : (n,) float64
-            as recorded [Nm or N]
+        `time`: of the sample [s]; `position`: (n,), true, of the encoder's side [rad or m]; `torque`: (n,), true, of
+        the drive, on the joint's side of the gear [Nm or N].
         """
         for channel in self._channels:
             position, torque = channel.pass_on(time, position, torque)

@@ -29,7 +29,7 @@ from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot import Robot
 from tauscope.robot.yaml_text import Place, read_yaml
 from tauscope_sim.effects import EFFECTS, Effect, ScenarioEntry, SensorEffect
-from tauscope_sim.effects.fields import NotNegative, NotNegativeNumbers, Seed, single_zero
+from tauscope_sim.effects.effect import NotNegative, NotNegativeNumbers, Seed, single_zero
 from tauscope_sim.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -75,13 +75,10 @@ def scenario_from_yaml(data: bytes, label: str, robot: Robot) -> Scenario:
 
 
 class _Reader:
-    """Words the refusals of one file."""
-
     def __init__(self, label: str, lines: Mapping[Place, int], robot: Robot) -> None:
         self._label, self._lines, self._robot = label, lines, robot
 
     def scenario(self, data: Any) -> Scenario:
-        """The scenario of plain data."""
         document = self._validate(ScenarioDocument, data, (), "")
         entries = [self._entry(value, number) for number, value in enumerate(document.effects)]
         scenario = Scenario(
@@ -97,7 +94,6 @@ class _Reader:
         return scenario
 
     def _entry(self, value: Any, number: int) -> ScenarioEntry:
-        """One effect."""
         place: Place = ("effects", number)
         if not isinstance(value, Mapping):
             raise self._error(place, "", f"must be a mapping with the key effect, but is {shown(value)}")
@@ -116,28 +112,24 @@ class _Reader:
         return entry
 
     def _joint_number(self, key: str, value: Any) -> Any:
-        """A joint's number where its name is written; anything else as it is."""
         if key not in ("joint", "other_joint", "link") or not isinstance(value, str):
             return value
         names = [joint.name for joint in self._robot.joints]
         return names.index(value) + 1 if value in names else value
 
     def _per_joint(self, document: ScenarioDocument, key: str) -> Array:
-        """One number a joint, (n,)."""
         values, count = getattr(document, key), self._robot.joint_count
         if len(values) not in (1, count):
             raise self._error((key,), "", f"holds {len(values)} numbers; give one, or one for each of {count} joints")
         return np.broadcast_to(np.array(values), (count,)).copy()
 
     def _try_out(self, scenario: Scenario) -> None:
-        """Build the plant once: effects may contradict one another."""
         try:
             scenario.plant(self._robot)
         except ScenarioError as error:
             raise self._error(("effects",), "", str(error)) from error
 
     def _validate(self, kind: type, data: Any, place: Place, name: str) -> Any:
-        """The data as a validated document."""
         if not isinstance(data, Mapping):
             raise self._error(place, name, f"must be a mapping, but is {shown(data)}")
         try:
@@ -155,7 +147,6 @@ class _Reader:
         raise self._error((*place, *inner), name, text + more)
 
     def _error(self, place: Place, name: str, text: str) -> ScenarioError:
-        """The error of an entry: ``scenario.yaml:7: effects[1] (cogging).order: …``."""
         line = next((self._lines[place[:n]] for n in range(len(place), -1, -1) if place[:n] in self._lines), None)
         steps = [f"[{step}]" if isinstance(step, int) else f".{step}" for step in place]
         if name:

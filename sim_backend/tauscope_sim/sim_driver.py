@@ -8,7 +8,7 @@ from typing import Any
 
 from tauscope.robot.messages import shown
 from tauscope_drivers.driver import ArmDescription, Connection, Driver, Option
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 
 _LINGER_S = 5.0
 _LONGEST_FOLDER = 90
@@ -51,7 +51,6 @@ class SimulatedDriver(Driver):
 
 
 def _virtual_arm(arm: ArmDescription, scenario: Path | None, start: list[float] | None) -> Connection:
-    """The arm within this process."""
     from tauscope_sim.driver import SimulatedArm
     from tauscope_sim.scenario import Scenario
     from tauscope_sim.scenario_file import read_scenario
@@ -61,7 +60,6 @@ def _virtual_arm(arm: ArmDescription, scenario: Path | None, start: list[float] 
 
 
 def _path(settings: Mapping[str, Any], key: str) -> Path | None:
-    """A path among the settings."""
     value = settings.get(key)
     if value is not None and (not isinstance(value, str) or not value):
         raise _refusal(f"{key} is {shown(value)}; give the path of a file")
@@ -69,7 +67,6 @@ def _path(settings: Mapping[str, Any], key: str) -> Path | None:
 
 
 def _posture(start: Any, joint_count: int) -> list[float] | None:
-    """Where the simulated arm stands at first."""
     if start is None:
         return None
     if not isinstance(start, list | tuple) or len(start) != joint_count:
@@ -84,7 +81,7 @@ def _posture(start: Any, joint_count: int) -> list[float] | None:
 
 
 def _refusal(reason: str) -> DriverError:
-    return DriverError(DriverErrorKind.REFUSED, f"backend sim: {reason}")
+    return DriverError.refusal(f"backend sim: {reason}")
 
 
 DRIVER = SimulatedDriver()

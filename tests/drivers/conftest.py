@@ -11,8 +11,7 @@ from _pytest.mark import ParameterSet
 
 from arm_rigs import Rig, remote_rigs, virtual_rigs
 from hardware_emulated.canopen_rig import canopen_rigs
-from hardware_emulated.dynamixel_rig import dynamixel_rigs
-from hardware_emulated.feetech_rig import feetech_rigs
+from hardware_emulated.servo_rigs import PH54, STS3215, servo_rigs
 from prompt_process import prompt_process
 from tauscope.runtime.drivers import driver_names
 from tauscope_drivers import StopPolicy
@@ -21,8 +20,8 @@ RigMaker = Callable[[Path], AbstractContextManager[Callable[[], Rig]]]
 
 RIGS: dict[str, dict[str, RigMaker]] = {
     "sim": {"virtual": virtual_rigs, "real-time": remote_rigs},
-    "dynamixel": {"dynamixel": dynamixel_rigs},
-    "feetech": {"feetech": feetech_rigs},
+    "dynamixel": {"dynamixel": partial(servo_rigs, servos=PH54)},
+    "feetech": {"feetech": partial(servo_rigs, servos=STS3215)},
     "canopen": {"canopen": canopen_rigs, "canopen-stepped": partial(canopen_rigs, stepped=True)},
 }
 """Makers of rigs by the driver's name: a new driver joins the suite here."""

@@ -37,11 +37,9 @@ def test_it_carries_out_the_policy_that_the_arm_was_enabled_with(rig: Rig, polic
     enabled = rig.backend.exchange(setpoint(START)).enabled
     assert enabled.all() == (policy is not StopPolicy.TORQUE_OFF)
     fallen = np.abs(rig.watch(0.3).position[-1] - START).max()
-    assert {
-        StopPolicy.HOLD: fallen < 1e-3,
-        StopPolicy.DAMP: 1e-3 < fallen < 0.1,
-        StopPolicy.TORQUE_OFF: fallen > 0.2,
-    }[policy], fallen
+    assert {StopPolicy.HOLD: fallen < 1e-3, StopPolicy.DAMP: 1e-3 < fallen < 0.1, StopPolicy.TORQUE_OFF: fallen > 0.2}[
+        policy
+    ], fallen
 
 
 def test_it_latches_until_it_is_acknowledged(rig: Rig) -> None:

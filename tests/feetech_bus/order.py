@@ -1,62 +1,44 @@
-"""The order that starts an emulator process, as JSON."""
+"""An emulated STS3215 servo and its joint, and the order that starts an arm of them."""
 
-import json
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any, ClassVar, cast
+import math
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
-from feetech_bus.bus import FeetechBus
-from feetech_bus.servo import FeetechServo
-from feetech_bus.specification import ServoSpecification
-from tauscope_sim.dynamixel_bus.arm import MovedArm, Pendulums
-from tauscope_sim.dynamixel_bus.emulator import DynamixelEmulator
-from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal
+from tauscope_sim.dynamixel_bus.order import ServoOrder
 
 
 @dataclass(frozen=True)
-class FeetechOrder:
-    """What to emulate.
+class ServoSpecification:
+    """One servo.
 
-    `start`: where the joints stand [rad].
+    `torque_per_permille`: joint torque of 1 ‰ of duty [Nm].
+    `registers`: as they differ from a delivered servo's.
     """
 
-    module: ClassVar[str] = "feetech_bus"
+    servo: int
+    baud: int = 1_000_000
+    torque_per_permille: float = 1.91e-3
+    direction: int = 1
+    reduction: float = 1.0
+    zero_count: int = 2048
+    registers: dict[str, int] = field(default_factory=dict)
 
-    servos: tuple[ServoSpecification, ...]
-    start: tuple[float, ...]
-    port: str
-    control: str
-    robot: str | None = None
-    weight: float = 0.5
+    @property
+    def counts_per_radian(self) -> float:
+        """Counts for one radian of the joint, signed."""
+        return self.direction * self.reduction * 4096 / (2.0 * math.pi)
+
+
+@dataclass(frozen=True)
+class FeetechOrder(ServoOrder[ServoSpecification]):
+    """The arm and the clock are those of the other emulated servos."""
+
+    specification: ClassVar[type] = ServoSpecification
+
     echoes: bool = False
-    latency_s: float = 0.0
-    stepped: bool = False
-    trace: str | None = None
 
-    def to_json(self) -> str:
-        return json.dumps(asdict(self))
+    def make_bus(self) -> Any:
+        from feetech_bus.bus import FeetechBus
+        from feetech_bus.servo import FeetechServo
 
-    @staticmethod
-    def from_json(text: str) -> "FeetechOrder":
-        document = json.loads(text)
-        servos = tuple(ServoSpecification(**servo) for servo in document.pop("servos"))
-        return FeetechOrder(servos=servos, **{**document, "start": tuple(document["start"])})
-
-    def open_port(self) -> PseudoTerminal:
-        return PseudoTerminal(self.port)
-
-    def build(self, now_s: float) -> DynamixelEmulator:
-        """The arm and the clock are those of the other emulated servos."""
-        servos = [FeetechServo(servo) for servo in self.servos]
-        bus = FeetechBus(servos, paced=not self.stepped, echoes=self.echoes)
-        identifiers = [servo.servo for servo in servos]
-        return DynamixelEmulator(cast(Any, bus), identifiers, self._arm(), now_s, latency_s=self.latency_s)
-
-    def _arm(self) -> MovedArm:
-        if self.robot is None:
-            return Pendulums(self.start, weight=self.weight)
-        from tauscope.robot import read_robot
-        from tauscope_sim.dynamixel_bus.plant_arm import PlantArm
-        from tauscope_sim.scenario import Scenario
-
-        return PlantArm(read_robot(Path(self.robot)), Scenario(), self.start)
+        return FeetechBus(list(map(FeetechServo, self.servos)), paced=not self.stepped, echoes=self.echoes)

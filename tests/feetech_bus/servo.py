@@ -5,10 +5,12 @@ power-up, and a goal switches torque on.
 """
 
 from dataclasses import replace
+from typing import ClassVar
 
 from feetech_bus.memory import Memory
-from feetech_bus.specification import ServoSpecification
-from tauscope_sim.dynamixel_bus.servo_loop import RELEASED, Demand
+from feetech_bus.order import ServoSpecification
+from tauscope_sim.dynamixel_bus.servo import RELEASED, Demand
+from tauscope_sim.emulation.fault_kit import FaultKind
 
 VOLTAGE, ENCODER, HEAT, CURRENT, OVERLOAD = 0x01, 0x02, 0x04, 0x08, 0x20
 
@@ -20,6 +22,11 @@ class FeetechServo:
     """A servo on the bus and at its joint."""
 
     latched_s = None
+    alarms: ClassVar[dict[FaultKind, int]] = {
+        FaultKind.OVER_TEMPERATURE: HEAT,
+        FaultKind.OVERLOAD: OVERLOAD,
+        FaultKind.ENCODER_JUMP: ENCODER,
+    }
 
     def __init__(self, specification: ServoSpecification) -> None:
         """Power up."""

@@ -64,16 +64,20 @@ def _link(vector: np.ndarray) -> dict[str, Any]:
     return {"mass": values[6], "first_moment": values[7:], "inertia": inertia}
 
 
-def write_robot(arm: dict[str, Any], path: Path, port: str, *, knows_model: bool = True, model: str = MODEL) -> Path:
-    """The arm with a servo at every joint, with or without the truth about its links and friction."""
-    servos = [{"id": number, "model": model} for number in range(1, len(arm["joints"]) + 1)]
-    servos[0]["port"] = port
-    joints = [
-        {**joint, "torque_constant": TORQUE_PER_MILLIAMPERE, "drive": servo}
-        for joint, servo in zip(arm["joints"], servos, strict=True)
-    ]
+def write_robot(arm: dict[str, Any], path: Path, port: str, *, knows_model: bool = True) -> Path:
+    """The arm with a PH54 at every joint, with or without the truth about its links and friction."""
     told = {key: value for key, value in arm.items() if knows_model or key != "model"}
-    path.write_text(json.dumps({**told, "joints": joints}), encoding="utf-8")
+    return write_servos(told, path, port, id_key="id", constant=TORQUE_PER_MILLIAMPERE, model=MODEL)
+
+
+def write_servos(arm: dict[str, Any], path: Path, port: str, *, id_key: str, constant: float, **block: Any) -> Path:
+    """The arm with a servo at every joint."""
+    joints = [
+        {**joint, "torque_constant": constant, "drive": {id_key: number, **block}}
+        for number, joint in enumerate(arm["joints"], 1)
+    ]
+    joints[0]["drive"]["port"] = port
+    path.write_text(json.dumps({**arm, "joints": joints}), encoding="utf-8")
     return path
 
 

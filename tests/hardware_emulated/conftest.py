@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from hardware_emulated.commands import Tauscope, called_with
-from hardware_emulated.dynamixel_bench import Bench, bench
+from hardware_emulated.servo_bench import Bench, bench
 from prompt_process import prompt_process
 
 

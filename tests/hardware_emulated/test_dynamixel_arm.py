@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hardware_emulated.dynamixel_bench import WATCHDOG_S, Bench, bench, drive, limits, setpoint
+from hardware_emulated.servo_bench import WATCHDOG_S, Bench, bench, drive, limits, setpoint
 from tauscope_drivers import ControlMode, DriverError, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.dynamixel_bus import ServoSpecification

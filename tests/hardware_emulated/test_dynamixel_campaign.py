@@ -22,7 +22,7 @@ from hardware_emulated.campaign_arms import (
     three_joints,
     write_robot,
 )
-from hardware_emulated.robot_servos import servos_of
+from hardware_emulated.servo_kinds import servos_of
 from hardware_emulated.stepped_clock import SteppedClock
 from tauscope.excitation import ExcitationOptions, design_excitation
 from tauscope.identification import document, identify

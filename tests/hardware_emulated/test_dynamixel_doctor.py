@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hardware_emulated.dynamixel_bench import SLACK_S, Bench, bench, limits
+from hardware_emulated.servo_bench import SLACK_S, Bench, bench, limits
 from tauscope_drivers import ControlMode, DriverError
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.doctor import examine, scan_bus
 from tauscope_drivers.dynamixel.dry_run import plan_frames
-from tauscope_drivers.dynamixel.packets import FrameParser
+from tauscope_drivers.dynamixel.packets import DynamixelParser
 from tauscope_drivers.inspection import PHASES, FoundDevice, FrameRequest, Severity
 from tauscope_sim.dynamixel_bus import ServoSpecification
 from tauscope_sim.emulation import FaultKind, InjectedFault
@@ -80,10 +80,7 @@ def test_scan_finds_servos_at_their_baud_rate(tmp_path: Path) -> None:
     servos = (ServoSpecification(1, baud=3_000_000), ServoSpecification(7, model_number=2020, baud=3_000_000))
     with bench(tmp_path, servos) as one:
         found = list(scan_bus(one.emulator.order.port, [1_000_000, 3_000_000], slack_s=SLACK_S))
-    assert found == [
-        FoundDevice(1, 3_000_000, "XM430-W350", "52"),
-        FoundDevice(7, 3_000_000, "PH54-200-S500", "52"),
-    ]
+    assert found == [FoundDevice(1, 3_000_000, "XM430-W350", "52"), FoundDevice(7, 3_000_000, "PH54-200-S500", "52")]
 
 
 @pytest.mark.parametrize("baud", [57_600, 4_500_000])
@@ -102,7 +99,7 @@ def test_dry_run_plans_what_a_run_sends(tmp_path: Path, mode: ControlMode) -> No
     assert [frame.phase for frame in planned] == sorted((frame.phase for frame in planned), key=PHASES.index)
     for frame in planned:
         raw = bytes.fromhex(frame.wire)
-        assert list(FrameParser().feed(raw)) == [raw]
+        assert list(DynamixelParser().feed(raw)) == [raw]
     enabling = [frame.meaning for frame in planned if frame.phase == "enable" and "(servo 1," in frame.meaning]
     assert "Torque Enable := 1" in enabling[-1]
     assert any("Bus Watchdog := 5" in meaning for meaning in enabling)

@@ -11,7 +11,7 @@ import pytest
 from hardware_emulated.campaign_arms import three_joints, write_robot
 from hardware_emulated.fault_runs import Site, fault_site
 from hardware_emulated.fault_table import FaultTable
-from hardware_emulated.robot_servos import servos_of
+from hardware_emulated.servo_kinds import servos_of
 from hardware_emulated.stepped_clock import SteppedClock
 from tauscope.robot import Robot
 from tauscope.runtime.drivers import find_driver, to_drive_joints

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hardware_emulated.dynamixel_bench import TORQUE_PER_MILLIAMPERE, WATCHDOG_S, Bench, bench, drive, limits, setpoint
+from hardware_emulated.servo_bench import TORQUE_PER_UNIT, WATCHDOG_S, Bench, bench, drive, limits, setpoint
 from tauscope_drivers import ControlMode, DriverError, StopPolicy
 from tauscope_sim.dynamixel_bus import ServoSpecification
 
@@ -54,7 +54,7 @@ def test_current_is_what_the_motor_gives(three: Bench) -> None:
     states = drive(arm, lambda _: setpoint(np.full(3, 1.0)), 1.0)
     mean = np.nanmean([state.effort for state in states[-50:]], axis=0)
     # Held against gravity: m g l sin q at the place where it hangs.
-    expected = 0.5 * np.sin(states[-1].position) / TORQUE_PER_MILLIAMPERE
+    expected = 0.5 * np.sin(states[-1].position) / TORQUE_PER_UNIT
     np.testing.assert_allclose(mean, expected, atol=3.0)
 
 
@@ -87,7 +87,7 @@ def test_torque_is_commanded_as_current_within_the_cap(weightless: Bench) -> Non
 
 
 def test_direction_and_reduction_reach_the_joint(tmp_path: Path) -> None:
-    servos = (ServoSpecification(1, direction=-1, reduction=2.0, torque_per_milliampere=TORQUE_PER_MILLIAMPERE),)
+    servos = (ServoSpecification(1, direction=-1, reduction=2.0, torque_per_milliampere=TORQUE_PER_UNIT),)
     with bench(tmp_path, servos, start=0.4) as one:
         arm = one.arm(direction=-1, reduction=2.0)
         np.testing.assert_allclose(arm.connect().position, 0.4, atol=ONE_COUNT)
@@ -161,7 +161,7 @@ def test_without_fast_sync_read_each_servo_answers_for_itself(tmp_path: Path) ->
 
 def test_families_may_be_mixed_on_one_bus(tmp_path: Path) -> None:
     servos = (
-        ServoSpecification(1, torque_per_milliampere=TORQUE_PER_MILLIAMPERE),
+        ServoSpecification(1, torque_per_milliampere=TORQUE_PER_UNIT),
         ServoSpecification(2, model_number=2020, torque_per_milliampere=0.001),
         ServoSpecification(3, model_number=4030, torque_per_milliampere=0.001),
     )

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hardware_emulated.dynamixel_bench import WATCHDOG_S, Bench, drive, limits, setpoint
+from hardware_emulated.servo_bench import WATCHDOG_S, Bench, drive, limits, setpoint
 from tauscope_drivers import ControlMode, DriverError, StopPolicy
 from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_drivers.errors import DriverErrorKind
@@ -135,7 +135,7 @@ sys.path[:0] = [{tests!r}]
 from tauscope_drivers import ControlMode, StopPolicy
 from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_drivers.drive_block import DriveJoint
-from hardware_emulated.dynamixel_bench import drive, limits, setpoint
+from hardware_emulated.servo_bench import drive, limits, setpoint
 joints = [DriveJoint(f"joint{{n}}", {{"id": n, "port": {port!r}}}, torque_per_unit=0.01) for n in (1, 2, 3)]
 arm = DynamixelArm(joints, slack_s=0.03)
 arm.connect()

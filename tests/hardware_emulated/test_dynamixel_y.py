@@ -5,10 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hardware_emulated.dynamixel_bench import WATCHDOG_S, bench, drive, limits, setpoint
+from hardware_emulated.servo_bench import WATCHDOG_S, bench, drive, limits, setpoint
 from tauscope_drivers import ControlMode, DriverError, StopPolicy
-from tauscope_drivers.dynamixel.control_table import find_model, model_names
-from tauscope_drivers.dynamixel.models import gear_ratio_of
+from tauscope_drivers.dynamixel.control_table import find_model, gear_ratio_of, model_names
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.dynamixel_bus import ServoSpecification
 from tauscope_sim.emulation import FaultKind, InjectedFault

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from emulator_process import EmulatorProcess
-from feetech_bus import FeetechOrder, ServoSpecification
 from hardware_emulated.campaign_arms import standard_parameters, three_joints
+from hardware_emulated.servo_kinds import FEETECH
 from hardware_emulated.stepped_clock import SteppedClock
-from hardware_emulated.test_feetech_commands import TORQUE_PER_PERMILLE, write_feetech_robot
 from tauscope.excitation import ExcitationOptions, design_excitation
 from tauscope.identification import document, identify
 from tauscope.recording import read_recording
@@ -34,15 +33,10 @@ DESIGN = ExcitationOptions(period_s=8.0, periods=2, starts=2, slow_postures=2)
 @pytest.mark.timeout(1200)
 def test_parameters_are_found_from_load(tmp_path: Path) -> None:
     arm = three_joints()
-    robot = read_robot(write_feetech_robot(arm, tmp_path / "arm.json", str(tmp_path / "port")))
+    robot = read_robot(FEETECH.write_robot(arm, tmp_path / "arm.json", str(tmp_path / "port")))
     motion = design_excitation(robot, DESIGN).trajectory
-    order = FeetechOrder(
-        servos=tuple(ServoSpecification(number, torque_per_permille=TORQUE_PER_PERMILLE) for number in (1, 2, 3)),
-        start=tuple((motion.start + 0.1).tolist()),
-        port=str(tmp_path / "port"),
-        control=str(tmp_path / "control"),
-        robot=str(tmp_path / "arm.json"),
-        stepped=True,
+    order = FEETECH.order(
+        robot, (motion.start + 0.1).tolist(), tmp_path, robot=str(tmp_path / "arm.json"), stepped=True
     )
     with EmulatorProcess(order) as emulator:
         joints = to_drive_joints(find_driver("feetech"), robot)

@@ -1,16 +1,16 @@
 """Runs of the simulated arm: the registry, virtual time, and both ways of control."""
 
-import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import tauscope_drivers
 from tauscope.dynamics import friction_torque, inverse_dynamics
 from tauscope.errors import AcquisitionError, ScenarioError
 from tauscope.recording import read_recording
 from tauscope.robot import Robot, read_robot
-from tauscope.runtime.drivers import DEFAULT_BACKEND, driver_names, make_backend
+from tauscope.runtime.drivers import DEFAULT_BACKEND, driver_names, find_driver, make_backend
 from tauscope.runtime.in_process import run_trajectory
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.states import RunState
@@ -115,7 +115,8 @@ def test_a_missing_scenario_is_named(robot: Robot, tmp_path: Path) -> None:
 
 
 def test_every_backend_has_a_name() -> None:
-    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    folders = Path(tauscope_drivers.__file__).parent.glob("*/driver.py")
     first, *others = driver_names()
     assert first == DEFAULT_BACKEND
-    assert others == sorted(project["entry-points"]["tauscope.drivers"].keys() - {DEFAULT_BACKEND})
+    assert others == sorted(folder.parent.name for folder in folders)
+    assert all(find_driver(name).name == name for name in others)

@@ -15,8 +15,7 @@ from tauscope_drivers.canopen.configuration import BusConfiguration, read_config
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST
 from tauscope_drivers.canopen.enabling import power_up
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.observation import blind_state, listed
-from tauscope_drivers.canopen.session import Session, possible_rate_hz, rate_limited_by
+from tauscope_drivers.canopen.session import Session, blind_state, listed, possible_rate_hz, rate_limited_by
 from tauscope_drivers.canopen.state_machine import Goal
 from tauscope_drivers.canopen.stopping import (
     POLICY_GOALS,
@@ -96,7 +95,7 @@ class CanopenArm:
     def connect(self) -> ArmState:
         """Open the bus, make sure that every node is a drive, and read it by SDO."""
         if self._session is not None:
-            raise DriverError(DriverErrorKind.CANNOT_CONNECT, "the arm is connected already; disconnect it first")
+            raise DriverError.no_connection("the arm is connected already; disconnect it first")
         session = self._session = self._open()
         try:
             self._modes = frozenset.intersection(*(node.identify() for node in session.nodes))
@@ -130,7 +129,7 @@ class CanopenArm:
         """
         session = self._require_session()
         if self._mode is not None:
-            raise DriverError(DriverErrorKind.REFUSED, "the arm is enabled already; stop it first")
+            raise DriverError.refusal("the arm is enabled already; stop it first")
         self._refuse_impossible(mode, stop_policy, watchdog_s)
         for node in session.nodes:
             if write_settings(node):
@@ -214,14 +213,12 @@ class CanopenArm:
             self._session, self._mode = None, None
 
     def _open(self) -> Session:
-        """Open the bus and listen to its drives."""
         bus = CanBus(self._configuration, self._given_bus, self.clock)
         nodes = tuple(DriveNode.on_bus(bus, node, joint) for joint, node in enumerate(self._configuration.nodes, 1))
         answer_s = 2.0 / possible_rate_hz(self._configuration) + self._patience_s
         return Session(bus, nodes, self.clock, round(answer_s * 1e9), self._caught)
 
     def _refuse_impossible(self, mode: ControlMode, policy: StopPolicy, watchdog_s: float) -> None:
-        """Refuse what these drives cannot do, before anything is switched on."""
         reason = None
         if mode not in self._modes:
             reason = f"not every drive has the cyclic synchronous {mode} mode (0x6502)"
@@ -232,7 +229,7 @@ class CanopenArm:
         else:
             require_targets(self._configuration, mode)
         if reason is not None:
-            raise DriverError(DriverErrorKind.REFUSED, reason)
+            raise DriverError.refusal(reason)
 
     def _require_session(self) -> Session:
         if self._session is None:
@@ -247,8 +244,7 @@ def _require_hold(nodes: Sequence[DriveNode], mode: ControlMode, policy: StopPol
     """
     falling = [node for node in nodes if not node.stays_stopped]
     if falling and mode is ControlMode.TORQUE and policy is StopPolicy.HOLD:
-        raise DriverError(
-            DriverErrorKind.REFUSED,
+        raise DriverError.refusal(
             f"{falling[0].place}: has no power after a quick stop ({objects.QUICK_STOP_OPTION}), and cannot hold in "
-            "torque mode; run in position mode, or state stop_policy torque_off for an arm that may be let go",
+            "torque mode; run in position mode, or state stop_policy torque_off for an arm that may be let go"
         )

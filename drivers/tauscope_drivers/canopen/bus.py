@@ -12,9 +12,8 @@ import can
 import canopen
 
 from tauscope_drivers.canopen.configuration import BusConfiguration
-from tauscope_drivers.canopen.interfaces import ONE_PROCESS, BusClaim, ClaimedError, open_interface
+from tauscope_drivers.canopen.interfaces import ONE_PROCESS, BusClaim, ClaimedError, SerialAdapterBus, open_interface
 from tauscope_drivers.canopen.sdo import NodeDictionary, PumpedSdoClient
-from tauscope_drivers.canopen.serial_adapter import SerialAdapterBus
 from tauscope_drivers.clock import Clock, MonotonicClock
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 
@@ -63,10 +62,9 @@ class CanBus:
         except (can.CanError, OSError, ValueError, NotImplementedError, ImportError, TypeError) as error:
             self._release()
             text = " ".join(str(error).split())
-            raise DriverError(
-                DriverErrorKind.CANNOT_CONNECT,
+            raise DriverError.no_connection(
                 f"CAN bus {self._name} cannot be opened ({text}); check the adapter, its name, who else uses it, and "
-                "drive.options",
+                "drive.options"
             ) from error
         self._network.bus = self._bus
 
@@ -94,7 +92,6 @@ class CanBus:
         """Send frames one after the other, with one write where the adapter takes that.
 
         Raises DriverError ``lost`` where the bus does not take them.
-
         `frames`: iterable of (int, bytes), identifier and payload of each, in their order.
         """
         gathering = self._bus.gathering() if isinstance(self._bus, SerialAdapterBus) else nullcontext()
@@ -163,7 +160,6 @@ class CanBus:
         self._release()
 
     def _release(self) -> None:
-        """Let another process have the bus."""
         if self._claim is not None:
             self._claim.release()
             self._claim = None
@@ -185,7 +181,6 @@ def _claim_interface(configuration: BusConfiguration) -> BusClaim | None:
     try:
         return BusClaim(name)
     except ClaimedError as error:
-        raise DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
-            f"CAN bus {configuration.channel} is driven by {error} already; end that first",
+        raise DriverError.no_connection(
+            f"CAN bus {configuration.channel} is driven by {error} already; end that first"
         ) from error

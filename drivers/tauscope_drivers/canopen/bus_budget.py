@@ -67,7 +67,6 @@ def rate_limit(nodes: int, frames: CycleFrames, bit_rate: float, serial_baud: fl
 
 
 def _serial_s(nodes: int, frames: CycleFrames, serial_baud: float | None) -> float:
-    """Time of a cycle's frames on the adapter's serial line [s]."""
     if serial_baud is None:
         return 0.0
     messages = 1 + nodes * (len(frames.received_bytes) + len(frames.sent_bytes))

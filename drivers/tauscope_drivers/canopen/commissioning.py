@@ -51,29 +51,25 @@ def find_missing(node: DriveNode, file: DeviceFile) -> list[Setting]:
     """
     missing = [one for one in settings_of(file).written if _read_setting(node, file, one) != one.data]
     if missing and decode_state(node.dictionary.read(objects.STATUSWORD)) in POWERED:
-        raise DriverError(
-            DriverErrorKind.REFUSED,
+        raise DriverError.refusal(
             f"{node.place}: is under power, and {missing[0].entry} is not yet {missing[0].text} as {file.name} has it; "
-            "support the arm and let go of it first",
+            "support the arm and let go of it first"
         )
     return missing
 
 
 def _read_setting(node: DriveNode, file: DeviceFile, setting: Setting) -> bytes:
-    """What the drive has where a setting goes."""
     with _refusals_named(node, file, setting):
         return node.dictionary.read_data(setting.entry)
 
 
 def _give(node: DriveNode, file: DeviceFile, setting: Setting) -> None:
-    """Write one value and read it back."""
     with _refusals_named(node, file, setting):
         node.dictionary.send_data(setting.entry, setting.data, setting.text)
     if (kept := _read_setting(node, file, setting)) != setting.data:
-        raise DriverError(
-            DriverErrorKind.REFUSED,
+        raise DriverError.refusal(
             f"{node.place}: {setting.entry} was written as {setting.text}, as {file.name} has it, and reads back as "
-            f"0x{kept[::-1].hex().upper()}; correct its ParameterValue",
+            f"0x{kept[::-1].hex().upper()}; correct its ParameterValue"
         )
 
 
@@ -85,10 +81,9 @@ def _refusals_named(node: DriveNode, file: DeviceFile, setting: Setting) -> Iter
     except DriverError as error:
         if not isinstance(error.__cause__, SdoAbortedError):
             raise
-        raise DriverError(
-            DriverErrorKind.REFUSED,
+        raise DriverError.refusal(
             f"{node.place}: {setting.entry} = {setting.text} of {file.name} cannot be written ({error.__cause__}); "
-            "correct its ParameterValue, or remove it",
+            "correct its ParameterValue, or remove it"
         ) from error
 
 
@@ -103,7 +98,6 @@ def commission_drive(
     """Write all of it by SDO; each value is read back.
 
     Raises DriverError ``refused`` where the drive does not take a value.
-
     `cycle_s`: time between two SYNCs; the drive keeps the one that it knows where None [s].
     """
     write = node.dictionary.write
@@ -134,10 +128,9 @@ def _arm_abort(node: DriveNode, *, holds: bool) -> None:
     """Make the drive stop by itself where its master is silent. Raises DriverError ``refused`` where it would go on."""
     values = (_ABORT_BY_QUICK_STOP if holds else _ABORT_BY_DISABLING, _ABORT_BY_FAULT)
     if _choose(node, objects.ABORT_CONNECTION, values) == _NOTHING:
-        raise DriverError(
-            DriverErrorKind.REFUSED,
+        raise DriverError.refusal(
             f"{node.place}: {objects.ABORT_CONNECTION} stays 0: it goes on when the host is gone; "
-            "set it to 1, 2 or 3 with the maker's tool",
+            "set it to 1, 2 or 3 with the maker's tool"
         )
 
 
@@ -171,12 +164,11 @@ def _tell_cycle(node: DriveNode, cycle_s: float) -> None:
         if known not in (None, exponent) and not _takes(node, objects.INTERPOLATION_EXPONENT, exponent):
             value, _ = interpolation_period(cycle_s, (known,))
     except ValueError as error:
-        raise DriverError(DriverErrorKind.REFUSED, f"{node.place}: {error}; choose another rate") from error
+        raise DriverError.refusal(f"{node.place}: {error}; choose another rate") from error
     node.dictionary.write(objects.INTERPOLATION_VALUE, value)
 
 
 def _takes(node: DriveNode, entry: DriveObject, value: int) -> bool:
-    """Write a value; False where the drive refuses it."""
     try:
         node.dictionary.write(entry, value)
     except DriverError as error:

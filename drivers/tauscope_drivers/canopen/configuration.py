@@ -12,10 +12,17 @@ from pathlib import Path
 from typing import Any
 
 from tauscope_drivers.backend import ControlMode
+from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, DeviceFile, read_device_file
-from tauscope_drivers.canopen.data_sheet.needs import require_needed, require_target
+from tauscope_drivers.canopen.data_sheet.needs import (
+    present_objects,
+    require_needed,
+    require_target,
+    states_rated_torque,
+)
 from tauscope_drivers.canopen.data_sheet.settings import settings_of
 from tauscope_drivers.canopen.interfaces import OWN_OPTIONS
+from tauscope_drivers.canopen.objects import describe_absent
 from tauscope_drivers.drive_block import (
     DriveJoint,
     read_direction,
@@ -26,7 +33,8 @@ from tauscope_drivers.drive_block import (
     require_distinct,
     require_known_keys,
 )
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
+from tauscope_drivers.inspection import Finding, Severity, failure
 
 _HIGHEST_NODE = 127
 _BUS_KEYS = ("interface", "channel", "bit_rate", "serial_baud", "options")
@@ -98,7 +106,7 @@ def require_targets(configuration: BusConfiguration, mode: ControlMode) -> None:
             require_target(node.device_file, mode)
         except DataSheetError as error:
             text = f"joint {joint} (node {node.node_id}): {node.device_file.name}: {error}"
-            raise DriverError(DriverErrorKind.REFUSED, text) from error
+            raise DriverError.refusal(text) from error
 
 
 def read_node(joint: DriveJoint) -> NodeConfiguration:
@@ -121,7 +129,6 @@ def read_node(joint: DriveJoint) -> NodeConfiguration:
 
 
 def _options(joint: DriveJoint) -> Mapping[str, Any]:
-    """What python-can's interface is given besides."""
     options = joint.drive.get("options", {})
     if not isinstance(options, Mapping) or not all(isinstance(value, str | int | float) for value in options.values()):
         raise refusal(joint, "options", f"= {options!r}; give what python-can takes, as in {{host: 192.168.1.5}}")
@@ -149,3 +156,41 @@ def _device_file(joint: DriveJoint, node_id: int, *, reads_rated_torque: bool) -
     except DataSheetError as error:
         raise refusal(joint, "eds", f"= {path!r}: {error}") from error
     return file
+
+
+def check_blocks(joints: Sequence[DriveJoint]) -> list[Finding]:
+    """Flaws of every joint at once; of usable drives, the absent objects and their substitutes."""
+    findings: list[Finding] = []
+    without: list[str] = []
+    for joint in joints:
+        place = f"joint {joint.name}"
+        try:
+            node = read_node(joint)
+        except DriverError as error:
+            findings.append(failure(place, str(error)))
+            continue
+        findings += _describe_file(place, node)
+        without += [joint.name] if node.device_file is None else []
+    if without:
+        remedy = "name it as drive.eds: then its objects and mappings are known before a run"
+        findings.append(Finding(Severity.WARNING, f"joint {', '.join(without)}", "no EDS or DCF file", remedy))
+    if any(finding.severity is Severity.FAILURE for finding in findings):
+        return findings
+    try:
+        read_configuration(joints)
+    except DriverError as error:
+        findings.append(failure("canopen", str(error)))
+    return findings
+
+
+def _describe_file(place: str, node: NodeConfiguration) -> list[Finding]:
+    file = node.device_file
+    if file is None:
+        return []
+    absent = describe_absent(present_objects(file))
+    doubts: list[Finding] = []
+    if node.rated_torque_nm is None and not states_rated_torque(file):
+        detail = f"{file.name} has no {objects.RATED_TORQUE}: torque in ‰ of it means nothing, and a run is refused"
+        doubts.append(Finding(Severity.WARNING, place, detail, "state drive.rated_torque_nm"))
+    usable = Finding(Severity.GOOD, place, f"{file.name} describes all that the driver needs")
+    return [usable, *doubts, *(Finding(Severity.GOOD, place, f"{file.name} {line}") for line in absent)]

@@ -1,22 +1,28 @@
 """Looks at a CAN bus and the drives on it, moves nothing, writes nothing, and says what to do about what it finds."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
+
+from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import CanBus
+from tauscope_drivers.canopen.commissioning import find_missing
 from tauscope_drivers.canopen.configuration import BusConfiguration, read_configuration
 from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile
 from tauscope_drivers.canopen.data_sheet.settings import settings_of
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import DOUBTFUL, TARGETS
-from tauscope_drivers.canopen.rehearsal import rehearse
+from tauscope_drivers.canopen.pdo_mapping import read_mapping
+from tauscope_drivers.canopen.process_data import decode_mapping, received_parameters, sent_parameters
 from tauscope_drivers.canopen.session import possible_rate_hz
 from tauscope_drivers.canopen.state_machine import POWERED
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError
 from tauscope_drivers.inspection import Finding, FoundDevice, Severity, failure
+from tauscope_drivers.limits import require_sensible, stated_limits
 
 MEASURED_READS = 50
 """Reads by which the round trip is measured."""
@@ -81,7 +87,6 @@ def _examine_drives(
 
 
 def _examine_drive(node: DriveNode, joint: DriveJoint) -> list[Finding]:
-    """Name, modes, units, and what stands in the way of a run."""
     modes = node.identify()
     dictionary = node.dictionary
     name = dictionary.read_text(objects.DEVICE_NAME) or "a drive without a name"
@@ -133,7 +138,6 @@ def _examine_file(file: DeviceFile, place: str) -> list[Finding]:
 
 
 def _list_places(described: Sequence[DescribedObject]) -> str:
-    """Places in the object dictionary, the subindices of an index together."""
     subindices: dict[int, list[str]] = {}
     for one in described:
         subindices.setdefault(one.index, []).append(f"{one.subindex:02X}")
@@ -141,7 +145,6 @@ def _list_places(described: Sequence[DescribedObject]) -> str:
 
 
 def _loop_rate(configuration: BusConfiguration, nodes: Sequence[DriveNode], subject: str) -> Finding:
-    """How long a question takes, measured, beside what a whole cycle gets."""
     begin_ns = time.monotonic_ns()
     for read in range(MEASURED_READS):
         nodes[read % len(nodes)].dictionary.read(objects.STATUSWORD)
@@ -195,7 +198,6 @@ def scan_bus(interface: str, channel: str, bit_rates: Sequence[int] | None = Non
 
 
 def _answers(bus: CanBus) -> dict[int, int]:
-    """Device type of every node that answers."""
     found: dict[int, int] = {}
 
     def take(identifier: int, data: bytes) -> None:
@@ -217,3 +219,79 @@ def _name_and_version(bus: CanBus, node: int) -> tuple[str, str]:
     """Device name (0x1008) and software version (0x100A); empty where it tells none."""
     dictionary = bus.add_node(node)
     return dictionary.read_text(objects.DEVICE_NAME), dictionary.read_text(objects.SOFTWARE_VERSION)
+
+
+def rehearse(node: DriveNode, joint: DriveJoint) -> list[Finding]:
+    """What would keep a run with the limits of the robot file from starting. `node`: identified and read."""
+    checks: tuple[Callable[[], list[Finding]], ...] = (
+        lambda: _examine_settings(node),
+        lambda: _examine_place(node, joint),
+        lambda: _examine_torque(node, joint),
+        lambda: _examine_mapping(node),
+        lambda: _examine_abort(node),
+    )
+    findings: list[Finding] = []
+    for check in checks:
+        try:
+            findings += check()
+        except DriverError as error:
+            findings.append(failure(node.place, str(error), f"node {node.configuration.node_id}"))
+    return findings
+
+
+def _examine_settings(node: DriveNode) -> list[Finding]:
+    """Values of its DCF file: it has their objects, and no power while one is missing."""
+    if node.configuration.device_file is not None:
+        find_missing(node, node.configuration.device_file)
+    return []
+
+
+def _examine_place(node: DriveNode, joint: DriveJoint) -> list[Finding]:
+    place = node.units.position(node.dictionary.read(objects.POSITION_ACTUAL))
+    require_sensible(stated_limits([joint]), np.array([place]), [node.place])
+    return []
+
+
+def _examine_torque(node: DriveNode, joint: DriveJoint) -> list[Finding]:
+    limits = stated_limits([joint])
+    if not node.has(objects.LARGEST_TORQUE):
+        return []
+    cap = node.dictionary.read(objects.LARGEST_TORQUE)
+    if np.isfinite(limits.torque[0]):
+        cap = min(cap, node.units.torque_cap(float(limits.torque[0])))
+    if cap > 0:
+        return []
+    remedy = "raise it with the maker's tool, and check limits.torque and rated_torque_nm"
+    return [Finding(Severity.FAILURE, node.place, f"{objects.LARGEST_TORQUE} leaves no torque", remedy)]
+
+
+def _examine_mapping(node: DriveNode) -> list[Finding]:
+    """Whether its PDOs hold all that is needed, or can be mapped so."""
+    if ControlMode.POSITION not in node.mode_numbers:
+        return []
+    plan = node.plan_for(ControlMode.POSITION)
+    if plan.missing:
+        detail = f"{plan.missing[0]} is in none of its PDOs, and their mapping is fixed"
+        return [Finding(Severity.FAILURE, node.place, detail, "map it with the maker's tool, or use another drive")]
+    if node.configuration.device_file is not None:
+        return _compare_fixed(node)
+    detail = "has no EDS or DCF file: whether its objects and PDOs can be written shows only when a run writes them"
+    return [Finding(Severity.WARNING, node.place, detail, "name its file as drive.eds")]
+
+
+def _compare_fixed(node: DriveNode) -> list[Finding]:
+    plan = node.plan_for(ControlMode.POSITION)
+    uses = [*((pdo, received_parameters) for pdo in plan.received), *((pdo, sent_parameters) for pdo in plan.sent)]
+    for pdo, parameters in uses:
+        if pdo.is_fixed and decode_mapping(read_mapping(node, parameters(pdo.number, 0))) != pdo.layout.objects:
+            detail = f"its PDO {pdo.number + 1} is not mapped as its EDS or DCF file states"
+            return [Finding(Severity.FAILURE, node.place, detail, "give the file of this drive")]
+    return []
+
+
+def _examine_abort(node: DriveNode) -> list[Finding]:
+    """A drive does something when its master is silent."""
+    if node.has(objects.ABORT_CONNECTION) or node.dictionary.read_optional(objects.ABORT_CONNECTION) != 0:
+        return []
+    detail = f"{objects.ABORT_CONNECTION} is 0 and read-only: it goes on when the host is gone"
+    return [Finding(Severity.FAILURE, node.place, detail, "set it to 1, 2 or 3 with the maker's tool")]

@@ -5,8 +5,8 @@ from typing import Any
 
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.driver import PATIENCE, ArmDescription, BusDriver, Connection, Option
-from tauscope_drivers.errors import DriverError, DriverErrorKind
-from tauscope_drivers.inspection import Finding, FoundDevice, FrameRequest, PlannedFrame
+from tauscope_drivers.errors import DriverError
+from tauscope_drivers.inspection import Finding, FoundDevice
 
 
 class CanopenDriver(BusDriver):
@@ -20,14 +20,12 @@ class CanopenDriver(BusDriver):
         PATIENCE,
     )
     file_keys = ("eds",)
+    id_key = "node_id"
     block_example = "{node_id: 1, ...}"
     port_help = "INTERFACE:CHANNEL of python-can"
+    answering = "CiA 402 drives"
     neighbours = "motors of Damiao, Robstride, ODrive and moteus speak no CANopen"
     bus_options = ("interface", "channel")
-
-    def is_meant(self, block: Mapping[str, Any]) -> bool:
-        """Whether it has a ``node_id``."""
-        return "node_id" in block
 
     def make_backend(self, arm: ArmDescription, settings: Mapping[str, Any]) -> Connection:
         """The arm in real time."""
@@ -37,38 +35,19 @@ class CanopenDriver(BusDriver):
 
     def list_adapters(self) -> list[Finding]:
         """CAN interfaces of this machine."""
-        from tauscope_drivers.canopen.doctor import can_interfaces
-
-        return can_interfaces()
+        return self.load("doctor").can_interfaces()
 
     def check_blocks(self, joints: Sequence[DriveJoint]) -> list[Finding]:
         """Blocks, and the EDS or DCF files that they name."""
-        from tauscope_drivers.canopen.block_check import check_blocks
-
-        return check_blocks(joints)
-
-    def examine(self, joints: Sequence[DriveJoint]) -> list[Finding]:
-        """Bus, and every drive that the robot file names."""
-        from tauscope_drivers.canopen.doctor import examine
-
-        return examine(joints)
+        return self.load("configuration").check_blocks(joints)
 
     def scan(self, port: str, bit_rates: Sequence[int] | None) -> Iterator[FoundDevice]:
         """Nodes that answer when they are asked for their device type."""
-        from tauscope_drivers.canopen.doctor import scan_bus
-
         interface, _, channel = port.partition(":")
         if not interface or not channel:
             text = f"{port!r:.60} names no CAN bus; write INTERFACE:CHANNEL, as in socketcan:can0"
-            raise DriverError(DriverErrorKind.REFUSED, text)
-        return scan_bus(interface, channel, bit_rates)
-
-    def plan_frames(self, joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:
-        """The frames of a run, without a bus."""
-        from tauscope_drivers.canopen.dry_run import plan_frames
-
-        return plan_frames(joints, request)
+            raise DriverError.refusal(text)
+        return self.load("doctor").scan_bus(interface, channel, bit_rates)
 
 
 DRIVER = CanopenDriver()
-"""Found by the entry point ``tauscope.drivers``."""

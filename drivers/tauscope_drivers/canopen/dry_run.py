@@ -16,18 +16,14 @@ from tauscope_drivers.canopen.objects import DriveObject, select_modes
 from tauscope_drivers.canopen.state_machine import DriveState, Goal, next_controlword
 from tauscope_drivers.canopen.units import drive_units
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 from tauscope_drivers.inspection import FrameRequest, PlannedFrame
 from tauscope_drivers.limits import require_sensible
 
 _TO_POWER = (DriveState.SWITCH_ON_DISABLED, DriveState.READY, DriveState.SWITCHED_ON)
 _DOWNLOAD, _LONG_DOWNLOAD, _UPLOAD = 0x23, 0x21, 0x40
 _ALL_MODES = 0xFFFF
-_AS_DELIVERED = {
-    objects.LARGEST_TORQUE: 0xFFFF,
-    objects.INTERPOLATION_VALUE: 1,
-    objects.INTERPOLATION_EXPONENT: -3,
-}
+_AS_DELIVERED = {objects.LARGEST_TORQUE: 0xFFFF, objects.INTERPOLATION_VALUE: 1, objects.INTERPOLATION_EXPONENT: -3}
 
 
 class _PlannedDictionary:
@@ -41,32 +37,26 @@ class _PlannedDictionary:
         self._data: dict[DriveObject, bytes] = {}
 
     def read(self, entry: DriveObject) -> int:
-        """What was written, or what drives have as delivered."""
         request = bytes([_UPLOAD]) + _place(entry) + bytes(4)
         self._add(f"{entry}?", request)
         return self._values.get(entry, 0)
 
     def read_data(self, entry: DriveObject) -> bytes:
-        """Nothing that a drive was not given yet."""
         self.read(entry)
         return self._data.get(entry, b"")
 
     def read_optional(self, entry: DriveObject) -> int:
-        """As `read`: the drive has everything."""
         return self.read(entry)
 
     def write(self, entry: DriveObject, value: int) -> None:
-        """Keep a value, and read it back as the driver does."""
         self.send(entry, value)
         self.read(entry)
 
     def send(self, entry: DriveObject, value: int) -> None:
-        """Keep a value."""
         self._values[entry] = value
         self.send_data(entry, value.to_bytes(entry.bits // 8, "little", signed=entry.signed), str(value))
 
     def send_data(self, entry: DriveObject, data: bytes, text: str) -> None:
-        """Keep a value as transferred; a long one is announced by its size, and follows in segments."""
         self._data[entry] = data
         if len(data) > 4:
             payload = bytes([_LONG_DOWNLOAD]) + _place(entry) + len(data).to_bytes(4, "little")
@@ -115,9 +105,8 @@ def _plan_node(joint: int, configuration: NodeConfiguration) -> tuple[DriveNode,
     """A drive that nobody has asked, in the units that the robot file states."""
     label = f"joint {joint} (node {configuration.node_id})"
     if configuration.rated_torque_nm is None:
-        raise DriverError(
-            DriverErrorKind.REFUSED,
-            f"{label}: only the drive knows its rated torque (0x6076); state drive.rated_torque_nm for a dry run",
+        raise DriverError.refusal(
+            f"{label}: only the drive knows its rated torque (0x6076); state drive.rated_torque_nm for a dry run"
         )
     dictionary = _PlannedDictionary(configuration, label)
     node = DriveNode(configuration, joint, dictionary)  # pyright: ignore[reportArgumentType]
@@ -133,7 +122,6 @@ def _plan_node(joint: int, configuration: NodeConfiguration) -> tuple[DriveNode,
 def _cycle(
     nodes: Sequence[DriveNode], mode: ControlMode, phase: str, word: int, position: NDArray[np.float64]
 ) -> Iterator[PlannedFrame]:
-    """Targets of all nodes, then SYNC."""
     for node, place in zip(nodes, position, strict=True):
         what = f"{place:.4f}" if mode is ControlMode.POSITION else "0"
         for identifier, payload in node.targets(mode, word, float(place), 0.0):

@@ -4,8 +4,7 @@ from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import NMT_START
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.observation import listed
-from tauscope_drivers.canopen.session import Session, stay_at
+from tauscope_drivers.canopen.session import Session, listed, stay_at
 from tauscope_drivers.canopen.state_machine import DriveState, Goal
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.state import ArmState, Array
@@ -22,14 +21,8 @@ STILL_CYCLES = 4
 def power_up(session: Session, mode: ControlMode) -> tuple[ArmState, Array]:
     """Take all drives to *operation enabled*; targets are where the joints are when their drives get there.
 
-    Raises DriverError: ``fault`` or ``refused``: a drive does not get there.
-
-    Returns
-    -------
-    ArmState
-        of the last cycle
-    (n,) float64
-        targets that the drives stand at [rad or m]
+    Raises DriverError: ``fault`` or ``refused``: a drive does not get there. Returns the state of the last cycle, and
+    the targets that the drives stand at, (n,) [rad or m].
     """
     place = _read_settled_place(session, mode)
 
@@ -80,7 +73,6 @@ def _read_settled_place(session: Session, mode: ControlMode) -> Array:
 
 
 def _is_up(node: DriveNode) -> bool:
-    """Whether a drive was in *operation enabled* when it last answered."""
     return node.last_state is DriveState.OPERATION_ENABLED
 
 

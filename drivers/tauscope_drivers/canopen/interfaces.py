@@ -1,16 +1,23 @@
 """Opening any interface that python-can knows, fit for a control loop, and claiming one that several may open."""
 
+import contextlib
 import errno
+import re
+import select
 import socket
 import struct
 import sys
-from collections.abc import Mapping
+import time
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import can
+from can import CanInitializationError, CanOperationError
+from can.exceptions import error_check
+from can.interfaces.slcan import slcanBus
 
-from tauscope_drivers.canopen.serial_adapter import SerialAdapterBus
+from tauscope_drivers.serial_port import find_holder
 
 ONE_PROCESS = ("slcan", "virtual")
 """Interfaces that two programs cannot drive at once: a port that is locked, and a bus inside of one process."""
@@ -86,7 +93,6 @@ class BusClaim:
 
 
 def _holder(name: str) -> str:
-    """The process that has a name, as ``process 123 (name)``."""
     with socket.socket(socket.AF_UNIX) as visitor:
         visitor.setblocking(False)
         try:
@@ -96,3 +102,113 @@ def _holder(name: str) -> str:
         except OSError:
             return "another process"
     return f"process {process} ({command})"
+
+
+RESTART_S = 2.0
+"""Time that an adapter takes to restart after its port was opened, as python-can has it."""
+
+_VERSION_S = 0.1
+_ACKNOWLEDGEMENTS = ("\r", "z\r", "Z\r")
+_FRAME_LETTERS = "tTrRxdDbB"
+_FRAME = re.compile(r"(?:t[0-7][0-9A-F]{2}|T[01][0-9A-F]{7})(?P<bytes>[0-8])(?P<data>[0-9A-F]*)\r", re.IGNORECASE)
+_STAMP_DIGITS = 4
+"""Of the time that some adapters write behind a frame."""
+
+
+class SerialAdapterBus(slcanBus):
+    """`can.interfaces.slcan.slcanBus` that takes many frames with one call, and shares its port with nobody."""
+
+    _gathered: bytearray | None = None
+
+    def __init__(self, path: str, bit_rate: int) -> None:
+        """Open the adapter, and the channel on it.
+
+        Raises CanInitializationError where the port is missing, not permitted or taken; names the holder.
+        """
+        holder = find_holder(path)
+        if holder is not None:
+            raise CanInitializationError(f"{holder} has it")
+        super().__init__(path, bitrate=bit_rate, sleep_after_open=0.0)
+        try:
+            self.serialPortOrig.exclusive = True
+        except OSError as error:
+            self.shutdown()
+            raise CanInitializationError(f"{find_holder(path) or 'another program'} has it") from error
+        self._await_adapter()
+        self.set_bitrate(bit_rate)
+
+    @contextlib.contextmanager
+    def gathering(self) -> Iterator[None]:
+        """Send what is sent within the context with one write, on leaving it; nothing of it where that fails.
+
+        Raises CanOperationError where the port does not take it.
+        """
+        self._gathered = bytearray()
+        try:
+            yield
+            text = bytes(self._gathered)
+        finally:
+            self._gathered = None
+        self._put(text)
+
+    def shutdown(self) -> None:
+        """Close the channel and the port; of an adapter that is gone only the port is left to close."""
+        with contextlib.suppress(CanOperationError):
+            super().shutdown()
+        self.serialPortOrig.close()
+
+    def _await_adapter(self) -> None:
+        """Until it tells its version: some restart when they are opened, and some never tell."""
+        deadline = time.monotonic() + RESTART_S
+        while time.monotonic() < deadline:
+            with contextlib.suppress(ValueError):
+                if self.get_version(_VERSION_S)[0] is not None:
+                    return
+
+    def _write(self, string: str) -> None:
+        """One line for the adapter, at once or when the context of `gathering` is left."""
+        line = string.encode() + self.LINE_TERMINATOR
+        if self._gathered is None:
+            self._put(line)
+        else:
+            self._gathered += line
+
+    def _put(self, text: bytes) -> None:
+        with error_check("Could not write to serial device"):
+            self.serialPortOrig.write(text)
+
+    def _read(self, timeout: float | None) -> str | None:
+        """One line of the adapter, without waiting where one is there already."""
+        line = self._next_line()
+        if line is None:
+            port = self.serialPortOrig
+            waiting = port.in_waiting
+            if not waiting:
+                # the port's own timeout is a setting of the terminal, which takes longer to change than to read
+                if not select.select([port], [], [], timeout)[0]:
+                    return None
+                waiting = max(1, port.in_waiting)  # of a port that is gone the read fails
+            self._buffer.extend(port.read(waiting))
+            line = self._next_line()
+        return line
+
+    def _next_line(self) -> str | None:
+        """The first whole line that says something, taken out of the buffer.
+
+        What only acknowledges a command says nothing, and a frame that lacks characters is lost.
+        """
+        while ends := [place for mark in (self._OK, self._ERROR) if (place := self._buffer.find(mark)) >= 0]:
+            end = min(ends) + 1
+            line = self._buffer[:end].decode("ascii", "replace")
+            del self._buffer[:end]
+            if line not in _ACKNOWLEDGEMENTS and _is_sound(line):
+                return line
+        return None
+
+
+def _is_sound(line: str) -> bool:
+    """Whether a line is no frame, or a whole data frame: an adapter whose buffer overflows leaves characters out."""
+    if line[0] not in _FRAME_LETTERS:
+        return True
+    frame = _FRAME.fullmatch(line)
+    return frame is not None and len(frame["data"]) - 2 * int(frame["bytes"]) in (0, _STAMP_DIGITS)

@@ -18,20 +18,22 @@ from tauscope_drivers.canopen.objects import (
     describe_absent,
     select_modes,
 )
-from tauscope_drivers.canopen.pdo_plan import (
+from tauscope_drivers.canopen.process_data import (
     MEASURED,
     MEASURED_WHERE_THERE,
+    PdoLayout,
     PdoPlan,
     PdoSlots,
+    decode_pdo,
+    encode_pdo,
     plan_pdos,
     received_identifier,
     sent_identifier,
 )
-from tauscope_drivers.canopen.process_data import PdoLayout, decode_pdo, encode_pdo
 from tauscope_drivers.canopen.sdo import NodeDictionary
 from tauscope_drivers.canopen.state_machine import ENABLE_OPERATION, DriveState, Goal, decode_state, next_controlword
 from tauscope_drivers.canopen.units import DriveUnits, drive_units, read_rated_torque
-from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
+from tauscope_drivers.errors import DriverError, Fault
 
 FASTEST = 3.0
 """A joint is believed to be so many times as fast as its limit, no faster."""
@@ -181,9 +183,8 @@ class DriveNode:
         """
         kind = self.dictionary.read(objects.DEVICE_TYPE) & 0xFFFF
         if kind != _CIA_402:
-            raise DriverError(
-                DriverErrorKind.CANNOT_CONNECT,
-                f"{self.place}: its device profile is {kind}, not 402 (drives); check drive.node_id",
+            raise DriverError.no_connection(
+                f"{self.place}: its device profile is {kind}, not 402 (drives); check drive.node_id"
             )
         file = self.configuration.device_file
         if file is not None:
@@ -225,7 +226,6 @@ class DriveNode:
         """Identifier and payload of its target frames.
 
         Raises DriverError ``refused`` where the target is beyond what the drive can be told.
-
         `position`: of the joint, finite [rad or m]; `torque`: of the joint, finite [Nm or N].
         """
         target = TARGETS[mode][self.mode_numbers[mode]]
@@ -240,7 +240,7 @@ class DriveNode:
                 for pdo in self.plan.received
             ]
         except OverflowError as error:
-            raise DriverError(DriverErrorKind.REFUSED, f"{self.place}: {error}; check counts_per_turn") from error
+            raise DriverError.refusal(f"{self.place}: {error}; check counts_per_turn") from error
 
     def controlword(self, goal: Goal) -> int:
         """Next controlword towards a goal; a lost answer changes nothing, or it would drop an arm under power.
@@ -273,8 +273,6 @@ class DriveNode:
         return f"joint {self.joint} (node {self.configuration.node_id})"
 
     def _decode_measurements(self) -> Measurement:
-        """What this cycle's values say of the joint."""
-
         def convert(entry: DriveObject, to_joint: Callable[[int], float]) -> float:
             return to_joint(self.values[entry]) if entry in self.values else math.nan
 
@@ -299,17 +297,14 @@ class DriveNode:
             else:
                 self.remarks += (f"its rated torque (0x6076) {rated.remark}",) if rated.remark else ()
                 return drive_units(configuration, rated.nm)
-        raise DriverError(
-            DriverErrorKind.REFUSED, f"{self.place}: its rated torque (0x6076) {flaw}; give drive.rated_torque_nm"
-        )
+        raise DriverError.refusal(f"{self.place}: its rated torque (0x6076) {flaw}; give drive.rated_torque_nm")
 
     def _require_watchdog(self) -> None:
         """Refuse a drive that would not notice that the host is gone."""
         if self.dictionary.read_optional(objects.CONSUMER_HEARTBEAT) is None:
-            raise DriverError(
-                DriverErrorKind.REFUSED,
+            raise DriverError.refusal(
                 f"{self.place}: has no {objects.CONSUMER_HEARTBEAT}: it would not notice that the host is gone; "
-                "use a drive that watches the host's heartbeat",
+                "use a drive that watches the host's heartbeat"
             )
 
     def _take(self, layout: PdoLayout, data: bytes) -> None:

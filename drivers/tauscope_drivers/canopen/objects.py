@@ -26,7 +26,6 @@ class DriveObject:
         return self.index << 16 | self.subindex << 8 | self.bits
 
     def __str__(self) -> str:
-        """Name and place, for messages."""
         return f"{self.name} (0x{self.index:04X}:{self.subindex:02X})"
 
 
@@ -75,10 +74,7 @@ CYCLIC_TORQUE = 10
 
 
 TARGETS: Mapping[ControlMode, Mapping[int, DriveObject]] = {
-    ControlMode.POSITION: {
-        CYCLIC_POSITION: TARGET_POSITION,
-        INTERPOLATED_POSITION: INTERPOLATION_DATA,
-    },
+    ControlMode.POSITION: {CYCLIC_POSITION: TARGET_POSITION, INTERPOLATED_POSITION: INTERPOLATION_DATA},
     ControlMode.TORQUE: {CYCLIC_TORQUE: TARGET_TORQUE},
 }
 """Modes of operation, the best first, and the target of each."""

@@ -6,20 +6,18 @@ from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import DriveObject
-from tauscope_drivers.canopen.pdo_plan import (
+from tauscope_drivers.canopen.process_data import (
     PDO_COUNT,
     Pdo,
+    PdoParameters,
     PdoPlan,
     PdoSlot,
     PdoSlots,
     decode_mapping,
-    received_identifier,
-    sent_identifier,
-)
-from tauscope_drivers.canopen.process_data import (
-    PdoParameters,
     mapping_entries,
+    received_identifier,
     received_parameters,
+    sent_identifier,
     sent_parameters,
 )
 from tauscope_drivers.errors import DriverError, DriverErrorKind
@@ -46,9 +44,7 @@ def map_process_data(node: DriveNode, mode: ControlMode) -> None:
         if all(_write_pdo(node, pdo, is_sent=is_sent) for pdo, is_sent in _directions(plan)):
             break
     else:
-        raise DriverError(
-            DriverErrorKind.REFUSED, f"{node.place}: its PDO mapping reads differently each time; check the wiring"
-        )
+        raise DriverError.refusal(f"{node.place}: its PDO mapping reads differently each time; check the wiring")
     node.use_plan(plan)
     unknown = {entry for pdo in plan.received for entry in pdo.layout.objects} - _COMMANDED
     # a frame of fixed mapping holds other objects as well: they keep the values that they have
@@ -66,10 +62,9 @@ def _directions(plan: PdoPlan) -> list[tuple[Pdo, bool]]:
 
 def _require_complete(node: DriveNode, plan: PdoPlan) -> None:
     if plan.missing:
-        raise DriverError(
-            DriverErrorKind.REFUSED,
+        raise DriverError.refusal(
             f"{node.place}: {plan.missing[0]} is in none of its PDOs, and their mapping is fixed; "
-            "map it with the maker's tool, or use another drive",
+            "map it with the maker's tool, or use another drive"
         )
 
 
@@ -112,7 +107,6 @@ def _map(node: DriveNode, places: PdoParameters, wanted: list[int]) -> bool:
 
 
 def _use_as_it_is(node: DriveNode, places: PdoParameters, identifier: int, *, is_sent: bool) -> None:
-    """Switch on a PDO of fixed mapping, at SYNC."""
     dictionary = node.dictionary
     kind = dictionary.read(places.kind)
     if not (kind == _EVERY_SYNC or (kind <= _LAST_SYNCHRONOUS and not is_sent)):

@@ -1,9 +1,10 @@
-"""Process data: frames of several objects, which of them the driver uses, and where a drive keeps that."""
+"""Process data: frames of several objects, where a drive keeps what they are, and which of its PDOs are used."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
+from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.objects import DriveObject
 
 
@@ -83,10 +84,130 @@ def sent_parameters(number: int, entries: int) -> PdoParameters:
 
 
 def _parameters(communication: int, mapping: int, entries: int) -> PdoParameters:
-    """Communication and mapping parameter, CiA 301."""
     return PdoParameters(
         identifier=DriveObject("PDO COB-ID", communication, 1, 32),
         kind=DriveObject("PDO transmission type", communication, 2, 8),
         count=DriveObject("PDO number of entries", mapping, 0, 8),
         entries=tuple(DriveObject("PDO entry", mapping, subindex, 32) for subindex in range(1, entries + 1)),
     )
+
+
+PDO_COUNT = 4
+"""PDOs with an identifier of their own by CiA 301's default connection set."""
+
+MEASURED = (objects.STATUSWORD, objects.TORQUE_ACTUAL, objects.POSITION_ACTUAL)
+MEASURED_WHERE_THERE = (objects.VELOCITY_ACTUAL, objects.ERROR_CODE)
+
+_STEP = 0x100
+_FRAME_BITS = 64
+_KNOWN = {
+    entry.mapping: entry
+    for entry in (
+        *(*MEASURED, *MEASURED_WHERE_THERE, objects.CONTROLWORD, objects.MODE_OF_OPERATION, objects.MODE_DISPLAY),
+        *(objects.TARGET_POSITION, objects.TARGET_TORQUE, objects.INTERPOLATION_DATA, objects.LARGEST_TORQUE),
+    )
+}
+
+
+@dataclass(frozen=True)
+class PdoSlot:
+    """A PDO that a drive has.
+
+    `number`: from 0.
+    `fixed`: its objects, where its mapping cannot be written; None where it can.
+    `entries`: most objects that it takes.
+    """
+
+    number: int
+    fixed: tuple[DriveObject, ...] | None = None
+    entries: int = 8
+
+
+@dataclass(frozen=True)
+class Pdo:
+    """A PDO as it is used."""
+
+    number: int
+    layout: PdoLayout
+    is_fixed: bool = False
+
+
+@dataclass(frozen=True)
+class PdoPlan:
+    """All PDOs of a drive that are used.
+
+    `missing`: needed, and in none of them.
+    """
+
+    received: tuple[Pdo, ...]
+    sent: tuple[Pdo, ...]
+    missing: tuple[DriveObject, ...] = ()
+
+
+@dataclass(frozen=True)
+class PdoSlots:
+    """The PDOs of a drive; all that the driver needs are free where nobody knows."""
+
+    received: tuple[PdoSlot, ...] = field(default=(PdoSlot(0),))
+    sent: tuple[PdoSlot, ...] = field(default=(PdoSlot(0), PdoSlot(1)))
+
+
+def plan_pdos(slots: PdoSlots, target: DriveObject, optional: Iterable[DriveObject]) -> PdoPlan:
+    """PDOs for a target and for all measurements.
+
+    `target`: what the mode is commanded by; `optional`: measurements that the drive has beside the needed ones.
+    """
+    received, not_received = _assign(slots.received, (objects.CONTROLWORD, target), ())
+    sent, not_sent = _assign(slots.sent, MEASURED, tuple(optional))
+    return PdoPlan(received, sent, (*not_received, *not_sent))
+
+
+def received_identifier(number: int, node_id: int) -> int:
+    """Identifier of an RPDO by CiA 301's default connection set."""
+    return RECEIVED_ID + _STEP * number + node_id
+
+
+def sent_identifier(number: int, node_id: int) -> int:
+    """Identifier of a TPDO by CiA 301's default connection set."""
+    return SENT_ID + _STEP * number + node_id
+
+
+def decode_mapping(entries: Sequence[int]) -> tuple[DriveObject, ...] | None:
+    """Objects of a mapping parameter's entries; None where they are no frame of whole bytes."""
+    found = tuple(
+        _KNOWN.get(entry) or DriveObject("Mapped object", entry >> 16, entry >> 8 & 0xFF, entry & 0xFF)
+        for entry in entries
+    )
+    sizes = [one.bits for one in found]
+    return found if sum(sizes) <= _FRAME_BITS and all(bits and bits % 8 == 0 for bits in sizes) else None
+
+
+def _assign(
+    slots: Sequence[PdoSlot], needed: Sequence[DriveObject], optional: Sequence[DriveObject]
+) -> tuple[tuple[Pdo, ...], tuple[DriveObject, ...]]:
+    """PDOs that hold all objects, and the needed ones that are left over: fixed PDOs are used first."""
+    left = [*needed, *optional]
+    used: list[Pdo] = []
+    fixed = {slot.number: slot.fixed for slot in slots if slot.fixed}
+    while fixed:
+        number = max(fixed, key=lambda number: (len(set(left) & set(fixed[number])), -number))
+        held = fixed.pop(number)
+        if not set(left) & set(held):
+            break
+        used.append(Pdo(number, PdoLayout(held), is_fixed=True))
+        left = [entry for entry in left if entry not in held]
+    for slot in slots:
+        if slot.fixed is None and left:
+            content = _fill(left, slot.entries)
+            used.append(Pdo(slot.number, PdoLayout(content)))
+            left = [entry for entry in left if entry not in content]
+    return tuple(sorted(used, key=lambda one: one.number)), tuple(entry for entry in needed if entry in left)
+
+
+def _fill(wanted: Sequence[DriveObject], most: int) -> tuple[DriveObject, ...]:
+    """The first objects that fit into a frame together."""
+    content: list[DriveObject] = []
+    for entry in wanted:
+        if len(content) < most and sum(one.bits for one in content) + entry.bits <= _FRAME_BITS:
+            content.append(entry)
+    return tuple(content)

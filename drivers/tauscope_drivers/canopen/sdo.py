@@ -10,7 +10,7 @@ from canopen.sdo.client import SdoClient
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError, SdoError
 
 from tauscope_drivers.canopen.objects import DriveObject
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 
 _OTHER_DRIVE = "check that drive.eds and the firmware are those of this drive"
 _OTHER_VALUE = "see the drive's manual for the values that it takes, and correct the robot file's limits or its DCF"
@@ -100,9 +100,8 @@ class NodeDictionary:
             values.append(self.read(entry))
             if values[-1] == values[-2]:
                 return values[-1]
-        raise DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
-            f"node {self.node_id}: {entry} reads {', '.join(map(str, values))}; check the wiring and the adapter",
+        raise DriverError.no_connection(
+            f"node {self.node_id}: {entry} reads {', '.join(map(str, values))}; check the wiring and the adapter"
         )
 
     def read_data(self, entry: DriveObject) -> bytes:
@@ -144,9 +143,8 @@ class NodeDictionary:
             kept = self.read(entry)
             if kept == value:
                 return
-        raise DriverError(
-            DriverErrorKind.REFUSED,
-            f"node {self.node_id}: {entry} was written as {value} and reads {kept}; the drive limits or forbids it",
+        raise DriverError.refusal(
+            f"node {self.node_id}: {entry} was written as {value} and reads {kept}; the drive limits or forbids it"
         )
 
     def send(self, entry: DriveObject, value: int) -> None:
@@ -169,12 +167,9 @@ class NodeDictionary:
     def _failure(self, what: str, error: Exception) -> DriverError:
         if isinstance(error, SdoAbortedError):
             meaning, remedy = describe_abort(error.code)
-            return DriverError(
-                DriverErrorKind.REFUSED, f"node {self.node_id}: {what}: {meaning} (abort 0x{error.code:08X}); {remedy}"
-            )
-        return DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
-            f"node {self.node_id}: {what} ({' '.join(str(error).split())}); check node number, power and wiring",
+            return DriverError.refusal(f"node {self.node_id}: {what}: {meaning} (abort 0x{error.code:08X}); {remedy}")
+        return DriverError.no_connection(
+            f"node {self.node_id}: {what} ({' '.join(str(error).split())}); check node number, power and wiring"
         )
 
 

@@ -35,7 +35,6 @@ def read_rated_torque(
     """Rated torque in the unit that fits the joint's torque limit, else the rated current (0x6075).
 
     Raises ValueError where neither unit fits, or it reads 0.
-
     `value`: as the drive states it [mNm or µNm]; `torque_limit`: of the joint; None where the robot file states none
     [Nm or N]; `rated_current_ma`: None where the drive states none [mA].
     """

@@ -3,14 +3,15 @@
 import struct
 import time
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-from tauscope_drivers.clock import AnswerTime, Clock, MonotonicClock
+from tauscope_drivers.clock import Clock
 from tauscope_drivers.dynamixel import packets
 from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
-from tauscope_drivers.dynamixel.packets import FrameParser, Status
-from tauscope_drivers.errors import DriverError, DriverErrorKind
-from tauscope_drivers.serial_port import BITS_PER_BYTE, SerialPort
+from tauscope_drivers.dynamixel.packets import DynamixelParser, Status
+from tauscope_drivers.errors import DriverError
+from tauscope_drivers.serial_port import SerialPort
+from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers, SerialServoBus
 
 
 class Turns:
@@ -63,52 +64,21 @@ class Turns:
         self._last = place
 
 
-FACTORY_RETURN_DELAY_S = 500e-6
-"""Return Delay Time of a servo as delivered [s]."""
-
-ATTEMPTS = 3
-"""How often a single servo is asked outside the control loop."""
-
-PATIENCE_S = 0.02
-"""How much longer a single servo is waited for there [s]."""
-
-_LATEST_ANSWER_NS = 500_000_000
-"""Answers have come 133 ms late where a machine stood still; a control loop gives an arm up long before this."""
-
 _AFTERTHOUGHT_NS = 2_000_000
 _STATUS_BYTES = 11
 _PING_ANSWER_BYTES = 14
-_BROADCAST_PING_SLOT_S = 0.003
 _FAST_BYTES = 8
 _FAST_SERVO_BYTES = 4
 
 
-@dataclass(frozen=True)
-class Answers:
-    """What came of one question to many servos.
-
-    `asked_ns`: instant at which the question had left [ns, by the bus' clock].
-    `late_ns`: how much later than usual the last answer came [ns].
-    `beyond_ns`: how much longer than bus and adapter should take for it [ns].
-    """
-
-    asked_ns: int
-    late_ns: int
-    statuses: dict[int, Status]
-    beyond_ns: int = 0
-
-
-class ServoBus:
+class ServoBus(SerialServoBus[Status]):
     """Speaks to the servos of one port; one thread's own."""
 
     def __init__(self, port: SerialPort, clock: Clock | None = None) -> None:
-        self.port = port
-        self._clock = MonotonicClock() if clock is None else clock
-        self.return_delay_s = FACTORY_RETURN_DELAY_S
+        """Use a port, open or not yet."""
+        super().__init__(port, clock)
         self.discarded_bytes = 0
-        self._missed_ns: dict[tuple[int, int], int] = {}
         self._answered_ns = 0
-        self._answer_times: dict[tuple[tuple[int, ...], bool], AnswerTime] = {}
 
     def ping(self, servo: int) -> tuple[int, int] | None:
         """Model number and firmware of a servo; None where it does not answer."""
@@ -120,17 +90,11 @@ class ServoBus:
 
     def ping_all(self) -> dict[int, tuple[int, int]]:
         """Model number and firmware of every servo that answers a ping to all, by ID."""
-        slots = packets.HIGHEST_ID + 1
-        self.port.send(packets.encode_ping())
-        deadline = self.port.reply_deadline_ns(_PING_ANSWER_BYTES * slots, slots * _BROADCAST_PING_SLOT_S)
-        parser = FrameParser()
-        found: dict[int, tuple[int, int]] = {}
-        while received := self.port.receive(deadline):
-            for frame in parser.feed(received):
-                status = packets.decode_status(frame)
-                if status is not None and len(status.data) == 3:
-                    found[status.servo] = struct.unpack("<HB", status.data)
-        return dict(sorted(found.items()))
+        ping = packets.encode_ping()
+        frames = self._ask_everybody(ping, _PING_ANSWER_BYTES, packets.HIGHEST_ID + 1, DynamixelParser())
+        statuses = map(packets.decode_status, frames)
+        found = {status.servo: status.data for status in statuses if status is not None and len(status.data) == 3}
+        return {servo: struct.unpack("<HB", found[servo]) for servo in sorted(found)}
 
     def read_once(self, servo: int, address: int, length: int, patience_s: float = 0.0) -> Status | None:
         """A stretch of a control table, asked for once; None where no whole answer came."""
@@ -169,9 +133,7 @@ class ServoBus:
             # A write whose answer was lost may have arrived: what counts is what the servo holds now.
             if self.read(servo, item) == value:
                 return
-        raise DriverError(
-            DriverErrorKind.REFUSED, f"servo {servo}: {item.name} was written as {value} and reads otherwise; check it"
-        )
+        raise DriverError.refusal(f"servo {servo}: {item.name} was written as {value} and reads otherwise; check it")
 
     def clear_error(self, servo: int) -> None:
         """Let a servo of the Y series forget its error; whether it did is what its Error Code says."""
@@ -186,47 +148,30 @@ class ServoBus:
 
     def sync_read(
         self, servos: Sequence[int], block: Block, *, fast: bool = False, patience_s: float = 0.0, spare: int = 0
-    ) -> Answers:
+    ) -> Answers[Status]:
         """Read the same block of many servos.
 
         Nothing in an answer says to which question it belongs. Where an earlier one was not answered in time, as many
         bytes before the block as make another length are read with it, so that what comes late has the wrong length.
         """
-        if any(self._list_owing(servos, block.length + surplus) for surplus in range(spare + 1)):
+        if any(self._find_owing(servos, block.length + surplus) for surplus in range(spare + 1)):
             self.port.drain()
         surplus = min(range(spare + 1), key=lambda surplus: self._last_missed_ns(servos, block.length + surplus))
         length = block.length + surplus
-        owed = self._list_owing(servos, length)
+        owed = self._find_owing(servos, length)
         request = packets.encode_sync_read(servos, block.address - surplus, length, fast=fast)
-        # Taken before: who is woken by the bytes may run before this process does again.
-        asked_ns = self._clock.now_ns() + round(len(request) * BITS_PER_BYTE * 1e9 / self.port.baudrate)
-        self.port.send(request)
-        self._answered_ns = asked_ns
+        self._answered_ns = asked_ns = self._send_question(request)
         receive = self._receive_fast if fast else self._receive_each
         waits_s = len(servos) * self.return_delay_s + patience_s
         found = receive(servos, length, len(request), waits_s, owed)
         answer_bytes = _fast_bytes(servos, length) if fast else len(servos) * (_STATUS_BYTES + length)
-        usual_s = answer_bytes * BITS_PER_BYTE / self.port.baudrate + len(servos) * self.return_delay_s
-        taken_ns = self._answered_ns - asked_ns - round((usual_s + self.port.latency_s) * 1e9)
+        usual_s = self._wire_s(answer_bytes) + len(servos) * self.return_delay_s
         wanted = {servo: replace(status, data=status.data[surplus:]) for servo, status in found.items()}
-        if not found:
-            return Answers(asked_ns, 0, wanted)
-        times = self._answer_times.setdefault((tuple(servos), fast), AnswerTime())
-        return Answers(asked_ns, times.late_ns(taken_ns), wanted, max(0, taken_ns))
-
-    def _list_owing(self, servos: Sequence[int], length: int) -> set[int]:
-        """Servos whose answer of this length to an earlier question may still be under way."""
-        since_ns = time.monotonic_ns() - _LATEST_ANSWER_NS
-        return {servo for servo in servos if self._missed_ns.get((servo, length), 0) > since_ns}
+        return self._time_answers((tuple(servos), fast), asked_ns, self._answered_ns, usual_s, wanted)
 
     def _last_missed_ns(self, servos: Sequence[int], length: int) -> int:
         """When the last answer of this length was missed that may still be under way; zero where none is."""
-        return max((self._missed_ns[servo, length] for servo in self._list_owing(servos, length)), default=0)
-
-    def _miss(self, servos: Collection[int], length: int) -> None:
-        """Note who has not answered at all: that answer may come yet."""
-        now_ns = time.monotonic_ns()
-        self._missed_ns |= {(servo, length): now_ns for servo in servos}
+        return max((self._missed_ns[servo, length] for servo in self._find_owing(servos, length)), default=0)
 
     def _receive_each(
         self, servos: Sequence[int], length: int, sent: int, waits_s: float, owed: set[int]
@@ -235,7 +180,7 @@ class ServoBus:
         answer_bytes = _STATUS_BYTES + length
         deadline = self.port.reply_deadline_ns(sent + len(servos) * answer_bytes, waits_s)
         # Stuffing lengthens an answer by a third at most.
-        parser = FrameParser(longest=answer_bytes + length // 3 + 1)
+        parser = DynamixelParser(longest=answer_bytes + length // 3 + 1)
         turns = Turns(servos, owed)
         while received := self.port.receive(deadline):
             for frame in parser.feed(received):
@@ -257,7 +202,7 @@ class ServoBus:
         """One packet of all servos, or what is whole of one that breaks off; none where there are two that differ."""
         answer_bytes = _fast_bytes(servos, length)
         deadline = self.port.reply_deadline_ns(sent + answer_bytes, waits_s)
-        parser = FrameParser(longest=answer_bytes)
+        parser = DynamixelParser(longest=answer_bytes)
         packets_found: list[list[Status]] = []
         while received := self.port.receive(deadline):
             decoded = [packets.decode_fast(frame, servos, length) for frame in parser.feed(received)]
@@ -275,13 +220,12 @@ class ServoBus:
         return answers
 
     def _ask(self, servo: int, request: bytes, length: int, patience_s: float) -> Status | None:
-        """Send an instruction to one servo and wait for its answer."""
-        if self._list_owing([servo], length):
+        if self._find_owing([servo], length):
             self.port.drain()
         self.port.send(request)
         delay_s = self.return_delay_s + patience_s
         deadline = self.port.reply_deadline_ns(len(request) + _STATUS_BYTES + length, delay_s)
-        parser = FrameParser()
+        parser = DynamixelParser()
         while received := self.port.receive(deadline):
             for frame in parser.feed(received):
                 status = packets.decode_status(frame)
@@ -293,16 +237,13 @@ class ServoBus:
 
 
 def _fast_bytes(servos: Sequence[int], length: int) -> int:
-    """Length of the packet with which all answer at once, each with so many bytes."""
     return _FAST_BYTES + len(servos) * (length + _FAST_SERVO_BYTES)
 
 
 def _failure(servo: int, what: str, answer: Status | None) -> DriverError:
-    """Error of an instruction that was not carried out."""
     if answer is None:
-        return DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
-            f"servo {servo} does not answer ({what}); check its power, cable, ID and baud rate",
+        return DriverError.no_connection(
+            f"servo {servo} does not answer ({what}); check its power, cable, ID and baud rate"
         )
     reason = packets.describe_refusal(answer.refusal)
-    return DriverError(DriverErrorKind.REFUSED, f"servo {servo}: {what}: {reason}; check the servo with its wizard")
+    return DriverError.refusal(f"servo {servo}: {what}: {reason}; check the servo with its wizard")

@@ -1,32 +1,14 @@
-"""What the driver needs to know of each joint's servo, from the robot file's ``drive`` blocks.
+"""The joints' servos, from the robot file's ``drive`` blocks: ``{id: 3}`` and where they differ other keys."""
 
-On each joint ``{id: 3}`` and, where they differ from the defaults, the other keys of `ServoConfiguration`. All servos
-are on one bus, and ``port`` and ``baud`` stand on the first joint: ``{id: 1, port: /dev/ttyUSB0, baud: 1000000}``.
-"""
-
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tauscope_drivers.drive_block import (
-    DriveJoint,
-    read_direction,
-    read_positive,
-    read_text,
-    read_whole,
-    refusal,
-    require_distinct,
-    require_known_keys,
-)
+from tauscope_drivers.drive_block import DriveJoint, read_direction, read_positive, read_whole, refusal
 from tauscope_drivers.dynamixel.control_table import find_model_by_name
 from tauscope_drivers.dynamixel.packets import HIGHEST_ID
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.serial_servos.configuration import BusConfiguration, read_bus, read_torque_constant
 
-DEFAULT_BAUD = 1_000_000
-
-_BUS_KEYS = ("port", "baud")
-_SERVO_KEYS = ("id", "model", "direction", "reduction", "zero_count", "milliampere_per_unit", "current_limit_ma")
-_LOWEST_BAUD, _HIGHEST_BAUD = 9_600, 10_500_000
+_KEYS = ("id", "model", "direction", "reduction", "zero_count", "milliampere_per_unit", "current_limit_ma")
 
 
 @dataclass(frozen=True)
@@ -52,32 +34,12 @@ class ServoConfiguration:
     torque_per_milliampere: float | None = None
 
 
-@dataclass(frozen=True)
-class BusConfiguration:
-    """The bus and the servos on it, in the order of the joints."""
-
-    servos: tuple[ServoConfiguration, ...]
-    port: str
-    baud: int = DEFAULT_BAUD
+def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration[ServoConfiguration]:
+    """Bus and servos of an arm; see `read_bus`."""
+    return read_bus(joints, _read_servo, keys=_KEYS, bauds=(9_600, 10_500_000), device="/dev/ttyUSB0")
 
 
-def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
-    """Bus and servos of an arm.
-
-    Raises DriverError ``refused`` where a key is missing, unknown or not usable; names the joint and the key.
-    """
-    first = joints[0]
-    require_known_keys(joints, _BUS_KEYS, _SERVO_KEYS)
-    servos = tuple(_servo(joint) for joint in joints)
-    require_distinct(joints, "id")
-    port = read_text(first, "port", "give the serial device, like /dev/ttyUSB0")
-    return BusConfiguration(
-        servos, port, read_whole(first, "baud", DEFAULT_BAUD, least=_LOWEST_BAUD, most=_HIGHEST_BAUD)
-    )
-
-
-def _servo(joint: DriveJoint) -> ServoConfiguration:
-    """The servo of a joint."""
+def _read_servo(joint: DriveJoint) -> ServoConfiguration:
     zero = joint.drive.get("zero_count")
     return ServoConfiguration(
         joint=joint.name,
@@ -88,12 +50,11 @@ def _servo(joint: DriveJoint) -> ServoConfiguration:
         zero_count=None if zero is None else read_whole(joint, "zero_count", None, least=-(2**31), most=2**31 - 1),
         milliampere_per_unit=read_positive(joint, "milliampere_per_unit"),
         current_limit_ma=read_positive(joint, "current_limit_ma"),
-        torque_per_milliampere=_torque_per_milliampere(joint),
+        torque_per_milliampere=read_torque_constant(joint),
     )
 
 
 def _model(joint: DriveJoint) -> str | None:
-    """The model that a robot file promises."""
     model = joint.drive.get("model")
     if model is None:
         return None
@@ -101,13 +62,3 @@ def _model(joint: DriveJoint) -> str | None:
         raise refusal(joint, "model", f"= {model!r}; write it as on the case, like XM430-W350")
     find_model_by_name(model)
     return model
-
-
-def _torque_per_milliampere(joint: DriveJoint) -> float | None:
-    """The constant that a robot file states."""
-    constant = joint.torque_per_unit
-    if constant is not None and (not math.isfinite(constant) or constant == 0.0):
-        raise DriverError(
-            DriverErrorKind.REFUSED, f"joint {joint.name}: torque_constant = {constant}; give one that is not zero"
-        )
-    return constant

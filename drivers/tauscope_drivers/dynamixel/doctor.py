@@ -1,30 +1,25 @@
-"""Looks at a port and the servos on it, moves nothing, writes nothing, and says what to do about what it finds."""
+"""Looks at the servos of a port, moves nothing, writes nothing, and says what to do about what it finds."""
 
 import math
-import time
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.bus import ServoBus
-from tauscope_drivers.dynamixel.bus_budget import BusTiming, CycleTraffic, largest_rate_hz
-from tauscope_drivers.dynamixel.configuration import BusConfiguration, read_configuration
-from tauscope_drivers.dynamixel.control_table import model_names
+from tauscope_drivers.dynamixel.bus_budget import count_traffic
+from tauscope_drivers.dynamixel.configuration import ServoConfiguration, read_configuration
+from tauscope_drivers.dynamixel.control_table import WATCHDOG_MOST, WATCHDOG_STEP_S, model_names
 from tauscope_drivers.dynamixel.enabling import plan_tasks
-from tauscope_drivers.dynamixel.faults import hardware_faults, watchdog_fault
-from tauscope_drivers.dynamixel.health import Health
-from tauscope_drivers.dynamixel.models import WATCHDOG_MOST, WATCHDOG_STEP_S
+from tauscope_drivers.dynamixel.health import Health, hardware_faults, watchdog_fault
 from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, drive_mode, operating_mode
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.dynamixel.session import Session, make_session, read_items, read_settings
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.inspection import Finding, FoundDevice, Severity, failure
 from tauscope_drivers.limits import stated_limits
-from tauscope_drivers.serial_adapters import latency_finding
-from tauscope_drivers.serial_port import SerialPort
-
-MEASURED_CYCLES = 50
-"""Reads of which the loop rate is measured."""
+from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S
+from tauscope_drivers.serial_servos.doctor import examine_bus, measure_loop_rate, scan_bauds
 
 _SECONDARY = ("Secondary ID", "Secondary(Shadow) ID")
 _MOST_TURNS = 256
@@ -40,27 +35,16 @@ def examine(joints: Sequence[DriveJoint], *, slack_s: float = 0.002) -> list[Fin
 
     Raises DriverError: ``refused``: a ``drive`` block is not valid.
     """
-    configuration = read_configuration(joints)
-    port = SerialPort(configuration.port, configuration.baud, slack_s)
-    try:
-        port.open()
-    except DriverError as error:
-        return [failure(configuration.port, str(error))]
-    try:
-        findings = [Finding(Severity.GOOD, port.path, f"open at {port.baudrate} baud, locked for this program")]
-        findings.append(latency_finding(port.path))
-        return findings + _examine_servos(ServoBus(port), configuration, joints)
-    except DriverError as error:
-        return [failure(configuration.port, str(error))]
-    finally:
-        port.close()
+    return examine_bus(read_configuration(joints), ServoBus, _examine_servos, joints, slack_s)
 
 
-def _examine_servos(bus: ServoBus, configuration: BusConfiguration, joints: Sequence[DriveJoint]) -> list[Finding]:
+def _examine_servos(
+    bus: ServoBus, wanted_servos: Sequence[ServoConfiguration], joints: Sequence[DriveJoint]
+) -> list[Finding]:
     findings: list[Finding] = []
     servos: list[JointServo] = []
     found: list[dict[str, int]] = []
-    for number, wanted in enumerate(configuration.servos, 1):
+    for number, wanted in enumerate(wanted_servos, 1):
         subject = f"joint {wanted.joint} (servo {wanted.servo})"
         identity = bus.ping(wanted.servo)
         if identity is None:
@@ -77,11 +61,14 @@ def _examine_servos(bus: ServoBus, configuration: BusConfiguration, joints: Sequ
         findings += _examine_servo(servo, settings)
         servos.append(servo)
         found.append(settings)
-    if len(servos) == len(configuration.servos):
+    if len(servos) == len(wanted_servos):
         findings += _examine_secondary(servos, found)
         findings += _rehearse(make_session(bus, servos, found), joints)
-        slowest = max(settings["Return Delay Time"] for settings in found)
-        findings.append(_loop_rate(bus, servos, slowest * 2e-6))
+        bus.return_delay_s = max(settings["Return Delay Time"] for settings in found) * RETURN_DELAY_UNIT_S
+        identifiers, block = [servo.servo for servo in servos], servos[0].model.state_block
+        traffic = count_traffic(len(servos))
+        ask = partial(bus.sync_read, identifiers, block)
+        findings.append(measure_loop_rate(bus, ask, traffic, SHORTEST_RETURN_DELAY_S))
     return findings
 
 
@@ -110,7 +97,6 @@ def _rehearse(session: Session, joints: Sequence[DriveJoint]) -> list[Finding]:
 
 
 def _turn_offset(session: Session, joint: DriveJoint) -> list[Finding]:
-    """Whether a joint would stand within its range but for whole turns of its servo."""
     servo = session.servos[0]
     counts = session.read(0, ["Present Position"])["Present Position"]
     turn = servo.model.counts_per_radian * 2.0 * math.pi
@@ -125,12 +111,10 @@ def _turn_offset(session: Session, joint: DriveJoint) -> list[Finding]:
 
 
 def _count_turns(turns: int) -> str:
-    """Turns in words."""
     return f"{turns} turn{'s' if abs(turns) > 1 else ''}"
 
 
 def _slow_servo(servo: JointServo, settings: dict[str, int], joint: DriveJoint) -> list[Finding]:
-    """Whether the servo's own Velocity Limit (44 on X) is below the speed that the joint may have."""
     own = settings.get("Velocity Limit", 0)
     wanted = 0 if joint.velocity_limit is None else servo.units.velocity_cap(joint.velocity_limit)
     if not own or own >= wanted:
@@ -142,7 +126,6 @@ def _slow_servo(servo: JointServo, settings: dict[str, int], joint: DriveJoint) 
 
 
 def _examine_secondary(servos: Sequence[JointServo], settings: Sequence[dict[str, int]]) -> list[Finding]:
-    """A servo that listens to a second ID follows the instructions of that servo as well."""
     own = {servo.servo: servo.label for servo in servos}
     findings: list[Finding] = []
     for servo, values in zip(servos, settings, strict=True):
@@ -155,7 +138,6 @@ def _examine_secondary(servos: Sequence[JointServo], settings: Sequence[dict[str
 
 
 def _examine_servo(servo: JointServo, settings: dict[str, int]) -> list[Finding]:
-    """Model, firmware, and what stands in the way of a run."""
     unit = f"{abs(servo.units.milliampere):g} mA a unit ({servo.units.source})"
     findings = [Finding(Severity.GOOD, servo.label, f"answers, firmware {servo.firmware}, {unit}")]
 
@@ -196,40 +178,18 @@ def _examine_servo(servo: JointServo, settings: dict[str, int]) -> list[Finding]
     return findings
 
 
-def _loop_rate(bus: ServoBus, servos: Sequence[JointServo], return_delay_s: float) -> Finding:
-    """How often all servos can be read, measured, beside what a whole cycle will allow once delays are set."""
-    bus.return_delay_s = return_delay_s
-    identifiers, block = [servo.servo for servo in servos], servos[0].model.state_block
-    begin_ns = time.monotonic_ns()
-    missed = sum(len(identifiers) - len(bus.sync_read(identifiers, block).statuses) for _ in range(MEASURED_CYCLES))
-    rate_hz = MEASURED_CYCLES / ((time.monotonic_ns() - begin_ns) * 1e-9)
-    timing = BusTiming(bus.port.baudrate, 2e-6, bus.port.latency_s)
-    possible = largest_rate_hz(CycleTraffic(len(servos)), timing)
-    detail = f"all servos read {rate_hz:.0f} times a second now; a whole cycle gets {possible:.0f} Hz at most"
-    if missed:
-        answers = MEASURED_CYCLES * len(identifiers)
-        remedy = "check cables, termination, supply and the adapter"
-        return Finding(Severity.WARNING, bus.port.path, f"{missed} of {answers} answers were missed; {detail}", remedy)
-    return Finding(Severity.GOOD, bus.port.path, detail)
-
-
 USUAL_BAUDS = (57_600, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 115_200, 4_500_000, 9_600)
 """Rates that servos can be set to, the factory's first [bit/s]."""
 
 
-def scan_bus(path: str, bauds: Sequence[int] = USUAL_BAUDS, *, slack_s: float = 0.002) -> Iterator[FoundDevice]:
-    """Every servo that answers a ping to all, one baud rate after the other; about a second each.
+def scan_bus(path: str, bauds: Sequence[int] | None = None, *, slack_s: float = 0.002) -> Iterator[FoundDevice]:
+    """Every servo that answers a ping to all; see `scan_bauds`. `bauds`: None for the usual ones [bit/s]."""
+    return scan_bauds(path, USUAL_BAUDS if bauds is None else bauds, ServoBus, _list_servos, slack_s)
 
-    Raises DriverError ``cannot-connect`` where the port is missing, not permitted or taken.
-    """
-    for baud in bauds:
-        port = SerialPort(path, baud, slack_s)
-        port.open()
-        try:
-            found = ServoBus(port).ping_all()
-        finally:
-            port.close()
-        for servo, (number, firmware) in found.items():
-            name = model_names().get(number)
-            label = f"model number {number}" if name is None else name.upper().replace("_", "-")
-            yield FoundDevice(servo, baud, label, str(firmware))
+
+def _list_servos(bus: ServoBus) -> list[tuple[int, str, str]]:
+    names = model_names()
+    return [
+        (servo, names[number].upper().replace("_", "-") if number in names else f"model number {number}", str(firmware))
+        for servo, (number, firmware) in bus.ping_all().items()
+    ]

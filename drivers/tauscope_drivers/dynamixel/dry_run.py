@@ -71,7 +71,6 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
 
 
 def _connection(servos: Sequence[JointServo]) -> Iterator[PlannedFrame]:
-    """A ping each, and what is put in order before anything moves."""
     for servo in servos:
         yield _frame("connect", f"{servo.label}: who are you?", packets.encode_ping(servo.servo))
         for write in commissioning_writes(servo, _DELIVERED, holds=False):
@@ -79,7 +78,6 @@ def _connection(servos: Sequence[JointServo]) -> Iterator[PlannedFrame]:
 
 
 def _enabling(servos: Sequence[JointServo], tasks: Sequence[ServoTask]) -> Iterator[PlannedFrame]:
-    """Mode and limits of all servos; then, one servo after the other, its place for a goal, watchdog, torque."""
     for servo, task in zip(servos, tasks, strict=True):
         for write in preparing_writes(servo, _DELIVERED, task, holds=False):
             yield _write(servo, "enable", write.item.name, write.value, write.reason)
@@ -89,7 +87,6 @@ def _enabling(servos: Sequence[JointServo], tasks: Sequence[ServoTask]) -> Itera
 
 
 def _bounds(servos: Sequence[JointServo], limits: DriveLimits, tasks: Sequence[ServoTask]) -> Bounds:
-    """Ranges of the goals; the servos' own Position Limits are not known."""
     ends = [
         servo.units.counts_within(float(limits.position_low[joint]), float(limits.position_high[joint]))
         for joint, servo in enumerate(servos)
@@ -100,13 +97,8 @@ def _bounds(servos: Sequence[JointServo], limits: DriveLimits, tasks: Sequence[S
 
 
 def _cycles(
-    servos: Sequence[JointServo],
-    mode: ControlMode,
-    bounds: Bounds,
-    targets: NDArray[np.float64],
-    cycle_s: float | None,
+    servos: Sequence[JointServo], mode: ControlMode, bounds: Bounds, targets: NDArray[np.float64], cycle_s: float | None
 ) -> Iterator[PlannedFrame]:
-    """Goals out, states in, and one servo's health in turn."""
     turns = health_turns(servos)
     pace = None
     for cycle, position in enumerate(targets):
@@ -120,7 +112,6 @@ def _cycles(
 
 
 def _stop(servos: Sequence[JointServo], mode: ControlMode) -> Iterator[PlannedFrame]:
-    """Servos that track positions hold the last one; those that are given current are let go."""
     for servo in servos:
         if mode is ControlMode.TORQUE:
             yield _write(servo, "stop", "Torque Enable", 0, "torque off")
@@ -128,14 +119,12 @@ def _stop(servos: Sequence[JointServo], mode: ControlMode) -> Iterator[PlannedFr
 
 
 def _goals(servos: Sequence[JointServo], name: str, goals: Sequence[int]) -> Iterator[PlannedFrame]:
-    """Goals of a cycle, one frame a family."""
     for _, members in servo_families(servos):
         items = [servos[members[0]].model.items[name]]
         yield _sync_write(items, {servos[index].servo: [goals[index]] for index in members})
 
 
 def _pace_goals(servos: Sequence[JointServo], goals: Sequence[int], speeds: Sequence[int]) -> Iterator[PlannedFrame]:
-    """Goals of a cycle with the speeds towards them."""
     for items, values in paced_goals(servos, goals, speeds):
         yield _sync_write(items, values)
 
@@ -148,7 +137,6 @@ def _sync_write(items: Sequence[Item], values: Mapping[int, Sequence[int]]) -> P
 
 
 def _questions(servos: Sequence[JointServo], turn: int, health: Block) -> Iterator[PlannedFrame]:
-    """Reads of a cycle: the state of all, then a piece of one servo's health."""
     for block, members in servo_families(servos):
         identifiers = [servos[index].servo for index in members]
         asked = ", ".join(map(str, identifiers))

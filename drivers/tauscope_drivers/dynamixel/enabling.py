@@ -21,7 +21,7 @@ from tauscope_drivers.dynamixel.preparation import (
 )
 from tauscope_drivers.dynamixel.servo import JointServo
 from tauscope_drivers.dynamixel.session import Session
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 from tauscope_drivers.limits import require_sensible
 from tauscope_drivers.state import Setpoint
 
@@ -64,14 +64,8 @@ def enable_servos(
 
     An arm may fall meanwhile: each servo is asked where it is at the last moment, and catches its joint there. A servo
     that holds its joint already, in the mode that is asked for, is taken over without letting go. Raises DriverError:
-    ``refused`` or ``cannot-connect``: no servo has torque that had none before.
-
-    Returns
-    -------
-    Bounds
-        for the cyclic exchange
-    list of int
-        Goal Position that each servo was given where positions are tracked [counts]
+    ``refused`` or ``cannot-connect``: no servo has torque that had none before. Returns the bounds of the cyclic
+    exchange, and the Goal Position that each servo was given where positions are tracked [counts].
     """
     tasks, ranges = plan_tasks(session, mode, limits, watchdog_s)
     taken = _give_torque(session, tasks)
@@ -85,14 +79,8 @@ def plan_tasks(
 ) -> tuple[list[ServoTask], list[tuple[int, int]]]:
     """Check everything that enabling needs, and plan it; only reads.
 
-    Raises DriverError: ``refused`` or ``cannot-connect``: names the joint.
-
-    Returns
-    -------
-    list of ServoTask
-        one a joint
-    list of tuple of two int
-        lowest and highest Goal Position, one a joint [counts]
+    Raises DriverError: ``refused`` or ``cannot-connect``: names the joint. Returns one task a joint, and the lowest and
+    highest Goal Position of each [counts].
     """
     steps = watchdog_steps(watchdog_s)
     present = [_present_position(session, joint) for joint in range(len(session.servos))]
@@ -146,19 +134,16 @@ def _take(session: Session, joint: int, task: ServoTask) -> int:
 
 
 def _present_position(session: Session, joint: int) -> int:
-    """Present Position of a servo [counts]; one that does not answer is asked again."""
     return session.read(joint, ["Present Position"])["Present Position"]
 
 
 def _range(session: Session, joint: int, limits: DriveLimits, mode: ControlMode) -> tuple[int, int]:
-    """Goal Positions that are allowed by the joint's limits and, where it applies them, the servo's own."""
     low, high = float(limits.position_low[joint]), float(limits.position_high[joint])
     servo = session.servos[joint]
     lowest, highest = position_counts(servo, session.settings[joint], low, high, mode)
     if lowest >= highest:
-        raise DriverError(
-            DriverErrorKind.REFUSED,
-            f"{servo.label}: its own Position Limits leave nothing of the range {low:.4g} to {high:.4g}; widen them",
+        raise DriverError.refusal(
+            f"{servo.label}: its own Position Limits leave nothing of the range {low:.4g} to {high:.4g}; widen them"
         )
     return lowest, highest
 
@@ -170,10 +155,9 @@ def _require_in_own_range(session: Session, joint: int, mode: ControlMode, prese
     if not lowest <= present <= highest:
         place = servo.units.position(present)
         ends = sorted((servo.units.position(lowest), servo.units.position(highest)))
-        raise DriverError(
-            DriverErrorKind.REFUSED,
+        raise DriverError.refusal(
             f"{servo.label} stands at {place:.4g}, its own Position Limits are {ends[0]:.4g} to {ends[1]:.4g}; move it "
-            "back by hand, or widen them",
+            "back by hand, or widen them"
         )
 
 
@@ -182,7 +166,6 @@ def _require_adoptable(session: Session, joint: int, mode: ControlMode) -> None:
     servo, settings = session.servos[joint], session.settings[joint]
     wrong_mode = settings["Operating Mode"] != operating_mode(servo, mode)
     if wrong_mode or settings["Drive Mode"] != drive_mode(servo, settings["Drive Mode"]):
-        raise DriverError(
-            DriverErrorKind.REFUSED,
-            f"{servo.label} is under torque in another mode; support the arm, stop it with torque_off, then enable",
+        raise DriverError.refusal(
+            f"{servo.label} is under torque in another mode; support the arm, stop it with torque_off, then enable"
         )

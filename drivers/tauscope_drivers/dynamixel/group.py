@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope_drivers.dynamixel.bus import ATTEMPTS, PATIENCE_S, Answers, ServoBus
+from tauscope_drivers.dynamixel.bus import ServoBus
 from tauscope_drivers.dynamixel.control_table import BYTES_BEFORE_STATE, STATE_ITEMS, Block, Item
+from tauscope_drivers.dynamixel.packets import Status
 from tauscope_drivers.dynamixel.servo import JointServo
+from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers
 
 Array = NDArray[np.float64]
 
@@ -60,10 +62,9 @@ class ServoGroup:
         self.fast = any(statuses.keys() == self._ids for statuses in probes)
         return self.fast
 
-    def beyond_ns(self) -> int:
-        """How much longer than bus and adapter should take for it an answer of all servos takes at least [ns]."""
-        answers = [self._read_all(fast=self.fast, patience_s=PATIENCE_S) for _ in range(PROBES)]
-        return min((one.beyond_ns for one in answers if one.statuses), default=0)
+    def probe(self) -> list[Answers[Status]]:
+        """Answers of all servos, by which the latency of an adapter is learnt."""
+        return [self._read_all(fast=self.fast, patience_s=PATIENCE_S) for _ in range(PROBES)]
 
     def write(self, name: str, values: Sequence[int | None]) -> None:
         """Write an item of all servos, without an answer."""
@@ -141,7 +142,7 @@ class ServoGroup:
     def _ids(self) -> set[int]:
         return {servo.servo for servo in self.servos}
 
-    def _read_all(self, *, fast: bool, patience_s: float) -> Answers:
+    def _read_all(self, *, fast: bool, patience_s: float) -> Answers[Status]:
         """Answers of all families, as if to one question: asked when the first was, late as the latest."""
         found = [
             self._bus.sync_read(
@@ -157,7 +158,7 @@ class ServoGroup:
         late_ns, beyond_ns = (max(getattr(one, name) for one in found) for name in ("late_ns", "beyond_ns"))
         return Answers(found[0].asked_ns, late_ns, statuses, beyond_ns)
 
-    def _reading(self, answers: Answers) -> GroupReading:
+    def _reading(self, answers: Answers[Status]) -> GroupReading:
         position, velocity, current = np.full((3, len(self.servos)), np.nan)
         alerts: list[bool | None] = [None] * len(self.servos)
         for index, servo in enumerate(self.servos):

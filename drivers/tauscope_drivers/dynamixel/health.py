@@ -7,10 +7,75 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from tauscope_drivers.dynamixel.faults import alert_fault, hardware_faults, torque_lost_fault, watchdog_fault
-from tauscope_drivers.dynamixel.models import WATCHDOG_MOST
+from tauscope_drivers.dynamixel.control_table import WATCHDOG_MOST, ServoModel
 from tauscope_drivers.dynamixel.servo import JointServo
 from tauscope_drivers.errors import Fault
+
+_POWER_CYCLE = "support the arm, switch the servo's power off and on, then acknowledge"
+
+_BITS: tuple[tuple[int, str, str, str], ...] = (
+    (0x01, "voltage", "input voltage outside its range", f"check the supply; {_POWER_CYCLE}"),
+    (0x02, "encoder", "motor hall sensor fault", f"{_POWER_CYCLE}; replace the servo where it returns"),
+    (0x04, "over-temperature", "too hot", f"let it cool down; {_POWER_CYCLE}"),
+    (0x08, "encoder", "encoder fault", f"{_POWER_CYCLE}; replace the servo where it returns"),
+    (0x10, "electrical", "electrical shock or too little power", f"check wiring and supply; {_POWER_CYCLE}"),
+    (0x20, "overload", "overload for too long", f"lower the load or the current limit; {_POWER_CYCLE}"),
+)
+
+_CLEAR = "then acknowledge"
+_CODES: dict[int, tuple[str, str, str]] = {
+    1: ("voltage", "input voltage too high", f"check the supply, {_CLEAR}"),
+    2: ("voltage", "input voltage too low", f"check the supply, {_CLEAR}"),
+    3: ("over-temperature", "inverter too hot", f"let it cool down, {_CLEAR}"),
+    4: ("over-temperature", "motor too hot", f"let it cool down, {_CLEAR}"),
+    5: ("overload", "overload for too long", f"lower the load or the current limit, {_CLEAR}"),
+    7: ("drive-hardware", "inverter fault", "have the servo repaired"),
+    9: ("battery", "multi-turn battery low", "replace the battery"),
+    10: ("battery", "multi-turn battery empty", "replace the battery"),
+    11: ("encoder", "multi-turn position lost", "reset the multi-turn position with the wizard"),
+    12: ("encoder", "multi-turn sensor fault", "have the servo repaired"),
+    13: ("encoder", "encoder fault", "have the servo repaired"),
+    14: ("encoder", "hall sensor fault", "have the servo repaired"),
+    15: ("drive-hardware", "no calibration data", "have the servo repaired"),
+    17: ("following-error", "following error too large", f"move slower, {_CLEAR}"),
+    19: ("over-speed", "faster than its Velocity Limit allows", f"move slower, {_CLEAR}"),
+    20: ("position-limit", "beyond its Position Limit", f"move the joint back by hand, {_CLEAR}"),
+}
+_WATCHDOG_CODE = 18
+
+
+def hardware_faults(model: ServoModel, register: int, joint: int) -> tuple[Fault, ...]:
+    """Faults that a servo's error register states; empty for 0. `joint`: number of the joint, from 1."""
+    if not register:
+        return ()
+    name = model.error_item.name
+    if model.family.error_is_code:
+        if register == _WATCHDOG_CODE:
+            return (watchdog_fault(joint),)
+        code, meaning, remedy = _CODES.get(register, ("drive", "fault", "see the servo's manual for the code"))
+        return (Fault(code, joint, f"{meaning}, {name} {register}", remedy),)
+    found = tuple(
+        Fault(code, joint, f"{meaning}, {name} 0x{register:02X}", remedy)
+        for bit, code, meaning, remedy in _BITS
+        if register & bit
+    )
+    return found or (Fault("drive", joint, f"{name} 0x{register:02X}", "see the servo's manual for the bits"),)
+
+
+def watchdog_fault(joint: int | None) -> Fault:
+    """The Bus Watchdog of a servo has fired, or those of all. `joint`: number of the joint, from 1; None for all."""
+    who = "the servos" if joint is None else "the servo"
+    detail = f"{who} heard no instruction in time and stopped"
+    return Fault("watchdog", joint, detail, "make sure the host runs, then acknowledge")
+
+
+_ALERT = "the servo sets its alert bit", "read Hardware Error Status with the wizard"
+"""Which error it is was not read yet."""
+
+_TORQUE_LOST = (
+    "the servo has let go of the joint; it lost power or was restarted",
+    "check supply and cable, then acknowledge and enable again",
+)
 
 
 class Health:
@@ -73,7 +138,7 @@ class Health:
             if self.is_latched[index] and not self.is_latched.all():
                 found.append(watchdog_fault(servo.number))
             if self._alerts[index] and not hardware:
-                found.append(alert_fault(servo.number))
+                found.append(Fault("hardware-error", servo.number, *_ALERT))
             if self._lost[index] and not hardware:
-                found.append(torque_lost_fault(servo.number))
+                found.append(Fault("restarted", servo.number, *_TORQUE_LOST))
         return tuple(found)

@@ -6,8 +6,12 @@ Source: ROBOTIS e-Manual, "Protocol 2.0".
 """
 
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+
+from typing_extensions import override
+
+from tauscope_drivers.serial_servos.bus import FrameParser
 
 HEADER = b"\xff\xff\xfd\x00"
 BROADCAST_ID = 0xFE
@@ -111,58 +115,23 @@ def encode_sync_write(values: Mapping[int, bytes], address: int) -> bytes:
     )
 
 
-class FrameParser:
-    """Finds whole frames in what comes from a port, whatever it is.
+class DynamixelParser(FrameParser):
+    """Finds whole frames in what comes from a port, whatever it is."""
 
-    Noise and damaged frames are passed over and counted in `discarded`.
-    """
+    header, fixed_bytes = HEADER, _FIXED_BYTES
 
     def __init__(self, longest: int = LONGEST_FRAME) -> None:
-        """Begin with nothing.
+        """Begin with nothing. `longest`: longest frame that can be meant [bytes]."""
+        super().__init__(longest)
 
-        `longest`: longest frame that can be meant, so that a damaged length does not swallow what follows [bytes].
-        """
-        self.discarded = 0
-        self._longest = longest
-        self._buffer = bytearray()
+    @override
+    def find_end(self, start: bytearray) -> int | None:
+        end = _FIXED_BYTES + (start[5] | start[6] << 8)
+        return end if end >= _SHORTEST_FRAME else None
 
-    def feed(self, received: bytes) -> Iterator[bytes]:
-        """Frames that are complete now and whose checksum is right, header included."""
-        self._buffer += received
-        while (frame := self._next_frame()) is not None:
-            yield frame
-
-    @property
-    def pending(self) -> bytes:
-        """The frame that has begun and is not complete."""
-        return bytes(self._buffer)
-
-    def _next_frame(self) -> bytes | None:
-        """The next whole frame whose checksum is right."""
-        buffer = self._buffer
-        while True:
-            start = buffer.find(HEADER)
-            if start < 0:
-                self._discard(max(0, len(buffer) - len(HEADER) + 1))
-                return None
-            self._discard(start)
-            if len(buffer) < _FIXED_BYTES:
-                return None
-            end = _FIXED_BYTES + (buffer[5] | buffer[6] << 8)
-            if not _SHORTEST_FRAME <= end <= self._longest:
-                self._discard(1)
-            elif len(buffer) < end:
-                return None
-            elif checksum(buffer[: end - 2]) != buffer[end - 2] | buffer[end - 1] << 8:
-                self._discard(1)
-            else:
-                frame = bytes(buffer[:end])
-                del buffer[:end]
-                return frame
-
-    def _discard(self, count: int) -> None:
-        del self._buffer[:count]
-        self.discarded += count
+    @override
+    def is_whole(self, frame: bytes) -> bool:
+        return checksum(frame[:-2]) == frame[-2] | frame[-1] << 8
 
 
 def decode_status(frame: bytes) -> Status | None:

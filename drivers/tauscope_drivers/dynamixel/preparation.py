@@ -5,10 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tauscope_drivers.backend import ControlMode
-from tauscope_drivers.dynamixel.control_table import Item
-from tauscope_drivers.dynamixel.models import CURRENT_MODE, WATCHDOG_MOST, WATCHDOG_STEP_S
+from tauscope_drivers.dynamixel.control_table import CURRENT_MODE, WATCHDOG_MOST, WATCHDOG_STEP_S, Item
 from tauscope_drivers.dynamixel.servo import JointServo
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 
 SETTINGS = (
     "Return Delay Time",
@@ -118,10 +117,9 @@ def watchdog_steps(watchdog_s: float) -> int:
     """
     steps = math.floor(watchdog_s / WATCHDOG_STEP_S + _ROUNDING) if math.isfinite(watchdog_s) else 0
     if not 1 <= steps <= WATCHDOG_MOST:
-        raise DriverError(
-            DriverErrorKind.REFUSED,
+        raise DriverError.refusal(
             f"a watchdog of {watchdog_s:g} s is not possible; the servos take {WATCHDOG_STEP_S:g} s to "
-            f"{WATCHDOG_MOST * WATCHDOG_STEP_S:g} s",
+            f"{WATCHDOG_MOST * WATCHDOG_STEP_S:g} s"
         )
     return steps
 
@@ -130,7 +128,6 @@ def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -
     """Most current within a torque limit, the robot file's limit and the servo's own Current Limit [units].
 
     Raises DriverError ``refused`` where the limit cannot be turned into current, or leaves none.
-
     `torque`: limit of the joint, infinite where there is none [Nm or N].
     """
     cap = settings["Current Limit"]
@@ -140,13 +137,12 @@ def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -
         if servo.units.torque_per_milliampere is not None:
             cap = min(cap, servo.units.current_cap(torque))
         elif servo.current_limit_ma is None:
-            raise DriverError(
-                DriverErrorKind.REFUSED,
+            raise DriverError.refusal(
                 f"{servo.label}: a torque limit of {torque:g} Nm is no current without a torque constant; state "
-                "torque_constant, or drive.current_limit_ma",
+                "torque_constant, or drive.current_limit_ma"
             )
     if cap <= 0:
-        raise DriverError(DriverErrorKind.REFUSED, f"{servo.label}: its limits leave no current at all; raise them")
+        raise DriverError.refusal(f"{servo.label}: its limits leave no current at all; raise them")
     return cap
 
 
@@ -154,16 +150,13 @@ def velocity_cap(servo: JointServo, settings: Mapping[str, int], velocity: float
     """Profile Velocity within a speed limit and the servo's own Velocity Limit, beyond which it refuses it [units].
 
     Raises DriverError ``refused`` where the servo's own limit leaves no motion.
-
     `velocity`: limit of the joint, infinite where there is none [rad/s or m/s].
     """
     cap, own = servo.units.velocity_cap(velocity), settings.get("Velocity Limit")
     if own is None:
         return cap
     if own == 0:
-        raise DriverError(
-            DriverErrorKind.REFUSED, f"{servo.label}: its Velocity Limit is 0; raise it with the DYNAMIXEL Wizard"
-        )
+        raise DriverError.refusal(f"{servo.label}: its Velocity Limit is 0; raise it with the DYNAMIXEL Wizard")
     return min(cap or own, own)
 
 

@@ -1,11 +1,121 @@
-"""A servo that was found on the bus, at its joint."""
+"""A servo that was found on the bus, at its joint, and what its numbers mean there."""
 
+import math
 from dataclasses import dataclass
 
 from tauscope_drivers.dynamixel.configuration import ServoConfiguration
 from tauscope_drivers.dynamixel.control_table import ServoModel, find_model, find_model_by_name
-from tauscope_drivers.dynamixel.units import ServoUnits, servo_units
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
+
+MULTI_TURN_COUNTS = 1_048_575
+"""Goal Position reaches this far both ways in the current-based position mode of X and MX."""
+
+
+@dataclass(frozen=True)
+class ServoUnits:
+    """What one unit of a servo means at its joint.
+
+    `radians_per_count`: joint position for one count, negative where the servo is mounted the other way round [rad or
+        m].
+    `velocity_unit`: joint velocity for one unit of Present Velocity, signed likewise [rad/s or m/s].
+    `milliampere`: current for one unit of Present Current, signed likewise [mA].
+    `torque_per_milliampere`: joint torque for one milliampere; None where the robot file does not say, for no maker's
+        figure exists [Nm/mA or N/mA].
+    """
+
+    radians_per_count: float
+    zero_count: int
+    velocity_unit: float
+    milliampere: float
+    source: str
+    torque_per_milliampere: float | None = None
+
+    def position(self, counts: int) -> float:
+        """Joint position [rad or m]."""
+        return (counts - self.zero_count) * self.radians_per_count
+
+    def counts(self, position: float) -> int:
+        """Nearest count of a joint position. `position`: finite [rad or m]."""
+        return round(position / self.radians_per_count) + self.zero_count
+
+    def counts_within(self, low: float, high: float) -> tuple[int, int]:
+        """Lowest and highest whole count between two joint positions.
+
+        `low`, `high`: infinite where there is no limit [rad or m].
+        """
+        ends = sorted((low / self.radians_per_count, high / self.radians_per_count))
+        lowest = -MULTI_TURN_COUNTS if ends[0] == -math.inf else math.ceil(ends[0] - _ROUNDING) + self.zero_count
+        highest = MULTI_TURN_COUNTS if ends[1] == math.inf else math.floor(ends[1] + _ROUNDING) + self.zero_count
+        return lowest, highest
+
+    def velocity(self, units: int) -> float:
+        """Joint velocity [rad/s or m/s]."""
+        return units * self.velocity_unit
+
+    def velocity_cap(self, velocity: float) -> int:
+        """Profile Velocity for a largest speed; 0, which means none, where there is none.
+
+        `velocity`: positive, may be infinite [rad/s or m/s].
+        """
+        most = velocity / abs(self.velocity_unit)
+        return 0 if most > _LARGEST_PROFILE else max(1, math.floor(most))
+
+    def current(self, units: int) -> float:
+        """Motor current, positive where it pushes the joint forward [mA]."""
+        return units * self.milliampere
+
+    def current_units(self, torque: float) -> int:
+        """Nearest Goal Current for a joint torque. `torque`: finite [Nm or N]."""
+        return round(torque / self._torque_per_unit())
+
+    def current_cap(self, torque: float) -> int:
+        """Largest whole Goal Current within a torque limit; 0x7FFF where there is no limit.
+
+        `torque`: positive, may be infinite [Nm or N].
+        """
+        if torque == math.inf:
+            return 0x7FFF
+        return min(0x7FFF, math.floor(torque / abs(self._torque_per_unit()) + _ROUNDING))
+
+    def _torque_per_unit(self) -> float:
+        if self.torque_per_milliampere is None:
+            raise ValueError("the joint's torque constant is not known")
+        return self.milliampere * self.torque_per_milliampere
+
+
+_ROUNDING = 1e-9
+_LARGEST_PROFILE = 32_767
+
+
+def servo_units(
+    model: ServoModel,
+    *,
+    direction: int = 1,
+    reduction: float = 1.0,
+    zero_count: int | None = None,
+    milliampere: float | None = None,
+    torque_per_milliampere: float | None = None,
+) -> ServoUnits:
+    """Units of a servo of this model at its joint.
+
+    Raises ValueError where no unit of current is known for the model, and none is given.
+    `reduction`: turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints.
+    `zero_count`: count at which the joint stands at zero; None for the model's own.
+    `milliampere`: one unit of Present Current, in place of the model's [mA].
+    `torque_per_milliampere`: as recorded torque constants are: joint torque for one milliampere [Nm/mA or N/mA].
+    """
+    unit = model.current_unit
+    if milliampere is None and unit is None:
+        raise ValueError(f"no unit of current is known for the {model.label}")
+    size = milliampere if milliampere is not None else unit.milliampere if unit is not None else math.nan
+    return ServoUnits(
+        radians_per_count=direction / (model.counts_per_radian * reduction),
+        zero_count=model.zero_count if zero_count is None else zero_count,
+        velocity_unit=direction * model.velocity_unit / reduction,
+        milliampere=direction * size,
+        source="robot file" if milliampere is not None or unit is None else unit.source,
+        torque_per_milliampere=torque_per_milliampere,
+    )
 
 
 @dataclass(frozen=True)
@@ -39,7 +149,6 @@ def make_servo(number: int, configuration: ServoConfiguration, identity: tuple[i
 
     Raises DriverError ``cannot-connect`` where not the model that the robot file names, one that senses no current or
     has no watchdog.
-
     `number`: of the joint, from 1.
     """
     place = f"joint {configuration.joint} (servo {configuration.servo})"
@@ -48,7 +157,7 @@ def make_servo(number: int, configuration: ServoConfiguration, identity: tuple[i
     elif configuration.model is not None:
         model, firmware = find_model_by_name(configuration.model), 0
     else:
-        raise DriverError(DriverErrorKind.REFUSED, f"{place}: drive.model is missing; a dry run needs it")
+        raise DriverError.refusal(f"{place}: drive.model is missing; a dry run needs it")
     if configuration.model is not None and find_model_by_name(configuration.model).name != model.name:
         raise _unfit(place, f"is a {model.label}, the robot file says {configuration.model}; correct one of them")
     if not model.senses_current:
@@ -67,15 +176,9 @@ def make_servo(number: int, configuration: ServoConfiguration, identity: tuple[i
     except ValueError as error:
         raise _unfit(place, f"{error}; state drive.milliampere_per_unit") from error
     return JointServo(
-        number,
-        configuration.joint,
-        configuration.servo,
-        model,
-        firmware,
-        units,
-        configuration.current_limit_ma,
+        number, configuration.joint, configuration.servo, model, firmware, units, configuration.current_limit_ma
     )
 
 
 def _unfit(place: str, reason: str) -> DriverError:
-    return DriverError(DriverErrorKind.CANNOT_CONNECT, f"{place} {reason}")
+    return DriverError.no_connection(f"{place} {reason}")

@@ -6,22 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope_drivers.dynamixel.bus import FACTORY_RETURN_DELAY_S, PATIENCE_S, ServoBus
+from tauscope_drivers.dynamixel.bus import ServoBus
 from tauscope_drivers.dynamixel.configuration import ServoConfiguration
+from tauscope_drivers.dynamixel.control_table import CURRENT_MODE, gear_ratio_of
 from tauscope_drivers.dynamixel.group import ServoGroup
 from tauscope_drivers.dynamixel.health import Health
-from tauscope_drivers.dynamixel.models import CURRENT_MODE, gear_ratio_of
 from tauscope_drivers.dynamixel.original_settings import CHANGED, OriginalSettings
 from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, SETTINGS, RegisterWrite, commissioning_writes
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
-from tauscope_drivers.errors import DriverError, DriverErrorKind
-
-SHORTEST_RETURN_DELAY_S = 2e-6
-"""Of a servo whose Return Delay Time is 0 [s]."""
+from tauscope_drivers.errors import DriverError
+from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S
+from tauscope_drivers.serial_servos.bus import FACTORY_RETURN_DELAY_S, PATIENCE_S, learn_latency
 
 ELECTRONIC_GEAR = ("Electronic GearRatio Numerator", "Electronic GearRatio Denominator")
-
-_RETURN_DELAY_UNIT_S = 2e-6
 
 
 @dataclass
@@ -110,11 +107,10 @@ def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) ->
     for joint, servo in enumerate(servos):
         holds = bool(session.health.has_torque[joint])
         session.carry_out(joint, commissioning_writes(servo, settings[joint], holds=holds))
-    slowest = max(values["Return Delay Time"] for values in settings) * _RETURN_DELAY_UNIT_S
+    slowest = max(values["Return Delay Time"] for values in settings) * RETURN_DELAY_UNIT_S
     bus.return_delay_s = max(SHORTEST_RETURN_DELAY_S, slowest)
     session.group.probe_fast()
-    # an adapter that is slow by a constant is no slower than that in any answer
-    bus.port.latency_s += session.group.beyond_ns() * 1e-9
+    learn_latency(bus.port, session.group.probe())
     return session
 
 
@@ -144,10 +140,9 @@ def _require_delivered_gear(bus: ServoBus, servo: JointServo) -> None:
     numerator, denominator = (gear[name] for name in ELECTRONIC_GEAR)
     ratio = gear_ratio_of(servo.model.name)
     if numerator != ratio * denominator:
-        raise DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
+        raise DriverError.no_connection(
             f"{servo.label}: its Electronic GearRatio is {numerator}:{denominator}, its counts are right at {ratio}:1; "
-            "set it back with the wizard, and state a reduction of your own as drive.reduction",
+            "set it back with the wizard, and state a reduction of your own as drive.reduction"
         )
 
 
@@ -167,10 +162,9 @@ def read_items(bus: ServoBus, servo: JointServo, names: Iterable[str]) -> dict[s
 def _reach(bus: ServoBus, number: int, configuration: ServoConfiguration) -> JointServo:
     identity = bus.ping(configuration.servo)
     if identity is None:
-        raise DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
+        raise DriverError.no_connection(
             f"joint {configuration.joint}: servo {configuration.servo} does not answer on {bus.port.path} at "
-            f"{bus.port.baudrate} baud; check its power, cable, ID and baud rate",
+            f"{bus.port.baudrate} baud; check its power, cable, ID and baud rate"
         )
     servo = make_servo(number, configuration, identity)
     _let_answer(bus, servo)

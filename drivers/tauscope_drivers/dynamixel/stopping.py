@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 
 from tauscope_drivers.backend import ControlMode, StopPolicy
+from tauscope_drivers.dynamixel.control_table import CURRENT_MODE
 from tauscope_drivers.dynamixel.group import GroupReading
-from tauscope_drivers.dynamixel.models import CURRENT_MODE
 from tauscope_drivers.dynamixel.preparation import operating_mode
 from tauscope_drivers.dynamixel.session import Session
 from tauscope_drivers.errors import DriverError, DriverErrorKind
@@ -133,7 +133,6 @@ def _change_to_holding(session: Session, joints: Sequence[int], caps: Sequence[i
 
 
 def _present_counts(session: Session, reading: GroupReading) -> list[int | None]:
-    """Where each servo stands [counts]; None for who did not answer."""
     return [
         None if reading.alerts[joint] is None else servo.units.counts(float(reading.position[joint]))
         for joint, servo in enumerate(session.servos)

@@ -1,63 +1,39 @@
-"""Instructions and their answers on one bus of servos."""
+"""Instructions and their answers on one bus of servos, and what a cycle of them takes."""
 
-import time
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 
-from tauscope_drivers.clock import AnswerTime, Clock, MonotonicClock
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.clock import Clock
+from tauscope_drivers.errors import DriverError
 from tauscope_drivers.feetech import packets
-from tauscope_drivers.feetech.packets import ANSWER_BYTES, FrameParser, Status
-from tauscope_drivers.feetech.registers import FIRST_IN_RAM, REGISTERS, SPARE_BYTES, Block
-from tauscope_drivers.serial_port import BITS_PER_BYTE, SerialPort
+from tauscope_drivers.feetech.packets import ANSWER_BYTES, FeetechParser, Status
+from tauscope_drivers.feetech.registers import FEEDBACK, FIRST_IN_RAM, REGISTERS, SPARE_BYTES, TARGETS, Block
+from tauscope_drivers.serial_port import SerialPort
+from tauscope_drivers.serial_servos.budget import CycleTraffic
+from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers, SerialServoBus
 
-FACTORY_RETURN_DELAY_S = 500e-6
-"""Return Delay Time of 250 [s]."""
-
-ATTEMPTS = 3
-"""How often a single servo is asked outside the control loop."""
-
-PATIENCE_S = 0.02
-"""How much longer a single servo is waited for there [s]."""
-
-_LATEST_ANSWER_NS = 500_000_000
-"""Answers have come 133 ms late where a machine stood still; a control loop gives an arm up long before this."""
-
-_PING_SLOT_S = 0.003
-"""Time that a ping to all leaves each ID [s]."""
+_ASK_BYTES = 8
+_GOAL_BYTES = 7
+"""ID, position, time and speed."""
 
 
-@dataclass(frozen=True)
-class Answers:
-    """Answers to one question to many servos.
-
-    `asked_ns`: instant at which the question had left [ns, by the bus' clock].
-    `late_ns`: how much later than usual the last answer came [ns].
-    `beyond_ns`: how much longer than bus and adapter should take for it [ns].
-    """
-
-    asked_ns: int
-    late_ns: int
-    statuses: dict[int, Status]
-    beyond_ns: int = 0
+def count_traffic(servos: int) -> CycleTraffic:
+    """A cycle: Sync Write of the goals, Sync Read of all servos, a read of one servo's torque and limits."""
+    each = _GOAL_BYTES + 1 + ANSWER_BYTES + FEEDBACK.length
+    count = 3 * _ASK_BYTES + servos * each + ANSWER_BYTES + TARGETS.length
+    return CycleTraffic(servos, count, servos + 1, 2, "set Return Delay Time to 0 with Feetech's FD")
 
 
-class FeetechBus:
+class FeetechBus(SerialServoBus[Status]):
     """Speaks to the servos of one port; one thread's own.
 
-    Nothing in an answer says to which question it belongs. After a question that was not answered in time, the next
-    ones ask for another number of bytes: an answer that comes late has the wrong length. A servo that may still owe an
-    answer of the same length is not believed.
+    After a question that was not answered in time, the next ones ask for another number of bytes: an answer that comes
+    late has the wrong length. A servo that may still owe an answer of the same length is not believed.
     """
 
     def __init__(self, port: SerialPort, clock: Clock | None = None) -> None:
         """Use a port, open or not yet."""
-        self.port = port
-        self.return_delay_s = FACTORY_RETURN_DELAY_S
-        self._clock = MonotonicClock() if clock is None else clock
-        self._missed_ns: dict[tuple[int, int], int] = {}
+        super().__init__(port, clock)
         self._owes = False
-        self._answer_times: dict[int, AnswerTime] = {}
 
     def ping(self, servo: int) -> bool:
         """Whether a servo answers."""
@@ -65,14 +41,9 @@ class FeetechBus:
 
     def ping_all(self) -> list[int]:
         """IDs of the servos that answer a ping to all."""
-        slots = packets.HIGHEST_ID + 1
-        self.port.send(packets.encode_ping())
-        deadline = self.port.reply_deadline_ns(ANSWER_BYTES * slots, slots * _PING_SLOT_S)
-        parser, found = FrameParser(), set[int]()
-        while received := self.port.receive(deadline):
-            statuses = map(packets.decode_status, parser.feed(received))
-            found |= {status.servo for status in statuses if status is not None and not status.data}
-        return sorted(found)
+        frames = self._ask_everybody(packets.encode_ping(), ANSWER_BYTES, packets.HIGHEST_ID + 1, FeetechParser())
+        statuses = map(packets.decode_status, frames)
+        return sorted({status.servo for status in statuses if status is not None and not status.data})
 
     def read(self, servo: int, block: Block) -> tuple[int, dict[str, int]]:
         """Alarms and registers of one servo, asked again while it does not answer.
@@ -84,10 +55,7 @@ class FeetechBus:
             answer = self._ask(servo, request, block.length, PATIENCE_S)
             if answer is not None:
                 return answer.alarms, block.decode(answer.data)
-        raise DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
-            f"servo {servo} does not answer; check its power, cable, ID and baud rate",
-        )
+        raise DriverError.no_connection(f"servo {servo} does not answer; check its power, cable, ID and baud rate")
 
     def read_once(self, servo: int, block: Block) -> Status | None:
         """A block and some spare bytes, asked for once; None where no answer came that can be believed."""
@@ -111,9 +79,8 @@ class FeetechBus:
             if all(found[name] == value for name, value in values.items()):
                 return
         name, value = next((name, value) for name, value in values.items() if found[name] != value)
-        raise DriverError(
-            DriverErrorKind.REFUSED,
-            f"servo {servo}: {name} was written as {value} and reads {found[name]}; check it with Feetech's FD",
+        raise DriverError.refusal(
+            f"servo {servo}: {name} was written as {value} and reads {found[name]}; check it with Feetech's FD"
         )
 
     def sync_write(self, values: Mapping[int, Mapping[str, int]]) -> None:
@@ -123,33 +90,26 @@ class FeetechBus:
             (address,) = {start for start, _ in encoded.values()}
             self.port.send(packets.encode_sync_write({servo: data for servo, (_, data) in encoded.items()}, address))
 
-    def sync_read(self, servos: Sequence[int], block: Block, patience_s: float = 0.0) -> Answers:
+    def sync_read(self, servos: Sequence[int], block: Block, patience_s: float = 0.0) -> Answers[Status]:
         """Read a block and some spare bytes of many servos."""
         self._drain()
         length = self._choose_length(servos, block)
         owed = self._find_owing(servos, length)
         request = packets.encode_sync_read(servos, block.address, length)
-        # Taken before: who is woken by the bytes may run before this process does again.
-        asked_ns = self._clock.now_ns() + round(self._wire_s(len(request)) * 1e9)
-        self.port.send(request)
-        answer_bytes = len(servos) * (ANSWER_BYTES + length)
-        waits_s = len(servos) * self.return_delay_s
+        asked_ns = self._send_question(request)
+        answer_bytes, waits_s = len(servos) * (ANSWER_BYTES + length), len(servos) * self.return_delay_s
         deadline = self.port.reply_deadline_ns(len(request) + answer_bytes, waits_s + patience_s)
         found, answered_ns = self._receive_each(servos, length, max(len(request), ANSWER_BYTES + length), deadline)
         self._miss(set(servos) - found.keys(), length)
-        found = {servo: status for servo, status in found.items() if status is not None and servo not in owed}
-        if not found:
-            return Answers(asked_ns, 0, found)
-        usual_s = self._wire_s(answer_bytes) + waits_s + self.port.latency_s
-        taken_ns = answered_ns - asked_ns - round(usual_s * 1e9)
-        late_ns = self._answer_times.setdefault(len(servos), AnswerTime()).late_ns(taken_ns)
-        return Answers(asked_ns, late_ns, found, max(0, taken_ns))
+        believed = {servo: status for servo, status in found.items() if status is not None and servo not in owed}
+        usual_s = self._wire_s(answer_bytes) + waits_s
+        return self._time_answers(len(servos), asked_ns, answered_ns, usual_s, believed)
 
     def _receive_each(
         self, servos: Sequence[int], length: int, longest: int, deadline: int
     ) -> tuple[dict[int, Status | None], int]:
         """One answer of each servo, None where two differ, and when the last came."""
-        parser, found = FrameParser(longest), dict[int, Status | None]()
+        parser, found = FeetechParser(longest), dict[int, Status | None]()
         answered_ns = 0
         while len(found) < len(servos) and (received := self.port.receive(deadline)):
             for frame in parser.feed(received):
@@ -167,7 +127,7 @@ class FeetechBus:
         self.port.send(request)
         delay_s = self.return_delay_s + patience_s
         deadline = self.port.reply_deadline_ns(len(request) + ANSWER_BYTES + length, delay_s)
-        parser = FrameParser(max(len(request), ANSWER_BYTES + length))
+        parser = FeetechParser(max(len(request), ANSWER_BYTES + length))
         may_echo = True
         while received := self.port.receive(deadline):
             for frame in parser.feed(received):
@@ -191,19 +151,9 @@ class FeetechBus:
         lengths = range(block.length, block.length + SPARE_BYTES + 1)
         return min(lengths, key=lambda length: max(self._missed_ns.get((servo, length), 0) for servo in servos))
 
-    def _find_owing(self, servos: Sequence[int], length: int) -> set[int]:
-        """Servos whose answer of this length to an earlier question may still be under way."""
-        since_ns = time.monotonic_ns() - _LATEST_ANSWER_NS
-        return {servo for servo in servos if self._missed_ns.get((servo, length), 0) > since_ns}
-
     def _miss(self, servos: Collection[int], length: int) -> None:
-        """Note who has not answered: that answer may come yet."""
         self._owes |= bool(servos)
-        self._missed_ns |= dict.fromkeys(((servo, length) for servo in servos), time.monotonic_ns())
-
-    def _wire_s(self, count: int) -> float:
-        """Time of so many bytes on the wire [s]."""
-        return count * BITS_PER_BYTE / self.port.baudrate
+        super()._miss(servos, length)
 
 
 def encode_registers(values: Mapping[str, int]) -> tuple[int, bytes]:

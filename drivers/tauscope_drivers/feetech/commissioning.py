@@ -11,7 +11,6 @@ import numpy as np
 
 from tauscope_drivers.backend import DriveLimits
 from tauscope_drivers.errors import DriverError
-from tauscope_drivers.feetech.faults import alarm_faults
 from tauscope_drivers.feetech.registers import (
     COUNTS_PER_TURN,
     FULL_ANGLE,
@@ -19,13 +18,13 @@ from tauscope_drivers.feetech.registers import (
     POSITION_MODE,
     PROTECTIONS,
     PROTECTIVE,
-    RETURN_DELAY_UNIT_S,
     VOLT,
 )
 from tauscope_drivers.feetech.servo import JointServo
-from tauscope_drivers.feetech.session import Session
+from tauscope_drivers.feetech.session import Session, alarm_faults
 from tauscope_drivers.inspection import Finding, Severity, failure
 from tauscope_drivers.limits import require_sensible
+from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S
 
 _TOOL = "with Feetech's FD: Tauscope writes nothing to EEPROM"
 
@@ -106,7 +105,6 @@ def find_flaws(servo: JointServo, reading: Reading, limits: DriveLimits, joint: 
 
 
 def _find_supply(servo: JointServo, reading: Reading) -> list[Finding]:
-    """A supply outside the servo's own limits: it lets go of the joint."""
     volts = reading.feedback["Present Voltage"]
     low, high = reading.settings["Min Voltage Limit"], reading.settings["Max Voltage Limit"]
     if low <= volts <= high:
@@ -116,7 +114,6 @@ def _find_supply(servo: JointServo, reading: Reading) -> list[Finding]:
 
 
 def _find_limits(servo: JointServo, reading: Reading, task: ServoTask) -> list[Finding]:
-    """Limits that leave nothing, or are those of another place."""
     if not task.torque:
         remedy = "raise limits.torque, or state joints[].torque_constant as Nm for 1 ‰ of load"
         return [Finding(Severity.FAILURE, servo.label, "the torque limit is below 1 ‰ of its duty", remedy)]

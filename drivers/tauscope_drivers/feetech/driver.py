@@ -1,29 +1,19 @@
 """The driver of Feetech STS3215 servos, as the registry finds it."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.driver import PATIENCE, ArmDescription, BusDriver, Connection, Option
-from tauscope_drivers.errors import DriverError
-from tauscope_drivers.feetech.configuration import ID_KEY, read_configuration
-from tauscope_drivers.inspection import Finding, FoundDevice, FrameRequest, PlannedFrame, failure
+from tauscope_drivers.driver import ArmDescription, Connection, SerialBusDriver
 
 
-class FeetechDriver(BusDriver):
+class FeetechDriver(SerialBusDriver):
     """Implements `BusDriver`."""
 
     name = "feetech"
     title = "Feetech STS3215 servos"
-    options = (Option("port", "serial device, in place of the robot file's"), PATIENCE)
+    id_key = "servo_id"
     block_example = "{servo_id: 1}"
-    port_help = "serial device"
-    neighbours = "Dynamixel servos of protocol 2.0 answer to tauscope bus scan dynamixel"
-    bus_options = ("port",)
-
-    def is_meant(self, block: Mapping[str, Any]) -> bool:
-        """Whether it has a ``servo_id``."""
-        return ID_KEY in block
+    answering = "servos of Feetech, and Dynamixel servos of protocol 1.0,"
 
     def make_backend(self, arm: ArmDescription, settings: Mapping[str, Any]) -> Connection:
         """The arm in real time."""
@@ -31,38 +21,5 @@ class FeetechDriver(BusDriver):
 
         return Connection(FeetechArm(arm.joints, slack_s=self.read_patience_s(settings)), is_real_time=True)
 
-    def list_adapters(self) -> list[Finding]:
-        """Serial ports of this machine."""
-        from tauscope_drivers.serial_adapters import serial_adapters
-
-        return serial_adapters()
-
-    def check_blocks(self, joints: Sequence[DriveJoint]) -> list[Finding]:
-        """Blocks: servo IDs, port and units."""
-        try:
-            read_configuration(joints)
-        except DriverError as error:
-            return [failure(self.name, str(error))]
-        return []
-
-    def examine(self, joints: Sequence[DriveJoint]) -> list[Finding]:
-        """Port, and every servo that the robot file names."""
-        from tauscope_drivers.feetech.doctor import examine
-
-        return examine(joints)
-
-    def scan(self, port: str, bit_rates: Sequence[int] | None) -> Iterator[FoundDevice]:
-        """Servos that answer a ping to all."""
-        from tauscope_drivers.feetech.doctor import USUAL_BAUDS, scan_bus
-
-        return scan_bus(port, USUAL_BAUDS if bit_rates is None else bit_rates)
-
-    def plan_frames(self, joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:
-        """The frames of a run, without a port."""
-        from tauscope_drivers.feetech.dry_run import plan_frames
-
-        return plan_frames(joints, request)
-
 
 DRIVER = FeetechDriver()
-"""Found by the entry point ``tauscope.drivers``."""

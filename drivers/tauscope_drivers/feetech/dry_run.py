@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from tauscope_drivers.backend import ControlMode, StopPolicy
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.errors import DriverError
 from tauscope_drivers.feetech import packets
 from tauscope_drivers.feetech.bus import encode_registers
 from tauscope_drivers.feetech.commissioning import Reading, ServoTask, plan_task
@@ -17,11 +17,7 @@ from tauscope_drivers.inspection import FrameRequest, PlannedFrame
 from tauscope_drivers.limits import require_sensible
 
 _DELIVERED = Reading(
-    {
-        "Min Position Limit": 0,
-        "Max Position Limit": COUNTS_PER_TURN - 1,
-        "Max Torque Limit": PERMILLE,
-    },
+    {"Min Position Limit": 0, "Max Position Limit": COUNTS_PER_TURN - 1, "Max Torque Limit": PERMILLE},
     {"Present Voltage": 74},
 )
 """A servo as delivered, at 7.4 V."""
@@ -34,7 +30,7 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
     """
     if request.mode is not ControlMode.POSITION:
         text = f"these servos cannot do mode {request.mode}; choose {ControlMode.POSITION}"
-        raise DriverError(DriverErrorKind.REFUSED, text)
+        raise DriverError.refusal(text)
     servos = [JointServo(number, servo) for number, servo in enumerate(read_configuration(joints).servos, 1)]
     require_sensible(request.limits, request.targets[0], [servo.label for servo in servos])
     tasks = [plan_task(servo, _DELIVERED, request.limits, joint) for joint, servo in enumerate(servos)]
@@ -53,7 +49,6 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
 
 
 def _connection(servos: Sequence[JointServo]) -> Iterator[PlannedFrame]:
-    """A ping and the settings of each."""
     for servo in servos:
         yield _frame("connect", f"{servo.label}: are you there?", packets.encode_ping(servo.servo))
         yield _read(servo, "connect", IDENTITY, "model and firmware?")
@@ -63,7 +58,6 @@ def _connection(servos: Sequence[JointServo]) -> Iterator[PlannedFrame]:
 def _enabling(
     servos: Sequence[JointServo], tasks: Sequence[ServoTask], request: FrameRequest
 ) -> Iterator[PlannedFrame]:
-    """Limits, its place for a goal, then torque, one servo after the other."""
     for servo, task, place in zip(servos, tasks, request.targets[0], strict=True):
         for write in taking_writes(task, servo.counts(float(place)), None):
             yield _write(servo, write)
@@ -72,7 +66,6 @@ def _enabling(
 def _cycle(
     servos: Sequence[JointServo], writes: Sequence[Mapping[str, int]], turn: JointServo
 ) -> Iterator[PlannedFrame]:
-    """Goals out, states in, and torque and limits of one servo in turn."""
     encoded = {servo.servo: encode_registers(values) for servo, values in zip(servos, writes, strict=True)}
     address = next(iter(encoded.values()))[0]
     told = ", ".join(

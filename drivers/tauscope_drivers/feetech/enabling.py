@@ -37,7 +37,7 @@ def plan_tasks(session: Session, limits: DriveLimits) -> list[ServoTask]:
 def _plan(session: Session, joint: int, reading: Reading, limits: DriveLimits) -> ServoTask:
     servo = session.servos[joint]
     for flaw in find_flaws(servo, reading, limits, joint):
-        raise DriverError(DriverErrorKind.REFUSED, f"{servo.label}: {flaw.detail}; {flaw.remedy}")
+        raise DriverError.refusal(f"{servo.label}: {flaw.detail}; {flaw.remedy}")
     return plan_task(servo, reading, limits, joint)
 
 
@@ -119,7 +119,6 @@ def stop_servos(session: Session, policy: StopPolicy) -> None:
 
 
 def _hold(session: Session, joint: int) -> None:
-    """Hold a joint that is held, where it is."""
     targets = session.read_targets(joint)
     if not targets["Torque Enable"]:
         return
@@ -129,7 +128,6 @@ def _hold(session: Session, joint: int) -> None:
 
 
 def _is_near(goal: int, present: int) -> bool:
-    """Whether a servo may keep its goal."""
     return abs(goal - present) < NEAR_GOAL_RAD * COUNTS_PER_RADIAN
 
 

@@ -4,8 +4,12 @@ A frame is FF FF, ID, length, instruction or alarms, parameters, checksum. An in
 adapter that echoes is found by comparing with the request. Source: Feetech, "FT-SCS communication protocol".
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+
+from typing_extensions import override
+
+from tauscope_drivers.serial_servos.bus import FrameParser
 
 HEADER = b"\xff\xff"
 BROADCAST_ID = 0xFE
@@ -75,45 +79,23 @@ def encode_sync_write(values: Mapping[int, bytes], address: int) -> bytes:
     return encode_frame(BROADCAST_ID, _SYNC_WRITE, bytes([address, length]) + parts)
 
 
-class FrameParser:
-    """Finds whole frames in what comes from a port; noise and damaged frames are passed over."""
+class FeetechParser(FrameParser):
+    """Finds whole frames in what comes from a port."""
+
+    header, fixed_bytes = HEADER, _FIXED_BYTES
 
     def __init__(self, longest: int = LONGEST_FRAME) -> None:
-        """Begin with nothing.
+        """Begin with nothing. `longest`: longest frame that can be meant [bytes]."""
+        super().__init__(longest)
 
-        `longest`: longest frame that can be meant, so that a damaged length does not swallow what follows [bytes].
-        """
-        self._longest = longest
-        self._buffer = bytearray()
+    @override
+    def find_end(self, start: bytearray) -> int | None:
+        end = _FIXED_BYTES + start[3]
+        return end if start[2] <= BROADCAST_ID and end >= ANSWER_BYTES else None
 
-    def feed(self, received: bytes) -> Iterator[bytes]:
-        """Frames that are complete now and whose checksum is right, header included."""
-        self._buffer += received
-        while (frame := self._next_frame()) is not None:
-            yield frame
-
-    def _next_frame(self) -> bytes | None:
-        """The next whole frame whose checksum is right."""
-        buffer = self._buffer
-        while True:
-            start = buffer.find(HEADER)
-            if start < 0:
-                del buffer[: max(0, len(buffer) - 1)]
-                return None
-            del buffer[:start]
-            if len(buffer) < _FIXED_BYTES:
-                return None
-            end = _FIXED_BYTES + buffer[3]
-            if buffer[2] > BROADCAST_ID or not ANSWER_BYTES <= end <= self._longest:
-                del buffer[0]
-            elif len(buffer) < end:
-                return None
-            elif checksum(buffer[2 : end - 1]) != buffer[end - 1]:
-                del buffer[0]
-            else:
-                frame = bytes(buffer[:end])
-                del buffer[:end]
-                return frame
+    @override
+    def is_whole(self, frame: bytes) -> bool:
+        return checksum(frame[2:-1]) == frame[-1]
 
 
 def decode_status(frame: bytes) -> Status | None:

@@ -1,10 +1,11 @@
-"""The memory table of an STS3215, and the units of its numbers.
+"""The memory table of an STS3215, the units of its numbers, and other devices by the first bytes of theirs.
 
 Source: Feetech, "STS servo memory table"; addresses and signs agree with rustypot's definition (a test compares them).
 Words are little-endian, signs are a bit beside a magnitude.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 COUNTS_PER_TURN = 4096
@@ -17,6 +18,12 @@ MODEL_NUMBER = 777
 NEIGHBOURS = {521: "STS3036", 2825: "STS3250", 11272: "SM8512BL", 1284: "SCS0009"}
 """Other models of the maker that answer on such a bus."""
 
+_ROBOTIS = {
+    **{12: "AX-12", 18: "AX-18A", 300: "AX-12W", 24: "RX-24F", 28: "RX-28", 64: "RX-64", 107: "EX-106"},
+    **{29: "MX-28", 310: "MX-64", 320: "MX-106"},
+}
+"""Models of Dynamixel protocol 1.0, whose frames are the same: model number at 0, firmware at 2, ID at 3."""
+
 TORQUE_PER_VOLT = 1.91 / 7.4
 """Stall torque of the horn per volt, from the data sheet at 7.4 V [Nm/V]."""
 
@@ -26,7 +33,6 @@ VOLT = 0.1
 PERMILLE = 1000
 """Torque Limit and Present Load at full duty."""
 
-RETURN_DELAY_UNIT_S = 2e-6
 LARGEST_SPEED = 32_766
 """Largest Goal Speed that the memory table names."""
 
@@ -162,3 +168,31 @@ SPARE_BYTES = 6
 def speed_unit(phase: int) -> int:
     """Counts per second of one unit of speed."""
     return 1 if phase & FINE_SPEED else _COARSE_SPEED
+
+
+def is_supported(servo: int, identity: Mapping[str, int]) -> bool:
+    """Whether it is an STS3215. `identity`: the registers of `IDENTITY`."""
+    return _robotis_model(servo, identity) is None and _model_number(identity) == MODEL_NUMBER
+
+
+def describe_device(servo: int, identity: Mapping[str, int]) -> str:
+    """Its model, and whether the driver knows it. `identity`: the registers of `IDENTITY`."""
+    if (model := _robotis_model(servo, identity)) is not None:
+        return f"Dynamixel {model} (protocol 1.0, not supported)"
+    number = _model_number(identity)
+    if number == MODEL_NUMBER:
+        return "STS3215"
+    if number in NEIGHBOURS:
+        return f"Feetech {NEIGHBOURS[number]} (not supported)"
+    return f"model number {number} (not supported)"
+
+
+def _model_number(identity: Mapping[str, int]) -> int:
+    """Model number; servos of the SCS series have the high byte first, and say so."""
+    number = identity["Model Number"]
+    return (number & 0xFF) << 8 | number >> 8 if identity["Byte Order"] == 1 else number
+
+
+def _robotis_model(servo: int, identity: Mapping[str, int]) -> str | None:
+    number = identity["Firmware Major Version"] | identity["Firmware Minor Version"] << 8
+    return _ROBOTIS.get(number) if identity["Model Number"] & 0xFF == servo else None

@@ -7,18 +7,55 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
-from tauscope_drivers.feetech.bus import PATIENCE_S, FeetechBus
+from tauscope_drivers.feetech.bus import FeetechBus
 from tauscope_drivers.feetech.configuration import ServoConfiguration
-from tauscope_drivers.feetech.faults import alarm_faults, restarted_fault, watchdog_fault
-from tauscope_drivers.feetech.neighbours import describe_device, is_supported
-from tauscope_drivers.feetech.registers import FEEDBACK, IDENTITY, RETURN_DELAY_UNIT_S, SETTINGS, TARGETS, speed_unit
+from tauscope_drivers.feetech.registers import (
+    FEEDBACK,
+    IDENTITY,
+    SETTINGS,
+    TARGETS,
+    describe_device,
+    is_supported,
+    speed_unit,
+)
 from tauscope_drivers.feetech.servo import JointServo
-
-SHORTEST_RETURN_DELAY_S = 2e-6
-"""Of a servo whose Return Delay Time is 0 [s]."""
+from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S
+from tauscope_drivers.serial_servos.bus import PATIENCE_S, learn_latency
 
 _PROBES = 3
 """Answers by which the latency of an adapter is learnt."""
+
+_SILENCE = "no goal was sent in time; the servos hold their last one"
+_WATCHDOG = Fault("watchdog", None, _SILENCE, "make sure the host runs, then acknowledge")
+_RESTARTED = (
+    "the servo has lost its torque or its limits; it lost power or was restarted",
+    "check supply and cable, then acknowledge and enable again",
+)
+
+_CLEAR = "then acknowledge"
+
+_BITS: tuple[tuple[int, str, str, str], ...] = (
+    (0x01, "voltage", "supply voltage outside its limits", f"check the supply, {_CLEAR}"),
+    (0x02, "encoder", "encoder fault", "switch the servo's power off and on; replace it where the fault returns"),
+    (0x04, "over-temperature", "too hot", f"let it cool down, {_CLEAR}"),
+    (0x08, "over-current", "too much current", f"look for an obstacle, let go of the arm, {_CLEAR}"),
+    (0x20, "overload", "overload for too long", f"lower the load, let go of the arm, {_CLEAR}"),
+)
+
+
+def alarm_faults(alarms: int, joint: int) -> tuple[Fault, ...]:
+    """Faults that a servo's alarms state; empty for 0.
+
+    `alarms`: bits of the register Status, which every answer carries; `joint`: number of the joint, from 1.
+    """
+    found = tuple(
+        Fault(code, joint, f"{meaning}, Status 0x{alarms:02X}", remedy)
+        for bit, code, meaning, remedy in _BITS
+        if alarms & bit
+    )
+    if found or not alarms:
+        return found
+    return (Fault("drive", joint, f"Status 0x{alarms:02X}", "see the servo's memory table for the bits"),)
 
 
 class Health:
@@ -58,11 +95,11 @@ class Health:
     @property
     def faults(self) -> tuple[Fault, ...]:
         """Of the arm, then joint by joint."""
-        found = [watchdog_fault()] if self.starved else []
+        found = [_WATCHDOG] if self.starved else []
         for index, alarms in enumerate(self.alarms):
             found += alarm_faults(alarms, index + 1)
             if self._lost[index] and not alarms:
-                found.append(restarted_fault(index + 1))
+                found.append(Fault("restarted", index + 1, *_RESTARTED))
         return tuple(found)
 
 
@@ -144,8 +181,7 @@ def open_session(bus: FeetechBus, configurations: Sequence[ServoConfiguration]) 
     found = [reach(bus, number, servo) for number, servo in enumerate(configurations, 1)]
     session = make_session(bus, found)
     answers = [bus.sync_read(session.identifiers, FEEDBACK, PATIENCE_S) for _ in range(_PROBES)]
-    # an adapter that is slow by a constant is no slower than that in any answer
-    bus.port.latency_s += min((one.beyond_ns for one in answers if one.statuses), default=0) * 1e-9
+    learn_latency(bus.port, answers)
     return session
 
 
@@ -167,15 +203,14 @@ def reach(bus: FeetechBus, number: int, configuration: ServoConfiguration) -> tu
     """
     servo = JointServo(number, configuration)
     if not bus.ping(servo.servo):
-        raise DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
+        raise DriverError.no_connection(
             f"{servo.label} does not answer on {bus.port.path} at {bus.port.baudrate} baud; "
-            "check its power, cable, ID and baud rate",
+            "check its power, cable, ID and baud rate"
         )
     with naming(servo):
         identity = bus.read(servo.servo, IDENTITY)[1]
         if not is_supported(servo.servo, identity):
             device = describe_device(servo.servo, identity)
-            raise DriverError(DriverErrorKind.CANNOT_CONNECT, f"is {device}; this driver knows the STS3215 alone")
+            raise DriverError.no_connection(f"is {device}; this driver knows the STS3215 alone")
         settings = bus.read(servo.servo, SETTINGS)[1]
     return replace(servo, counts_per_speed_unit=speed_unit(settings["Phase"])), settings

@@ -21,6 +21,7 @@ from tauscope.runtime.drivers import (
     FrameRequest,
     Severity,
     bus_drivers,
+    describe_neighbours,
     find_bus,
     find_driver,
     select_bus,
@@ -141,7 +142,7 @@ def show_devices(backend: str, port: str, bit_rates: Sequence[int] | None) -> No
             found.append(device)
             told(f"scan {port}: {len(found)} found")
     if not found:
-        others = f" ({bus.neighbours})" if bus.neighbours else ""
+        others = f" ({known})" if (known := describe_neighbours(bus)) else ""
         raise AcquisitionError(f"{port}: nobody answers{others}; check power, cable, termination and bit rate")
     rows = [(str(one.address), one.model, one.firmware, str(one.bit_rate)) for one in found]
     output().print(table("Devices", Table(("address", "model", "firmware", "bit/s"), rows, words=2)))

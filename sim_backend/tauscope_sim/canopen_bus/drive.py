@@ -4,12 +4,72 @@ Time is passed in, frames go in and come out; what moves is behind `AxisDemand` 
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
 
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile
-from tauscope_sim.canopen_bus.axis import AxisDemand, AxisMeasurement, AxisMode, AxisScale
 from tauscope_sim.canopen_bus.object_dictionary import Abort, AbortError, ObjectDictionary, answer_request, apply_sheet
 from tauscope_sim.canopen_bus.power_state import PowerState, PowerStateMachine
 from tauscope_sim.canopen_bus.process_data import ProcessData
+
+
+class AxisMode(Enum):
+    """What a drive does to its joint."""
+
+    RELEASED = "released"
+    HOLDING = "holding"
+    POSITION = "position"
+    TORQUE = "torque"
+
+
+@dataclass(frozen=True)
+class AxisDemand:
+    """What a drive wants of its joint until the next demand.
+
+    `position`: target where the mode is position [rad or m].
+    `torque`: target where the mode is torque [Nm or N].
+    `torque_cap`: most that it exerts; nothing where it is released [Nm or N].
+    `interpolation_s`: time in which it goes from one target to the next, where the mode is position; 0 where nobody
+        told it [s].
+    """
+
+    mode: AxisMode
+    position: float = 0.0
+    torque: float = 0.0
+    torque_cap: float = 0.0
+    interpolation_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class AxisMeasurement:
+    """What a drive's sensors tell of its joint.
+
+    `position`: [rad or m].
+    `velocity`: [rad/s or m/s].
+    `torque`: [Nm or N].
+    """
+
+    position: float
+    velocity: float
+    torque: float
+
+
+@dataclass(frozen=True)
+class AxisScale:
+    """Counts and per mille of an emulated drive.
+
+    `rated_torque_mnm`: object 0x6076, at the motor shaft [mNm].
+    """
+
+    counts_per_radian: float
+    rated_torque_mnm: int
+    gear_ratio: float
+
+    @property
+    def torque_per_permille(self) -> float:
+        """Joint torque of one part in thousand of the rated torque [Nm or N]."""
+        return self.rated_torque_mnm / 1e6 * self.gear_ratio
+
 
 Frame = tuple[int, bytes]
 
@@ -134,7 +194,6 @@ class EmulatedDrive:
 
     @property
     def _target_count(self) -> int:
-        """Where the drive is sent; in interpolated mode to where it is, as long as bit 4 does not start it."""
         if self._mode_taken == CYCLIC_POSITION:
             return self.dictionary.get(0x607A)
         starts = self.dictionary.get(0x6040) & _INTERPOLATE
@@ -142,13 +201,11 @@ class EmulatedDrive:
 
     @property
     def _watched_node(self) -> int:
-        """Node whose heartbeat is watched; -1 for none."""
         word = self.dictionary.get(0x1016, 1)
         return (word >> 16 & 0x7F) if word & 0xFFFF and word >> 16 & 0x7F else -1
 
     @property
     def _interpolation_s(self) -> float:
-        """Time from one target to the next; 0 where the drive has no such object and finds it from SYNC."""
         if not self.dictionary.has(0x60C2, 1):
             return 0.0
         return self.dictionary.get(0x60C2, 1) * 10.0 ** self.dictionary.get(0x60C2, 2)
@@ -170,7 +227,6 @@ class EmulatedDrive:
         self._nmt = _PRE_OPERATIONAL
 
     def _abort_connection(self) -> None:
-        """Do what 0x6007 says of a connection that is gone."""
         if self.power.state is not PowerState.OPERATION_ENABLED:
             return
         match self.dictionary.get(0x6007):
@@ -182,7 +238,6 @@ class EmulatedDrive:
                 self.power.fail()
 
     def _report(self, error_code: int) -> None:
-        """Keep the error code and send an emergency."""
         self.dictionary.put(0x603F, error_code)
         register = 0x11 if error_code in (HEARTBEAT_LOST, _BUS_OFF_RECOVERED) else 0x01
         self.dictionary.put(0x1001, register)
@@ -191,7 +246,6 @@ class EmulatedDrive:
         self._show_status()
 
     def _follow_network(self, command: int) -> None:
-        """Follow a network-management command."""
         if command in _NMT_RESETS:
             self.power_up()
         else:
@@ -200,7 +254,6 @@ class EmulatedDrive:
             self.power.quick_stop()
 
     def _show_status(self) -> None:
-        """Compose the statusword."""
         word = self.power.state.value
         if self.power.state not in (PowerState.QUICK_STOP_ACTIVE, PowerState.NOT_READY):
             word |= 0x20 if word & 0x07 else 0

@@ -6,10 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauscope.robot import Robot
-from tauscope_sim.canopen_bus.axis import AxisDemand, AxisMeasurement, AxisMode
-from tauscope_sim.canopen_bus.drive import EmulatedDrive
-from tauscope_sim.device.inertia import InertiaSchedule
-from tauscope_sim.device.servo import Servo
+from tauscope_sim.canopen_bus.drive import AxisDemand, AxisMeasurement, AxisMode, EmulatedDrive
+from tauscope_sim.device.servo import InertiaSchedule, Servo
 from tauscope_sim.device.target import Target, catching_up_acceleration
 from tauscope_sim.scenario import Scenario
 

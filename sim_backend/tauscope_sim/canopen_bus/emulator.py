@@ -1,27 +1,14 @@
 """Drives, the arm that they move, the wire and the adapter: everything but the port."""
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
-from tauscope_sim.canopen_bus.drive import EmulatedDrive, Frame
+from tauscope_sim.canopen_bus.drive import EmulatedDrive
 from tauscope_sim.canopen_bus.driven_arm import DrivenArm
+from tauscope_sim.canopen_bus.lines import SerialLine, SocketLine, Wire
 from tauscope_sim.canopen_bus.power_state import PowerState
-from tauscope_sim.canopen_bus.wire import Wire
-from tauscope_sim.emulation.device_clock import MOST_STEPS, STEP_S, DeviceClock
-from tauscope_sim.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault, faults_from
-
-
-class Line(Protocol):
-    """Turns what a master sends into frames, and frames into what it reads."""
-
-    def take(self, data: bytes) -> tuple[list[Frame], bytes]:
-        """Frames for the bus, and what the adapter answers by itself."""
-        ...
-
-    def text(self, frame: Frame) -> bytes:
-        """A frame of the bus as the host reads it."""
-        ...
-
+from tauscope_sim.emulation.emulator import STEP_S, Emulator
+from tauscope_sim.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault
 
 _TICKS_PER_MEASUREMENT = 10
 """While nobody asks: a drive that has stopped has to see that it stands."""
@@ -30,31 +17,31 @@ _SYNC = 0x080
 _OVER_TEMPERATURE, _OVERLOAD = 0x4310, 0x7121
 
 
-class CanEmulator:
+class CanEmulator(Emulator):
     """An arm of emulated drives; the instants are those of the caller's clock."""
 
     def __init__(
-        self, drives: Sequence[EmulatedDrive], driven: DrivenArm, now_s: float, bit_rate: float, line: Line
+        self,
+        drives: Sequence[EmulatedDrive],
+        driven: DrivenArm,
+        now_s: float,
+        bit_rate: float,
+        line: SerialLine | SocketLine,
     ) -> None:
         """Everything at rest.
 
         `now_s`: present instant [s]; `bit_rate`: of the bus; infinite where frames shall arrive at once [bit/s].
         """
+        super().__init__(now_s)
         self.drives = tuple(drives)
         self.driven = driven
         self.schedule = FaultSchedule()
         self._wire = Wire(bit_rate)
         self._line = line
         self._answers = b""
-        self._clock = DeviceClock(now_s)
         self._away_until_s = {drive.node_id: 0.0 for drive in drives}
         self._ailing: dict[int, tuple[int, float]] = {}
         self._stopped_s: list[float | None] = [None for _ in drives]
-
-    @property
-    def now_s(self) -> float:
-        """Instant up to which the devices have come [s]."""
-        return self._clock.now_s
 
     @property
     def next_due_s(self) -> float:
@@ -89,13 +76,6 @@ class CanEmulator:
                 self.driven.take_targets(now_s - self._clock.lost_s)
         self.advance_to(now_s)
 
-    def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
-        """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
-
-        `now_s`: present instant [s].
-        """
-        self._clock.catch_up(now_s, self._step, most_steps)
-
     def due(self, now_s: float) -> bytes:
         """Text that has reached the host by now. `now_s`: present instant [s]."""
         text, self._answers = self._answers, b""
@@ -116,29 +96,26 @@ class CanEmulator:
             "lost": self._clock.lost_s,
         }
 
-    def answer(self, request: dict[str, Any]) -> dict[str, int] | None:
-        """Do what a test asks.
+    def inject(self, faults: list[InjectedFault]) -> None:
+        """Plan faults, and carry out those that are due."""
+        self.schedule.add(faults)
+        self.schedule.run(self.now_s, self._carry_out)
+        for drive in self.drives:
+            self._let_ail(drive)
 
-        `request`: ``{"inject": [fault, …]}``, ``{"get": [node, [index, subindex]]}``, ``{"put": [node, [index,
-        subindex], value]}``, ``{"stand": bool}`` (put the stand under it, or take it away), or nothing of these.
-        """
-        if "inject" in request:
-            self.schedule.add(faults_from(request["inject"], self.now_s))
-            self.schedule.run(self.now_s, self._carry_out)
-            for drive in self.drives:
-                self._let_ail(drive)
-        elif "get" in request:
-            node, (index, subindex) = request["get"]
-            return {"value": self._drive(node).dictionary.get(index, subindex)}
-        elif "put" in request:
-            node, (index, subindex), value = request["put"]
-            self._drive(node).dictionary.put(index, value, subindex)
-        elif "stand" in request:
-            self.driven.stands_on_stand = request["stand"]
-        return None
+    def get(self, device: int, place: tuple[int, int]) -> int:
+        """Value of an entry."""
+        return self._drive(device).dictionary.get(*place)
+
+    def put(self, device: int, place: tuple[int, int], value: int) -> None:
+        """Set an entry."""
+        self._drive(device).dictionary.put(place[0], value, place[1])
+
+    def set_stand(self, is_there: bool) -> None:
+        """Put the stand under the arm, or take it away."""
+        self.driven.stands_on_stand = is_there
 
     def _step(self) -> None:
-        """One period of the drives' loops."""
         now_s = self.now_s
         self.schedule.run(now_s, self._carry_out)
         self.driven.step(self._clock.tick)
@@ -157,7 +134,6 @@ class CanEmulator:
                 self._wire.carry(frames, now_s)
 
     def _carry_out(self, fault: InjectedFault) -> None:
-        """Do what a fault does."""
         until_s = self.now_s + fault.seconds
         concerned = [self._drive(fault.device)] if fault.device else list(self.drives)
         match fault.kind:

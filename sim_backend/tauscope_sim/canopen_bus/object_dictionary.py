@@ -150,7 +150,6 @@ def answer_request(dictionary: ObjectDictionary, request: bytes) -> bytes | None
 
 
 def _answer(dictionary: ObjectDictionary, request: bytes, index: int, subindex: int) -> bytes:
-    """Answer to an upload or an expedited download."""
     command = request[0] & _COMMAND
     if command == _UPLOAD:
         data = dictionary.read(index, subindex)
@@ -199,7 +198,6 @@ def apply_sheet(dictionary: ObjectDictionary, file: DeviceFile) -> None:
 
 
 def _value(described: DescribedObject) -> int | None:
-    """Value of a DCF, else as delivered."""
     if described.value is None:
         return described.default
     return int.from_bytes(described.value, "little", signed=described.type_name.startswith("INTEGER"))

@@ -1,22 +1,18 @@
 """The order that starts emulated drives as a process, as JSON."""
 
-import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from tauscope.robot import read_robot
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
-from tauscope_sim.canopen_bus.axis import AxisScale
-from tauscope_sim.canopen_bus.drive import EmulatedDrive
+from tauscope_sim.canopen_bus.drive import AxisScale, EmulatedDrive
 from tauscope_sim.canopen_bus.driven_arm import DrivenArm
 from tauscope_sim.canopen_bus.emulator import CanEmulator
 from tauscope_sim.canopen_bus.lines import CanSocket, SerialLine, SocketLine
-from tauscope_sim.emulation.device_clock import STEP_S
-from tauscope_sim.emulation.emulator import Port
-from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal
+from tauscope_sim.emulation.emulator import STEP_S, EmulatorOrder, Port
 from tauscope_sim.scenario import Scenario
 from tauscope_sim.scenario_file import read_scenario
 
@@ -24,7 +20,7 @@ _SOCKET = "socketcan:"
 
 
 @dataclass(frozen=True)
-class CanOrder:
+class CanOrder(EmulatorOrder):
     """What to emulate.
 
     `start`: where the joints stand [rad or m].
@@ -32,8 +28,6 @@ class CanOrder:
     `torque_noise`: standard deviation of what the drives measure of the torque [Nm or N].
     `bit_rate`: of the bus [bit/s].
     """
-
-    module: ClassVar[str] = "tauscope_sim.canopen_bus"
 
     robot: str
     start: tuple[float, ...]
@@ -46,20 +40,9 @@ class CanOrder:
     stepped: bool = False
     trace: str | None = None
 
-    def to_json(self) -> str:
-        """The order as text."""
-        return json.dumps(asdict(self))
-
-    @staticmethod
-    def from_json(text: str) -> "CanOrder":
-        """The order in a text."""
-        document = json.loads(text)
-        tuples = {name: tuple(document[name]) for name in ("start", "rated_torque_mnm")}
-        return CanOrder(**{**document, **tuples})
-
     def open_port(self) -> Port:
         """A serial adapter on a pseudo terminal, or the kernel's CAN bus."""
-        return PseudoTerminal(self.port) if self._interface is None else CanSocket(self._interface)
+        return super().open_port() if self._interface is None else CanSocket(self._interface)
 
     def build(self, now_s: float) -> CanEmulator:
         """The emulator. `now_s`: present instant [s]."""
@@ -78,11 +61,9 @@ class CanOrder:
         return CanEmulator(drives, driven, now_s, bit_rate, line)
 
     def _file(self, block: Mapping[str, Any]) -> DeviceFile | None:
-        """The EDS or DCF file of a drive, beside the robot file; None where it names none."""
         eds = block.get("eds")
         return None if eds is None else read_device_file(Path(self.robot).parent / eds, block["node_id"])
 
     @property
     def _interface(self) -> str | None:
-        """Of SocketCAN; None for a serial adapter."""
         return self.port.removeprefix(_SOCKET) if self.port.startswith(_SOCKET) else None

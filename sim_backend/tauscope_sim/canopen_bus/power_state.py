@@ -65,7 +65,6 @@ class PowerStateMachine:
             self.state = PowerState.SWITCH_ON_DISABLED
 
     def _step(self, switch_on: bool, enable: bool) -> PowerState:
-        """State after a controlword with voltage and without quick stop."""
         match self.state, switch_on, enable:
             case PowerState.SWITCH_ON_DISABLED, False, _:
                 return PowerState.READY  # 2

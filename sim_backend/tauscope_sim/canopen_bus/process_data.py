@@ -23,7 +23,6 @@ class _Pdo:
 
     @property
     def identifier(self) -> int | None:
-        """Of its frames; None where it is off."""
         word = self.cob_id.value
         return None if word & _OFF else word & 0x7FF
 
@@ -39,7 +38,6 @@ class ProcessData:
         self._sent = [self._add(0x1800 + number, 0x180 + 0x100 * number + node_id) for number in range(PDOS)]
 
     def _add(self, communication: int, identifier: int) -> _Pdo:
-        """Communication and mapping parameters of a PDO that is off."""
         add, mapping = self._dictionary.add, communication + _TO_MAPPING
         add(communication, 0, 1, 2, writable=False)
         cob_id = add(communication, 1, 4, _OFF | identifier)
@@ -74,12 +72,10 @@ class ProcessData:
         return frames
 
     def _entries(self, mapping: int) -> list[tuple[int, int, int]]:
-        """Index, subindex and bytes of what a PDO holds."""
         words = self._words(mapping, self._dictionary.get(mapping, 0))
         return [(word >> 16, word >> 8 & 0xFF, (word & 0xFF) // 8) for word in words]
 
     def _words(self, mapping: int, count: int) -> list[int]:
-        """The first entries of a mapping, as they were written."""
         return [self._dictionary.get(mapping, subindex) for subindex in range(1, count + 1)]
 
     def _require_mappable(self, mapping: int, word: int) -> None:
@@ -114,5 +110,4 @@ class ProcessData:
             start += size
 
     def _sample(self, pdo: _Pdo) -> bytes:
-        """Payload of a TPDO."""
         return b"".join(self._dictionary.encode(index, subindex) for index, subindex, _ in self._entries(pdo.mapping))

@@ -46,7 +46,6 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _serve(server: DeviceServer) -> None:
-    """Say that hosts can connect, and serve them."""
     signal.signal(signal.SIGTERM, lambda *_: server.finish())
     # Control-C is meant for the program in front, never for the arm
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -75,13 +74,11 @@ def _listener(path: Path) -> socket.socket:
 
 
 def _answers(path: Path) -> bool:
-    """Whether somebody listens on a socket."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
         return probe.connect_ex(str(path)) == 0
 
 
 def _robot(path: Path) -> Robot:
-    """Robot of a robot file, or of the JSON that `tauscope_sim.driver.start_device` writes."""
     if path.suffix != ".json":
         return read_robot(path)
     try:
@@ -93,7 +90,6 @@ def _robot(path: Path) -> Robot:
 
 
 def _numbers(text: str, count: int) -> list[float]:
-    """Read one finite number a joint, from a JSON list."""
     refusal = argparse.ArgumentTypeError(f"--start-position {text}: give a JSON list of {count} numbers")
     try:
         numbers = [float(number) for number in json.loads(text)]
@@ -105,7 +101,6 @@ def _numbers(text: str, count: int) -> list[float]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    """Command line of the process."""
     parser = argparse.ArgumentParser(prog="python -m tauscope_sim.device", description=__doc__)
     parser.add_argument("--robot", type=Path, required=True, metavar="FILE", help="robot file with a model block")
     parser.add_argument("--scenario", type=Path, metavar="FILE", help="scenario file; nothing is concealed without")

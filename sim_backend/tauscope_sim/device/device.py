@@ -13,7 +13,7 @@ from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device.activity import COMMANDED, POWERED, Activity, commanded_by, stopped_by
 from tauscope_sim.device.drives import Drives, Motion
 from tauscope_sim.device.faults import Disturbances, FaultCode, FaultLatch, Injection, device_fault
-from tauscope_sim.device.limits import checked_limits, checked_setpoint, refused
+from tauscope_sim.device.limits import checked_limits, checked_setpoint
 from tauscope_sim.device.mechanism import Mechanism
 from tauscope_sim.scenario import Scenario
 
@@ -133,15 +133,16 @@ class SimulatedDevice:
         """Take the arm under power where it stands.
 
         Raises DriverError: ``refused`` or ``fault``.
-
         `watchdog_s`: time without setpoints after which it does [s].
         """
         if self._activity in COMMANDED:
-            raise refused("the arm is enabled already; stop it before enabling it again")
+            raise DriverError.refusal("the arm is enabled already; stop it before enabling it again")
         self._refuse_faults()
         shortest, longest = WATCHDOG_RANGE_S
         if not shortest <= watchdog_s <= longest:
-            raise refused(f"the watchdog's time {watchdog_s} s is not within {shortest} to {longest} s; choose another")
+            raise DriverError.refusal(
+                f"the watchdog's time {watchdog_s} s is not within {shortest} to {longest} s; choose another"
+            )
         motion = self._motion()
         self._drives.enable(self._activity, motion, checked_limits(limits, motion.position))
         self._enabling = _Enabling(stop_policy, round(watchdog_s * 1e9))
@@ -152,7 +153,6 @@ class SimulatedDevice:
         """Take the host's setpoint, and feed the watchdog; drives that stopped by a fault do not follow it.
 
         Raises DriverError: ``not-enabled`` or ``refused``.
-
         `sent_ns`: when it was sent, by the device's clock; None for now [ns].
         """
         if self._enabling is None:
@@ -190,7 +190,7 @@ class SimulatedDevice:
         Faults and disturbances are gone afterwards. Raises DriverError: ``refused`` while the arm is enabled.
         """
         if self._activity in COMMANDED:
-            raise refused("the arm is enabled; stop it before carrying it back")
+            raise DriverError.refusal("the arm is enabled; stop it before carrying it back")
         self._enabling = None
         self._activity = Activity.BRAKED
         self._latch.clear()
@@ -200,14 +200,13 @@ class SimulatedDevice:
     def inject(self, injection: Injection) -> None:
         """Make a disturbance happen. Raises DriverError ``refused`` where no such joint."""
         if not 1 <= injection.joint <= self.capabilities.joint_count:
-            raise refused(
+            raise DriverError.refusal(
                 f"joint {injection.joint}: the arm has {self.capabilities.joint_count} joints; name one of them"
             )
         begins = max(injection.start_ns, self._sample_ns + TICK_NS)
         self._disturbances.add(replace(injection, start_ns=begins))
 
     def _carry_out_tick(self) -> None:
-        """Run the drives at the present tick, take the reading, and move the arm on to the next."""
         self._sample_ns = self._start_ns + self._tick * TICK_NS
         if self._disturbances.waiting or self._tick % _TICKS_PER_TEMPERATURE == 0:
             self._disturbances.update(self._sample_ns)
@@ -237,13 +236,11 @@ class SimulatedDevice:
             self._trip(*overrun)
 
     def _motion(self) -> Motion:
-        """What the drives' loop sees of the motors."""
         true = self._mechanism.true
         position = true.motor_position + self._disturbances.slip if self._disturbances.any else true.motor_position
         return Motion(position, true.motor_velocity)
 
     def _stop(self, policy: StopPolicy) -> None:
-        """Carry out a stop policy."""
         before, self._activity = self._activity, stopped_by(self._activity, policy)
         self._pending.clear()
         if self._activity is Activity.HOLDING and before is not Activity.HOLDING:
@@ -256,7 +253,6 @@ class SimulatedDevice:
             self._stop(self._enabling.stop_policy)
 
     def _look_for_faults(self) -> None:
-        """Latch what is wrong with the motors now."""
         temperature = self._mechanism.true.temperature + self._disturbances.heat
         for column in np.flatnonzero(temperature > HOTTEST).tolist():
             detail = f"motor at {temperature[column]:.0f} °C, above {HOTTEST:.0f} °C"
@@ -265,6 +261,5 @@ class SimulatedDevice:
             self._trip(FaultCode.OVERLOAD, column + 1, "the drive reports an overload")
 
     def _refuse_faults(self) -> None:
-        """Refuse while a fault is latched."""
         if faults := self._latch.faults:
             raise DriverError(DriverErrorKind.FAULT, "; ".join(str(fault) for fault in faults), faults)

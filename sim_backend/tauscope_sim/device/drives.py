@@ -9,8 +9,7 @@ from tauscope.robot.robot import Robot
 from tauscope_drivers import DriveLimits, Setpoint
 from tauscope_sim.device.activity import Activity
 from tauscope_sim.device.faults import FaultCode
-from tauscope_sim.device.inertia import InertiaSchedule
-from tauscope_sim.device.servo import Servo
+from tauscope_sim.device.servo import InertiaSchedule, Servo
 from tauscope_sim.device.target import STOP_TIME_S, Target, catching_up_acceleration
 from tauscope_sim.scenario import Scenario
 
@@ -114,9 +113,7 @@ class Drives:
         return FaultCode.POSITION_LIMIT, column + 1, detail
 
     def _target_at(self, motion: Motion) -> Target:
-        """A target that begins where the motors are, and comes to rest from there."""
         return Target(motion.position, motion.velocity, self._acceleration, self._tick_s)
 
     def _waits_for_torque(self, activity: Activity) -> bool:
-        """Whether the arm is in torque control but held, because no setpoint came yet."""
         return activity is Activity.TORQUE and self._commanded_torque is None

@@ -141,5 +141,4 @@ class Disturbances:
 
 
 def _is_over(injection: Injection, time_ns: int) -> bool:
-    """Whether it will never act again."""
     return injection.duration_ns is not None and time_ns >= injection.start_ns + injection.duration_ns

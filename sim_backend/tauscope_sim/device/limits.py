@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope_drivers import DriveLimits, DriverError, Setpoint
-from tauscope_drivers.errors import DriverErrorKind
 
 Array = NDArray[np.float64]
 
@@ -17,7 +16,6 @@ def checked_limits(limits: DriveLimits, position: Array) -> DriveLimits:
 
     Raises DriverError ``refused``: wrong shapes, not-a-number, an empty range, no room to move, or an arm outside its
     range.
-
     `position`: (n,), where the arm stands [rad or m].
     """
     count = len(position)
@@ -25,7 +23,7 @@ def checked_limits(limits: DriveLimits, position: Array) -> DriveLimits:
     for name in ("position_low", "position_high", "velocity", "torque"):
         array = np.array(getattr(limits, name), dtype=np.float64)
         if array.shape != (count,) or np.isnan(array).any():
-            raise refused(
+            raise DriverError.refusal(
                 f"limits.{name} {array.tolist()} is not one number for each of {count} joints; state them all"
             )
         arrays[name] = array
@@ -47,21 +45,17 @@ def checked_setpoint(setpoint: Setpoint, joint_count: int) -> Setpoint:
     for name in ("position", "torque"):
         array = np.array(getattr(setpoint, name), dtype=np.float64)
         if array.shape != (joint_count,):
-            raise refused(f"setpoint.{name} has shape {array.shape}; give one number for each of {joint_count} joints")
+            raise DriverError.refusal(
+                f"setpoint.{name} has shape {array.shape}; give one number for each of {joint_count} joints"
+            )
         finite = np.isfinite(array)
         if not finite.all():
             joint = int(np.argmin(finite)) + 1
-            raise refused(f"joint {joint}: setpoint.{name} is {array[joint - 1]}; nothing was sent")
+            raise DriverError.refusal(f"joint {joint}: setpoint.{name} is {array[joint - 1]}; nothing was sent")
         arrays.append(array)
     return Setpoint(*arrays)
 
 
-def refused(message: str) -> DriverError:
-    """The error of a request that the device does not carry out."""
-    return DriverError(DriverErrorKind.REFUSED, message)
-
-
 def _refuse_first(faulty: NDArray[np.bool_], message: str) -> None:
-    """Name the first joint that is at fault, if there is one."""
     if faulty.any():
-        raise refused(f"joint {int(np.argmax(faulty)) + 1}: {message}")
+        raise DriverError.refusal(f"joint {int(np.argmax(faulty)) + 1}: {message}")

@@ -38,7 +38,6 @@ def resting_posture(robot: Robot) -> Array:
 
 
 def _inertia(bodies: RigidBodies, posture: Array) -> Array:
-    """Each joint's inertia with the others held, (n,)."""
     bodies.update(posture, np.zeros_like(posture))
     return bodies.mass_matrix().diagonal().copy()
 
@@ -148,5 +147,4 @@ class Mechanism:
         self._take(self._zero, tick)
 
     def _take(self, torque: Array, tick: int) -> None:
-        """Keep what a reading will be made of."""
         self._sample = Sample(tick * self._tick_s, self.true.motor_position, self.true.motor_velocity, torque)

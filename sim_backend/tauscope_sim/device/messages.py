@@ -3,7 +3,10 @@
 import json
 import math
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -12,6 +15,84 @@ from numpy.typing import NDArray
 from tauscope_drivers import ArmState, ControlMode, DriveLimits, DriverError, Fault, Setpoint, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device.faults import Disturbance, Injection
+
+PROTOCOL = 1
+"""Version that host and device have to agree on."""
+
+LARGEST_BODY = 65536
+"""Longest body that is accepted [B]."""
+
+_HEADER = struct.Struct("<BxxxII")
+
+
+class FrameKind(IntEnum):
+    """What a frame is."""
+
+    HELLO = 1
+    ENABLE = 2
+    EXCHANGE = 3
+    STOP = 4
+    ACKNOWLEDGE = 5
+    READ = 6
+    INJECT = 7
+    STATUS = 8
+    GOODBYE = 9
+    SHUT_DOWN = 10
+    PUT_BACK = 11
+    WELCOME = 64
+    STATE = 65
+    ERROR = 66
+    REPORT = 67
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One message."""
+
+    kind: FrameKind
+    sequence: int
+    body: bytes = b""
+
+    def encode(self) -> bytes:
+        """The frame as it goes over the wire."""
+        return _HEADER.pack(self.kind, self.sequence, len(self.body)) + self.body
+
+
+class BrokenFrameError(ValueError):
+    """What arrived is no frame: the connection cannot be used any longer."""
+
+
+class FrameBuffer:
+    """Cuts a stream of bytes into frames."""
+
+    def __init__(self) -> None:
+        self._bytes = bytearray()
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """Take what arrived and return the frames that are complete.
+
+        Raises BrokenFrameError where the kind is unknown or the body longer than `LARGEST_BODY`.
+        """
+        self._bytes += data
+        frames: list[Frame] = []
+        while len(self._bytes) >= _HEADER.size:
+            kind, sequence, length = _HEADER.unpack_from(self._bytes)
+            if length > LARGEST_BODY:
+                raise BrokenFrameError(f"a frame of {length} bytes; the most is {LARGEST_BODY}")
+            end = _HEADER.size + length
+            if len(self._bytes) < end:
+                break
+            frames.append(Frame(_find_kind(kind), sequence, bytes(self._bytes[_HEADER.size : end])))
+            del self._bytes[:end]
+        return frames
+
+
+def _find_kind(kind: int) -> FrameKind:
+    try:
+        return FrameKind(kind)
+    except ValueError as error:
+        raise BrokenFrameError(f"a frame of the unknown kind {kind}") from error
+
 
 Array = NDArray[np.float64]
 
@@ -31,10 +112,8 @@ def encode_document(document: Mapping[str, Any]) -> bytes:
 
 def decode_document(body: bytes) -> dict[str, Any]:
     """Plain data from JSON. Raises BadMessageError where it is not a JSON object."""
-    try:
+    with _expecting("JSON"):
         document = json.loads(body)
-    except (ValueError, RecursionError) as error:
-        raise BadMessageError("the body is not JSON") from error
     if not isinstance(document, dict):
         raise BadMessageError("the body is not a JSON object")
     return document
@@ -69,14 +148,12 @@ def encode_state(state: ArmState) -> bytes:
 
 def decode_state(body: bytes) -> ArmState:
     """The reading that `encode_state` wrote. Raises BadMessageError where it does not hold a reading."""
-    try:
+    with _expecting("a reading of the arm"):
         time_ns, count = _STATE_HEAD.unpack_from(body)
         numbers = np.frombuffer(body, "<f8", 4 * count, _STATE_HEAD.size).astype(np.float64).reshape(4, count)
         end = _STATE_HEAD.size + 33 * count
         enabled = np.frombuffer(body, np.uint8, count, end - count).astype(np.bool_)
         faults = _faults(json.loads(body[end:])) if len(body) > end else ()
-    except (struct.error, ValueError, TypeError, KeyError) as error:
-        raise BadMessageError("the body is not a reading of the arm") from error
     position, velocity, effort, temperature = numbers
     return ArmState(time_ns, position, velocity, effort, temperature, enabled, faults)
 
@@ -90,11 +167,9 @@ def encode_error(error: DriverError) -> bytes:
 def decode_error(body: bytes) -> DriverError:
     """The error that `encode_error` wrote. Raises BadMessageError where it does not hold one."""
     document = decode_document(body)
-    try:
+    with _expecting("an error"):
         kind = DriverErrorKind(document["kind"])
         return DriverError(kind, str(document["message"]), _faults(document["faults"]))
-    except (ValueError, TypeError, KeyError) as error:
-        raise BadMessageError("the body is not an error") from error
 
 
 def encode_enable(mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> bytes:
@@ -111,14 +186,12 @@ def encode_enable(mode: ControlMode, limits: DriveLimits, stop_policy: StopPolic
 def decode_enable(body: bytes) -> tuple[ControlMode, DriveLimits, StopPolicy, float]:
     """The arguments of `encode_enable`. Raises BadMessageError where a field is missing or of the wrong kind."""
     document = decode_document(body)
-    try:
+    with _expecting("a request to enable"):
         limits = DriveLimits(
             **{name: np.array([_number_in(x) for x in document["limits"][name]]) for name in _LIMIT_FIELDS}
         )
         mode, policy = ControlMode(document["mode"]), StopPolicy(document["stop_policy"])
         return mode, limits, policy, _number_in(document["watchdog_s"])
-    except (ValueError, TypeError, KeyError, OverflowError) as error:
-        raise BadMessageError("the body is not a request to enable") from error
 
 
 def encode_stop(policy: StopPolicy) -> bytes:
@@ -128,10 +201,8 @@ def encode_stop(policy: StopPolicy) -> bytes:
 
 def decode_stop(body: bytes) -> StopPolicy:
     """The policy of `encode_stop`. Raises BadMessageError where it names no policy."""
-    try:
+    with _expecting("a request to stop"):
         return StopPolicy(decode_document(body)["policy"])
-    except (ValueError, KeyError) as error:
-        raise BadMessageError("the body is not a request to stop") from error
 
 
 def encode_injection(injection: Injection) -> bytes:
@@ -145,7 +216,7 @@ def decode_injection(body: bytes) -> Injection:
     Raises BadMessageError where a field is missing or of the wrong kind.
     """
     document = decode_document(body)
-    try:
+    with _expecting("a disturbance"):
         duration = document["duration_ns"]
         return Injection(
             kind=Disturbance(document["kind"]),
@@ -154,8 +225,15 @@ def decode_injection(body: bytes) -> Injection:
             duration_ns=None if duration is None else int(duration),
             size=float(document["size"]),
         )
-    except (ValueError, TypeError, KeyError, OverflowError) as error:
-        raise BadMessageError("the body is not a disturbance") from error
+
+
+@contextmanager
+def _expecting(what: str) -> Iterator[None]:
+    """Whatever else is found is a bad message."""
+    try:
+        yield
+    except (struct.error, ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
+        raise BadMessageError(f"the body is not {what}") from error
 
 
 def _number_out(value: float) -> float | str:
@@ -164,7 +242,6 @@ def _number_out(value: float) -> float | str:
 
 
 def _number_in(value: Any) -> float:
-    """Read a number, or the text of one that JSON cannot hold."""
     if isinstance(value, str) and value in ("inf", "-inf", "nan"):
         return float(value)
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -173,12 +250,10 @@ def _number_in(value: Any) -> float:
 
 
 def _fault_document(fault: Fault) -> dict[str, Any]:
-    """A fault as plain data."""
     return {"code": fault.code, "joint": fault.joint, "detail": fault.detail, "remedy": fault.remedy}
 
 
 def _faults(documents: Any) -> tuple[Fault, ...]:
-    """Faults from plain data."""
     return tuple(
         Fault(
             str(one["code"]),

@@ -9,12 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tauscope_drivers import DriverError
-from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device.activity import Activity
 from tauscope_sim.device.device import SimulatedDevice
-from tauscope_sim.device.frames import PROTOCOL, BrokenFrameError, Frame, FrameBuffer, FrameKind
 from tauscope_sim.device.messages import (
+    PROTOCOL,
     BadMessageError,
+    BrokenFrameError,
+    Frame,
+    FrameBuffer,
+    FrameKind,
     decode_document,
     decode_enable,
     decode_injection,
@@ -63,7 +66,6 @@ class TraceWriter:
         os.close(self._file)
 
     def _write(self, line: str) -> None:
-        """Hand one line to the operating system."""
         os.write(self._file, (line + "\n").encode())
 
 
@@ -94,8 +96,6 @@ class Punctuality:
 
 
 class _Host:
-    """The connection of one host."""
-
     def __init__(self, connection: socket.socket) -> None:
         connection.setblocking(False)
         self.connection = connection
@@ -144,7 +144,6 @@ class DeviceServer:
         self._drop_host("the device is shutting down")
 
     def _sleep(self) -> None:
-        """Wait for a request, a new host or the next pass."""
         interval = PASS_AT_REST_NS if self._device.activity is Activity.BRAKED else PASS_NS
         remaining = self._device.time_ns + interval - time.monotonic_ns()
         if remaining > 0:
@@ -167,13 +166,11 @@ class DeviceServer:
         self._trace.note()
 
     def _serve(self) -> None:
-        """Answer the host that is there, then take a new one."""
         if self._host is not None:
             self._hear(self._host)
         self._accept()
 
     def _hear(self, host: _Host) -> None:
-        """Answer what a host asks for; notice that it has gone."""
         try:
             data = host.connection.recv(65536)
         except BlockingIOError:
@@ -193,7 +190,6 @@ class DeviceServer:
             self._drop_host(f"the host's connection broke: {error}")
 
     def _accept(self) -> None:
-        """Let a host in, or tell it who is in already."""
         try:
             connection, _ = self._listener.accept()
         except (BlockingIOError, ConnectionAbortedError):
@@ -203,9 +199,8 @@ class DeviceServer:
         if self._host is None:
             self._host = _Host(connection)
             return
-        held = DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
-            f"the simulated arm is held by process {self._host.process}; end that run first",
+        held = DriverError.no_connection(
+            f"the simulated arm is held by process {self._host.process}; end that run first"
         )
         with connection:
             connection.setblocking(False)
@@ -230,7 +225,7 @@ class DeviceServer:
         except DriverError as error:
             kind, body = FrameKind.ERROR, encode_error(error)
         except BadMessageError as error:
-            refusal = DriverError(DriverErrorKind.REFUSED, f"the device does not understand the request: {error}")
+            refusal = DriverError.refusal(f"the device does not understand the request: {error}")
             kind, body = FrameKind.ERROR, encode_error(refusal)
         return Frame(kind, frame.sequence, body)
 
@@ -265,16 +260,13 @@ class DeviceServer:
         return FrameKind.STATE, encode_state(device.read())
 
     def _welcome(self, body: bytes) -> bytes:
-        """Agree on the version of the protocol."""
         if (asked := decode_document(body).get("protocol")) != PROTOCOL:
-            raise DriverError(
-                DriverErrorKind.CANNOT_CONNECT,
-                f"the device speaks version {PROTOCOL} of its protocol, not {asked!r}; use one Tauscope for both",
+            raise DriverError.no_connection(
+                f"the device speaks version {PROTOCOL} of its protocol, not {asked!r}; use one Tauscope for both"
             )
         return encode_document({"joint_count": self._device.capabilities.joint_count, "process": os.getpid()})
 
     def _report(self) -> bytes:
-        """What the device does and how punctual it has been."""
         return encode_document(
             {
                 "activity": self._device.activity.value,

@@ -4,13 +4,168 @@ The host's feed-forward torque goes through the same spline as its positions. As
 positions that it belongs to, it would make the drive's torque ripple in step with the host's cycle.
 """
 
+from collections import deque
+from statistics import median_low
+
 import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.robot.robot import Robot
-from tauscope_sim.device.setpoint_spline import SetpointSpline
 
 Array = NDArray[np.float64]
+
+_LATEST_PHASE = 5.0
+_CURVED_CYCLES = 2.0
+_MOST_SKIPPED = 10
+_EARLIEST = 0.3
+_EARLY, _LATE = 0.5, 1.9
+_LARGEST_ERROR = 0.1
+_MEMORY = 200
+_INTERVALS = 15
+_CHANGE_OF_PACE = 0.1
+_FIRST_PERIOD = 4.0
+_TOLD = 20
+"""A grid whose period was told begins as one that rests on so many arrivals."""
+
+_OFF_THE_GRID = 15
+"""After so many arrivals in a row that are off the grid on the same side, it is the grid that is wrong."""
+
+
+class SetpointSpline:
+    """Target as a function of the drive's own time, from setpoints that arrive roughly periodically.
+
+    A setpoint is a point of any kind: joint positions, and what else belongs to the same instant of the motion.
+
+    The drive has no clock in common with the host. Its grid of cycles is a straight line through the last arrivals,
+    with a memory long enough to keep their jitter out of the target; it begins anew where the host changes its pace.
+    While a setpoint is overdue the target goes on as it moved; cycles that the host skipped are filled in on a
+    parabola. Time is counted in ticks.
+
+    `position`: (n,), where the target stands [rad or m].
+    `period`: time between setpoints, where the host has told it: a drive that knows it does not have to find it
+        [ticks].
+    """
+
+    def __init__(self, position: Array, period: float | None = None) -> None:
+        self._points = np.tile(position, (4, 1))
+        self._intervals: deque[float] = deque(maxlen=_INTERVALS)
+        self._is_told = period is not None
+        self._period = _FIRST_PERIOD if period is None else period
+        self._arrival: float | None = None
+        self._grid = 0.0
+        self._arrivals = 0
+        self._off = 0
+        self._weights = np.empty((2, 4))
+
+    def add(self, position: Array, arrival: float) -> None:
+        """Take a setpoint. `position`: (n,), target of the host [rad or m]; `arrival`: when it arrived [ticks]."""
+        cycles = self._place_on_grid(arrival)
+        older, before = self._points[2].copy(), self._points[3].copy()
+        # parabola through the last two setpoints, at -1 and 0, and the new one
+        bend = ((position - before) / max(cycles, 1) - (before - older)) / (cycles + 1.0)
+        slope = (before - older) + bend
+        for cycle in range(1, cycles + 1):
+            self._points[:3] = self._points[1:]
+            self._points[3] = before + cycle * slope + (cycle * cycle) * bend
+        self._points[3] = position
+
+    def starved(self, time: float) -> bool:
+        """Whether setpoints have failed to come for so long that the target should come to rest.
+
+        `time`: instant [ticks].
+        """
+        return time - self._grid > _LATEST_PHASE * self._period
+
+    def restart(self, position: Array) -> None:
+        """Continue with setpoints from another place; the pace of the host is not forgotten.
+
+        `position`: (n,), where the target stands [rad or m].
+        """
+        self._points[:] = position
+
+    def at(self, time: float) -> tuple[Array, Array]:
+        """Target [rad or m] and its rate [per tick] at an instant, each (n,).
+
+        `time`: not long before the last setpoint [ticks].
+        """
+        overdue = (time - self._grid) / self._period
+        rate = 1.0 / self._period
+        x = min(max(overdue, -1.0), 1.0)
+        x2 = x * x
+        x3 = x2 * x
+        self._weights[:] = (
+            (
+                (1.0 - 3.0 * x + 3.0 * x2 - x3) / 6.0,
+                (4.0 - 6.0 * x2 + 3.0 * x3) / 6.0,
+                (1.0 + 3.0 * x + 3.0 * x2 - 3.0 * x3) / 6.0,
+                x3 / 6.0,
+            ),
+            (
+                rate * (-0.5 + x - 0.5 * x2),
+                rate * (-2.0 * x + 1.5 * x2),
+                rate * (0.5 + x - 1.5 * x2),
+                rate * (0.5 * x2),
+            ),
+        )
+        position, velocity = self._weights.dot(self._points)
+        return self._overdue(position, velocity, overdue - 1.0) if overdue > 1.0 else (position, velocity)
+
+    def _overdue(self, position: Array, velocity: Array, cycles: float) -> tuple[Array, Array]:
+        """Go on from the end of the spline: with its acceleration at first, then with the velocity reached."""
+        points = self._points
+        change = points[1] - 2.0 * points[2] + points[3]
+        curved = min(cycles, _CURVED_CYCLES)
+        position += (cycles * self._period) * velocity + (curved * (cycles - 0.5 * curved)) * change
+        return position, velocity + (curved / self._period) * change
+
+    def _place_on_grid(self, arrival: float) -> int:
+        """Find the cycle that a setpoint belongs to; returns by how many it follows the one before, zero where none."""
+        before, self._arrival = self._arrival, arrival
+        if before is None:
+            return self._begin_grid(arrival)
+        self._intervals.append(max(arrival - before, 0.0))
+        usual = max(1.0, median_low(self._intervals))
+        learning = len(self._intervals) < _INTERVALS and not self._is_told
+        if not learning and not self._is_told and abs(usual - self._period) > _CHANGE_OF_PACE * self._period:
+            self._period = usual
+            self._intervals.clear()
+            return self._begin_grid(arrival)
+        unit = usual if learning else self._period
+        cycles = self._cycles((arrival - self._grid) / unit)
+        if cycles > _MOST_SKIPPED or abs(self._off) >= _OFF_THE_GRID:
+            return self._begin_grid(arrival)
+        self._lock(arrival, cycles, learning)
+        return cycles
+
+    def _cycles(self, waited: float) -> int:
+        """How many cycles passed while so many were waited for: a host that tells its period skips whole ones."""
+        if self._is_told and _EARLY < waited < _LATE:
+            return 1
+        return max(int(waited + _EARLIEST), 0)
+
+    def _begin_grid(self, arrival: float) -> int:
+        self._grid, self._arrivals, self._off = arrival, _TOLD if self._is_told else 1, 0
+        return 1
+
+    def _lock(self, arrival: float, cycles: int, learning: bool) -> None:
+        """Fit a straight line to the arrivals, by least squares with a memory of limited length.
+
+        Its slope is the host's period, unless that was told: a few late arrivals at first would make it run away from
+        those that follow.
+        """
+        self._arrivals = n = min(self._arrivals + 1, _MEMORY)
+        self._grid += cycles * self._period
+        late = arrival - self._grid
+        if not learning:
+            # a stall says nothing of the host's clock
+            largest = _LARGEST_ERROR * self._period
+            side = int(np.sign(late)) if abs(late) > largest else 0
+            self._off = self._off + side if side * self._off > 0 else side
+            late = min(max(late, -largest), largest)
+        self._grid += 2.0 * (2 * n - 1) / (n * (n + 1)) * late
+        if not self._is_told:
+            self._period = max(1.0, self._period + 6.0 / (n * (n + 1)) * late / max(cycles, 1))
+
 
 STOP_TIME_S = 0.1
 """A hold brings every joint to rest in this time, all at once and so on the path that the arm is on [s]."""
@@ -113,7 +268,6 @@ class Target:
             self.position = np.minimum(np.maximum(moved, self._low), self._high)
 
     def _follow_spline(self, tick: int) -> None:
-        """Move with the spline; catch up with it where a limit kept the target behind."""
         point, point_rate = self._spline.at(tick)
         count = len(self.position)
         position, rate, self.feed_forward = point[:count], point_rate[:count], point[count:]

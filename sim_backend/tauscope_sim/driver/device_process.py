@@ -12,7 +12,6 @@ from types import TracebackType
 
 from tauscope.robot import Robot, robot_to_dict
 from tauscope_drivers import DriverError
-from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.own_process import process_environment
 
 START_TIMEOUT_S = 60.0
@@ -58,13 +57,14 @@ def start_device(
     """Start a simulated arm in real time, in a session of its own: signals to the caller's group do not reach it.
 
     Raises DriverError ``cannot-connect`` where the process did not start, with its own message.
-
     `start_position`: where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m];
     `linger_s`: how long the process goes on without a host [s].
     """
     socket, trace, log = folder / "device.sock", folder / "device.csv", folder / "device.log"
     if len(os.fsencode(socket)) > _LONGEST_SOCKET_PATH:
-        raise _cannot_start(f"{socket}: longer than a socket's path can be; choose a folder with a shorter path")
+        raise DriverError.no_connection(
+            f"{socket}: longer than a socket's path can be; choose a folder with a shorter path"
+        )
     command = [sys.executable, "-m", "tauscope_sim.device", "--linger", str(linger_s)]
     command += ["--robot", str(_robot_file(robot, folder)), "--socket", str(socket), "--trace", str(trace)]
     if scenario is not None:
@@ -86,7 +86,6 @@ def start_device(
 
 
 def _robot_file(robot: Robot | Path, folder: Path) -> Path:
-    """The robot file, written where the arm is not one already."""
     if isinstance(robot, Path):
         return robot
     file = folder / "device-robot.json"
@@ -95,7 +94,6 @@ def _robot_file(robot: Robot | Path, folder: Path) -> Path:
 
 
 def _await_ready(device: DeviceProcess, log: Path) -> None:
-    """Wait for the process' word that hosts can connect."""
     word = b""
     if (output := device.process.stdout) is not None:
         with output, selectors.DefaultSelector() as selector:
@@ -106,9 +104,4 @@ def _await_ready(device: DeviceProcess, log: Path) -> None:
     device.end()
     lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
     reason = lines[-1].removeprefix("error: ") if lines else f"not ready within {START_TIMEOUT_S:.0f} s"
-    raise _cannot_start(f"the simulated arm's process did not start: {reason}")
-
-
-def _cannot_start(message: str) -> DriverError:
-    """The error of a device that cannot be reached."""
-    return DriverError(DriverErrorKind.CANNOT_CONNECT, message)
+    raise DriverError.no_connection(f"the simulated arm's process did not start: {reason}")

@@ -23,10 +23,14 @@ from tauscope_drivers import (
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device.device import WATCHDOG_RANGE_S
 from tauscope_sim.device.faults import Injection
-from tauscope_sim.device.frames import PROTOCOL, BrokenFrameError, Frame, FrameBuffer, FrameKind
 from tauscope_sim.device.limits import checked_setpoint
 from tauscope_sim.device.messages import (
+    PROTOCOL,
     BadMessageError,
+    BrokenFrameError,
+    Frame,
+    FrameBuffer,
+    FrameKind,
     decode_document,
     decode_error,
     decode_state,
@@ -84,14 +88,14 @@ class RemoteSimulatedArm:
         of joints.
         """
         if self._socket is not None:
-            raise _cannot_connect("the arm is connected already; disconnect it first")
+            raise DriverError.no_connection("the arm is connected already; disconnect it first")
         connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             connection.settimeout(_PATIENCE_S)
             connection.connect(str(self._path))
         except OSError as error:
             connection.close()
-            raise _cannot_connect(
+            raise DriverError.no_connection(
                 f"{self._path}: no simulated arm answers there ({error.strerror}); start it"
             ) from error
         self._socket, self._buffer = connection, FrameBuffer()
@@ -99,14 +103,14 @@ class RemoteSimulatedArm:
             hello = encode_document({"protocol": PROTOCOL, "process": os.getpid()})
             welcome = decode_document(self._request(FrameKind.HELLO, hello).body)
             if welcome.get("joint_count") != self._count:
-                raise _cannot_connect(
+                raise DriverError.no_connection(
                     f"{self._path}: the simulated arm has {welcome.get('joint_count')} joints, the robot file "
                     f"{self._count}; start the device with this robot file"
                 )
             return self._state_after(FrameKind.READ)
         except (DriverError, BadMessageError) as error:
             self._close()
-            raise _cannot_connect(str(error)) from error
+            raise DriverError.no_connection(str(error)) from error
 
     def acknowledge_faults(self) -> ArmState:
         """Clear the latched faults; see `drivers.Backend`."""
@@ -169,7 +173,6 @@ class RemoteSimulatedArm:
         self._close()
 
     def _state_after(self, kind: FrameKind, body: bytes = b"") -> ArmState:
-        """State that answers a request outside the cycle."""
         return self._state_of(self._patiently(kind, body))
 
     def _patiently(self, kind: FrameKind, body: bytes = b"") -> Frame:
@@ -199,7 +202,6 @@ class RemoteSimulatedArm:
         return reply
 
     def _require_connection(self) -> socket.socket:
-        """The connection; refuses where there is none."""
         if self._socket is None:
             raise DriverError(DriverErrorKind.NOT_CONNECTED, "the arm is not connected; connect it first")
         return self._socket
@@ -218,7 +220,6 @@ class RemoteSimulatedArm:
         raise TimeoutError
 
     def _state_of(self, reply: Frame) -> ArmState:
-        """The reading in a reply."""
         try:
             state = decode_state(reply.body)
         except BadMessageError as error:
@@ -227,12 +228,10 @@ class RemoteSimulatedArm:
         return state
 
     def _miss(self) -> ArmState:
-        """State of a cycle without an answer."""
         nothing = np.full(self._count, np.nan)
         return ArmState(self._clock.now_ns(), nothing, nothing, nothing, nothing, self._enabled)
 
     def _lose(self, reason: str) -> DriverError:
-        """Give the connection up."""
         self._close()
         return DriverError(
             DriverErrorKind.LOST,
@@ -240,13 +239,7 @@ class RemoteSimulatedArm:
         )
 
     def _close(self) -> None:
-        """Close the socket."""
         if self._socket is not None:
             self._socket.close()
         self._socket = None
         self._enabled = np.zeros(self._count, dtype=np.bool_)
-
-
-def _cannot_connect(message: str) -> DriverError:
-    """The error of a connection that does not come about."""
-    return DriverError(DriverErrorKind.CANNOT_CONNECT, message)

@@ -70,7 +70,7 @@ class SimulatedArm:
     def connect(self) -> ArmState:
         """Reach the device and read it. Raises DriverError: ``cannot-connect`` where it is connected already."""
         if self._connected:
-            raise DriverError(DriverErrorKind.CANNOT_CONNECT, "the arm is connected already; disconnect it first")
+            raise DriverError.no_connection("the arm is connected already; disconnect it first")
         self._connected = True
         return self.device.read()
 
@@ -114,6 +114,5 @@ class SimulatedArm:
         self._connected = False
 
     def _require_connection(self) -> None:
-        """Refuse what needs a connection."""
         if not self._connected:
             raise DriverError(DriverErrorKind.NOT_CONNECTED, "the arm is not connected; connect it first")

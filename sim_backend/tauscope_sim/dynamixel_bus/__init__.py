@@ -1,9 +1,9 @@
 """Emulated Dynamixel servos on a pseudo terminal, in a process of their own, moved by the simulated arm's physics."""
 
 from tauscope_sim.dynamixel_bus.bus import EmulatedBus
+from tauscope_sim.dynamixel_bus.control_memory import ServoSpecification
 from tauscope_sim.dynamixel_bus.emulator import DynamixelEmulator
 from tauscope_sim.dynamixel_bus.order import DynamixelOrder
 from tauscope_sim.dynamixel_bus.servo import EmulatedServo
-from tauscope_sim.dynamixel_bus.specification import ServoSpecification
 
 __all__ = ["DynamixelEmulator", "DynamixelOrder", "EmulatedBus", "EmulatedServo", "ServoSpecification"]

@@ -1,42 +1,16 @@
 """What the servos move: anything that torque moves, such as a pendulum a joint."""
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tauscope_sim.dynamixel_bus.servo_loop import Demand
+from tauscope_sim.dynamixel_bus.servo import Demand
 
 Array = NDArray[np.float64]
 
 BANDWIDTH_HZ = 8.0
 """Of the pendulums' position loops [Hz]."""
-
-
-class MovedArm(Protocol):
-    """An arm that torque moves, and the position loops that were tuned to it."""
-
-    @property
-    def joint_count(self) -> int:
-        """Number of joints n."""
-        ...
-
-    @property
-    def motion(self) -> tuple[Array, Array]:
-        """Position [rad or m] and velocity [rad/s or m/s] of the joints, each (n,)."""
-        ...
-
-    def torque(self, demands: Sequence[Demand]) -> Array:
-        """Torque with which the servos meet their demands now, (n,) [Nm or N]."""
-        ...
-
-    def advance(self, torque: Array, duration_s: float) -> None:
-        """Move on under a constant torque.
-
-        `torque`: (n,), of the motors, at the joints [Nm or N]; `duration_s`: for how long [s].
-        """
-        ...
 
 
 class Pendulums:
@@ -47,12 +21,7 @@ class Pendulums:
     """
 
     def __init__(
-        self,
-        position: ArrayLike,
-        *,
-        inertia: float = 0.05,
-        damping: float = 0.05,
-        weight: float = 0.5,
+        self, position: ArrayLike, *, inertia: float = 0.05, damping: float = 0.05, weight: float = 0.5
     ) -> None:
         """Place them at rest.
 

@@ -11,7 +11,7 @@ from tauscope_sim.dynamixel_bus.framing import (
     fast_status_frame,
     status_frame,
 )
-from tauscope_sim.dynamixel_bus.servo import ENCODER, OVERHEATING, OVERLOAD, EmulatedServo
+from tauscope_sim.dynamixel_bus.servo import EmulatedServo
 from tauscope_sim.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault
 
 
@@ -94,18 +94,19 @@ class EmulatedBus:
         deliveries: list[Delivery] = []
         for instruction in instructions:
             end_s = max(now_s, self._free_s) + self._wire_s(instruction.length)
-            handler = self._handlers.get(instruction.code, self._refuse)
-            answers = handler(instruction, end_s)
+            answers = self._obey(instruction, end_s)
             self._free_s = max([end_s, *(due for due, _ in answers)])
             deliveries += answers
         return deliveries
+
+    def _obey(self, instruction: Instruction, end_s: float) -> list[Delivery]:
+        return self._handlers.get(instruction.code, self._refuse)(instruction, end_s)
 
     def run_faults(self, now_s: float) -> None:
         """Let the faults happen that are due. `now_s`: present instant [s]."""
         self.schedule.run(now_s, lambda fault: self._carry_out(fault, now_s))
 
     def _carry_out(self, fault: InjectedFault, now_s: float) -> None:
-        """Do what a fault does."""
         if fault.kind is FaultKind.POWER_DIP:
             for servo in self.servos:
                 self._restart(servo, now_s + fault.seconds)
@@ -116,14 +117,12 @@ class EmulatedBus:
                 self._away_until_s[fault.device] = now_s + fault.seconds
             case FaultKind.RESET:
                 self._restart(fault.device, now_s + fault.seconds)
-            case FaultKind.OVER_TEMPERATURE:
-                servo.fail(OVERHEATING)
-            case FaultKind.OVERLOAD:
-                servo.fail(OVERLOAD)
+            case FaultKind.OVER_TEMPERATURE | FaultKind.OVERLOAD:
+                servo.fail(servo.alarms[fault.kind])
             case FaultKind.ENCODER_JUMP:
                 servo.encoder_offset_counts += fault.counts
                 if not fault.counts:
-                    servo.fail(ENCODER)
+                    servo.fail(servo.alarms[fault.kind])
             case _:
                 self._answer_faults[fault.device] = AnswerFaults(fault.kind, fault.count, fault.seconds)
 
@@ -132,7 +131,6 @@ class EmulatedBus:
         self._away_until_s[servo] = back_s
 
     def _present(self, now_s: float) -> list[EmulatedServo]:
-        """Servos that hear now, in the order of their IDs."""
         return [self.servos[key] for key in sorted(self.servos) if now_s >= self._away_until_s[key]]
 
     def _find_addressed(self, instruction: Instruction, now_s: float) -> list[EmulatedServo]:
@@ -140,7 +138,6 @@ class EmulatedBus:
         return [servo for servo in present if instruction.servo in (servo.servo, BROADCAST_ID)]
 
     def _find_present(self, servos: Sequence[int], now_s: float) -> list[EmulatedServo]:
-        """Present ones of a list, in its order."""
         present = {servo.servo: servo for servo in self._present(now_s)}
         return [present[key] for key in servos if key in present]
 
@@ -149,13 +146,11 @@ class EmulatedBus:
         return length * _BITS_PER_BYTE / baud if self._paced else 0.0
 
     def _answer(self, servo: EmulatedServo, error: int, data: bytes, after_s: float) -> list[Delivery]:
-        """A status packet of one servo, whose last byte arrives in time."""
         frame = status_frame(servo.servo, error | servo.error_byte, data)
         due = after_s + servo.return_delay_s + self._wire_s(len(frame))
         return self._answer_faults[servo.servo].apply(frame, due)
 
     def _answers(self, parts: list[tuple[EmulatedServo, int, bytes]], after_s: float) -> list[Delivery]:
-        """Status packets one after the other; who is silent lets its time pass."""
         deliveries: list[Delivery] = []
         for servo, error, data in parts:
             deliveries += self._answer(servo, error, data, after_s)
@@ -197,11 +192,17 @@ class EmulatedBus:
         return deliveries
 
     def _act(self, instruction: Instruction, end_s: float) -> list[Delivery]:
+        return self._try(instruction, end_s, EmulatedServo.act)
+
+    def _clear(self, instruction: Instruction, end_s: float) -> list[Delivery]:
+        return self._try(instruction, end_s, lambda servo: servo.clear(instruction.parameters))
+
+    def _try(self, instruction: Instruction, end_s: float, attempt: Callable[[EmulatedServo], None]) -> list[Delivery]:
         parts: list[tuple[EmulatedServo, int, bytes]] = []
         for servo in self._find_addressed(instruction, end_s):
             error = 0
             try:
-                servo.act()
+                attempt(servo)
             except WriteRefusedError as refusal:
                 error = refusal.error
             parts.append((servo, error, b""))
@@ -214,17 +215,6 @@ class EmulatedBus:
         for servo in servos:
             self._restart(servo.servo, end_s + _REBOOT_S)
         return answers
-
-    def _clear(self, instruction: Instruction, end_s: float) -> list[Delivery]:
-        parts: list[tuple[EmulatedServo, int, bytes]] = []
-        for servo in self._find_addressed(instruction, end_s):
-            error = 0
-            try:
-                servo.clear(instruction.parameters)
-            except WriteRefusedError as refusal:
-                error = refusal.error
-            parts.append((servo, error, b""))
-        return [] if instruction.servo == BROADCAST_ID else self._answers(parts, end_s)
 
     def _refuse(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         servos = [] if instruction.servo == BROADCAST_ID else self._find_addressed(instruction, end_s)
@@ -286,7 +276,6 @@ class EmulatedBus:
         return [servo for servo in self._present(now_s) if number in (servo.servo, servo.secondary)]
 
     def _write_quietly(self, servo: EmulatedServo, address: int, data: bytes) -> None:
-        """A write that nobody answers, refused or not."""
         try:
             servo.write(address, data)
         except WriteRefusedError:

@@ -1,40 +1,40 @@
 """Servos, the arm that they move, and a clock: everything of the emulator but its pseudo terminal."""
 
 import heapq
-from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope_sim.dynamixel_bus.arm import MovedArm
 from tauscope_sim.dynamixel_bus.bus import EmulatedBus
 from tauscope_sim.dynamixel_bus.servo import EmulatedServo
-from tauscope_sim.emulation.device_clock import ALL_STEPS, MOST_STEPS, STEP_S, DeviceClock
-from tauscope_sim.emulation.fault_kit import faults_from
+from tauscope_sim.emulation.emulator import ALL_STEPS, STEP_S, Emulator
+from tauscope_sim.emulation.fault_kit import InjectedFault
+
+if TYPE_CHECKING:
+    from tauscope_sim.dynamixel_bus.arm import Pendulums
+    from tauscope_sim.dynamixel_bus.plant_arm import PlantArm
 
 Array = NDArray[np.float64]
 
 
-class DynamixelEmulator:
+class DynamixelEmulator(Emulator):
     """An arm of emulated servos on one bus; the instants are those of the caller's clock."""
 
-    def __init__(
-        self, bus: EmulatedBus, order: Sequence[int], arm: MovedArm, now_s: float, *, latency_s: float = 0.0
-    ) -> None:
+    def __init__(self, bus: EmulatedBus, arm: "Pendulums | PlantArm", now_s: float, *, latency_s: float = 0.0) -> None:
         """Everything at rest. The arm stands on a stand until all its servos have had torque once.
 
         `now_s`: present instant [s]; `latency_s`: how much later than over the wire an answer reaches the master: the
         latency of an adapter [s].
         """
+        super().__init__(now_s)
         self.bus = bus
         self.arm = arm
-        self.torque = np.zeros(arm.joint_count)
         self.stands_on_stand = True
-        self._servos = [bus.servos[servo] for servo in order]
+        self.torque = np.zeros(arm.joint_count)
+        self._servos = list(bus.servos.values())
         self._bauds = {servo.specification.baud for servo in self._servos}
         self._latency_s = latency_s
-        self._clock = DeviceClock(now_s)
         self._outgoing: list[tuple[float, int, bytes]] = []
         self._count = 0
         self._look()
@@ -43,11 +43,6 @@ class DynamixelEmulator:
     def servos(self) -> list[EmulatedServo]:
         """In the order of the joints."""
         return self._servos
-
-    @property
-    def now_s(self) -> float:
-        """Instant up to which the device has come [s]."""
-        return self._clock.now_s
 
     def hears(self, baud: int) -> bool:
         """Whether a master that has set this baud rate is understood. `baud`: of the master's port [bit/s]."""
@@ -81,13 +76,6 @@ class DynamixelEmulator:
         """When the next bytes reach the master; infinite where none are under way [s]."""
         return self._outgoing[0][0] if self._outgoing else float("inf")
 
-    def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
-        """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
-
-        `now_s`: present instant [s].
-        """
-        self._clock.catch_up(now_s, self._step, most_steps)
-
     def describe(self) -> dict[str, Any]:
         """Where the arm is and what its servos do."""
         position, velocity = self.arm.motion
@@ -105,27 +93,24 @@ class DynamixelEmulator:
             "lost": self._clock.lost_s,
         }
 
-    def answer(self, request: dict[str, Any]) -> dict[str, int] | None:
-        """Do what a test asks.
+    def inject(self, faults: list[InjectedFault]) -> None:
+        """Plan faults, and carry out those that are due."""
+        self.bus.schedule.add(faults)
+        self.bus.run_faults(self.now_s)
 
-        `request`: ``{"inject": [fault, …]}``, ``{"get": [servo, item]}``, ``{"put": [servo, item, value]}``,
-        ``{"stand": bool}`` (put the stand under it, or take it away), or nothing of these.
-        """
-        if "inject" in request:
-            self.bus.schedule.add(faults_from(request["inject"], self.now_s))
-            self.bus.run_faults(self.now_s)
-        elif "get" in request:
-            servo, item = request["get"]
-            return {"value": self.bus.servos[servo].memory.get(item)}
-        elif "put" in request:
-            servo, item, value = request["put"]
-            self.bus.servos[servo].memory.put(item, value)
-        elif "stand" in request:
-            self.stands_on_stand = request["stand"]
-        return None
+    def get(self, device: int, place: str) -> int:
+        """Value of an item."""
+        return self.bus.servos[device].memory.get(place)
+
+    def put(self, device: int, place: str, value: int) -> None:
+        """Set an item."""
+        self.bus.servos[device].memory.put(place, value)
+
+    def set_stand(self, is_there: bool) -> None:
+        """Put the stand under the arm, or take it away."""
+        self.stands_on_stand = is_there
 
     def _step(self) -> None:
-        """One period of the servos' loops."""
         self.bus.run_faults(self.now_s)
         position, _ = self.arm.motion
         demands = [
@@ -139,7 +124,6 @@ class DynamixelEmulator:
         self._look()
 
     def _look(self) -> None:
-        """Let the servos see their joints."""
         position, velocity = self.arm.motion
         for servo, *seen in zip(self._servos, position, velocity, self.torque, strict=True):
             servo.take_motion(*map(float, seen))

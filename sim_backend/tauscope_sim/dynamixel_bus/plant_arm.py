@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauscope.robot import Robot
-from tauscope_sim.device.inertia import InertiaSchedule
-from tauscope_sim.dynamixel_bus.servo_loop import Demand
+from tauscope_sim.device.servo import InertiaSchedule
+from tauscope_sim.dynamixel_bus.servo import Demand
 from tauscope_sim.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -54,7 +54,6 @@ class PlantArm:
         return np.clip(wanted, -cap, cap)
 
     def _track(self, error: Array) -> Array:
-        """Torque of the position loops."""
         if self._age == 0:
             matrix, _, load = self._inertia.at(self._position)
             self._own_inertia, self._load = matrix.diagonal().copy(), load.copy()

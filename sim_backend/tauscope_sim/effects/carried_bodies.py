@@ -9,11 +9,9 @@ from pydantic import Field
 
 from tauscope.robot.document_fields import Number, Positive, Vector
 from tauscope.robot.robot import LinkInertia, Robot
-from tauscope_sim.effects.effect import Effect, JointEffect
-from tauscope_sim.effects.fields import zero_vector
-from tauscope_sim.plant.coordinates import Coordinates
+from tauscope_sim.effects.effect import Effect, JointEffect, zero_vector
 from tauscope_sim.plant.rigid_bodies import RigidBodies
-from tauscope_sim.plant.term import Term
+from tauscope_sim.plant.term import Coordinates, Term
 
 Array = NDArray[np.float64]
 
@@ -84,15 +82,12 @@ class PayloadChange(Payload):
 
 
 class _Change(Term):
-    """Picks up and drops."""
-
     def __init__(self, change: PayloadChange) -> None:
         self._payload = change.standard_parameters()
         self._start, self._end = change.start, change.end
         self.event_times = (change.start,) if change.end is None else (change.start, change.end)
 
     def begin(self, time: float, bodies: RigidBodies) -> None:
-        """Carry the body, or not."""
         present = self._start <= time and (self._end is None or time < self._end)
         bodies.carry(self, self._payload if present else None)
 
@@ -100,7 +95,6 @@ class _Change(Term):
 class RotorInertia(JointEffect):
     """τ = J q̈.
 
-    `joint`: its number, counted from 1.
     `inertia`: J, the rotor's inertia times the square of the gear ratio [kg m² or kg].
     """
 

@@ -2,17 +2,82 @@
 
 from collections.abc import Callable
 from enum import StrEnum
-from typing import ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, BeforeValidator
 
 from tauscope.errors import ScenarioError
-from tauscope.robot.document_fields import Document, Positive
+from tauscope.robot.document_fields import Document, Number, Positive, refusal
+from tauscope.robot.messages import shown
 from tauscope.robot.robot import Joint, Robot
-from tauscope_sim.effects.fields import JointNumber
-from tauscope_sim.plant.coordinates import Coordinates
-from tauscope_sim.plant.term import Forces, Moment, Slopes, Term, Transmission
+from tauscope_sim.plant.term import Coordinates, Forces, Moment, Slopes, Term, Transmission
+
+LARGEST_EXPONENT = 10.0
+"""Of a power law in speed or angle."""
+
+
+def _not_negative(value: float) -> float:
+    if value < 0.0:
+        raise refusal(f"must be zero or more, but is {value:g}")
+    return value
+
+
+def _exponent(value: float) -> float:
+    if not 0.0 < value <= LARGEST_EXPONENT:
+        raise refusal(f"must be above 0 and at most {LARGEST_EXPONENT:g}, but is {value:g}")
+    return value
+
+
+def _whole(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+        raise refusal(f"must be a number counted from 1 or a joint's name, but is {shown(value)}")
+    return value
+
+
+def _seed(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**63:
+        raise refusal(f"must be a whole number of zero or more, but is {shown(value)}")
+    return value
+
+
+def _list(value: Any) -> Any:
+    if isinstance(value, list | tuple):
+        if not value:
+            raise refusal("must not be an empty list; write a number or a list of numbers")
+        return list(value)
+    return [value]
+
+
+NotNegative = Annotated[Number, AfterValidator(_not_negative)]
+Exponent = Annotated[Number, AfterValidator(_exponent)]
+JointNumber = Annotated[int, BeforeValidator(_whole)]
+Numbers = Annotated[list[Number], BeforeValidator(_list)]
+NotNegativeNumbers = Annotated[list[NotNegative], BeforeValidator(_list)]
+Seed = Annotated[int, BeforeValidator(_seed)]
+
+
+def one_of(*words: str) -> Any:
+    """Validator of a key that is one of a few words."""
+
+    def check(value: Any) -> str:
+        if not isinstance(value, str) or value not in words:
+            raise refusal(f"must be {' or '.join(words)}, but is {shown(value)}")
+        return value
+
+    return BeforeValidator(check)
+
+
+def zero_vector() -> list[float]:
+    """Three zeros."""
+    return [0.0, 0.0, 0.0]
+
+
+def single_zero() -> list[float]:
+    """A zero for all."""
+    return [0.0]
+
 
 Array = NDArray[np.float64]
 
@@ -113,10 +178,7 @@ class Side(StrEnum):
 
 
 class JointLaw(JointEffect):
-    """An effect τ(q, v) of one joint; q and v are the motor's, or the link's where it acts on that side.
-
-    `joint`: its number, counted from 1.
-    """
+    """An effect τ(q, v) of one joint; q and v are the motor's, or the link's where it acts on that side."""
 
     side: ClassVar[Side] = Side.MOTOR
 
@@ -131,29 +193,21 @@ class JointLaw(JointEffect):
 
 
 class FrictionLaw(SmoothSignEffect, JointLaw):
-    """A friction law τ(q, v) of one joint that uses A(v).
-
-    `joint`: its number, counted from 1.
-    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
-    """
+    """A friction law τ(q, v) of one joint that uses A(v)."""
 
     side: ClassVar[Side] = Side.FRICTION
 
 
 class _LawTerm(Term):
-    """A law at its place."""
-
     def __init__(self, joint: int, place: int, side: Side, law: Law) -> None:
         self._joint, self._place, self._side = joint, place, side.value
         self._torque, self._slopes = law
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add τ(q, v)."""
         torque = self._torque(moment.position[self._place], moment.velocity[self._place])
         getattr(forces, self._side)[self._joint] += torque
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        """Add dτ/dq and dτ/dv."""
         place = self._place
         by_position, by_velocity = self._slopes(moment.position[place], moment.velocity[place])
         slopes.by_position[place, place] += by_position

@@ -4,15 +4,13 @@ import math
 from typing import ClassVar
 
 from tauscope.robot.document_fields import Positive
-from tauscope_sim.effects.effect import JointEffect
-from tauscope_sim.effects.fields import NotNegative
+from tauscope_sim.effects.effect import JointEffect, NotNegative
 from tauscope_sim.plant.term import Transmission
 
 
 class JointElasticity(JointEffect):
     """T = K (θ - q) + D (θ̇ - q̇).
 
-    `joint`: its number, counted from 1.
     `stiffness`: K [Nm/rad or N/m].
     `damping`: D [Nm s/rad or N s/m].
     `rotor_inertia`: J [kg m² or kg].
@@ -43,7 +41,6 @@ class JointElasticity(JointEffect):
 class Backlash(JointEffect):
     """T = k x max(0, 1 + c sgn(x) δ̇) beyond a dead zone.
 
-    `joint`: its number, counted from 1.
     `gap`: b, total lost motion [rad or m].
     `contact_stiffness`: k, of teeth and transmission together [Nm/rad or N/m].
     `contact_damping`: c [s/rad or s/m].

@@ -16,11 +16,9 @@ from pydantic import Field
 
 from tauscope.robot.document_fields import Number, Positive, Vector
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import Effect
-from tauscope_sim.effects.fields import JointNumber, NotNegative, one_of, zero_vector
-from tauscope_sim.plant.coordinates import Coordinates
+from tauscope_sim.effects.effect import Effect, JointNumber, NotNegative, one_of, zero_vector
 from tauscope_sim.plant.rigid_bodies import RigidBodies
-from tauscope_sim.plant.term import Forces, Moment, Term
+from tauscope_sim.plant.term import Coordinates, Forces, Moment, Term
 
 Array = NDArray[np.float64]
 
@@ -61,8 +59,6 @@ class ExternalContact(Effect):
 
 
 class _Contact(Term):
-    """Torque on the links within the window."""
-
     def __init__(self, contact: ExternalContact) -> None:
         self._force = None if contact.force is None else np.array(contact.force)
         self._offset = np.array(contact.offset)
@@ -73,11 +69,9 @@ class _Contact(Term):
         self._touching = False
 
     def begin(self, time: float, bodies: RigidBodies) -> None:
-        """Take note whether the window is open."""
         self._touching = self.event_times[0] <= time < self.event_times[1]
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add the torque on the links."""
         if not self._touching:
             return
         share = math.sin(math.pi * (moment.time - self._start) / self._duration) if self._smooth else 1.0

@@ -8,18 +8,15 @@ from typing import Annotated, ClassVar
 
 from tauscope.robot.document_fields import Number
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import SmoothSignEffect
-from tauscope_sim.effects.fields import JointNumber, one_of
+from tauscope_sim.effects.effect import JointNumber, SmoothSignEffect, one_of
 from tauscope_sim.friction import smooth_sign, smooth_sign_slope
-from tauscope_sim.plant.coordinates import Coordinates
-from tauscope_sim.plant.term import Forces, Moment, Slopes, Term
+from tauscope_sim.plant.term import Coordinates, Forces, Moment, Slopes, Term
 
 
 class FrictionCoupling(SmoothSignEffect):
     """τ_j = f, τ_k = s f with f = c A(v_j + s v_k) + d (v_j + s v_k).
 
     `joint`: j, counted from 1.
-    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
     `other_joint`: k, counted from 1.
     `coulomb`: c [Nm or N].
     `viscous`: d [Nm s/rad or N s/m].
@@ -48,8 +45,6 @@ class FrictionCoupling(SmoothSignEffect):
 
 
 class _Coupling(Term):
-    """Friction between two joints."""
-
     def __init__(
         self, joints: tuple[int, int], places: tuple[int, int], sign: float, coulomb: float, viscous: float, k_v: float
     ) -> None:
@@ -57,14 +52,12 @@ class _Coupling(Term):
         self._coulomb, self._viscous, self._k_v = coulomb, viscous, k_v
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add f to the one joint and s f to the other."""
         w = self._motion(moment)
         friction = self._coulomb * smooth_sign(w, self._k_v) + self._viscous * w
         forces.friction[self._joints[0]] += friction
         forces.friction[self._joints[1]] += self._sign * friction
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        """Add df/dw, times s for each time that the other joint is concerned."""
         slope = self._coulomb * smooth_sign_slope(self._motion(moment), self._k_v) + self._viscous
         first, second = self._places
         slopes.by_velocity[first, first] += slope
@@ -73,5 +66,4 @@ class _Coupling(Term):
         slopes.by_velocity[second, first] += self._sign * slope
 
     def _motion(self, moment: Moment) -> float:
-        """Sum or difference of the velocities, w."""
         return moment.velocity[self._places[0]] + self._sign * moment.velocity[self._places[1]]

@@ -20,8 +20,7 @@ from tauscope.robot.document_fields import Number, Positive
 from tauscope.robot.robot import Robot
 from tauscope_sim.effects.effect import JointEffect
 from tauscope_sim.friction import shape_constants, smooth_sign, smooth_sign_slope
-from tauscope_sim.plant.coordinates import Coordinates
-from tauscope_sim.plant.term import AMBIENT, Forces, Moment, Slopes, Term
+from tauscope_sim.plant.term import AMBIENT, Coordinates, Forces, Moment, Slopes, Term
 
 Array = NDArray[np.float64]
 
@@ -32,7 +31,6 @@ LARGEST_EXPONENT = 20.0
 class FrictionDrift(JointEffect):
     """Static friction times e^{c ϑ}, with ϑ from dissipated heat.
 
-    `joint`: its number, counted from 1.
     `thermal_resistance`: R [K/W].
     `time_constant`: T [s].
     `coulomb_per_kelvin`: c_c [1/K].
@@ -63,8 +61,6 @@ class FrictionDrift(JointEffect):
 
 
 class _WarmingFriction(Term):
-    """Friction with a temperature as its state."""
-
     state_count = 1
 
     def __init__(
@@ -78,24 +74,20 @@ class _WarmingFriction(Term):
         self._start = drift.initial_temperature - AMBIENT
 
     def initial_states(self) -> tuple[float, ...]:
-        """The temperature at which the arm is placed, above ambient."""
         return (self._start,)
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add the change of friction."""
         v = moment.velocity[self._place]
         coulomb, viscous = self._changes(moment)
         level = self._stiction * smooth_sign(v, self._k_v) + self._stribeck * smooth_sign(v, self._delta)
         forces.friction[self._joint] += coulomb * level + viscous * self._viscous * v
 
     def rates(self, moment: Moment, rates: list[float]) -> None:
-        """Write ϑ̇."""
         heat = moment.friction[self._joint] * moment.velocity[self._place]
         rise = moment.states[self.first_state]
         rates[self.first_state] = (self._resistance * heat - rise) / self._time_constant
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        """Add the derivatives with respect to velocity; temperature is slow."""
         v, place = moment.velocity[self._place], self._place
         coulomb, viscous = self._changes(moment)
         level = self._stiction * smooth_sign_slope(v, self._k_v) + self._stribeck * smooth_sign_slope(v, self._delta)
@@ -103,11 +95,9 @@ class _WarmingFriction(Term):
         slopes.rate_by_state[self.first_state, self.first_state] -= 1.0 / self._time_constant
 
     def report_temperature(self, states: list[float], temperature: Array) -> None:
-        """Write the joint's temperature."""
         temperature[self._joint] = AMBIENT + states[self.first_state]
 
     def _changes(self, moment: Moment) -> tuple[float, float]:
-        """Relative change of the Coulomb and of the viscous part."""
         rise = moment.states[self.first_state]
         coulomb, viscous = (math.expm1(min(c * rise, LARGEST_EXPONENT)) for c in self._coefficients)
         return coulomb, viscous

@@ -5,16 +5,13 @@ from typing import ClassVar
 
 from tauscope.robot.document_fields import Number, Positive
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import FrictionLaw, JointLaw, Law, Side
-from tauscope_sim.effects.fields import Exponent
+from tauscope_sim.effects.effect import Exponent, FrictionLaw, JointLaw, Law, Side
 from tauscope_sim.friction import smooth_sign, smooth_sign_slope
 
 
 class CoulombFriction(FrictionLaw):
     """τ = c A(v).
 
-    `joint`: its number, counted from 1.
-    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
     `level`: c [Nm or N].
     """
 
@@ -37,7 +34,6 @@ class CoulombFriction(FrictionLaw):
 class ViscousFriction(JointLaw):
     """τ = c v.
 
-    `joint`: its number, counted from 1.
     `coefficient`: c [Nm s/rad or N s/m].
     """
 
@@ -53,8 +49,6 @@ class ViscousFriction(JointLaw):
 class StribeckFriction(FrictionLaw):
     """τ = c A(v) exp(-(|v|/v_s)^α).
 
-    `joint`: its number, counted from 1.
-    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
     `amplitude`: c [Nm or N].
     `velocity`: v_s [rad/s or m/s].
     """
@@ -86,8 +80,6 @@ class StribeckFriction(FrictionLaw):
 class AsymmetricCoulomb(FrictionLaw):
     """τ = c A(v) for v > 0, else 0.
 
-    `joint`: its number, counted from 1.
-    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
     `amplitude`: c: friction of positive motion less that of negative motion [Nm or N].
     """
 
@@ -110,7 +102,6 @@ class AsymmetricCoulomb(FrictionLaw):
 class AsymmetricViscous(JointLaw):
     """τ = c max(v, 0).
 
-    `joint`: its number, counted from 1.
     `amplitude`: c: coefficient of positive motion less that of negative motion [Nm s/rad or N s/m].
     """
 
@@ -120,10 +111,7 @@ class AsymmetricViscous(JointLaw):
 
     def law(self, robot: Robot) -> Law:
         """τ and its derivatives."""
-        return (
-            lambda q, v: self.amplitude * max(v, 0.0),
-            lambda q, v: (0.0, self.amplitude if v > 0.0 else 0.0),
-        )
+        return (lambda q, v: self.amplitude * max(v, 0.0), lambda q, v: (0.0, self.amplitude if v > 0.0 else 0.0))
 
 
 LEAST_SPEED = 1e-3
@@ -133,7 +121,6 @@ LEAST_SPEED = 1e-3
 class NonlinearViscous(JointLaw):
     """τ = c sgn(v) |v|^p.
 
-    `joint`: its number, counted from 1.
     `amplitude`: c, friction at 1 rad/s or 1 m/s [Nm or N].
     """
 
@@ -157,8 +144,6 @@ class NonlinearViscous(JointLaw):
 class PositionDependentFriction(FrictionLaw):
     """τ = c A(v) sin(k q + φ).
 
-    `joint`: its number, counted from 1.
-    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
     `amplitude`: c [Nm or N].
     `phase`: φ [rad].
     """

@@ -1,7 +1,7 @@
 """Friction that grows with the transmitted torque: τ = μ |L| A(v), μ without unit, A(v) = (2/π) arctan(K_v v).
 
 L is the torque that the transmission hands to the link: rigid bodies, springs and contacts, but not the motor's own
-inertia. It depends on the acceleration, which depends on the friction: `tauscope_sim.plant.loads` solves that loop.
+inertia. It depends on the acceleration, which depends on the friction: `tauscope_sim.plant.term` solves that loop.
 """
 
 from typing import ClassVar
@@ -10,16 +10,12 @@ from tauscope.robot.document_fields import Positive
 from tauscope.robot.robot import Robot
 from tauscope_sim.effects.effect import SmoothSignEffect
 from tauscope_sim.friction import smooth_sign, smooth_sign_slope
-from tauscope_sim.plant.coordinates import Coordinates
-from tauscope_sim.plant.loads import LARGEST_GAIN
-from tauscope_sim.plant.term import Forces, Moment, Slopes, Term
+from tauscope_sim.plant.term import LARGEST_GAIN, Coordinates, Forces, Moment, Slopes, Term
 
 
 class LoadDependentFriction(SmoothSignEffect):
     """τ = μ |L| A(v).
 
-    `joint`: its number, counted from 1.
-    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
     `mu`: μ [Nm/Nm].
     """
 
@@ -38,19 +34,15 @@ class LoadDependentFriction(SmoothSignEffect):
 
 
 class _LoadFriction(Term):
-    """Friction on the magnitude of the load."""
-
     depends_on_load = True
 
     def __init__(self, joint: int, place: int, mu: float, k_v: float) -> None:
         self._joint, self._place, self._mu, self._k_v = joint, place, mu, k_v
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add μ A(v) to the load's friction."""
         forces.load_friction[self._joint] += self._mu * smooth_sign(moment.velocity[self._place], self._k_v)
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        """Add μ |L| dA/dv."""
         place = self._place
         slope = smooth_sign_slope(moment.velocity[place], self._k_v)
         slopes.by_velocity[place, place] += self._mu * abs(moment.load[self._joint]) * slope

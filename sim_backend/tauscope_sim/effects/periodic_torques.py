@@ -1,4 +1,4 @@
-"""Torques that repeat with a joint's angle: cogging, and the ripple of a gear under load."""
+"""Torques that follow a joint's angle: cogging and the ripple of a gear under load, springs, cables, a constant."""
 
 import math
 from collections.abc import Callable
@@ -6,18 +6,15 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
+from tauscope.robot.document_fields import Number, Positive
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import JointEffect, JointLaw, Law
-from tauscope_sim.effects.fields import Numbers, one_of, single_zero
-from tauscope_sim.plant.coordinates import Coordinates
-from tauscope_sim.plant.loads import LARGEST_GAIN
-from tauscope_sim.plant.term import Forces, Moment, Slopes, Term
+from tauscope_sim.effects.effect import Exponent, JointEffect, JointLaw, Law, Numbers, Side, one_of, single_zero
+from tauscope_sim.plant.term import LARGEST_GAIN, Coordinates, Forces, Moment, Slopes, Term
 
 
 class AngleHarmonics(JointEffect):
     """s(q) = Σ a_i sin(k_i q' + φ_i), with q' = q, or gear ratio × q where it is periodic in the motor's angle.
 
-    `joint`: its number, counted from 1.
     `phase`: φ_i, a number or one an order [rad].
     """
 
@@ -57,7 +54,6 @@ class AngleHarmonics(JointEffect):
 class Cogging(AngleHarmonics, JointLaw):
     """τ = Σ a_i sin(k_i q' + φ_i).
 
-    `joint`: its number, counted from 1.
     `amplitude`: a_i, a number or one an order [Nm or N].
     `phase`: φ_i, a number or one an order [rad].
     """
@@ -73,7 +69,6 @@ class Cogging(AngleHarmonics, JointLaw):
 class TorqueRipple(AngleHarmonics):
     """τ = L Σ a_i sin(k_i q' + φ_i).
 
-    `joint`: its number, counted from 1.
     `amplitude`: a_i, a number or one an order [Nm/Nm].
     `phase`: φ_i, a number or one an order [rad].
     """
@@ -94,18 +89,80 @@ class TorqueRipple(AngleHarmonics):
 
 
 class _Ripple(Term):
-    """A gain of the load that depends on the motor's position."""
-
     depends_on_load = True
 
     def __init__(self, joint: int, place: int, sine: Callable[[float], float], slope: Callable[[float], float]) -> None:
         self._joint, self._place, self._sine, self._slope = joint, place, sine, slope
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add s(q) to the gain."""
         forces.load_gain[self._joint] += self._sine(moment.position[self._place])
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        """Add L ds/dq."""
         place = self._place
         slopes.by_position[place, place] += moment.load[self._joint] * self._slope(moment.position[place])
+
+
+class JointSpring(JointLaw):
+    """τ = k (q - q₀), between two links: the transmission carries it.
+
+    `stiffness`: k [Nm/rad or N/m].
+    `rest`: q₀, where the spring is slack [rad or m].
+    """
+
+    effect_id: ClassVar[str] = "joint_spring"
+    side: ClassVar[Side] = Side.LINK
+    stiffness: Number
+    rest: Number = 0.0
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+        return (lambda q, v: self.stiffness * (q - self.rest)), (lambda q, v: (self.stiffness, 0.0))
+
+
+LEAST_STRETCH = 1e-6
+"""Below this the slope of a root is taken as here [rad or m]."""
+
+
+class CableForce(JointLaw):
+    """τ = ±k max(±(q - q_c), 0)^p, between two links: the transmission carries it.
+
+    `stiffness`: k [Nm/rad^p or N/m^p].
+    `angle`: q_c, where it begins [rad or m].
+    """
+
+    effect_id: ClassVar[str] = "cable_force"
+    side: ClassVar[Side] = Side.LINK
+    stiffness: Positive
+    angle: Number
+    side_of_angle: Annotated[str, one_of("above", "below")] = "above"
+    exponent: Exponent = 1.5
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+        sign = 1.0 if self.side_of_angle == "above" else -1.0
+
+        def torque(q: float, v: float) -> float:
+            return sign * self.stiffness * max(sign * (q - self.angle), 0.0) ** self.exponent
+
+        def slopes(q: float, v: float) -> tuple[float, float]:
+            stretch = sign * (q - self.angle)
+            if stretch <= 0.0:
+                return 0.0, 0.0
+            # below p = 1 the slope has no bound at the beginning; the implicit part needs none
+            return self.stiffness * self.exponent * max(stretch, LEAST_STRETCH) ** (self.exponent - 1.0), 0.0
+
+        return torque, slopes
+
+
+class TorqueOffset(JointLaw):
+    """τ = c.
+
+    `torque`: c [Nm or N].
+    """
+
+    effect_id: ClassVar[str] = "torque_offset"
+    torque: Number
+
+    def law(self, robot: Robot) -> Law:
+        """τ and its derivatives."""
+        return (lambda q, v: self.torque), (lambda q, v: (0.0, 0.0))

@@ -18,11 +18,9 @@ from numpy.typing import NDArray
 
 from tauscope.robot.document_fields import Positive
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import JointEffect
-from tauscope_sim.effects.fields import NotNegative, one_of
+from tauscope_sim.effects.effect import JointEffect, NotNegative, one_of
 from tauscope_sim.friction import shape_constants, smooth_sign, smooth_sign_slope
-from tauscope_sim.plant.coordinates import Coordinates
-from tauscope_sim.plant.term import Forces, Moment, Slopes, Term
+from tauscope_sim.plant.term import Coordinates, Forces, Moment, Slopes, Term
 
 Array = NDArray[np.float64]
 
@@ -30,7 +28,6 @@ Array = NDArray[np.float64]
 class PreslidingHysteresis(JointEffect):
     """Dahl's or the LuGre model in place of the joint's Coulomb friction.
 
-    `joint`: its number, counted from 1.
     `distance`: x_s, over which friction builds up [rad or m].
     `damping`: σ₁ of the LuGre model [Nm s/rad or N s/m].
     """
@@ -79,21 +76,17 @@ class _Bristles(Term):
         self._distance, self._damping = distance, damping * distance
 
     def initial_states(self) -> tuple[float, ...]:
-        """Bristles that stand upright."""
         return (0.0,)
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add the bristles' torque less the static friction that they replace."""
         v, z = moment.velocity[self._place], moment.states[self.first_state]
         replaced = self._stiction * smooth_sign(v, self._k_v) + self._stribeck * smooth_sign(v, self._delta)
         forces.friction[self._joint] += self._stiction * z + self._damping * self._rate(v, z) - replaced
 
     def rates(self, moment: Moment, rates: list[float]) -> None:
-        """Write ż."""
         rates[self.first_state] = self._rate(moment.velocity[self._place], moment.states[self.first_state])
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        """Add the derivatives of torque and ż."""
         place, state = self._place, self.first_state
         v, z = moment.velocity[place], moment.states[state]
         level = self._level(v)
@@ -106,9 +99,7 @@ class _Bristles(Term):
         slopes.by_state[place, state] += self._stiction + self._damping * by_state
 
     def _level(self, v: float) -> float:
-        """Steady deflection at a speed, g(v)."""
         return 1.0 + self._stribeck / self._stiction * smooth_sign(abs(v), self._delta)
 
     def _rate(self, v: float, z: float) -> float:
-        """Rate of deflection, ż."""
         return (v - abs(v) * z / self._level(v)) / self._distance

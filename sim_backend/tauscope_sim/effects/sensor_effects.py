@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from tauscope.robot.document_fields import Nonzero, Positive
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import ScenarioEntry
-from tauscope_sim.effects.fields import JointNumber, one_of
+from tauscope_sim.effects.effect import JointNumber, ScenarioEntry, one_of
 
 Array = NDArray[np.float64]
 
@@ -18,23 +17,9 @@ class Channel(Protocol):
     """A sensor effect at work: it sees the samples in the order of time, and only those of the past."""
 
     def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        """What is recorded in place of a sample.
+        """Position and torque that are recorded in place of a sample's, each (n,) [rad or m; Nm or N].
 
-        Parameters
-        ----------
-        time : float
-            of the sample [s]
-        position : (n,) float64
-            [rad or m]
-        torque : (n,) float64
-            [Nm or N]
-
-        Returns
-        -------
-        position : (n,) float64
-            [rad or m]
-        torque : (n,) float64
-            [Nm or N]
+        `time`: of the sample [s]; `position`: (n,) [rad or m]; `torque`: (n,) [Nm or N].
         """
         ...
 
@@ -48,10 +33,7 @@ class SensorEffect(ScenarioEntry):
 
 
 class TorqueGainError(SensorEffect):
-    """τ_recorded = gain τ.
-
-    `joint`: its number, counted from 1.
-    """
+    """τ_recorded = gain τ."""
 
     effect_id: ClassVar[str] = "torque_gain_error"
     joint: JointNumber
@@ -65,20 +47,16 @@ class TorqueGainError(SensorEffect):
 
 
 class _Gain:
-    """A factor a joint."""
-
     def __init__(self, gains: Array) -> None:
         self._gains = gains
 
     def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        """Scale the torque."""
         return position, self._gains * torque
 
 
 class TorqueSaturation(SensorEffect):
     """τ_recorded = c tanh(τ/c), or τ clipped to ±c.
 
-    `joint`: its number, counted from 1.
     `level`: c [Nm or N].
     """
 
@@ -93,13 +71,10 @@ class TorqueSaturation(SensorEffect):
 
 
 class _Saturation:
-    """A bounded torque of one joint."""
-
     def __init__(self, joint: int, level: float, clip: bool) -> None:
         self._joint, self._level, self._clip = joint, level, clip
 
     def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        """Bound the torque."""
         recorded, joint, level = torque.copy(), self._joint, self._level
         ratio = torque[joint] / level
         recorded[joint] = level * (np.clip(ratio, -1.0, 1.0) if self._clip else np.tanh(ratio))
@@ -134,21 +109,17 @@ class TimeDelay(SensorEffect):
 
 
 class _DelayLine:
-    """Remembers samples for as long as the delay."""
-
     def __init__(self, delay: float, columns: slice) -> None:
         self._delay, self._columns = delay, columns
         self._samples: deque[tuple[float, Array]] = deque()
 
     def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        """Replace torque, or position, by what it was."""
         late = torque if self._delay > 0.0 else position
         recorded = late.copy()
         recorded[self._columns] = self._past(time, late[self._columns], abs(self._delay))
         return (position, recorded) if self._delay > 0.0 else (recorded, torque)
 
     def _past(self, time: float, value: Array, age: float) -> Array:
-        """The channel as it was, and one more sample to remember."""
         samples, instant = self._samples, time - age
         samples.append((time, value.copy()))
         while len(samples) > 1 and samples[1][0] <= instant:

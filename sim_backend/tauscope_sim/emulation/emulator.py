@@ -1,49 +1,139 @@
-"""What the server runs: anything that takes bytes of a master, lets time pass, and answers."""
+"""What the server runs: emulated devices with their clock and their port, and the order that starts them."""
 
-from typing import Any, ClassVar, Protocol
+import contextlib
+import errno
+import fcntl
+import json
+import os
+import struct
+import tty
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import asdict
+from math import ceil
+from typing import Any, Protocol, Self
 
-from tauscope_sim.emulation.device_clock import MOST_STEPS
+from tauscope_sim.emulation.fault_kit import InjectedFault, faults_from
+
+STEP_S = 1e-3
+"""Period of the devices' own loops and of the physics [s]."""
+
+MOST_STEPS = 10
+"""Steps that are taken in a row while nothing is asked."""
+
+LONGEST_CATCH_UP_S = 0.25
+"""Where the machine stood still for longer than this, the device's clock has lost the rest [s]."""
+
+ALL_STEPS = ceil(LONGEST_CATCH_UP_S / STEP_S)
+"""As many as can be due."""
 
 
-class Emulator(Protocol):
-    """Devices on one bus with the arm that they move; the instants are those of the server's clock."""
+class DeviceClock:
+    """How far devices have come; what a machine that stood still made them miss is lost, and told.
+
+    `lost_s`: time that was never stepped through [s].
+    """
+
+    def __init__(self, now_s: float) -> None:
+        """Begin. `now_s`: present instant [s]."""
+        self.tick = round(now_s / STEP_S)
+        self.lost_s = 0.0
 
     @property
     def now_s(self) -> float:
         """Instant up to which the devices have come [s]."""
-        ...
+        return self.tick * STEP_S + self.lost_s
+
+    def catch_up(self, now_s: float, step: Callable[[], None], most_steps: int = MOST_STEPS) -> None:
+        """Take the steps that are due: not all at once where there are many, so that a master is heard in between.
+
+        `now_s`: present instant [s].
+        """
+        if now_s - self.now_s > LONGEST_CATCH_UP_S:
+            self.lost_s += now_s - self.now_s - LONGEST_CATCH_UP_S
+        for _ in range(most_steps):
+            if self.now_s + STEP_S > now_s:
+                return
+            self.tick += 1
+            step()
+
+
+class Emulator(ABC):
+    """Devices on one bus with the arm that they move; the instants are those of the server's clock."""
+
+    def __init__(self, now_s: float) -> None:
+        """Everything at rest; the arm stands on a stand until all its devices have had torque once."""
+        self._clock = DeviceClock(now_s)
 
     @property
+    def now_s(self) -> float:
+        """Instant up to which the devices have come [s]."""
+        return self._clock.now_s
+
+    @property
+    @abstractmethod
     def next_due_s(self) -> float:
         """When the next bytes reach the master; infinite where none are under way [s]."""
-        ...
 
+    @abstractmethod
     def hears(self, baud: int) -> bool:
         """Whether a master that has set this baud rate is understood. `baud`: of the master's port [bit/s]."""
-        ...
 
+    @abstractmethod
     def receive(self, data: bytes, now_s: float) -> None:
         """Take bytes of the master. `now_s`: when [s]."""
-        ...
 
     def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
         """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
 
         `now_s`: present instant [s].
         """
-        ...
+        self._clock.catch_up(now_s, self._step, most_steps)
 
+    @abstractmethod
     def due(self, now_s: float) -> bytes:
         """Bytes that have reached the master by now. `now_s`: present instant [s]."""
-        ...
 
+    @abstractmethod
     def describe(self) -> dict[str, Any]:
         """What the devices are doing, as plain data."""
-        ...
 
     def answer(self, request: dict[str, Any]) -> dict[str, int] | None:
-        """Do what a test asks; returns ``{"value": …}`` where it asks for one."""
-        ...
+        """Do what a test asks.
+
+        `request`: ``{"inject": [fault, …]}``, ``{"get": [device, place]}``, ``{"put": [device, place, value]}``,
+        ``{"stand": bool}`` (put the stand under it, or take it away), or nothing of these. A place is an item's name,
+        or index and subindex.
+        """
+        if "inject" in request:
+            self.inject(faults_from(request["inject"], self.now_s))
+        elif "get" in request:
+            return {"value": self.get(*request["get"])}
+        elif "put" in request:
+            self.put(*request["put"])
+        elif "stand" in request:
+            self.set_stand(request["stand"])
+        return None
+
+    @abstractmethod
+    def inject(self, faults: list[InjectedFault]) -> None:
+        """Plan faults, and carry out those that are due."""
+
+    @abstractmethod
+    def get(self, device: int, place: Any) -> int:
+        """What a device holds."""
+
+    @abstractmethod
+    def put(self, device: int, place: Any, value: int) -> None:
+        """Set what a device holds, behind the master's back."""
+
+    @abstractmethod
+    def set_stand(self, is_there: bool) -> None:
+        """Put the stand under the arm, or take it away."""
+
+    @abstractmethod
+    def _step(self) -> None:
+        """One period of the devices' loops."""
 
 
 class Port(Protocol):
@@ -71,35 +161,92 @@ class Port(Protocol):
         ...
 
 
-class EmulatorOrder(Protocol):
-    """What the server needs of the order that started it."""
+_TCGETS2 = 0x802C542A
+_TERMIOS2 = "=4I20B2I"
 
-    module: ClassVar[str]
-    """What runs as the process: the package of the bus."""
+
+class PseudoTerminal:
+    """The near end, a `Port`; a master opens the far end by the name that was linked to it.
+
+    The far end is not kept open here, so that whoever has it open is a master.
+    """
+
+    def __init__(self, link: str) -> None:
+        self._near, far = os.openpty()
+        tty.setraw(far)
+        self._link = link
+        temporary = f"{link}.{os.getpid()}"
+        os.symlink(os.ttyname(far), temporary)
+        os.replace(temporary, link)
+        os.close(far)
+        os.set_blocking(self._near, False)
+
+    def fileno(self) -> int:
+        """Descriptor to wait on."""
+        return self._near
+
+    def read(self) -> bytes | None:
+        """What a master sent; None where no master has it open."""
+        try:
+            return os.read(self._near, 4096)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            if error.errno == errno.EIO:
+                return None
+            raise
+
+    def write(self, data: bytes) -> None:
+        """Send to the master; lost where there is none, or where it reads nothing."""
+        with contextlib.suppress(BlockingIOError, OSError):
+            os.write(self._near, data)
 
     @property
-    def control(self) -> str:
-        """Unix socket for the test."""
-        ...
+    def baud(self) -> int:
+        """What the master has set [bit/s]."""
+        settings = fcntl.ioctl(self._near, _TCGETS2, bytes(struct.calcsize(_TERMIOS2)))
+        return struct.unpack(_TERMIOS2, settings)[-1]
+
+    def close(self) -> None:
+        """Hang up."""
+        os.close(self._near)
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(self._link)
+
+
+class EmulatorOrder(ABC):
+    """The order that starts an emulator process; subclasses are frozen dataclasses that JSON can hold.
+
+    `port`: what the master opens.
+    `control`: Unix socket for the test.
+    `stepped`: whether time passes only when a test says so; else it is the machine's.
+    `trace`: file that what the devices do is appended to.
+    """
+
+    port: str
+    control: str
+    stepped: bool
+    trace: str | None
 
     @property
-    def trace(self) -> str | None:
-        """File that what the devices do is appended to."""
-        ...
-
-    @property
-    def stepped(self) -> bool:
-        """Whether time passes only when a test says so; else it is the machine's."""
-        ...
+    def kind(self) -> str:
+        """Module and name of the order, by which the process finds it."""
+        return f"{type(self).__module__}:{type(self).__qualname__}"
 
     def to_json(self) -> str:
         """The order as text, which the process is started with."""
-        ...
+        return json.dumps(vars(self), default=asdict)
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """The order in a text."""
+        document = json.loads(text)
+        return cls(**{key: tuple(value) if isinstance(value, list) else value for key, value in document.items()})
 
     def open_port(self) -> Port:
-        """What the master opens."""
-        ...
+        """What the master opens: a pseudo terminal."""
+        return PseudoTerminal(self.port)
 
+    @abstractmethod
     def build(self, now_s: float) -> Emulator:
         """The emulator. `now_s`: present instant [s]."""
-        ...

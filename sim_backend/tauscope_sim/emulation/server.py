@@ -12,8 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from tauscope_sim.emulation.device_clock import MOST_STEPS
-from tauscope_sim.emulation.emulator import EmulatorOrder, Port
+from tauscope_sim.emulation.emulator import MOST_STEPS, EmulatorOrder, Port
 from tauscope_sim.own_process import take_precedence
 
 _SWITCH_S = 5e-5
@@ -63,7 +62,6 @@ class Arrivals:
             return pieces, time.monotonic_ns()
 
     def _receive(self) -> None:
-        """Wait, note the instant, read."""
         with contextlib.suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)
         while self._end not in select.select([self._port, self._end], [], [])[0]:
@@ -135,7 +133,6 @@ class EmulatorServer:
         return self._stepped_s if self._order.stepped else self._instant(time.monotonic_ns())
 
     def _wait(self) -> list[Any]:
-        """Until something comes, an answer is due, or the physics want their step; what can be read then."""
         due_s = self._emulator.next_due_s
         if not self._order.stepped:
             due_s = min(due_s, self._emulator.now_s + _PERIOD_S)
@@ -168,12 +165,10 @@ class EmulatorServer:
         self._send()
 
     def _send(self) -> None:
-        """What has arrived at the master by now."""
         if arrived := self._emulator.due(self._now_s + (_AT_ONCE_S if self._order.stepped else 0.0)):
             self._port.write(arrived)
 
     def _receive(self) -> tuple[list[tuple[bytes, float]], float]:
-        """What the master sent since the last call, each piece with its instant, and until when that is all [s]."""
         if self._arrivals is not None:
             pieces, until_ns = self._arrivals.take()
             return [(piece, self._instant(at_ns)) for piece, at_ns in pieces], self._instant(until_ns)
@@ -182,7 +177,6 @@ class EmulatorServer:
         return [(piece, self._stepped_s)] if piece else [], self._stepped_s
 
     def _instant(self, monotonic_ns: int) -> float:
-        """By the devices' clock [s]."""
         return max(0.0, (monotonic_ns - self._start_ns) * 1e-9)
 
     def _serve_test(self, ready: list[Any]) -> None:
@@ -213,14 +207,12 @@ class EmulatorServer:
             self._test.setblocking(False)
 
     def _step_to(self, instant_s: float) -> None:
-        """Let time pass where only that makes it pass."""
         while self._stepped_s < instant_s:
             self._stepped_s = min(instant_s, self._stepped_s + _PERIOD_S)
             self._emulator.advance_to(self._stepped_s + _ROUNDING_S)
             self._write_trace()
 
     def _describe(self) -> dict[str, Any]:
-        """What the devices are doing, and when, by the machine's clock."""
         return {**self._emulator.describe(), "monotonic_ns": time.monotonic_ns()}
 
     def _write_trace(self) -> None:

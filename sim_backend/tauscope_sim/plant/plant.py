@@ -27,7 +27,6 @@ def settled(equations: EquationsOfMotion, motor_position: Array) -> Array:
     """State of an arm at rest with q_j = θ_j - twist_j(load_j(q)), found by iteration.
 
     Raises ScenarioError where a transmission is too soft to carry its link.
-
     `motor_position`: (n,), θ [rad or m]. Returns (2N + m,), y: positions, zero velocities, the effects' initial states.
     """
     compliant = list(equations.coordinates.compliant)
@@ -144,7 +143,6 @@ class Plant:
         """Start afresh at time zero: motors at rest in a place, compliant links hanging still, effects as when new.
 
         Raises ScenarioError where that is no place, or a transmission is too soft to carry its link.
-
         `position`: (n,), of the motors, in joint units [rad or m].
         """
         motors = np.asarray(position, dtype=np.float64)
@@ -161,7 +159,6 @@ class Plant:
         """Let time pass under constant torque.
 
         Raises ScenarioError where the duration is negative, or the motion grows beyond all bounds.
-
         `motor_torque`: (n,), of the drives, on the joint's side of the gear [Nm or N]; `duration_s`: how long [s].
         """
         if not duration_s >= 0.0:
@@ -206,7 +203,6 @@ class Plant:
             self._part = min(max(part * _change(attempt.error), self._shortest), self._longest)
 
     def _number_motors(self, first: int) -> Array:
-        """Numbers of the motors among the coordinates that begin at a place of the vector, (n,)."""
         return np.array([self._vector[first + place] for place in self._motors])
 
 

@@ -89,7 +89,6 @@ class RosenbrockStep:
         return Attempt([y + d for y, d in zip(predicted, difference, strict=True)], predicted, error)
 
     def _solution(self, scale: float) -> Array:
-        """K, (N + m, 2N + m)."""
         left = self._left + scale * self._slopes
         if self._by_position is not None:
             left += (scale * scale) * self._by_position
@@ -97,7 +96,6 @@ class RosenbrockStep:
         return dgesv(left, self._right)[2]
 
     def _solve(self, solution: Array, scale: float, right_side: list[float]) -> list[float]:
-        """Solve W k = r."""
         rates = solution.dot(right_side).tolist()
         return [r + scale * k for r, k in zip(right_side[: self._size], rates, strict=False)] + rates
 

@@ -8,14 +8,48 @@ where u is the drive's torque and L the load: the torque that the transmission h
 `link`, and the load's gains g and f are what terms fill in. All are signed as what the drive has to overcome.
 """
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dgesv
 
+from tauscope.errors import ScenarioError
 from tauscope.robot.robot import Robot
-from tauscope_sim.plant.coordinates import Coordinates
 from tauscope_sim.plant.rigid_bodies import RigidBodies
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """Places of links and motors in the coordinate vector p and the velocity vector v, both (N,).
+
+    Link j has place j. The motor of a rigid joint moves with its link and shares its place; the motors of compliant
+    joints stand behind the links: N = n + number of compliant joints. All in joint units: a motor's angle is divided by
+    its gear ratio.
+
+    `compliant`: joints whose transmission gives way, counted from 0, ascending.
+    """
+
+    joint_count: int
+    compliant: tuple[int, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates N."""
+        return self.joint_count + len(self.compliant)
+
+    def motor(self, joint: int) -> int:
+        """Place of a joint's motor. `joint`: counted from 0."""
+        if joint in self.compliant:
+            return self.joint_count + self.compliant.index(joint)
+        return joint
+
+    @property
+    def motors(self) -> list[int]:
+        """Places of all motors, one a joint."""
+        return [self.motor(joint) for joint in range(self.joint_count)]
+
 
 Array = NDArray[np.float64]
 
@@ -168,3 +202,53 @@ class PhysicalEffect(Protocol):
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
         """What it adds to the equations of motion."""
         ...
+
+
+MOST_SIGN_CHANGES = 60
+"""Sign patterns that are tried; a handful is needed, and the solution exists and is unique."""
+
+LARGEST_GAIN = 0.95
+"""Largest torque a unit of load that a transmission may lose: at 1 it is self-locking."""
+
+
+def loaded_accelerations(
+    mass_matrix: Array, drive: Array, link_side: Array, gain: Array, friction: Array, load: Array
+) -> tuple[Array, Array, Array]:
+    """Solve u = J q̈ + L (1 + g) + |L| f with L = (H - J) q̈ + h for q̈: the load's algebraic loop, in closed form.
+
+    For given signs of L it is linear: with D = diag(g + f sgn L),
+
+        (H + D (H - J)) q̈ = u - (1 + D) h.
+
+    The signs are corrected until they agree with the L that they lead to. H - J is positive definite and 1 + D is
+    positive, so the matrix is regular with a positive determinant for every pattern of signs: there is exactly one
+    solution, without a lag of one step. Raises ScenarioError where a transmission would lose more than `LARGEST_GAIN`
+    of its load.
+
+    `mass_matrix`: (2, n, n), H with the rotors J on its diagonal, and H - J without [kg m² or kg].
+    `drive`: (n,), u less what does not depend on the load [Nm or N].
+    `link_side`: (n,), h, torque on the link's side [Nm or N].
+    `gain`, `friction`: (n,), g and f of each joint, f zero or of any sign; |g| + |f| below 1.
+    `load`: (n,), L, a first guess of which only the signs count [Nm or N].
+    Returns q̈, (n,) [rad/s² or m/s²]; L, (n,) [Nm or N]; H + D (H - J) at the solution, (n, n) [kg m² or kg].
+    """
+    worst = int(np.argmax(np.abs(gain) + np.abs(friction)))
+    if not abs(gain[worst]) + abs(friction[worst]) <= LARGEST_GAIN:
+        raise ScenarioError(
+            f"joint {worst + 1}: friction and ripple of its load add up to {abs(gain[worst]) + abs(friction[worst]):g} "
+            f"of the load; make them at most {LARGEST_GAIN:g} together, or the transmission locks itself"
+        )
+    with_rotors, links_only = mass_matrix
+    for _ in range(MOST_SIGN_CHANGES):
+        loss = gain + friction * np.sign(load)
+        matrix = with_rotors + loss[:, None] * links_only
+        acceleration = dgesv(matrix, drive - (1.0 + loss) * link_side)[2]
+        found = links_only @ acceleration + link_side
+        wrong = friction * (np.sign(found) - np.sign(load)) * found
+        if not np.any(wrong):
+            break
+        # one sign at a time, the last joint first: this order (Murty's) never cycles
+        last = int(np.flatnonzero(wrong)[-1])
+        load = load.copy()
+        load[last] = found[last]
+    return acceleration, found, matrix

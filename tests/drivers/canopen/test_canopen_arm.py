@@ -10,7 +10,7 @@ from patience import eventually
 from tauscope_drivers import ArmState, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
 from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_drivers.errors import DriverErrorKind
-from tauscope_sim.canopen_bus.axis import AxisMode
+from tauscope_sim.canopen_bus.drive import AxisMode
 from tauscope_sim.canopen_bus.power_state import PowerState
 
 PATIENCE_S = 0.1

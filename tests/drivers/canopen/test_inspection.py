@@ -84,14 +84,7 @@ def test_planned_frames_are_those_of_the_standard() -> None:
     assert enabling == ["201#060000000000", "201#070000000000", "201#0F0000000000"]
     cycle = [frame.wire for frame in frames if frame.phase == "cycle"]
     # half a motor turn
-    assert cycle == [
-        "201#0F0000000000",
-        "202#0F0000000000",
-        "080#",
-        "201#0F0000800000",
-        "202#0F0000000000",
-        "080#",
-    ]
+    assert cycle == ["201#0F0000000000", "202#0F0000000000", "080#", "201#0F0000800000", "202#0F0000000000", "080#"]
     assert frames[-3].wire == "201#020000800000"
     assert sorted({frame.phase for frame in frames}, key=PHASES.index) == list(PHASES)
 

@@ -180,12 +180,7 @@ def test_what_an_interface_is_opened_with(monkeypatch: pytest.MonkeyPatch) -> No
     opened: list[dict[str, object]] = []
     monkeypatch.setattr(can, "Bus", lambda **given: opened.append(given))
     open_interface("pcan", "PCAN_USBBUS1", 500_000, {"auto_reset": True})
-    assert opened.pop() == {
-        "interface": "pcan",
-        "channel": "PCAN_USBBUS1",
-        "bitrate": 500_000,
-        "auto_reset": True,
-    }
+    assert opened.pop() == {"interface": "pcan", "channel": "PCAN_USBBUS1", "bitrate": 500_000, "auto_reset": True}
     with socket.create_server(("127.0.0.1", 0)) as server:
         options = {"host": "127.0.0.1", "port": server.getsockname()[1]}
         open_interface("socketcand", CHANNEL, 1_000_000, options)

@@ -7,12 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tauscope_drivers.canopen import objects
-from tauscope_drivers.canopen.process_data import (
-    PdoLayout,
-    decode_pdo,
-    encode_pdo,
-    mapping_entries,
-)
+from tauscope_drivers.canopen.process_data import PdoLayout, decode_pdo, encode_pdo, mapping_entries
 from tauscope_drivers.canopen.units import DriveUnits
 
 STATE_PDO = PdoLayout((objects.STATUSWORD, objects.TORQUE_ACTUAL, objects.POSITION_ACTUAL))

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tauscope_drivers.canopen.serial_adapter import SerialAdapterBus
-from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal
+from tauscope_drivers.canopen.interfaces import SerialAdapterBus
+from tauscope_sim.emulation.emulator import PseudoTerminal
 
 FRAME = b"t1818370200011D0C0000\r"
 """Identifier 0x181, eight bytes."""

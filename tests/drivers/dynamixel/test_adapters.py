@@ -10,8 +10,7 @@ from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.bus_budget import planned_budget
 from tauscope_drivers.dynamixel.configuration import read_configuration
 from tauscope_drivers.inspection import Severity
-from tauscope_drivers.serial_adapters import latency_finding, serial_adapters
-from tauscope_drivers.serial_port import read_latency_timer_ms
+from tauscope_drivers.serial_port import latency_finding, read_latency_timer_ms, serial_adapters
 
 
 @pytest.fixture
@@ -22,7 +21,7 @@ def adapter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     link.symlink_to(device)
     monkeypatch.setattr("tauscope_drivers.serial_port._TTY_DEVICES", tmp_path / "sys")
     one = SimpleNamespace(device=str(link), description="USB <-> Serial Converter")
-    monkeypatch.setattr("tauscope_drivers.serial_adapters.comports", lambda: [one])
+    monkeypatch.setattr("tauscope_drivers.serial_port.comports", lambda: [one])
     return link
 
 

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from tauscope_drivers.clock import MonotonicClock
 from tauscope_drivers.dynamixel.bus import ServoBus
-from tauscope_drivers.dynamixel.control_table import BYTES_BEFORE_STATE, find_model, model_names
-from tauscope_drivers.dynamixel.models import family_of
+from tauscope_drivers.dynamixel.control_table import BYTES_BEFORE_STATE, family_of, find_model, model_names
 from tauscope_drivers.dynamixel.packets import encode_write
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_sim.dynamixel_bus.framing import status_frame
@@ -82,7 +81,7 @@ def test_late_answers_have_another_length() -> None:
 
 def test_an_answer_from_long_ago_is_not_believed_where_every_length_was_missed(monkeypatch: pytest.MonkeyPatch) -> None:
     now_ms = 1000
-    monkeypatch.setattr("tauscope_drivers.dynamixel.bus.time.monotonic_ns", lambda: now_ms * 1_000_000)
+    monkeypatch.setattr("tauscope_drivers.serial_servos.bus.time.monotonic_ns", lambda: now_ms * 1_000_000)
     line = Line()
     bus = ServoBus(line)  # pyright: ignore[reportArgumentType]
     for _ in range(BYTES_BEFORE_STATE + 1):
@@ -94,7 +93,7 @@ def test_an_answer_from_long_ago_is_not_believed_where_every_length_was_missed(m
 
 def test_servos_that_come_back_are_believed_once_nothing_can_be_late(monkeypatch: pytest.MonkeyPatch) -> None:
     now_ms = 1000
-    monkeypatch.setattr("tauscope_drivers.dynamixel.bus.time.monotonic_ns", lambda: now_ms * 1_000_000)
+    monkeypatch.setattr("tauscope_drivers.serial_servos.bus.time.monotonic_ns", lambda: now_ms * 1_000_000)
     line = Line()
     bus = ServoBus(line)  # pyright: ignore[reportArgumentType]
     for _ in range(2 * (BYTES_BEFORE_STATE + 1)):

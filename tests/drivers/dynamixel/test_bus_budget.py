@@ -2,8 +2,9 @@
 
 import pytest
 
-from tauscope_drivers.dynamixel.bus_budget import BusTiming, CycleTraffic, cycle_parts, largest_rate_hz, require_rate
+from tauscope_drivers.dynamixel.bus_budget import count_traffic
 from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.serial_servos.budget import BusTiming, cycle_parts, largest_rate_hz, require_rate
 
 # Whole cycle of Sync Write of a current and (Fast) Sync Read of ten bytes: servos, baud, fast, return delay [s],
 # latency timer [s], cycles a second. Worked out from the frames' lengths in the protocol's description.
@@ -24,21 +25,21 @@ BY_HAND = [
 
 @pytest.mark.parametrize(("servos", "baud", "fast", "delay", "latency", "rate"), BY_HAND)
 def test_rates_by_hand(servos: int, baud: int, fast: bool, delay: float, latency: float, rate: int) -> None:
-    traffic = CycleTraffic(servos, goal_bytes=2, health_bytes=0, fast=fast)
+    traffic = count_traffic(servos, goal_bytes=2, health_bytes=0, fast=fast)
     assert round(largest_rate_hz(traffic, BusTiming(baud, delay, latency), load=1.0)) == rate
 
 
 def test_bytes_of_a_cycle_by_hand() -> None:
     # Sync Write 14 + 6·5, Sync Read 14 + 6, six answers of 21, Read 14 and its answer 11 + 3.
-    assert CycleTraffic(6).bytes == 44 + 20 + 126 + 28
+    assert count_traffic(6).bytes == 44 + 20 + 126 + 28
     # Fast: one answer of 8 + 6·14.
-    assert CycleTraffic(6, fast=True).bytes == 44 + 20 + 92 + 28
+    assert count_traffic(6, fast=True).bytes == 44 + 20 + 92 + 28
     # Two families: one more Sync Write and Sync Read of 14 each.
-    assert CycleTraffic(6, families=2).bytes == CycleTraffic(6).bytes + 28
+    assert count_traffic(6, families=2).bytes == count_traffic(6).bytes + 28
 
 
 def test_six_servos_at_a_megabaud_get_200_hz() -> None:
-    require_rate(200.0, CycleTraffic(6), BusTiming(1_000_000, 2e-6, 1e-3))
+    require_rate(200.0, count_traffic(6), BusTiming(1_000_000, 2e-6, 1e-3))
 
 
 @pytest.mark.parametrize(
@@ -51,12 +52,12 @@ def test_six_servos_at_a_megabaud_get_200_hz() -> None:
 )
 def test_refusal_names_what_limits(timing: BusTiming, limit: str, remedy: str) -> None:
     with pytest.raises(DriverError, match=limit) as caught:
-        require_rate(200.0, CycleTraffic(6), timing)
+        require_rate(200.0, count_traffic(6), timing)
     assert caught.value.kind is DriverErrorKind.REFUSED
     assert remedy in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
 def test_parts_add_up_to_the_cycle() -> None:
-    traffic, timing = CycleTraffic(6), BusTiming(1_000_000, 2e-6, 1e-3)
+    traffic, timing = count_traffic(6), BusTiming(1_000_000, 2e-6, 1e-3)
     assert sum(cycle_parts(traffic, timing).values()) == pytest.approx(1.0 / largest_rate_hz(traffic, timing, load=1.0))

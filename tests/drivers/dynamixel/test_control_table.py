@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from tauscope_drivers.dynamixel.control_table import find_model, find_model_by_name, model_names
-from tauscope_drivers.dynamixel.models import family_of
+from tauscope_drivers.dynamixel.control_table import family_of, find_model, find_model_by_name, model_names
 from tauscope_drivers.errors import DriverError
 
 # ROBOTIS e-Manual: number, label, torque, goal current, present current, watchdog, counts a turn, mA a unit.
@@ -83,11 +82,7 @@ def test_unknown_name_is_refused() -> None:
 def test_values_carry_their_sign() -> None:
     model = find_model(1020)
     block = bytes.fromhex("25 00 F6 FF FF FF FD 07 00 00")
-    assert model.state_block.decode(block) == {
-        "Present Current": 37,
-        "Present Velocity": -10,
-        "Present Position": 2045,
-    }
+    assert model.state_block.decode(block) == {"Present Current": 37, "Present Velocity": -10, "Present Position": 2045}
     assert model.items["Bus Watchdog"].decode(b"\xff", 98) == 255
     assert model.items["Goal Current"].encode(-2) == b"\xfe\xff"
 

@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.dynamixel.wired_port import WiredPort
-from tauscope_drivers import ControlMode, DriverError, Setpoint, StopPolicy
+from drivers.wired_port import WiredPort, starts, wire_drivers
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_drivers.dynamixel.doctor import examine
 from tauscope_drivers.inspection import Finding, Severity
-from tauscope_drivers.limits import stated_limits
 from tauscope_sim.dynamixel_bus import ServoSpecification
 
 FEW, MANY = 200, 1000
@@ -37,13 +35,11 @@ SETTINGS = {
     "Electronic GearRatio Numerator": (1, 50),
 }
 DEFECTS_MOST = 2
-CYCLE_S = 0.01
 
 
 @pytest.fixture(autouse=True)
 def wired(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("arm", "doctor"):
-        monkeypatch.setattr(f"tauscope_drivers.dynamixel.{module}.SerialPort", WiredPort)
+    wire_drivers(monkeypatch)
 
 
 def specification(number: int, rng: np.random.Generator) -> ServoSpecification:
@@ -68,20 +64,6 @@ def joint(number: int, rng: np.random.Generator) -> DriveJoint:
     )
 
 
-def starts(joints: list[DriveJoint]) -> str | None:
-    """Why a run does not start; None where it does."""
-    arm = DynamixelArm(joints)
-    try:
-        place = arm.connect().position
-        arm.enable(ControlMode.POSITION, stated_limits(joints), StopPolicy.HOLD, 1.0, CYCLE_S)
-        state = arm.exchange(Setpoint(place, np.zeros(len(joints))))
-    except DriverError as error:
-        return str(error)
-    finally:
-        arm.disconnect()
-    return str(state.faults[0]) if state.faults else None
-
-
 def look(seed: int) -> tuple[list[DriveJoint], list[Finding]]:
     """An arm of two servos, and what doctor finds of it."""
     rng = np.random.default_rng(seed)
@@ -101,7 +83,7 @@ def require_true(seeds: range) -> None:
         if any(finding.severity is Severity.FAILURE for finding in findings):
             continue
         green += 1
-        failure = starts(joints)
+        failure = starts(DynamixelArm(joints), joints)
         wrong += [] if failure is None else [f"device {seed}: {failure}"]
     assert wrong == []
     assert green > len(seeds) // 10, "devices are not all broken"
@@ -141,14 +123,15 @@ def test_findings_of_what_a_run_would_meet() -> None:
 
 def test_a_servo_that_answers_pings_alone_is_let_answer() -> None:
     servos = WiredPort.wire([(ServoSpecification(1, registers={"Status Return Level": 0}), 0.2)])
-    assert starts([DriveJoint("joint1", {"id": 1, "port": "wired"}, torque_per_unit=0.01)]) is None
+    joints = [DriveJoint("joint1", {"id": 1, "port": "wired"}, torque_per_unit=0.01)]
+    assert starts(DynamixelArm(joints), joints) is None
     assert servos[0].memory.get("Status Return Level") == 2
 
 
 def test_speeds_beyond_the_servos_own_limit_are_not_asked_for() -> None:
     (servo,) = WiredPort.wire([(ServoSpecification(1, registers={"Velocity Limit": 20}), 0.2)])
     joint = DriveJoint("joint1", {"id": 1, "port": "wired"}, torque_per_unit=0.01, velocity_limit=30.0)
-    assert starts([joint]) is None
+    assert starts(DynamixelArm([joint]), [joint]) is None
     assert servo.memory.get("Profile Velocity") <= 20
 
 
@@ -158,5 +141,5 @@ def test_a_second_id_makes_a_servo_follow_another_ones_goals() -> None:
         [(ServoSpecification(1), 0.2), (ServoSpecification(2, registers={"Secondary(Shadow) ID": 1}), 0.2)]
     )
     joints = [DriveJoint("joint1", {"id": 1, "port": "wired"}, torque_per_unit=0.01)]
-    assert starts(joints) is None
+    assert starts(DynamixelArm(joints), joints) is None
     assert servos[1].memory.get("Goal Position") == servos[0].memory.get("Goal Position")

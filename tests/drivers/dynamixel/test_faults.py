@@ -3,7 +3,7 @@
 import pytest
 
 from tauscope_drivers.dynamixel.control_table import find_model
-from tauscope_drivers.dynamixel.faults import hardware_faults
+from tauscope_drivers.dynamixel.health import hardware_faults
 
 X, Y = find_model(1020), find_model(4030)
 

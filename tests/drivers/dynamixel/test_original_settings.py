@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.dynamixel.wired_port import WiredPort
+from drivers.wired_port import WiredPort
 from tauscope_drivers import ControlMode, StopPolicy
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.arm import DynamixelArm
@@ -21,7 +21,7 @@ CHANGED = {"Return Delay Time": 0, "Operating Mode": 5, "Drive Mode": 0}
 
 @pytest.fixture
 def servo(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> EmulatedServo:
-    monkeypatch.setattr("tauscope_drivers.dynamixel.arm.SerialPort", WiredPort)
+    monkeypatch.setattr("tauscope_drivers.serial_servos.arm.SerialPort", WiredPort)
     monkeypatch.setenv(FOLDER, str(tmp_path))
     return WiredPort.wire([(ServoSpecification(1, registers={"Drive Mode": 4}), 0.2)])[0]
 

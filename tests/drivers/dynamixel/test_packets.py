@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from tauscope_drivers.dynamixel import packets
-from tauscope_drivers.dynamixel.packets import FrameParser, Status, checksum, decode_fast, decode_status
+from tauscope_drivers.dynamixel.packets import DynamixelParser, Status, checksum, decode_fast, decode_status
 
 # ROBOTIS e-Manual, "Protocol 2.0", the examples of each instruction.
 INSTRUCTIONS = {
@@ -50,7 +50,7 @@ data = st.binary(max_size=40) | st.lists(st.sampled_from([0xFF, 0xFD, 0x00, 0x55
 
 
 def frames(received: bytes) -> list[bytes]:
-    return list(FrameParser().feed(received))
+    return list(DynamixelParser().feed(received))
 
 
 @pytest.mark.parametrize("name", INSTRUCTIONS)
@@ -152,7 +152,7 @@ def test_no_input_crashes_a_decoder(noise: bytes, servos: list[int], length: int
 @given(st.lists(st.sampled_from([*map(bytes.fromhex, STATUSES), STUFFED, FAST]), max_size=5), st.data())
 def test_frames_are_found_however_they_are_cut(wanted: list[bytes], draw: st.DataObject) -> None:
     stream = b"".join(wanted)
-    parser, found = FrameParser(), []
+    parser, found = DynamixelParser(), []
     while stream:
         size = draw.draw(st.integers(1, len(stream)))
         found += parser.feed(stream[:size])
@@ -167,7 +167,7 @@ noises = st.binary(max_size=30).filter(lambda noise: b"\xff" not in noise)
 
 @given(before=noises, between=noises)
 def test_frames_are_found_in_noise(before: bytes, between: bytes) -> None:
-    parser = FrameParser()
+    parser = DynamixelParser()
     assert list(parser.feed(before + STUFFED + between + FAST)) == [STUFFED, FAST]
     assert parser.discarded == len(before) + len(between)
 
@@ -176,7 +176,7 @@ def test_frames_are_found_in_noise(before: bytes, between: bytes) -> None:
 def test_damaged_frame_is_let_go_and_the_next_one_found(position: int, bit: int) -> None:
     damaged = bytearray(STUFFED)
     damaged[position] ^= 1 << bit
-    found = list(FrameParser(longest=40).feed(bytes(damaged) + STUFFED * 3))
+    found = list(DynamixelParser(longest=40).feed(bytes(damaged) + STUFFED * 3))
     assert bytes(damaged) not in found
     assert found[-1:] == [STUFFED]
 

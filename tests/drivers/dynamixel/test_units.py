@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tauscope_drivers.dynamixel.control_table import find_model
-from tauscope_drivers.dynamixel.units import ServoUnits, servo_units
+from tauscope_drivers.dynamixel.servo import ServoUnits, servo_units
 
 XM430 = find_model(1020)
 

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from drivers.feetech.test_feetech_packets import answer
-from drivers.feetech.wired_port import WiredPort
+from drivers.wired_port import WiredPort
 from feetech_bus import ServoSpecification
 from tauscope_drivers.clock import MonotonicClock
 from tauscope_drivers.errors import DriverError, DriverErrorKind
@@ -89,7 +89,7 @@ def test_a_servo_that_owes_answers_of_every_length_is_not_believed_until_they_ca
     line: Line, bus: FeetechBus, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now_ms = 1000
-    monkeypatch.setattr("tauscope_drivers.feetech.bus.time.monotonic_ns", lambda: now_ms * 1_000_000)
+    monkeypatch.setattr("tauscope_drivers.serial_servos.bus.time.monotonic_ns", lambda: now_ms * 1_000_000)
 
     def hear(*servos: int) -> set[int]:
         line.coming.extend(answer(servo, 0, NEW + bytes(spare)) for spare in range(SPARE_BYTES + 1) for servo in servos)

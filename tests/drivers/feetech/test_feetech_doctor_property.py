@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 
-from drivers.feetech.wired_port import WiredPort
+from drivers.wired_port import WiredPort, starts, wire_drivers
 from feetech_bus import ServoSpecification
-from tauscope_drivers import ControlMode, DriverError, Setpoint, StopPolicy
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.feetech.arm import FeetechArm
 from tauscope_drivers.feetech.doctor import examine
 from tauscope_drivers.inspection import Finding, Severity
-from tauscope_drivers.limits import stated_limits
 
 FEW, MANY = 200, 1000
 """Arms of the quick suite, and of the slow one."""
@@ -34,13 +32,11 @@ SETTINGS = {
     "unloading": (0, 44),
 }
 DEFECTS_MOST = 2
-CYCLE_S = 0.01
 
 
 @pytest.fixture(autouse=True)
 def wired(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("arm", "doctor"):
-        monkeypatch.setattr(f"tauscope_drivers.feetech.{module}.SerialPort", WiredPort)
+    wire_drivers(monkeypatch)
 
 
 def specification(number: int, rng: np.random.Generator) -> ServoSpecification:
@@ -61,20 +57,6 @@ def joint(number: int, rng: np.random.Generator) -> DriveJoint:
         velocity_limit=float(rng.choice([0.1, 2.0, 30.0])) if rng.random() < 0.8 else None,
         position_range=(float(rng.choice([-1.5] * 10 + [0.5])), 3.0) if rng.random() < 0.8 else None,
     )
-
-
-def starts(joints: list[DriveJoint]) -> str | None:
-    """Why a run does not start; None where it does."""
-    arm = FeetechArm(joints)
-    try:
-        place = arm.connect().position
-        arm.enable(ControlMode.POSITION, stated_limits(joints), StopPolicy.HOLD, 1.0, CYCLE_S)
-        state = arm.exchange(Setpoint(place, np.zeros(len(joints))))
-    except DriverError as error:
-        return str(error)
-    finally:
-        arm.disconnect()
-    return str(state.faults[0]) if state.faults else None
 
 
 def look(seed: int) -> tuple[list[DriveJoint], list[Finding]]:
@@ -98,7 +80,7 @@ def require_true(seeds: range) -> None:
         joints, findings = look(seed)
         failures = [finding for finding in findings if finding.severity is Severity.FAILURE]
         assert all(finding.detail and finding.remedy for finding in failures)
-        reason = starts(joints)
+        reason = starts(FeetechArm(joints), joints)
         green += not failures
         if bool(failures) != (reason is not None):
             wrong.append(f"seed {seed}: doctor {[str(one) for one in failures]}, run {reason}")

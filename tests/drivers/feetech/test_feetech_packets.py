@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tauscope_drivers.feetech import packets
-from tauscope_drivers.feetech.packets import LONGEST_FRAME, FrameParser, Status, decode_status
+from tauscope_drivers.feetech.packets import LONGEST_FRAME, FeetechParser, Status, decode_status
 
 SERVOS = st.integers(0, packets.HIGHEST_ID)
 DATA = st.binary(max_size=40)
@@ -41,14 +41,14 @@ def test_servos_get_as_many_bytes_each() -> None:
 
 @given(SERVOS, st.integers(0, 255), DATA)
 def test_an_answer_comes_out_as_it_went_in(servo: int, alarms: int, data: bytes) -> None:
-    (frame,) = FrameParser().feed(answer(servo, alarms, data))
+    (frame,) = FeetechParser().feed(answer(servo, alarms, data))
     assert decode_status(frame) == Status(servo, alarms, data)
 
 
 @given(st.lists(st.tuples(SERVOS, st.integers(0, 255), DATA), max_size=5), st.data())
 def test_frames_are_found_however_the_bytes_are_cut(answers: list[tuple[int, int, bytes]], data: st.DataObject) -> None:
     wire = b"".join(answer(*one) for one in answers)
-    parser, found, start = FrameParser(), [], 0
+    parser, found, start = FeetechParser(), [], 0
     while start < len(wire):
         end = data.draw(st.integers(start + 1, len(wire)))
         found += [decode_status(frame) for frame in parser.feed(wire[start:end])]
@@ -58,7 +58,7 @@ def test_frames_are_found_however_the_bytes_are_cut(answers: list[tuple[int, int
 
 @given(st.binary(max_size=60), SERVOS, DATA)
 def test_what_is_found_in_noise_has_a_right_checksum(noise: bytes, servo: int, data: bytes) -> None:
-    for frame in FrameParser().feed(noise + answer(servo, 0, data) + noise):
+    for frame in FeetechParser().feed(noise + answer(servo, 0, data) + noise):
         assert frame.startswith(b"\xff\xff")
         assert sum(frame[2:]) % 256 == 255
         assert frame[3] == len(frame) - 4
@@ -66,7 +66,7 @@ def test_what_is_found_in_noise_has_a_right_checksum(noise: bytes, servo: int, d
 
 @given(st.binary(max_size=20).filter(lambda noise: b"\xff" not in noise), SERVOS, st.integers(0, 63), DATA)
 def test_an_answer_behind_noise_is_found(noise: bytes, servo: int, alarms: int, data: bytes) -> None:
-    assert [decode_status(frame) for frame in FrameParser().feed(noise + answer(servo, alarms, data))] == [
+    assert [decode_status(frame) for frame in FeetechParser().feed(noise + answer(servo, alarms, data))] == [
         Status(servo, alarms, data)
     ]
 
@@ -78,7 +78,7 @@ def test_one_wrong_bit_is_never_an_answer_of_the_same_length(
     frame = bytearray(answer(servo, alarms, sent))
     place, bit = data.draw(st.integers(0, len(frame) - 1)), data.draw(st.integers(0, 7))
     frame[place] ^= 1 << bit
-    statuses = [decode_status(found) for found in FrameParser(len(frame)).feed(bytes(frame))]
+    statuses = [decode_status(found) for found in FeetechParser(len(frame)).feed(bytes(frame))]
     assert all(status is None or len(status.data) != len(sent) for status in statuses)
 
 
@@ -86,7 +86,7 @@ def test_a_damaged_length_does_not_swallow_the_next_answer() -> None:
     damaged = bytearray(answer(1, 0, b"\x01\x02"))
     damaged[3] = 0xF0
     whole = answer(2, 0, b"\x03\x04")
-    assert list(FrameParser(longest=8).feed(bytes(damaged) + whole)) == [whole]
+    assert list(FeetechParser(longest=8).feed(bytes(damaged) + whole)) == [whole]
     assert LONGEST_FRAME == 4 + 255
 
 

@@ -1,4 +1,4 @@
-"""The memory table: as another library has it, and numbers that come out as they went in."""
+"""The memory table: as another library has it, numbers that come out as they went in, devices by their first bytes."""
 
 import pytest
 from hypothesis import given
@@ -9,6 +9,7 @@ from tauscope_drivers.feetech.registers import (
     COUNTS_PER_RADIAN,
     FEEDBACK,
     FIRST_IN_RAM,
+    IDENTITY,
     MODEL_NUMBER,
     NEIGHBOURS,
     REGISTERS,
@@ -18,6 +19,8 @@ from tauscope_drivers.feetech.registers import (
     TORQUE_PER_VOLT,
     Block,
     Register,
+    describe_device,
+    is_supported,
     speed_unit,
 )
 
@@ -85,3 +88,20 @@ def test_eeprom_is_one_block() -> None:
 @pytest.mark.parametrize(("phase", "unit"), [(12, 1), (0, 50)])
 def test_phase_states_the_unit_of_speed(phase: int, unit: int) -> None:
     assert speed_unit(phase) == unit
+
+
+@pytest.mark.parametrize(
+    ("servo", "first_bytes", "words"),
+    [
+        (3, (3, 10, 0, 9, 3), "STS3215"),
+        (3, (3, 9, 0, 9, 11), "Feetech STS3250 (not supported)"),
+        (1, (1, 0, 1, 5, 4), "Feetech SCS0009 (not supported)"),
+        (2, (1, 0, 0, 1, 1), "model number 257 (not supported)"),
+        (7, (12, 0, 24, 7, 1), "Dynamixel AX-12 (protocol 1.0, not supported)"),
+        (4, (29, 0, 36, 4, 34), "Dynamixel MX-28 (protocol 1.0, not supported)"),
+    ],
+)
+def test_a_device_is_named_by_its_first_bytes(servo: int, first_bytes: tuple[int, ...], words: str) -> None:
+    identity = IDENTITY.decode(bytes(first_bytes))
+    assert describe_device(servo, identity) == words
+    assert is_supported(servo, identity) == (words == "STS3215")

@@ -7,10 +7,9 @@ import pytest
 
 from hardware_emulated.campaign_arms import six_joints
 from tauscope.robot import Robot, robot_from_dict
-from tauscope_sim.canopen_bus.axis import AxisDemand, AxisMeasurement, AxisMode
-from tauscope_sim.canopen_bus.drive import EmulatedDrive
+from tauscope_sim.canopen_bus.drive import AxisDemand, AxisMeasurement, AxisMode, EmulatedDrive
 from tauscope_sim.canopen_bus.driven_arm import FASTEST, DrivenArm
-from tauscope_sim.emulation.device_clock import STEP_S
+from tauscope_sim.emulation.emulator import STEP_S
 from tauscope_sim.scenario import Scenario
 
 CYCLE = 5

@@ -2,8 +2,7 @@
 
 import pytest
 
-from tauscope_sim.canopen_bus.axis import AxisScale
-from tauscope_sim.canopen_bus.drive import EmulatedDrive
+from tauscope_sim.canopen_bus.drive import AxisScale, EmulatedDrive
 from tauscope_sim.canopen_bus.object_dictionary import Abort
 
 MAPPING = 0x1A00

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from arm_rigs import START, bench_robot
-from tauscope_sim.canopen_bus.axis import AxisScale
-from tauscope_sim.canopen_bus.drive import EmulatedDrive
+from tauscope_sim.canopen_bus.drive import AxisScale, EmulatedDrive
 from tauscope_sim.canopen_bus.driven_arm import DrivenArm
-from tauscope_sim.emulation.device_clock import STEP_S
+from tauscope_sim.emulation.emulator import STEP_S
 from tauscope_sim.scenario import Scenario
 
 COUNTS_PER_RADIAN = 1e7

@@ -12,7 +12,7 @@ from tauscope_drivers import ArmState, ControlMode, DriveLimits, DriverError, Fa
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device import Disturbance, Injection
 from tauscope_sim.device import messages as m
-from tauscope_sim.device.frames import LARGEST_BODY, BrokenFrameError, Frame, FrameBuffer, FrameKind
+from tauscope_sim.device.messages import LARGEST_BODY, BrokenFrameError, Frame, FrameBuffer, FrameKind
 
 FAULT = Fault("overload", 2, "détail", "remedy")
 DECODERS = [m.decode_document, m.decode_state, m.decode_error, m.decode_enable, m.decode_injection, m.decode_stop]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauscope_sim.device.setpoint_spline import SetpointSpline
+from tauscope_sim.device.target import SetpointSpline
 
 
 def feed(spline: SetpointSpline, function, arrivals, ticks):
@@ -33,10 +33,7 @@ def test_a_cubic_is_reproduced_two_cycles_late() -> None:
     np.testing.assert_allclose(targets[:, 1], smoothed.deriv(1)(late), atol=1e-12)
 
 
-@given(
-    st.lists(st.floats(-2.0, 2.0), min_size=5, max_size=30),
-    st.sampled_from([1.0, 3.5, 4.0, 20.0]),
-)
+@given(st.lists(st.floats(-2.0, 2.0), min_size=5, max_size=30), st.sampled_from([1.0, 3.5, 4.0, 20.0]))
 def test_the_target_stays_in_the_hull_of_the_setpoints(values: list[float], period: float) -> None:
     spline = SetpointSpline(np.array([values[0]]))
     arrivals = [(period * k, k) for k in range(len(values))]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tauscope_drivers.dynamixel import packets
-from tauscope_drivers.dynamixel.packets import FrameParser, Status, decode_fast, decode_status
+from tauscope_drivers.dynamixel.packets import DynamixelParser, Status, decode_fast, decode_status
 from tauscope_sim.dynamixel_bus import DynamixelEmulator, ServoSpecification
 from tauscope_sim.dynamixel_bus.arm import Pendulums
 from tauscope_sim.dynamixel_bus.bus import EmulatedBus
@@ -24,7 +24,7 @@ class Master:
         specifications = [ServoSpecification(number, **specification) for number in range(1, count + 1)]  # pyright: ignore[reportArgumentType]
         arm = Pendulums([start] * count, weight=weight)
         servos = [EmulatedServo(one) for one in specifications]
-        self.emulator = DynamixelEmulator(EmulatedBus(servos), [one.servo for one in specifications], arm, 0.0)
+        self.emulator = DynamixelEmulator(EmulatedBus(servos), arm, 0.0)
         self.time = 0.0
 
     def wait(self, seconds: float) -> bytes:
@@ -37,7 +37,7 @@ class Master:
 
     def ask(self, request: bytes, seconds: float = 0.004) -> list[Status]:
         self.emulator.receive(request, self.time)
-        statuses = [decode_status(frame) for frame in FrameParser().feed(self.wait(seconds))]
+        statuses = [decode_status(frame) for frame in DynamixelParser().feed(self.wait(seconds))]
         return [status for status in statuses if status is not None]
 
     def read(self, servo: int, address: int, size: int = 1) -> int:

@@ -79,10 +79,7 @@ def test_payload_change(start: float, end: float | None, planar: Any, planar_tri
 
 def test_two_payloads_come_and_go_independently(planar: Any, planar_trial: Any) -> None:
     both = [PayloadChange(mass=0.3, start=0.1, end=0.3), PayloadChange(mass=0.2, start=0.2, end=0.3)]
-    split = [
-        PayloadChange(mass=0.3, start=0.1, end=0.2),
-        PayloadChange(mass=0.5, start=0.2, end=0.3),
-    ]
+    split = [PayloadChange(mass=0.3, start=0.1, end=0.2), PayloadChange(mass=0.5, start=0.2, end=0.3)]
     one, other = (planar_trial.simulate(planar.robot, effects)["link_position"] for effects in (both, split))
     np.testing.assert_allclose(one, other, rtol=0, atol=1e-9)
 

@@ -17,8 +17,7 @@ from tauscope_sim.effects.friction_laws import (
     StribeckFriction,
     ViscousFriction,
 )
-from tauscope_sim.effects.periodic_torques import Cogging
-from tauscope_sim.effects.position_torques import CableForce, JointSpring, TorqueOffset
+from tauscope_sim.effects.periodic_torques import CableForce, Cogging, JointSpring, TorqueOffset
 
 
 def smooth_sign(v: float, k_v: float = 500.0) -> float:
@@ -33,10 +32,7 @@ LAWS: dict[str, tuple[Any, Callable[[float, float], float]]] = {
         StribeckFriction(joint=1, amplitude=1.5, velocity=0.35, exponent=1.35),
         lambda q, v: 1.5 * smooth_sign(v) * math.exp(-((abs(v) / 0.35) ** 1.35)),
     ),
-    "asymmetric coulomb": (
-        AsymmetricCoulomb(joint=1, amplitude=1.0),
-        lambda q, v: smooth_sign(v) if v > 0 else 0.0,
-    ),
+    "asymmetric coulomb": (AsymmetricCoulomb(joint=1, amplitude=1.0), lambda q, v: smooth_sign(v) if v > 0 else 0.0),
     "asymmetric viscous": (AsymmetricViscous(joint=1, amplitude=0.6), lambda q, v: 0.6 * v if v > 0 else 0.0),
     "nonlinear viscous": (
         NonlinearViscous(joint=1, amplitude=0.5, exponent=2.2),
@@ -52,10 +48,7 @@ LAWS: dict[str, tuple[Any, Callable[[float, float], float]]] = {
     ),
     "offset": (TorqueOffset(joint=1, torque=-0.5), lambda q, v: -0.5),
     "spring": (JointSpring(joint=1, stiffness=2.0, rest=0.1), lambda q, v: 2.0 * (q - 0.1)),
-    "cable above": (
-        CableForce(joint=1, stiffness=8.0, angle=0.45),
-        lambda q, v: 8.0 * max(q - 0.45, 0.0) ** 1.5,
-    ),
+    "cable above": (CableForce(joint=1, stiffness=8.0, angle=0.45), lambda q, v: 8.0 * max(q - 0.45, 0.0) ** 1.5),
     "cable below": (
         CableForce(joint=1, stiffness=8.0, angle=0.6, side_of_angle="below", exponent=2.0),
         lambda q, v: -8.0 * max(0.6 - q, 0.0) ** 2.0,

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from tauscope_sim.effects.carried_bodies import RotorInertia
 from tauscope_sim.effects.elastic_transmissions import Backlash, JointElasticity
 from tauscope_sim.effects.load_dependent_friction import LoadDependentFriction
-from tauscope_sim.effects.periodic_torques import Cogging, TorqueRipple
-from tauscope_sim.effects.position_torques import JointSpring
+from tauscope_sim.effects.periodic_torques import Cogging, JointSpring, TorqueRipple
 from tauscope_sim.plant import Plant
-from tauscope_sim.plant.loads import loaded_accelerations
+from tauscope_sim.plant.term import loaded_accelerations
 
 Array = NDArray[np.float64]
 Agree = Callable[..., dict[str, Array]]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal
+from tauscope_sim.emulation.emulator import PseudoTerminal
 from tauscope_sim.emulation.server import Arrivals
 
 BUSY_S = 0.2

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tauscope_sim.emulation.device_clock import ALL_STEPS, LONGEST_CATCH_UP_S, MOST_STEPS, STEP_S, DeviceClock
+from tauscope_sim.emulation.emulator import ALL_STEPS, LONGEST_CATCH_UP_S, MOST_STEPS, STEP_S, DeviceClock
 
 ROUNDING_S = 1e-9
 

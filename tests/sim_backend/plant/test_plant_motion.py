@@ -14,7 +14,7 @@ from tauscope.errors import RobotFileError, ScenarioError
 from tauscope.robot.robot import FrictionCoefficients, FrictionShape, Model, Robot
 from tauscope_sim.effects.carried_bodies import PayloadChange
 from tauscope_sim.effects.elastic_transmissions import JointElasticity
-from tauscope_sim.effects.position_torques import JointSpring
+from tauscope_sim.effects.periodic_torques import JointSpring
 from tauscope_sim.model import build_model
 from tauscope_sim.plant import AMBIENT, Plant
 

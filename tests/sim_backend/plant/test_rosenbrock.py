@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tauscope_sim.plant.coordinates import Coordinates
 from tauscope_sim.plant.equations import EquationsOfMotion
 from tauscope_sim.plant.rosenbrock import GAMMA, UNIT, RosenbrockStep
-from tauscope_sim.plant.term import Slopes
+from tauscope_sim.plant.term import Coordinates, Slopes
 
 Array = NDArray[np.float64]
 

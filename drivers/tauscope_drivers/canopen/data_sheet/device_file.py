@@ -253,7 +253,6 @@ def _describe(variable: ODVariable) -> DescribedObject:
 
 
 def _printable(name: str) -> str:
-    """A name on one line of a terminal."""
     return "".join(letter if letter.isprintable() else "?" for letter in name)[:_LONGEST_NAME]
 
 

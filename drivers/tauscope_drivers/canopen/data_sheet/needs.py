@@ -1,13 +1,12 @@
 """Whether a drive is what the driver needs and what its EDS or DCF file states."""
 
 from collections.abc import Iterator
-from typing import Protocol
 
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.data_sheet.device_file import TYPE_NAMES, DataSheetError, DescribedObject, DeviceFile
 from tauscope_drivers.canopen.objects import SUBSTITUTES, TARGETS, WRITTEN, DriveObject, select_modes
-from tauscope_drivers.canopen.pdo_plan import (
+from tauscope_drivers.canopen.process_data import (
     MEASURED,
     MEASURED_WHERE_THERE,
     PDO_COUNT,
@@ -16,7 +15,8 @@ from tauscope_drivers.canopen.pdo_plan import (
     decode_mapping,
     plan_pdos,
 )
-from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.canopen.sdo import NodeDictionary
+from tauscope_drivers.errors import DriverError
 
 _READ = (objects.DEVICE_TYPE, objects.SUPPORTED_MODES, objects.MODE_DISPLAY)
 _WRITTEN = (objects.CONTROLWORD, objects.MODE_OF_OPERATION)
@@ -93,7 +93,6 @@ def _slot(file: DeviceFile, number: int, communication: int, mapping: int) -> Pd
 
 
 def _entries(file: DeviceFile, mapping: int) -> Iterator[DescribedObject]:
-    """Entries of a mapping parameter, in their order."""
     subindex = 1
     while (entry := file.objects.get((mapping, subindex))) is not None:
         yield entry
@@ -142,15 +141,7 @@ def _refuse(flaws: list[str]) -> None:
         raise DataSheetError(f"{'; '.join(flaws)}; check that it is the file of this drive, or use another drive")
 
 
-class OptionalReader(Protocol):
-    """What reads a drive's entries."""
-
-    def read_optional(self, entry: DriveObject) -> int | None:
-        """Value of an entry; None where the drive has none."""
-        ...
-
-
-def require_identity(file: DeviceFile, dictionary: OptionalReader, place: str) -> None:
+def require_identity(file: DeviceFile, dictionary: NodeDictionary, place: str) -> None:
     """Refuse a drive of another vendor, product or revision than its file states; what it does not tell passes.
 
     Raises DriverError ``refused``, which names what differs.
@@ -165,10 +156,9 @@ def require_identity(file: DeviceFile, dictionary: OptionalReader, place: str) -
         told = dictionary.read_optional(entry)
         is_same = told in (None, stated) or (entry is objects.REVISION and _behaves_alike(told, stated))
         if not is_same:
-            raise DriverError(
-                DriverErrorKind.REFUSED,
+            raise DriverError.refusal(
                 f"{place}: {entry} reads 0x{told:X}, and {file.name} states 0x{stated:X}; "
-                "check drive.node_id, or give the file of this drive",
+                "check drive.node_id, or give the file of this drive"
             )
 
 

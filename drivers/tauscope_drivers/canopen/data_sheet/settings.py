@@ -63,7 +63,6 @@ def settings_of(file: DeviceFile) -> Settings:
 
 
 def _torque_cap(file: DeviceFile) -> int | None:
-    """Largest torque that a DCF allows."""
     described = file.objects.get((objects.LARGEST_TORQUE.index, objects.LARGEST_TORQUE.subindex))
     if described is None or described.value_text is None:
         return None
@@ -71,7 +70,6 @@ def _torque_cap(file: DeviceFile) -> int | None:
 
 
 def _reason_against(described: DescribedObject) -> str | None:
-    """Why a value is not written; None where it is."""
     if "w" not in described.access:
         return "read-only"
     if described.access == "wo":

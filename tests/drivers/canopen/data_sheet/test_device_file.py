@@ -11,18 +11,18 @@ from hypothesis import strategies as st
 from emulated_data_sheet import GAIN, LABEL, OFFSET, Sections, sections, text_of, write_file
 from tauscope_drivers import ControlMode
 from tauscope_drivers.canopen import objects
-from tauscope_drivers.canopen.block_check import check_blocks
 from tauscope_drivers.canopen.configuration import (
     BusConfiguration,
     DriveJoint,
     NodeConfiguration,
+    check_blocks,
     read_configuration,
     require_targets,
 )
 from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, DeviceFile, read_device_file
 from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects
 from tauscope_drivers.canopen.objects import describe_absent
-from tauscope_drivers.canopen.pdo_plan import MEASURED_WHERE_THERE, plan_pdos
+from tauscope_drivers.canopen.process_data import MEASURED_WHERE_THERE, plan_pdos
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.inspection import Severity
 

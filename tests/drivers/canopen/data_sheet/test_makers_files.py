@@ -23,10 +23,7 @@ ACCEPTED = ("maxon-epos4.eds", "maxon-epos4-50-15.dcf", "zeroerr-erob.eds", "eyo
 REFUSED = {
     "ingenia-everest-xcr.eds": ["Consumer heartbeat time (0x1016:01) is missing"],
     "maxon-epos2.eds": ["Torque actual value (0x6077:00) is missing"],
-    "xeryon-xla5.eds": [
-        "Consumer heartbeat time (0x1016:01) is missing",
-        "Torque actual value (0x6077:00) is missing",
-    ],
+    "xeryon-xla5.eds": ["Consumer heartbeat time (0x1016:01) is missing", "Torque actual value (0x6077:00) is missing"],
 }
 LIMITS = DriveLimits(np.full(1, -1.0), np.full(1, 1.0), np.full(1, 2.0), np.full(1, 20.0))
 RATED_NM = 0.5

@@ -1,22 +1,28 @@
-"""An arm of emulated servos in a process of its own, and the driver that is plugged into it."""
+"""Arms of emulated servos in a process of their own, and the drivers that are plugged into them."""
 
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+import feetech_bus
 from emulator_process import EmulatorProcess
+from feetech_bus import FeetechOrder
 from prompt_process import prompt_process
 from tauscope_drivers import ArmState, Backend, ControlMode, DriveLimits, Setpoint, StopPolicy
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.arm import DynamixelArm
+from tauscope_drivers.feetech.arm import FeetechArm
 from tauscope_sim.dynamixel_bus import DynamixelOrder, ServoSpecification
 
-TORQUE_PER_MILLIAMPERE = 0.01
+TORQUE_PER_UNIT = 0.01
+"""Of the driver's unit of effort [Nm]."""
+
 SLACK_S = 0.03
 """Answers are waited for this much longer than the bus takes: the machine of a test may be busy."""
 
@@ -33,17 +39,18 @@ class Bench:
 
     emulator: EmulatorProcess
     drives: list[dict[str, Any]]
-    arms: list[DynamixelArm] = field(default_factory=list)
+    make_arm: Any = DynamixelArm
+    arms: list[Any] = field(default_factory=list)
 
-    def arm(self, torque_constant: float | None = TORQUE_PER_MILLIAMPERE, **changes: Any) -> DynamixelArm:
+    def arm(self, torque_constant: float | None = TORQUE_PER_UNIT, **changes: Any) -> Any:
         joints = [
             DriveJoint(f"joint{number}", {**drive, **changes}, torque_per_unit=torque_constant)
             for number, drive in enumerate(self.drives, 1)
         ]
-        self.arms.append(DynamixelArm(joints, slack_s=SLACK_S))
+        self.arms.append(self.make_arm(joints, slack_s=SLACK_S))
         return self.arms[-1]
 
-    def enabled_arm(self, mode: ControlMode = ControlMode.POSITION, **options: Any) -> DynamixelArm:
+    def enabled_arm(self, mode: ControlMode = ControlMode.POSITION, **options: Any) -> Any:
         arm = self.arm()
         arm.connect()
         policy = StopPolicy.HOLD if mode is ControlMode.POSITION else StopPolicy.TORQUE_OFF
@@ -81,23 +88,36 @@ class Bench:
 
 @contextmanager
 def bench(
-    folder: Path, servos: int | tuple[ServoSpecification, ...] = 3, *, start: float = 0.2, **order: Any
+    folder: Path, servos: int | tuple[ServoSpecification, ...] = 3, *, start: float = 0.2, **options: Any
 ) -> Iterator[Bench]:
     """An emulated arm of pendulums, all of them in the same place."""
     if isinstance(servos, int):
-        specification = ServoSpecification(1, torque_per_milliampere=TORQUE_PER_MILLIAMPERE)
+        specification = ServoSpecification(1, torque_per_milliampere=TORQUE_PER_UNIT)
         servos = tuple(replace(specification, servo=number) for number in range(1, servos + 1))
-    port = str(folder / "port")
-    asked = DynamixelOrder(
-        servos=servos,
-        start=(start,) * len(servos),
-        port=port,
-        control=str(folder / "control"),
-        trace=str(folder / "trace"),
-        **order,
+    drives = [{"id": servo.servo, "baud": servo.baud} for servo in servos]
+    with _bench(folder, drives, partial(DynamixelOrder, servos, **options), start, DynamixelArm) as one:
+        yield one
+
+
+@contextmanager
+def feetech_bench(folder: Path, *, start: float = 0.2, **options: Any) -> Iterator[Bench]:
+    """The same with three STS3215 servos, which answer at once."""
+    quick = {"return_delay": 0}
+    servos = tuple(
+        feetech_bus.ServoSpecification(number, torque_per_permille=TORQUE_PER_UNIT, registers=quick)
+        for number in (1, 2, 3)
     )
+    drives = [{"servo_id": servo.servo} for servo in servos]
+    with _bench(folder, drives, partial(FeetechOrder, servos, **options), start, FeetechArm) as one:
+        yield one
+
+
+@contextmanager
+def _bench(folder: Path, drives: list[dict[str, Any]], order: Any, start: float, make_arm: Any) -> Iterator[Bench]:
+    port = str(folder / "port")
+    asked = order((start,) * len(drives), port, str(folder / "control"), trace=str(folder / "trace"))
     with EmulatorProcess(asked) as emulator:
-        one = Bench(emulator, [{"id": servo.servo, "port": port, "baud": servo.baud} for servo in servos])
+        one = Bench(emulator, [{**drive, "port": port} for drive in drives], make_arm)
         try:
             yield one
         finally:

@@ -1,0 +1,157 @@
+"""What questions and answers on a serial bus have in common: whose answer may still come, and how late one is."""
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Hashable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from tauscope_drivers.clock import AnswerTime, Clock, MonotonicClock
+from tauscope_drivers.serial_port import BITS_PER_BYTE, SerialPort
+
+FACTORY_RETURN_DELAY_S = 500e-6
+"""Return Delay Time of a servo as delivered: 250 units [s]."""
+
+ATTEMPTS = 3
+"""How often a single servo is asked outside the control loop."""
+
+PATIENCE_S = 0.02
+"""How much longer a single servo is waited for there [s]."""
+
+_LATEST_ANSWER_NS = 500_000_000
+"""Answers have come 133 ms late where a machine stood still; a control loop gives an arm up long before this."""
+
+_PING_SLOT_S = 0.003
+"""Time that a ping to all leaves each ID [s]."""
+
+_Status = TypeVar("_Status")
+
+
+@dataclass(frozen=True)
+class Answers(Generic[_Status]):
+    """Answers to one question to many servos.
+
+    `asked_ns`: instant at which the question had left [ns, by the bus' clock].
+    `late_ns`: how much later than usual the last answer came [ns].
+    `statuses`: by ID.
+    `beyond_ns`: how much longer than bus and adapter should take for it [ns].
+    """
+
+    asked_ns: int
+    late_ns: int
+    statuses: dict[int, _Status]
+    beyond_ns: int = 0
+
+
+class FrameParser(ABC):
+    """Finds whole frames in what comes from a port; noise and damaged frames are passed over, and counted."""
+
+    header: bytes
+    fixed_bytes: int
+    """Bytes from which a frame's end is known."""
+
+    def __init__(self, longest: int) -> None:
+        """Begin with nothing.
+
+        `longest`: longest frame that can be meant, so that a damaged length does not swallow what follows [bytes].
+        """
+        self.discarded = 0
+        self.longest = longest
+        self._buffer = bytearray()
+
+    @abstractmethod
+    def find_end(self, start: bytearray) -> int | None:
+        """Length of the frame that begins so [bytes]; None where none can begin so."""
+
+    @abstractmethod
+    def is_whole(self, frame: bytes) -> bool:
+        """Whether the checksum is right."""
+
+    def feed(self, received: bytes) -> Iterator[bytes]:
+        """Frames that are complete now and whose checksum is right, header included."""
+        self._buffer += received
+        while (frame := self._next_frame()) is not None:
+            yield frame
+
+    @property
+    def pending(self) -> bytes:
+        """The frame that has begun and is not complete."""
+        return bytes(self._buffer)
+
+    def _next_frame(self) -> bytes | None:
+        buffer = self._buffer
+        while True:
+            start = buffer.find(self.header)
+            if start < 0:
+                self._discard(max(0, len(buffer) - len(self.header) + 1))
+                return None
+            self._discard(start)
+            if len(buffer) < self.fixed_bytes:
+                return None
+            end = self.find_end(buffer)
+            if end is None or end > self.longest:
+                self._discard(1)
+            elif len(buffer) < end:
+                return None
+            elif not self.is_whole(frame := bytes(buffer[:end])):
+                self._discard(1)
+            else:
+                del buffer[:end]
+                return frame
+
+    def _discard(self, count: int) -> None:
+        del self._buffer[:count]
+        self.discarded += count
+
+
+class SerialServoBus(Generic[_Status]):
+    """Speaks to the servos of one port; one thread's own. Nothing in an answer says to which question it belongs."""
+
+    def __init__(self, port: SerialPort, clock: Clock | None = None) -> None:
+        """Use a port, open or not yet."""
+        self.port = port
+        self.return_delay_s = FACTORY_RETURN_DELAY_S
+        self._clock = MonotonicClock() if clock is None else clock
+        self._missed_ns: dict[tuple[int, int], int] = {}
+        self._answer_times: dict[Hashable, AnswerTime] = {}
+
+    def _ask_everybody(self, ping: bytes, answer_bytes: int, slots: int, parser: FrameParser) -> Iterator[bytes]:
+        """Frames that come after a ping to all."""
+        self.port.send(ping)
+        deadline = self.port.reply_deadline_ns(answer_bytes * slots, slots * _PING_SLOT_S)
+        while received := self.port.receive(deadline):
+            yield from parser.feed(received)
+
+    def _send_question(self, request: bytes) -> int:
+        """Send a question to many servos; when it has left [ns]."""
+        # Taken before: who is woken by the bytes may run before this process does again.
+        asked_ns = self._clock.now_ns() + round(self._wire_s(len(request)) * 1e9)
+        self.port.send(request)
+        return asked_ns
+
+    def _time_answers(
+        self, kind: Hashable, asked_ns: int, answered_ns: int, usual_s: float, found: dict[int, _Status]
+    ) -> Answers[_Status]:
+        """Say how late answers are. `kind`: questions that take as long; `usual_s`: what bus and servos take [s]."""
+        if not found:
+            return Answers(asked_ns, 0, found)
+        taken_ns = answered_ns - asked_ns - round((usual_s + self.port.latency_s) * 1e9)
+        late_ns = self._answer_times.setdefault(kind, AnswerTime()).late_ns(taken_ns)
+        return Answers(asked_ns, late_ns, found, max(0, taken_ns))
+
+    def _find_owing(self, servos: Sequence[int], length: int) -> set[int]:
+        """Servos whose answer of this length to an earlier question may still be under way."""
+        since_ns = time.monotonic_ns() - _LATEST_ANSWER_NS
+        return {servo for servo in servos if self._missed_ns.get((servo, length), 0) > since_ns}
+
+    def _miss(self, servos: Collection[int], length: int) -> None:
+        """Note who has not answered: that answer may come yet."""
+        self._missed_ns |= dict.fromkeys(((servo, length) for servo in servos), time.monotonic_ns())
+
+    def _wire_s(self, count: int) -> float:
+        return count * BITS_PER_BYTE / self.port.baudrate
+
+
+def learn_latency(port: SerialPort, answers: Sequence[Answers[_Status]]) -> None:
+    """Add what an adapter takes beyond its timer: one that is slow by a constant is no faster in any answer."""
+    port.latency_s += min((one.beyond_ns for one in answers if one.statuses), default=0) * 1e-9

@@ -1,0 +1,54 @@
+"""The ``drive`` blocks of an arm whose servos are on one serial bus: ``port`` and ``baud`` stand on the first joint."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from tauscope_drivers.drive_block import DriveJoint, read_text, read_whole, require_distinct, require_known_keys
+from tauscope_drivers.errors import DriverError
+
+DEFAULT_BAUD = 1_000_000
+
+_Servo = TypeVar("_Servo")
+
+
+@dataclass(frozen=True)
+class BusConfiguration(Generic[_Servo]):
+    """The bus and the servos on it, in the order of the joints."""
+
+    servos: tuple[_Servo, ...]
+    port: str
+    baud: int = DEFAULT_BAUD
+
+
+def read_bus(
+    joints: Sequence[DriveJoint],
+    read_servo: Callable[[DriveJoint], _Servo],
+    *,
+    keys: Sequence[str],
+    bauds: tuple[int, int],
+    device: str,
+) -> BusConfiguration[_Servo]:
+    """Bus and servos of an arm.
+
+    Raises DriverError ``refused`` where a key is missing, unknown or not usable; names the joint and the key.
+    `keys`: of a joint's block, that of its ID first; `bauds`: lowest and highest rate [bit/s]; `device`: as an example.
+    """
+    require_known_keys(joints, ("port", "baud"), keys)
+    servos = tuple(read_servo(joint) for joint in joints)
+    require_distinct(joints, keys[0])
+    port = read_text(joints[0], "port", f"give the serial device, like {device}")
+    return BusConfiguration(servos, port, read_whole(joints[0], "baud", DEFAULT_BAUD, least=bauds[0], most=bauds[1]))
+
+
+def read_torque_constant(joint: DriveJoint) -> float | None:
+    """Joint torque for one unit that the servo measures; None where the robot file does not say [Nm or N].
+
+    Raises DriverError ``refused`` where it is zero or no number.
+    """
+    constant = joint.torque_per_unit
+    if constant is not None and (not math.isfinite(constant) or constant == 0.0):
+        text = f"joint {joint.name}: torque_constant = {constant}; give one that is not zero"
+        raise DriverError.refusal(text)
+    return constant
