@@ -1,20 +1,14 @@
-"""The registry of drivers; nothing else in tauscope names a backend.
-
-A driver is a package of `tauscope_drivers` that has a module ``driver``, or has an entry point ``tauscope.drivers``.
-"""
+"""The registry of drivers, by the entry points ``tauscope.drivers``. Nothing else in tauscope names a backend."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from importlib.util import find_spec
 from pathlib import Path
-from pkgutil import iter_modules
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
-import tauscope_drivers
 from tauscope.errors import AcquisitionError
 from tauscope.extras import require_extra
 from tauscope.robot import Joint, Robot
@@ -58,14 +52,10 @@ _UNSTATED_CONSTANT = 1.0
 @cache
 def _entries() -> Mapping[str, EntryPoint]:
     """Every registered driver by its name, the default first."""
-    found = {entry.name: entry for entry in entry_points(group=ENTRY_POINT_GROUP)}
-    if DEFAULT_BACKEND not in found:
+    found = sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda one: (one.name != DEFAULT_BACKEND, one.name))
+    if not found:
         raise AcquisitionError("no driver is registered; install tauscope again (pip install -e . in a source tree)")
-    for _, name, is_package in iter_modules(tauscope_drivers.__path__):
-        module = f"{tauscope_drivers.__name__}.{name}.driver"
-        if is_package and find_spec(module) is not None:
-            found[name] = EntryPoint(name, f"{module}:DRIVER", ENTRY_POINT_GROUP)
-    return {name: found[name] for name in sorted(found, key=lambda name: (name != DEFAULT_BACKEND, name))}
+    return {entry.name: entry for entry in found}
 
 
 def driver_names() -> tuple[str, ...]:
