@@ -24,8 +24,7 @@ from server.queue.controls import HandControls
 from server.queue.executors import ManualExecutor
 from shared_data import REPOSITORY
 from tauscope.server.auth.gate import RateLimit
-from tauscope.server.auth.keys import KeyFile
-from tauscope.server.auth.scopes import Scope
+from tauscope.server.auth.keys import KeyFile, Scope
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.services import Services
 from tauscope.server.problems import KINDS
@@ -300,7 +299,7 @@ def a_fault_in_a_request(bench: Bench) -> Response:
     def fail(*_: object) -> None:
         raise KeyError("x")
 
-    bench.patch.setattr("tauscope.server.store.items.ItemStore.identifiers", fail)
+    bench.patch.setattr("tauscope.server.store.data_folder.ItemStore.identifiers", fail)
     return bench.client().get(RUNS)
 
 

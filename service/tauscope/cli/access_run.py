@@ -8,8 +8,7 @@ import typer
 
 from tauscope.errors import TauscopeError
 from tauscope.server.auth.audit_log import AuditLog
-from tauscope.server.auth.keys import ApiKey, KeyFile, utc_now
-from tauscope.server.auth.scopes import parse_scope
+from tauscope.server.auth.keys import ApiKey, KeyFile, parse_scope, utc_now
 from tauscope.server.http.settings import default_data_folder
 
 

@@ -15,7 +15,7 @@ from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
 from tauscope.server.http.campaigns import describe, result_of
 from tauscope.server.http.services import Services, open_services
 from tauscope.server.http.settings import Settings
-from tauscope.server.queue.record import JobState
+from tauscope.server.queue.job_folder import JobState
 from tauscope.server.queue.task_job import staged_workspace
 from tauscope.tasks.campaign import HeldOutMotion
 from tauscope.tasks.design_excitation import ExcitationDesignOptions

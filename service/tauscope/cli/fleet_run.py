@@ -8,8 +8,7 @@ from tauscope.cli.output_files import require_new
 from tauscope.cli.terminal import output, plain, shown_progress
 from tauscope.errors import ExportError, IdentificationError
 from tauscope.number_text import counted
-from tauscope.server.queue.cluster_executor import ClusterExecutor
-from tauscope.server.queue.executors import open_executor
+from tauscope.server.queue.cluster_executor import ClusterExecutor, open_executor
 from tauscope.server.queue.fleet import (
     DIAGNOSIS_COLUMNS,
     IDENTIFICATION_COLUMNS,

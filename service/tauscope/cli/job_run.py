@@ -15,8 +15,7 @@ from tauscope.server.http.services import Services, open_services
 from tauscope.server.http.settings import Settings, default_data_folder
 from tauscope.server.schedules.repository import FiringEntry, ScheduleRepository
 from tauscope.server.schedules.scheduler import new_boot
-from tauscope.server.store.data_folder import FolderLock, site_identifier
-from tauscope.server.store.items import utc_now
+from tauscope.server.store.data_folder import FolderLock, site_identifier, utc_now
 
 POLL_S = 0.5
 """How often the end is looked for [s]."""

@@ -15,10 +15,9 @@ from typing import Any
 from tauscope.errors import AcquisitionError, TauscopeError
 from tauscope.robot import read_robot
 from tauscope.runtime.drivers import Connection, make_backend
-from tauscope.runtime.in_process import open_recorder
+from tauscope.runtime.loop import end_event
 from tauscope.runtime.options import RunOrder, read_order
 from tauscope.runtime.processes import RunLock
-from tauscope.runtime.progress import end_event
 from tauscope.runtime.record import (
     FLUSH_S,
     STOP_FILE,
@@ -28,10 +27,9 @@ from tauscope.runtime.record import (
     RunRecord,
     read_record,
 )
-from tauscope.runtime.run import Run
+from tauscope.runtime.run import OpenRecorder, Run, RunTask, Surroundings, open_recorder
 from tauscope.runtime.states import RunState
 from tauscope.runtime.stop_listener import StopListener
-from tauscope.runtime.task import OpenRecorder, RunTask, Surroundings
 from tauscope.trajectory import read_trajectory
 
 _LARGEST_EVENT = 4096

@@ -18,7 +18,7 @@ from tauscope.runtime.record import RunProblem
 from tauscope.runtime.states import RunState
 from tauscope.server.control.campaign import CampaignWorkspace
 from tauscope.server.http import Settings, create_app
-from tauscope.server.queue.excitation import ExcitationWorkspace
+from tauscope.server.queue.analyses import ExcitationWorkspace
 
 CAMPAIGNS, RUNS = "/api/v1/campaigns", "/api/v1/runs"
 QUICK = {"duration_s": 4.0, "harmonics": 2, "periods": 2, "starts": 1, "slow_postures": 0, "closing_period": False}

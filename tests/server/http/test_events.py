@@ -18,9 +18,8 @@ from tauscope.server.http import Settings, create_app
 from tauscope.server.http.services import Services
 from tauscope.server.http.tasks import events as event_routes
 from tauscope.server.http.tasks.event_feeds import EventFeeds
-from tauscope.server.queue.job_folder import Workspace
-from tauscope.server.queue.record import JobRecord, JobState
-from tauscope.server.store.items import utc_now
+from tauscope.server.queue.job_folder import JobRecord, JobState, Workspace
+from tauscope.server.store.data_folder import utc_now
 
 
 @pytest.fixture

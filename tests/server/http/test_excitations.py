@@ -12,7 +12,7 @@ from server.http.problem_check import assert_problem
 from server.queue.executors import ManualExecutor
 from tauscope.robot import read_robot
 from tauscope.server.http import Settings
-from tauscope.server.queue.excitation import ExcitationWorkspace
+from tauscope.server.queue.analyses import ExcitationWorkspace
 from tauscope.trajectory import parse_trajectory_json
 
 EXCITATIONS = "/api/v1/excitations"
@@ -108,7 +108,7 @@ def test_trajectories_that_are_not_made(
 def test_a_table_that_would_be_too_long(
     waiting_client: TestClient, executor: ManualExecutor, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tauscope.server.queue.excitation.MOST_ROWS", 1000)
+    monkeypatch.setattr("tauscope.server.queue.analyses.MOST_ROWS", 1000)
     here = designed(waiting_client, executor, settings)
     assert waiting_client.get(f"{here}/trajectory?format=csv&rate_hz=900").status_code == 200
     assert_problem(waiting_client.get(f"{here}/trajectory?format=csv&rate_hz=1100"), "limit-exceeded", 413)

@@ -20,7 +20,7 @@ from tauscope.runtime.states import RunState
 from tauscope.server.control.run import RunWorkspace
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.tasks import event_feeds
-from tauscope.server.queue.excitation import ExcitationWorkspace
+from tauscope.server.queue.analyses import ExcitationWorkspace
 from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import RecordingStore, StoredRecording
 

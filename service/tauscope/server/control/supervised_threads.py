@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from tauscope.server.store.items import ItemStore
+from tauscope.server.store.data_folder import ItemStore
 
 CLOSE_TIMEOUT_S = 15.0
 """How long a run or a campaign may take to stop when the service ends [s]. Its control process may last longer."""

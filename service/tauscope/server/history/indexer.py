@@ -13,13 +13,16 @@ from typing import Any
 from tauscope.errors import NotFoundError
 from tauscope.server.control.campaign import CampaignWorkspace
 from tauscope.server.control.run import RunWorkspace
-from tauscope.server.queue.analyses import DiagnosisWorkspace, IdentificationWorkspace, RolloutWorkspace
-from tauscope.server.queue.excitation import ExcitationWorkspace
-from tauscope.server.queue.job_folder import Workspace
-from tauscope.server.queue.record import JobState
+from tauscope.server.queue.analyses import (
+    DiagnosisWorkspace,
+    ExcitationWorkspace,
+    IdentificationWorkspace,
+    RolloutWorkspace,
+)
+from tauscope.server.queue.job_folder import JobState, Workspace
+from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.database.index import FileMetadata, Index, ItemMetadata, RecordingRole
 from tauscope.server.store.files import hash_file, identifier_time
-from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 
 DAMAGED = "damaged"

@@ -17,7 +17,7 @@ from tauscope.server.history.drift import Drift
 from tauscope.server.history.model_history import ModelEntry, ModelHistory
 from tauscope.server.history.model_judgement import Candidate, compare_models
 from tauscope.server.queue.analyses import DiagnosisWorkspace, IdentificationOrder, IdentificationWorkspace
-from tauscope.server.store.items import ItemStore
+from tauscope.server.store.data_folder import ItemStore
 
 _log = logging.getLogger("tauscope.jobs")
 

@@ -7,8 +7,8 @@ from datetime import datetime, timedelta
 from tauscope.errors import NotFoundError
 from tauscope.server.history.indexer import DAMAGED, Indexer
 from tauscope.server.history.model_history import ModelHistory
+from tauscope.server.store.data_folder import utc_now
 from tauscope.server.store.database.index import ItemEntry, ItemQuery
-from tauscope.server.store.items import utc_now
 from tauscope.server.store.recordings import RecordingStore
 
 _ALL = 10**9

@@ -13,29 +13,37 @@ from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
 from tauscope.server.control.campaign import CampaignLinks, CampaignOrder, CampaignWorkspace
 from tauscope.server.control.run import RunWorkspace
-from tauscope.server.http.backends import BackendRequest, chosen_backend
-from tauscope.server.http.diagnoses import DIAGNOSES
-from tauscope.server.http.excitations import EXCITATIONS
-from tauscope.server.http.identifications import IDENTIFICATIONS
-from tauscope.server.http.leases import permit_of
-from tauscope.server.http.robots.files import read_received_robot
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT
-from tauscope.server.http.runs import find_run
-from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.answers import (
+from tauscope.server.http.answers import (
+    ENDINGS,
+    AnswerModel,
+    Identifier,
     JobAnswer,
     MotionLinks,
+    PageAnswer,
+    collection,
     damaged_fields,
     job_fields,
     require_document,
     require_success,
 )
+from tauscope.server.http.diagnoses import DIAGNOSES
+from tauscope.server.http.excitations import EXCITATIONS
+from tauscope.server.http.identifications import IDENTIFICATIONS
+from tauscope.server.http.leases import permit_of
+from tauscope.server.http.robot_files import EXAMPLE_ROBOT, read_received_robot
+from tauscope.server.http.runs import find_run
+from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
-from tauscope.server.http.tasks.routes import ENDINGS, Identifier, collection
-from tauscope.server.http.tasks.submission import RobotRequest, keep_robot, receive_request, stage_request
-from tauscope.server.models import AnswerModel, PageAnswer
+from tauscope.server.http.tasks.submission import (
+    BackendRequest,
+    RobotRequest,
+    chosen_backend,
+    keep_robot,
+    receive_request,
+    stage_request,
+)
 from tauscope.server.problems import problem_responses
-from tauscope.server.queue.record import JobState
+from tauscope.server.queue.job_folder import JobState
 from tauscope.tasks.campaign import CampaignOptions
 from tauscope.tasks.run import BackendChoice
 

@@ -8,10 +8,10 @@ from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.plots import DiagnosisPlots
 from tauscope.diagnosis.extended_model import LARGEST_FILE
 from tauscope.export.model_file import ModelFile
+from tauscope.server.http.answers import JobAnswer, JobLinks, PageAnswer, require_document
 from tauscope.server.http.openapi import binary_part, binary_parts
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.robot_files import EXAMPLE_ROBOT
 from tauscope.server.http.services import Services
-from tauscope.server.http.tasks.answers import JobAnswer, JobLinks, require_document
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import (
     JobDocument,
@@ -28,7 +28,6 @@ from tauscope.server.http.tasks.submission import (
     RecordingsRequest,
     keep_model,
 )
-from tauscope.server.models import PageAnswer
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.analyses import DiagnosisWorkspace
 from tauscope.server.queue.task_job import SAVED_MODEL, TRAJECTORY, OrderedRecording

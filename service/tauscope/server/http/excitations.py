@@ -8,18 +8,16 @@ from fastapi.responses import StreamingResponse
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
+from tauscope.server.http.answers import ENDINGS, Identifier, JobAnswer, JobLinks, PageAnswer, require_document
 from tauscope.server.http.openapi import file_contents
 from tauscope.server.http.reading import READING
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.robot_files import EXAMPLE_ROBOT
 from tauscope.server.http.services import ServicesDep
-from tauscope.server.http.tasks.answers import JobAnswer, JobLinks, require_document
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import JobDocument
-from tauscope.server.http.tasks.routes import ENDINGS, Identifier
 from tauscope.server.http.tasks.submission import RobotRequest
-from tauscope.server.models import PageAnswer
 from tauscope.server.problems import problem_responses
-from tauscope.server.queue.excitation import ExcitationWorkspace, write_trajectory_piece
+from tauscope.server.queue.analyses import ExcitationWorkspace, write_trajectory_piece
 from tauscope.server.queue.job_folder import read_bytes
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.trajectory.csv_format import PIECE_ROWS

@@ -6,10 +6,10 @@ from fastapi import APIRouter, Response
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
+from tauscope.server.http.answers import AnswerModel
 from tauscope.server.http.metrics import CONTENT_TYPE
 from tauscope.server.http.openapi import file_contents
 from tauscope.server.http.services import ServicesDep
-from tauscope.server.models import AnswerModel
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.version import tauscope_version
 

@@ -16,11 +16,10 @@ from tauscope.server.history.gates import ModelPolicy
 from tauscope.server.history.model_history import ModelEntry
 from tauscope.server.history.model_judgement import compare_models
 from tauscope.server.history.trend import parameter_trends
-from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
+from tauscope.server.http.answers import AnswerModel, Identifier, Limit, collection
+from tauscope.server.http.bodies import JSON, media_type, read_document, refuse_media_type
 from tauscope.server.http.openapi import Examples, json_body
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.routes import Identifier, Limit, collection
-from tauscope.server.models import AnswerModel
 from tauscope.server.problems import problem_responses
 from tauscope.strict_model import StrictModel
 

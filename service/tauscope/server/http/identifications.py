@@ -7,13 +7,12 @@ from pydantic import Field
 from tauscope.export.model_file import ModelFile
 from tauscope.identification import IdentificationDocument
 from tauscope.report.identification_plots import IdentificationPlots
+from tauscope.server.http.answers import JobAnswer, JobLinks, PageAnswer
 from tauscope.server.http.openapi import binary_parts
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT
-from tauscope.server.http.tasks.answers import JobAnswer, JobLinks
+from tauscope.server.http.robot_files import EXAMPLE_ROBOT
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import JobDocument, plots_document, report_document, result_document
 from tauscope.server.http.tasks.submission import MODEL_FILE, RECORDINGS_EXAMPLE, Names, RecordingsRequest
-from tauscope.server.models import PageAnswer
 from tauscope.server.queue.analyses import IdentificationWorkspace
 from tauscope.server.queue.task_job import OrderedRecording
 from tauscope.tasks.identify import IdentificationOptions

@@ -6,10 +6,9 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query
 from pydantic import AwareDatetime, Field
 
-from tauscope.server.http.robots.models import RobotVersionAnswer
+from tauscope.server.http.answers import AnswerModel, Limit
+from tauscope.server.http.robot_files import RobotVersionAnswer
 from tauscope.server.http.services import ServicesDep
-from tauscope.server.http.tasks.routes import Limit
-from tauscope.server.models import AnswerModel
 from tauscope.server.problems import problem_responses
 from tauscope.server.store.data_folder import FOLDERS
 from tauscope.server.store.database.index import ItemEntry, ItemQuery

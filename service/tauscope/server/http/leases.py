@@ -11,12 +11,12 @@ from tauscope.errors import NotFoundError
 from tauscope.robot.messages import one_line, shown
 from tauscope.runtime.drivers import BackendName
 from tauscope.server.auth.gate import find_caller
-from tauscope.server.auth.scopes import Scope
+from tauscope.server.auth.keys import Scope
 from tauscope.server.control.leases import LONGEST_TTL_S, Lease, LeaseLostError, Permit
-from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
+from tauscope.server.http.answers import AnswerModel
+from tauscope.server.http.bodies import JSON, media_type, read_document, refuse_media_type
 from tauscope.server.http.openapi import json_body
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.models import AnswerModel
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.run import BackendChoice

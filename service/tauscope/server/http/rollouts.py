@@ -7,16 +7,15 @@ from pydantic import Field
 from tauscope.closed_loop import RolloutDocument
 from tauscope.diagnosis.extended_model import LARGEST_FILE
 from tauscope.errors import NotFoundError
+from tauscope.server.http.answers import JobAnswer, JobLinks, PageAnswer, require_document
 from tauscope.server.http.diagnoses import DIAGNOSES
 from tauscope.server.http.identifications import IDENTIFICATIONS
 from tauscope.server.http.openapi import binary_part, binary_parts
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.robot_files import EXAMPLE_ROBOT
 from tauscope.server.http.services import Services
-from tauscope.server.http.tasks.answers import JobAnswer, JobLinks, require_document
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import report_document, result_document
 from tauscope.server.http.tasks.submission import MODEL_FILE, Names, Received, RecordingsRequest, keep_model
-from tauscope.server.models import PageAnswer
 from tauscope.server.queue.analyses import RolloutWorkspace
 from tauscope.server.queue.task_job import SAVED_MODEL, OrderedRecording
 from tauscope.tasks.task import ReadingOptions

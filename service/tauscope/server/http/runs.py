@@ -20,25 +20,34 @@ from tauscope.runtime.record import RunRecord
 from tauscope.runtime.states import RunState
 from tauscope.runtime.timing import RealTime, Timing
 from tauscope.server.control.leases import Permit
-from tauscope.server.control.motions import DesignedMotion, Motion, ready_motion, take_trajectory
-from tauscope.server.control.run import RunRequestRecord, RunWorkspace
+from tauscope.server.control.run import (
+    DesignedMotion,
+    Motion,
+    RunRequestRecord,
+    RunWorkspace,
+    ready_motion,
+    take_trajectory,
+)
 from tauscope.server.control.run_manager import run_recording_name
-from tauscope.server.http.backends import BackendRequest, chosen_backend
-from tauscope.server.http.documents import file_answer, to_json_text
+from tauscope.server.http.answers import AnswerModel, Identifier, MotionLinks, PageAnswer, shown_problem
+from tauscope.server.http.bodies import PartRule, file_answer, to_json_text
 from tauscope.server.http.excitations import EXCITATIONS
-from tauscope.server.http.form import PartRule
 from tauscope.server.http.leases import permit_of
 from tauscope.server.http.openapi import binary_part, file_contents
-from tauscope.server.http.robots.files import read_received_robot
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.robot_files import EXAMPLE_ROBOT, read_received_robot
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.answers import MotionLinks, shown_problem
 from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
-from tauscope.server.http.tasks.routes import Identifier
-from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request, stage_request
-from tauscope.server.models import AnswerModel, PageAnswer
+from tauscope.server.http.tasks.submission import (
+    BackendRequest,
+    Received,
+    RobotRequest,
+    chosen_backend,
+    keep_robot,
+    receive_request,
+    stage_request,
+)
 from tauscope.server.problems import Problem, ProblemError, make_problem, problem_responses
-from tauscope.server.queue.excitation import ExcitationOrder, ExcitationWorkspace, check_trajectory
+from tauscope.server.queue.analyses import ExcitationOrder, ExcitationWorkspace, check_trajectory
 from tauscope.server.queue.task_job import submit_job
 from tauscope.server.store.event_log import EventLog
 from tauscope.tasks.design_excitation import ExcitationDesignOptions

@@ -7,12 +7,11 @@ from fastapi import APIRouter, Path, Request
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
+from tauscope.server.http.answers import AnswerModel, Limit, collection
+from tauscope.server.http.bodies import JSON, media_type, read_document, refuse_media_type
 from tauscope.server.http.history import ReasonRequest
 from tauscope.server.http.openapi import json_body
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.routes import Limit, collection
-from tauscope.server.models import AnswerModel
 from tauscope.server.problems import problem_responses
 from tauscope.server.schedules.definition import ScheduleDefinition
 from tauscope.server.schedules.repeater import make_schedule

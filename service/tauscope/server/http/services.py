@@ -18,38 +18,31 @@ from tauscope.errors import TauscopeError
 from tauscope.server.auth.audit_log import AuditLog, AuditTrail
 from tauscope.server.auth.gate import Access, RateLimit
 from tauscope.server.auth.keys import KeyFile, KeyRing
-from tauscope.server.control.campaign_manager import CampaignManager
-from tauscope.server.control.campaign_runner import CampaignDependencies
-from tauscope.server.control.device_claims import DeviceClaims
-from tauscope.server.control.leases import Lease, Leases
+from tauscope.server.control.campaign_runner import CampaignDependencies, CampaignManager
+from tauscope.server.control.leases import DeviceClaims, Lease, Leases
 from tauscope.server.control.run import start_control
-from tauscope.server.control.run_manager import RunManager
-from tauscope.server.control.run_supervisor import StartControl
+from tauscope.server.control.run_manager import RunManager, StartControl
 from tauscope.server.history.indexer import Indexer, open_index
 from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.history.model_registry import DriftMonitor, ModelRegistry
 from tauscope.server.history.retention import RetentionRule, RetentionSweeper
-from tauscope.server.http.heartbeat import Heartbeat
 from tauscope.server.http.metrics import Metrics, TimedExecutor
-from tauscope.server.http.readiness import Clock, Readiness, ReadyMetrics, check_database, check_disk
+from tauscope.server.http.readiness import Clock, Heartbeat, Readiness, ReadyMetrics, check_database, check_disk
 from tauscope.server.http.reading import WIDTH, ReadingQueue
-from tauscope.server.http.repeated_answers import StoredAnswers
+from tauscope.server.http.repeated_requests import StoredAnswers
 from tauscope.server.http.settings import Settings
 from tauscope.server.http.tasks.event_feeds import EventFeeds
-from tauscope.server.queue.analyses import run_diagnosis, run_identification, run_rollout
-from tauscope.server.queue.cluster_executor import ClusterExecutor
-from tauscope.server.queue.excitation import run_excitation
-from tauscope.server.queue.executors import open_executor
+from tauscope.server.queue.analyses import run_diagnosis, run_excitation, run_identification, run_rollout
+from tauscope.server.queue.cluster_executor import ClusterExecutor, open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.server.schedules.repeater import Repeater
 from tauscope.server.schedules.repository import ScheduleRepository
 from tauscope.server.schedules.scheduler import Scheduler, new_boot
-from tauscope.server.store.data_folder import FOLDERS, FolderLock, item_stores, site_identifier
+from tauscope.server.store.data_folder import FOLDERS, FolderLock, ItemStore, item_stores, site_identifier
 from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index
-from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.server.store.robots import RobotStore
 

@@ -20,7 +20,7 @@ from tauscope.recording import (
 from tauscope.recording.recording import Array
 from tauscope.report.series import envelope_indices
 from tauscope.robot import Robot
-from tauscope.server.queue.record import without_folders
+from tauscope.server.queue.job_folder import without_folders
 
 
 def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport:

@@ -10,9 +10,8 @@ from pathlib import Path
 
 from tauscope.errors import LimitExceededError, NotFoundError, TauscopeError
 from tauscope.server.queue.cluster_executor import ClusterUnavailableError
-from tauscope.server.queue.job_folder import Workspace
-from tauscope.server.queue.record import JobProblem, JobRecord, JobState
-from tauscope.server.store.items import ItemStore
+from tauscope.server.queue.job_folder import JobProblem, JobRecord, JobState, Workspace
+from tauscope.server.store.data_folder import ItemStore
 
 Work = Callable[[Path], JobProblem | None]
 """Does the job of a folder; returns why it failed. It may run in another process."""

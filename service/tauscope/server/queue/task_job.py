@@ -13,6 +13,7 @@ from tauscope.errors import ExportError, NotFoundError, RecordingError, Tauscope
 from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.files import write_atomically
 from tauscope.server.queue.job_folder import (
+    JobProblem,
     Workspace,
     begin_step,
     do_work,
@@ -20,12 +21,12 @@ from tauscope.server.queue.job_folder import (
     read_document,
     read_stored,
     require_wanted,
+    without_folders,
     write_stored,
 )
 from tauscope.server.queue.queue import JobKind, JobQueue
-from tauscope.server.queue.record import JobProblem, without_folders
+from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.files import hash_file
-from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.task import ROLES

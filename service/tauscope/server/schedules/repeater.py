@@ -11,8 +11,7 @@ from typing import TypeVar
 
 from tauscope.errors import NotFoundError, TauscopeError
 from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
-from tauscope.server.control.campaign_manager import CampaignManager
-from tauscope.server.control.campaign_runner import CampaignDependencies
+from tauscope.server.control.campaign_runner import CampaignDependencies, CampaignManager
 from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.queue.analyses import (
     DiagnosisOrder,
@@ -24,7 +23,7 @@ from tauscope.server.queue.job_folder import Workspace
 from tauscope.server.queue.task_job import OrderedRecording, ordered_on_server, staged_workspace, submit_job
 from tauscope.server.schedules.definition import RecordingChoice, ScheduleDefinition
 from tauscope.server.schedules.repository import ScheduleEntry
-from tauscope.server.store.items import ItemStore
+from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.strict_model import StrictModel
 

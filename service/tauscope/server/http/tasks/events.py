@@ -7,13 +7,13 @@ from typing import Annotated, Any
 from anyio import to_thread
 from fastapi import APIRouter, Depends, Header, Request, Response
 from fastapi.sse import KEEPALIVE_COMMENT, EventSourceResponse, format_sse_event
-from pydantic.json_schema import models_json_schema
 
+from tauscope.server.http.answers import Identifier
+from tauscope.server.http.openapi import refer_to_model
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.event_feeds import EventFeeds, EventSource
-from tauscope.server.http.tasks.routes import Identifier
 from tauscope.server.problems import problem_responses
-from tauscope.server.queue.record import EndedEvent, ProgressEvent, StateEvent, StepEvent
+from tauscope.server.queue.job_folder import EndedEvent, ProgressEvent, StateEvent, StepEvent
 from tauscope.server.store.event_log import LoggedEvent
 
 EVENT_MODELS = (StateEvent, StepEvent, ProgressEvent, EndedEvent)
@@ -119,17 +119,17 @@ def _format_event(event: LoggedEvent) -> bytes:
 
 def _stream_schema() -> dict[str, Any]:
     """What the data of an event may be."""
-    references, _ = models_json_schema(
-        [(model, "serialization") for model in EVENT_MODELS], ref_template="#/components/schemas/{model}"
-    )
-    data = [references[(model, "serialization")] for model in EVENT_MODELS]
     return {
         "type": "object",
         "additionalProperties": False,
         "properties": {
             "event": {"type": "string", "enum": ["state", "step", "progress", "ended"]},
             "id": {"type": "string", "description": "number of the event, from 1"},
-            "data": {"type": "string", "contentMediaType": "application/json", "contentSchema": {"anyOf": data}},
+            "data": {
+                "type": "string",
+                "contentMediaType": "application/json",
+                "contentSchema": {"anyOf": [refer_to_model(model) for model in EVENT_MODELS]},
+            },
             "retry": {"type": "integer", "description": "how long to wait before connecting again [ms]"},
         },
     }

@@ -10,11 +10,11 @@ from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import LimitExceededError
 from tauscope.server.auth.gate import find_caller
-from tauscope.server.http.form import PartRule
+from tauscope.server.http.answers import damaged_fields, job_fields, require_success
+from tauscope.server.http.bodies import PartRule
 from tauscope.server.http.openapi import Examples
-from tauscope.server.http.robots.files import read_received_robot
+from tauscope.server.http.robot_files import read_received_robot
 from tauscope.server.http.services import Services
-from tauscope.server.http.tasks.answers import damaged_fields, job_fields, require_success
 from tauscope.server.http.tasks.router import (
     JobDocument,
     Resource,
@@ -25,8 +25,8 @@ from tauscope.server.http.tasks.router import (
 )
 from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request, stage_request
 from tauscope.server.problems import ProblemError
+from tauscope.server.queue.job_folder import JobState
 from tauscope.server.queue.queue import JobKind
-from tauscope.server.queue.record import JobState
 from tauscope.server.queue.task_job import OrderedRecording, TaskWorkspace
 from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import RecordingStore

@@ -15,22 +15,29 @@ from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
+from tauscope.server.http.answers import (
+    ENDINGS,
+    MOTION,
+    SUBMISSION,
+    After,
+    AnswerModel,
+    Identifier,
+    Limit,
+    collection,
+    require_document,
+)
 from tauscope.server.http.evidence import require_no_model
 from tauscope.server.http.leases import LeaseToken
 from tauscope.server.http.openapi import Examples, file_contents
 from tauscope.server.http.reading import READING
-from tauscope.server.http.robots.files import check_received_robot
-from tauscope.server.http.robots.models import RobotReportAnswer
+from tauscope.server.http.robot_files import RobotReportAnswer, check_received_robot
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.answers import require_document
 from tauscope.server.http.tasks.event_feeds import EventSource
 from tauscope.server.http.tasks.events import add_events_route
-from tauscope.server.http.tasks.routes import ENDINGS, MOTION, SUBMISSION, After, Identifier, Limit, collection
 from tauscope.server.http.tasks.submission import RobotRequest, request_body
-from tauscope.server.models import AnswerModel
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.queue import JobKind
-from tauscope.server.store.items import ItemStore
+from tauscope.server.store.data_folder import ItemStore
 
 HTML = "text/html"
 
