@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 from pydantic import BaseModel
+from typer import Context
 from typer.core import TyperGroup
 from typer.main import get_command
 
@@ -80,11 +81,13 @@ def fields(verb: str, models: tuple[type[BaseModel], ...]) -> dict[str, Any]:
 
 def options(verb: str) -> dict[str, Any]:
     """Options of the command line by each of their names."""
-    command = get_command(app)
-    assert isinstance(command, TyperGroup)
+    program = get_command(app)
+    assert isinstance(program, TyperGroup)
+    command = program.get_command(Context(program), verb)
+    assert command is not None
     return {
         name.removeprefix("--").replace("-", "_"): parameter
-        for parameter in command.commands[verb].params
+        for parameter in command.params
         for name in parameter.opts
         if name.startswith("--")
     }

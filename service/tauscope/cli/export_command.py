@@ -1,9 +1,18 @@
-"""``tauscope export``: its arguments."""
+"""``tauscope export``: a model for a controller or a simulator."""
 
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
+
+from tauscope.cli.output_files import require_free, write_file
+from tauscope.cli.task_run import parse_export_format
+from tauscope.cli.terminal import output, plain
+from tauscope.export.actuators import ActuatorChoice, ActuatorKind
+from tauscope.export.formats import EXPORT_FILES, ExportFormat, make_export
+from tauscope.export.isaac_lab import to_isaac_lab
+from tauscope.export.mjcf_patch import patch_mjcf
+from tauscope.export.model_file import read_export_model
 
 ModelFile = Annotated[
     Path,
@@ -56,15 +65,6 @@ def export(
 
     Findings of a diagnosis are included as far as the format can hold them; the file's comment lists the others.
     """
-    from tauscope.cli.output_files import require_free, write_file
-    from tauscope.cli.task_run import parse_export_format
-    from tauscope.cli.terminal import output, plain
-    from tauscope.export.actuators import ActuatorChoice, ActuatorKind
-    from tauscope.export.formats import EXPORT_FILES, ExportFormat, make_export
-    from tauscope.export.isaac_lab import to_isaac_lab
-    from tauscope.export.mjcf_patch import patch_mjcf
-    from tauscope.export.model_file import read_export_model
-
     kind = parse_export_format(out, EXPORT_FILES, "'OUT'")
     if isaac_lab and kind is not ExportFormat.PYTHON:
         raise typer.BadParameter(f"{str(out)!r}: Isaac Lab reads Python (.py)", param_hint="'--isaac-lab'")
