@@ -236,7 +236,7 @@ def a_job_that_kills_the_service(bench: Bench) -> Response:
     first, second = Bench(settings), Bench(settings)
     with TestClient(first.app, base_url=HOST):
         job = first.identify()
-    state = settings.identifications_folder / job["id"] / "state.json"
+    state = settings.data_folder / "identifications" / job["id"] / "state.json"
     record = json.loads(state.read_text(encoding="utf-8"))
     state.write_text(json.dumps({**record, "attempts": MOST_ATTEMPTS}), encoding="utf-8")
     with TestClient(second.app, base_url=HOST):
@@ -245,7 +245,7 @@ def a_job_that_kills_the_service(bench: Bench) -> Response:
 
 def a_file_that_was_changed(bench: Bench) -> Response:
     job = bench.identify()
-    (bench.settings.identifications_folder / job["id"] / "state.json").write_bytes(b"\0")
+    (bench.settings.data_folder / "identifications" / job["id"] / "state.json").write_bytes(b"\0")
     return bench.result(job)
 
 

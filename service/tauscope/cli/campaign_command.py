@@ -20,7 +20,6 @@ from tauscope.tasks.task import LocalFiles
 
 
 def _step(words: str) -> Any:
-    """An option that holds the options of a step."""
     return typer.Option(metavar="JSON", help=f"{words}: an object as in the REST API, or none.")
 
 

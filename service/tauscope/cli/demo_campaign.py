@@ -40,7 +40,6 @@ def run_campaign(data: Path, robot_file: Path, scenario: Mapping[str, Any], told
 
 
 def _begin(services: Services, robot_file: Path, scenario: Mapping[str, Any]) -> str:
-    """Hand the campaign in."""
     with staged_workspace(services.campaigns.items, CampaignWorkspace) as workspace:
         shutil.copy(robot_file, workspace.robot)
         workspace.write_order(

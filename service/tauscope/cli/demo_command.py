@@ -38,8 +38,7 @@ from tauscope.tasks.task import LocalFiles
 from tauscope.trajectory import write_trajectory
 from tauscope_sim.examples import example_robot
 
-NOISE_STD_NM = (0.5, 0.3, 0.7)
-"""σ_τ of the seed paper's section 5."""
+NOISE_STD_NM = (0.5, 0.3, 0.7)  # σ_τ of the seed paper's section 5
 
 RATE_HZ = 200.0
 TRAIN_MOTION = ExcitationOptions(periods=5, slow_postures=1, seed=0)
@@ -193,7 +192,6 @@ def compare(arm: Robot, identification: Identification) -> list[Comparison]:
 
 
 def _show(console: Console, folder: Path, outcome: identify.Result, comparisons: list[Comparison]) -> None:
-    """The result, the truth, and where everything is."""
     show_identification(console, outcome.document, outcome.robot)
     rows = [
         (row.name, given(round(row.truth, 6)), *with_uncertainty(row.value, row.std), f"{row.z:+.2f}")
@@ -210,7 +208,6 @@ def _show(console: Console, folder: Path, outcome: identify.Result, comparisons:
 
 
 def _show_findings(console: Console, found: DiagnosisDocument) -> None:
-    """What was found on an arm that conceals something."""
     console.print()
     console.print(plain("The same arm once more, a spring concealed at its first joint; what the diagnosis found:"))
     for finding in found.findings:

@@ -58,14 +58,9 @@ def _list_own(mark: Path) -> set[str]:
     return {MARK, *filter(None, names)} if first == _FIRST_LINE else set()
 
 
-DATA = "service"
-"""Data folder of a service within the demo's, which holds a campaign on an arm that conceals an effect."""
-
-PORT = 8000
-"""Where the page is, unless something else is there already."""
-
-LEFT_FOR_S = 900.0
-"""How long a page that nobody waits for stays [s]."""
+DATA = "service"  # data folder of a service within the demo's, which holds a campaign on an arm that conceals an effect
+PORT = 8000  # where the page is, unless something else is there already
+LEFT_FOR_S = 900.0  # how long a page that nobody waits for stays [s]
 
 _LOOK_S = 0.5
 

@@ -157,7 +157,6 @@ def check_drives(path: Path) -> list[Finding]:
 
 
 def _adapters(backend: str | None) -> list[Finding]:
-    """Adapters of one bus, or of all."""
     buses = bus_drivers().values() if backend is None else [find_bus(backend)]
     found: list[Finding] = []
     for bus in buses:
@@ -181,12 +180,10 @@ def show_finding(console: Console, finding: Finding) -> None:
 
 
 def _ask(name: str) -> bool:
-    """Whether somebody at a terminal says that the arm is supported."""
     return sys.stdin.isatty() and typer.confirm(f"{name} will be without torque. Is it supported?")
 
 
-SHOWN_CYCLES = 3
-"""Cycles of a run whose frames are shown."""
+SHOWN_CYCLES = 3  # cycles of a run whose frames are shown
 
 _RATE_HZ = 200.0
 
@@ -210,7 +207,6 @@ def show_frames(robot_file: Path, backend: str, trajectory: Path | None, options
 
 
 def _targets(robot: Robot, trajectory: Path | None, options: RunOptions) -> NDArray[np.float64]:
-    """Targets of all cycles."""
     if trajectory is None:
         ends = [joint.limits.position or (0.0, 0.0) for joint in robot.joints]
         place = np.array([min(max(0.0, low), high) for low, high in ends])

@@ -107,7 +107,6 @@ def diagnose(
 
 
 def _trajectory_suffix(path: Path) -> str:
-    """Format of the motion to record next."""
     if path.suffix.lower() not in TRAJECTORIES:
         text = f"{str(path)!r}: a trajectory file ends in .json or .csv"
         raise typer.BadParameter(text, param_hint="--next-trajectory")
@@ -165,7 +164,6 @@ def show_diagnosis(console: Console, document: DiagnosisDocument) -> None:
 
 
 def _show_findings(console: Console, findings: Sequence[FindingEntry]) -> None:
-    """The first few, and how many more there are."""
     for finding in findings[:MOST_FINDINGS]:
         console.print(plain(f"* {finding.statement}"), soft_wrap=True)
     if len(findings) > MOST_FINDINGS:

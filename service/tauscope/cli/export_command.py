@@ -85,7 +85,6 @@ def export(
 
 
 def _numbers(text: str | None, option: str) -> tuple[float, ...]:
-    """Numbers of an option, zero or more."""
     try:
         values = tuple(float(word) for word in text.split(",")) if text else ()
     except ValueError:

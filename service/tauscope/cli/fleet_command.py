@@ -102,7 +102,6 @@ def _run(verb: str, manifest: Path, out: Path, workers: int, total: int) -> int:
 
 
 def _row(result: FleetResult, columns: tuple[str, ...]) -> list[str]:
-    """A row of the table."""
     state = "succeeded" if result.error is None else "failed"
     figures = (result.figures.get(column, "") for column in columns)
     return [str(result.entry.row), result.entry.name, state, *figures, f"{result.seconds:.2f}", result.error or ""]

@@ -92,7 +92,6 @@ def show_identification(console: Console, document: IdentificationDocument, robo
 
 
 def _whole_arm(document: IdentificationDocument) -> Table:
-    """What belongs to no single joint."""
     fit = document.fit
     entries = (*document.conditioning, *document.held_out_conditioning)
     rows = [

@@ -135,7 +135,6 @@ def map_file(
 
 
 def _ask(layout: RecordingLayout) -> RecordingLayout:
-    """The layout as the user corrects it."""
     typer.echo(
         f"{{0}} or {{1}} stands for the joint's number from 0 or 1, {{name}} for its name; {NONE}: none", err=True
     )
@@ -155,7 +154,6 @@ def _ask(layout: RecordingLayout) -> RecordingLayout:
 
 
 def _clock(report: RecordingReport) -> Table:
-    """Duration, rate, gaps, periods, columns."""
     periods = report.periods
     rows = [
         ("duration", f"{significant(report.duration_s, 6)} s"),
@@ -174,7 +172,6 @@ def _clock(report: RecordingReport) -> Table:
 
 
 def _joints(report: RecordingReport) -> Table:
-    """Range of every joint's channels."""
     rows = []
     for number, joint in enumerate(report.joints, start=1):
         ranges = (" … ".join(significant(value) for value in pair) for pair in (joint.position, joint.effort))
@@ -213,12 +210,10 @@ def check_robot_file(file: RobotFile) -> None:
 
 
 def _mass(report: RobotReport) -> str:
-    """What the model weighs, where there is one."""
     return "" if report.total_mass is None else f", model of {given(report.total_mass)} kg"
 
 
 def _row(joint: JointSummary) -> list[str]:
-    """One joint."""
     limits = joint.limits
     reach = ABSENT if limits.position is None else " … ".join(given(value) for value in limits.position)
     return [

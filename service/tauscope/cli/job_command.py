@@ -20,11 +20,8 @@ from tauscope.server.schedules.repository import FiringEntry, ScheduleRepository
 from tauscope.server.schedules.scheduler import new_boot
 from tauscope.server.store.data_folder import FolderLock, site_identifier, utc_now
 
-POLL_S = 0.5
-"""How often the end is looked for [s]."""
-
-PATIENCE_S = 30.0
-"""How long a service may take to take it on [s]."""
+POLL_S = 0.5  # how often the end is looked for [s]
+PATIENCE_S = 30.0  # how long a service may take to take it on [s]
 
 GOOD_ENDS = ("succeeded", "finished")
 
@@ -69,7 +66,6 @@ def list_jobs(data: DataFolder = None, database: DatabaseUrl = None) -> None:
 
 
 def _is_free(folder: Path) -> bool:
-    """Whether no service works with a data folder."""
     try:
         FolderLock(folder).release()
     except TauscopeError:
@@ -78,7 +74,6 @@ def _is_free(folder: Path) -> bool:
 
 
 def _ask_service(name: str, folder: Path, database: str | None, timeout_s: float) -> FiringEntry:
-    """Have the service that works with the folder do it."""
     with open_database(folder, database) as opened:
         book = ScheduleRepository(opened, site_identifier(folder), new_boot())
         number = book.ask(name, utc_now())
@@ -102,7 +97,6 @@ def _fresh(services: Services, number: int) -> Callable[[], FiringEntry]:
 
 
 def _follow(firing: FiringEntry, look: Callable[[], FiringEntry], timeout_s: float) -> FiringEntry:
-    """The firing when what it started has ended."""
     deadline = time.monotonic() + timeout_s
     while not firing.is_final:
         if time.monotonic() > deadline:
@@ -114,7 +108,6 @@ def _follow(firing: FiringEntry, look: Callable[[], FiringEntry], timeout_s: flo
 
 
 def _tell(name: str, firing: FiringEntry) -> None:
-    """Say what came of it."""
     if firing.item is None:
         raise StoreError(f"schedule {name}: {firing.state}: {firing.reason or 'nothing was started'}")
     what = f"{firing.item[0]} {firing.item[1]}"
@@ -124,7 +117,6 @@ def _tell(name: str, firing: FiringEntry) -> None:
 
 
 def _outcome(firing: FiringEntry | None) -> str:
-    """What came of a firing, in a few words."""
     if firing is None:
         return ABSENT
     if firing.item is None:

@@ -83,12 +83,10 @@ def _choose(identifier: str, role: str, reason: str, data: Path | None, database
 
 
 def _state(entry: ModelEntry) -> str:
-    """Where a model stands."""
     return f"{entry.state}, reference" if entry.is_reference else entry.state
 
 
 def _reason(entry: ModelEntry) -> str:
-    """Which gates a model did not pass, and why."""
     failed = [f"{gate.name}: {gate.reason}" for gate in entry.gates if not gate.passed]
     return "; ".join(failed) or (ABSENT if entry.state == "unreadable" else "all gates passed")
 

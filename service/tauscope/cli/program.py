@@ -24,8 +24,7 @@ from typer.main import get_command, get_group
 from tauscope.errors import TauscopeError
 from tauscope.extras import require_extra
 
-DEBUG = "TAUSCOPE_DEBUG"
-"""Environment variable that makes every failure show its traceback."""
+DEBUG = "TAUSCOPE_DEBUG"  # environment variable that makes every failure show its traceback
 
 
 class ExitStatus(IntEnum):
@@ -131,7 +130,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _show_version(asked: bool) -> None:
-    """Answer ``--version``."""
     if asked:
         from importlib.metadata import PackageNotFoundError, version
 
@@ -162,7 +160,6 @@ def _prepare_process() -> None:
 
 
 def _fail(message: str) -> int:
-    """Say why, in one line."""
     if os.environ.get(DEBUG):
         traceback.print_exc()
     from tauscope.robot.messages import one_line
@@ -172,7 +169,6 @@ def _fail(message: str) -> int:
 
 
 def _status(exit_: SystemExit) -> int:
-    """The status that an exit carries, as `sys.exit` reads it."""
     if exit_.code is None:
         return ExitStatus.DONE
     return exit_.code if isinstance(exit_.code, int) else ExitStatus.CANNOT_ANSWER

@@ -53,8 +53,7 @@ HELD = (
     "! The arm is under power where it stopped, and its watchdog is off. Support it, then let go of it with: tauscope "
     "release."
 )
-SUFFIXES = (".csv", ".parquet", ".mcap")
-"""Formats of a recording, by suffix."""
+SUFFIXES = (".csv", ".parquet", ".mcap")  # formats of a recording, by suffix
 
 
 def run(
@@ -213,7 +212,6 @@ def show_run(console: Console, record: RunRecord, robot: Robot) -> None:
 
 
 def _whole(record: RunRecord) -> Table:
-    """What belongs to no single joint."""
     timing, recording = record.timing, record.recording
     rows = [
         ("played", f"{significant(100.0 * record.played, 4)} %"),
@@ -235,7 +233,6 @@ def _whole(record: RunRecord) -> Table:
 
 
 def _joints(record: RunRecord, robot: Robot) -> Table:
-    """How each joint followed, and answered."""
     stale = (0,) * robot.joint_count if record.timing is None else record.timing.stale_samples
     rows = [
         (

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -21,7 +20,15 @@ from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.history.retention import RetentionRule, plan_removal, remove
 from tauscope.server.http.settings import default_data_folder
 from tauscope.server.store.backup import restore_backup, write_backup
-from tauscope.server.store.data_folder import FOLDERS, RECORDINGS, FolderLock, item_stores, site_identifier, utc_now
+from tauscope.server.store.data_folder import (
+    FOLDERS,
+    RECORDINGS,
+    FolderLock,
+    ItemKind,
+    item_stores,
+    site_identifier,
+    utc_now,
+)
 from tauscope.server.store.database.database import FILE_NAME, Database
 from tauscope.server.store.database.index import Index
 from tauscope.server.store.recordings import RecordingStore
@@ -41,17 +48,6 @@ DatabaseUrl = Annotated[
         help="PostgreSQL database; SQLite in the data folder by default.",
     ),
 ]
-
-
-class Kind(StrEnum):
-    """Kinds of items."""
-
-    EXCITATION = "excitation"
-    RUN = "run"
-    IDENTIFICATION = "identification"
-    DIAGNOSIS = "diagnosis"
-    ROLLOUT = "rollout"
-    CAMPAIGN = "campaign"
 
 
 _OWN_FILES = "its state, its order or its result"
@@ -138,7 +134,7 @@ def prune_store(
     data: DataFolder = None,
     database: DatabaseUrl = None,
     kind: Annotated[
-        list[Kind] | None, typer.Option(help="Kind of item that may go, once for each; every kind by default.")
+        list[ItemKind] | None, typer.Option(help="Kind of item that may go, once for each; every kind by default.")
     ] = None,
     recordings: Annotated[
         bool, typer.Option("--recordings", help="Recordings too that nothing which stays was made from.")
@@ -149,9 +145,7 @@ def prune_store(
 
     No service may work with the folder meanwhile.
     """
-    rule = RetentionRule(
-        timedelta(days=older_than), frozenset([each.value for each in kind or ()] or FOLDERS), recordings
-    )
+    rule = RetentionRule(timedelta(days=older_than), frozenset(kind or FOLDERS), recordings)
     with open_store(data, database) as store:
         kept = RecordingStore(store.folder / RECORDINGS)
         removal = plan_removal(store.keeper, ModelHistory(store.database), kept, rule, utc_now())

@@ -13,8 +13,7 @@ from rich.text import Text
 from tauscope.report.table import Table
 from tauscope.robot.messages import one_line
 
-PIPE_WIDTH = 240
-"""Columns where nobody looks: wide enough for every table."""
+PIPE_WIDTH = 240  # columns where nobody looks: wide enough for every table
 
 
 def output() -> Console:

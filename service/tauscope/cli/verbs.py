@@ -14,8 +14,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from typer.core import TyperCommand, TyperOption
 
-SEVERAL = "..."
-"""A metavar that ends so marks an option that takes several values: what --help shows is what is parsed."""
+SEVERAL = "..."  # A metavar that ends so marks an option that takes several values: what --help shows is what is parsed
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -163,7 +162,6 @@ def describe_field(field: FieldInfo) -> str:
 
 
 def _list_types(annotation: Any) -> list[Any]:
-    """The plain types that a field may have."""
     origin = get_origin(annotation)
     if origin is Annotated:
         return _list_types(get_args(annotation)[0])

@@ -73,7 +73,6 @@ def control(
 
 
 def _task(order: RunOrder, folder: Path, make: Callable[..., Connection]) -> RunTask:
-    """Read what the order names."""
     robot = read_robot(order.robot)
     trajectory = read_trajectory(order.trajectory, robot)
     name, settings = order.backend.name, order.backend.settings
@@ -81,7 +80,6 @@ def _task(order: RunOrder, folder: Path, make: Callable[..., Connection]) -> Run
 
 
 def _refuse(record: RunRecord, error: TauscopeError) -> RunRecord:
-    """The record of a run that could not begin."""
     problem = RunProblem(code=error.code, detail=str(error))
     return record.moved(RunState.STOPPING, problem=problem).moved(RunState.FAILED)
 

@@ -56,7 +56,6 @@ class Violation:
     detail: str
 
     def __str__(self) -> str:
-        """One line for a message."""
         return f"{self.detail} ({self.rule})"
 
 
@@ -152,8 +151,7 @@ def guard_limits(
     )
 
 
-PERSISTENCE = 3
-"""Cycles in a row after which a measured speed counts: one noisy reading is no runaway."""
+PERSISTENCE = 3  # cycles in a row after which a measured speed counts: one noisy reading is no runaway
 
 _ROUNDING = 1e-9
 _NANOSECOND = 1e-9

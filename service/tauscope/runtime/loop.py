@@ -138,8 +138,7 @@ class Cycles:
 Report = Callable[[Mapping[str, Any]], None]
 """Takes an event: plain data with the key ``event``, one of ``state``, ``progress``, ``end``. Must be quick."""
 
-INTERVAL_S = 0.2
-"""Time between two words about progress."""
+INTERVAL_S = 0.2  # time between two words about progress
 
 
 def state_event(state: RunState, at: datetime) -> dict[str, Any]:

@@ -38,7 +38,6 @@ class Keeper(Protocol):
 
     def keep(self, record: RunRecord) -> None:
         """Keep the newest record; must not take time."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +61,7 @@ class Surroundings:
     report: Report
 
 
-LEAST_CYCLES_A_WATCHDOG = 2
-"""A watchdog has to outlast this many cycles, or every late one stops the arm."""
+LEAST_CYCLES_A_WATCHDOG = 2  # A watchdog has to outlast this many cycles, or every late one stops the arm
 
 
 def prepare(task: RunTask, backend: Backend, state: ArmState) -> Plan:
@@ -116,8 +114,7 @@ def _sound(backend: Backend, state: ArmState, options: RunOptions) -> ArmState:
     return state
 
 
-INTERNAL = "internal"
-"""Code of a problem that is a fault of Tauscope's own."""
+INTERNAL = "internal"  # code of a problem that is a fault of Tauscope's own
 
 
 class Run:
@@ -152,7 +149,6 @@ class Run:
         return self._conclude(end)
 
     def _move(self) -> None:
-        """Everything up to the end of the motion."""
         raise_if_requested(self._around.stops)
         self._enter(RunState.CONNECTING)
         connection = self._task.connect()
@@ -180,7 +176,6 @@ class Run:
                 self._stop_arm()
 
     def _enable_and_play(self, plan: Plan, backend: Backend, recorder: Recorder) -> None:
-        """The part in which the arm is under power."""
         options, stops = self._task.options, self._around.stops
         torque_mode = options.mode is ControlMode.TORQUE
         control = torque_control(self._task.robot, plan, options.bandwidth_rad_s) if torque_mode else None
@@ -205,7 +200,6 @@ class Run:
         self._is_played = True
 
     def _each_cycle(self, cycles: Cycles) -> None:
-        """Follow the phase, and report from time to time."""
         if self.record.state is RunState.RAMPING and cycles.plan.phase[cycles.metronome.index] == Phase.MOTION:
             self._enter(RunState.RUNNING)
         self._progress(cycles, self.record.state)
@@ -236,7 +230,6 @@ class Run:
         self._is_stopped = True
 
     def _conclude(self, end: RunState) -> RunRecord:
-        """Save what was recorded, and enter the end state."""
         lost, recording, problem = 0, None, self.record.problem
         if self._recorder is not None:
             remark = self._recorder.close()
@@ -275,7 +268,6 @@ class Run:
         return RunProblem(code=AcquisitionError.code, detail=detail)
 
     def _account(self) -> dict[str, Any]:
-        """What the loop leaves behind."""
         cycles = self._cycles
         if cycles is None:
             return {}
@@ -288,7 +280,6 @@ class Run:
         }
 
     def _enter(self, state: RunState, **changes: Any) -> None:
-        """Change the state, have it kept and tell it."""
         self.record = self.record.moved(state, **changes)
         self._around.keeper.keep(self.record)
         transition = self.record.history[-1]
@@ -298,13 +289,11 @@ class Run:
                 self._recorder.event(self._backend.clock.now_ns(), self._journal_event(transition))
 
     def _journal_event(self, transition: Transition) -> dict[str, Any]:
-        """A transition and, where there is one, its reason."""
         reason = self.record.stop if self.record.problem is None else self.record.problem.detail
         event = state_event(transition.state, transition.at)
         return event if reason is None else {**event, "reason": reason}
 
     def _tell(self, event: Any) -> None:
-        """Tell the owner, who may not be there any more."""
         try:
             self._around.report(event)
         except Exception:
@@ -313,7 +302,6 @@ class Run:
 
 
 def _outcome(cause: BaseException | None) -> tuple[RunState, dict[str, Any]]:
-    """The end that a run comes to, and what the record says of its cause."""
     if cause is None:
         return RunState.FINISHED, {}
     if isinstance(cause, StopAskedError):
@@ -334,7 +322,6 @@ def _problem(error: BaseException) -> RunProblem:
 
 
 def _reason(error: BaseException) -> str:
-    """The first line of what an error says."""
     return one_line(str(error)) or type(error).__name__
 
 
@@ -398,7 +385,6 @@ class _DirectKeeper:
         self._folder = folder
 
     def keep(self, record: RunRecord) -> None:
-        """Keep the newest record."""
         try:
             write_record(self._folder, record)
         except OSError as error:

@@ -38,11 +38,8 @@ from tauscope.runtime.run import prepare_folder
 from tauscope.runtime.states import RunState
 from tauscope.runtime.stop_listener import BEAT, STOP
 
-INTERRUPTED = "interrupted"
-"""Code of the problem of a run whose process is gone."""
-
-PATIENCE_S = 5.0
-"""Time that a control process without an owner may take to stop its arm before it is ended."""
+INTERRUPTED = "interrupted"  # code of the problem of a run whose process is gone
+PATIENCE_S = 5.0  # time that a control process without an owner may take to stop its arm before it is ended
 
 _WRITER_S = 10.0
 _POLL_S = 0.02
@@ -127,7 +124,6 @@ def _interrupt(folder: Path, record: RunRecord) -> RunRecord:
 
 
 def _write(folder: Path, record: RunRecord) -> RunRecord:
-    """Keep a record."""
     try:
         write_record(folder, record)
     except OSError as error:
@@ -135,8 +131,7 @@ def _write(folder: Path, record: RunRecord) -> RunRecord:
     return record
 
 
-BEATS_A_HEARTBEAT = 5
-"""How often an owner says that it is alive in the time after which it counts as gone."""
+BEATS_A_HEARTBEAT = 5  # how often an owner says that it is alive in the time after which it counts as gone
 
 _READ_BYTES = 2**16
 

@@ -22,8 +22,7 @@ from tauscope.errors import NotFoundError
 from tauscope.files import sync_folder
 from tauscope.server.auth.keys import utc_now
 
-GENESIS = "0" * 64
-"""What the first line names as the hash before."""
+GENESIS = "0" * 64  # what the first line names as the hash before
 
 
 def chained_line(previous: Mapping[str, Any] | None, content: Mapping[str, Any]) -> bytes:
@@ -90,7 +89,6 @@ def is_line_of_ours(line: bytes) -> bool:
 
 
 def _fault(entry: dict[str, Any] | None, number: int, previous: str, torn: bytes | None) -> str | None:
-    """What is wrong with an entry in its place."""
     if entry is None:
         return "is damaged"
     rest = {name: value for name, value in entry.items() if name != "hash"}
@@ -109,20 +107,14 @@ def _digest(entry: Mapping[str, Any]) -> str:
 
 
 def _canonical(entry: Mapping[str, Any]) -> bytes:
-    """One spelling of the same data."""
     return json.dumps(entry, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
 
 
 _log = logging.getLogger("tauscope.audit")
 
-AUDIT_FILE = "audit.jsonl"
-"""Name of the file, in the data folder."""
-
-_TAIL = 2**20
-"""Where the last entry is looked for; entries are far shorter [bytes]."""
-
-MOST_WAITING = 10_000
-"""Entries that wait for a disk that does not take them."""
+AUDIT_FILE = "audit.jsonl"  # name of the file, in the data folder
+_TAIL = 2**20  # where the last entry is looked for; entries are far shorter [bytes]
+MOST_WAITING = 10_000  # entries that wait for a disk that does not take them
 
 
 class AuditLog:
@@ -145,7 +137,6 @@ class AuditLog:
             raise NotFoundError(f"{self.path}: there is no audit log; name the service's data folder") from None
 
     def _content(self, actor: str, action: str, details: Mapping[str, Any]) -> dict[str, Any]:
-        """What an entry says."""
         known = {name: value for name, value in details.items() if value is not None}
         return {"time": self._clock().isoformat(), "actor": actor, "action": action, **known}
 

@@ -92,8 +92,7 @@ def is_stop(method: str, path: str) -> bool:
     return method == "POST" and re.fullmatch(rf"/api/v1/(stop|(runs|campaigns)/{_ITEM}/stop)", path) is not None
 
 
-KEY_FILE = "keys.json"
-"""Name of the file, in the data folder."""
+KEY_FILE = "keys.json"  # name of the file, in the data folder
 
 _PREFIX = "tsk"
 _NOBODY = "0" * 64
@@ -216,7 +215,6 @@ def utc_now() -> datetime:
 
 
 def _hash(salt: str, secret: str) -> str:
-    """What is kept of a secret."""
     return hashlib.sha256(bytes.fromhex(salt) + secret.encode("utf-8", "surrogatepass")).hexdigest()
 
 
@@ -235,8 +233,7 @@ class Caller:
     scope: Scope
 
 
-LOCAL = Caller("local", None, Scope.ADMIN)
-"""Anybody on this machine, as long as the service has no keys."""
+LOCAL = Caller("local", None, Scope.ADMIN)  # anybody on this machine, as long as the service has no keys
 
 
 class KeyRing:

@@ -27,11 +27,9 @@ from tauscope.server.control.run import (
 from tauscope.server.control.run_manager import RunManager, run_recording_name
 from tauscope.server.control.supervised_threads import Manager
 from tauscope.server.queue.analyses import (
-    DiagnosisOrder,
     DiagnosisWorkspace,
     ExcitationOrder,
     ExcitationWorkspace,
-    IdentificationOrder,
     IdentificationWorkspace,
 )
 from tauscope.server.queue.job_folder import JobProblem, JobRecord, JobState, StoppedError, Workspace
@@ -47,15 +45,11 @@ from tauscope.server.store.data_folder import ItemStore, staged_identifier
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.tasks.campaign import backend_of_run
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
-from tauscope.tasks.diagnose import DiagnosisOptions
 
 _log = logging.getLogger("tauscope.jobs")
 
-POLL_S = 0.2
-"""How often the progress of a run is told [s]."""
-
-RETRY_S = 0.5
-"""How often a queue, or a disk, that is full is asked again [s]."""
+POLL_S = 0.2  # how often the progress of a run is told [s]
+RETRY_S = 0.5  # how often a queue, or a disk, that is full is asked again [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,29 +137,29 @@ class CampaignRunner:
         return JobState.SUCCEEDED, None
 
     def _run_steps(self) -> None:
-        """Every step that is not done yet, one after the other."""
         made, order = self._workspace.read_made(), self._order
         if not made.recordings:
             self._begin("design the motion")
             excitation = self._design(order.excitation, "excitation")
             held_out_options = order.held_out_options()
             held_out = held_out_options and self._design(held_out_options, "held_out_excitation")
-            self._wait(ExcitationWorkspace, self._dependencies.excitations, excitation, "excitation")
+            self._wait(self._dependencies.excitations, excitation, "excitation")
             self._begin("run the motion")
             recordings = (self._run_motion(excitation, "run"),)
             judges: tuple[str, ...] = ()
             if held_out:
                 self._begin("design the held-out motion")
-                self._wait(ExcitationWorkspace, self._dependencies.excitations, held_out, "excitation")
+                self._wait(self._dependencies.excitations, held_out, "excitation")
                 self._begin("run the held-out motion")
                 judges = (self._run_motion(held_out, "held_out_run"),)
             self._record(recordings=recordings, held_out=judges)
         self._release_arm()
         self._begin("identify")
-        self._identify()
+        kinds = self._dependencies
+        self._analyse("identification", kinds.identifications, IdentificationWorkspace, order.identification)
         if order.diagnosis is not None:
             self._begin("diagnose")
-            self._diagnose(order.diagnosis)
+            self._analyse("diagnosis", kinds.diagnoses, DiagnosisWorkspace, order.diagnosis)
 
     def _design(self, options: ExcitationDesignOptions, link: str) -> str:
         """Have a motion designed; returns at once."""
@@ -175,7 +169,6 @@ class CampaignRunner:
         return identifier
 
     def _submit(self, kind: JobKind, workspace: type[TaskWorkspace[Order]], order: Order) -> str:
-        """Hand a job in, as soon as the queue takes one."""
         while True:
             try:
                 return submit_job(self._dependencies.jobs, kind, workspace, order, self._put_robot)
@@ -184,12 +177,10 @@ class CampaignRunner:
                     raise StoppedError from None
 
     def _put_robot(self, folder: Path) -> None:
-        """Copy the robot's files into a job's or a run's folder."""
         shutil.copytree(self._workspace.robot, folder, dirs_exist_ok=True)
 
-    def _wait(self, workspace: type[Workspace], kind: JobKind, identifier: str, noun: str) -> None:
-        """Wait for a job to succeed."""
-        record = wait_for_end(workspace(kind.items.folder(identifier)), self._stop_requested)
+    def _wait(self, kind: JobKind, identifier: str, noun: str) -> None:
+        record = wait_for_end(Workspace(kind.items.folder(identifier)), self._stop_requested)
         if record is None:
             raise StoppedError
         require_succeeded(record, f"{noun} {identifier}")
@@ -231,28 +222,16 @@ class CampaignRunner:
                 self._workspace.write_progress(told, {"run": run, "state": live.state.value})
             threading.Event().wait(POLL_S)
 
-    def _identify(self) -> None:
-        """From the recordings to the model."""
-        dependencies, made = self._dependencies, self._workspace.read_made()
-        identifier = self._find_submitted(dependencies.identifications, made.identification)
+    def _analyse(self, link: str, kind: JobKind, workspace: type[TaskWorkspace[Any]], options: Any) -> None:
+        """Have the recordings analysed; goes on with what was submitted before the service was started again."""
+        identifier = self._find_submitted(kind, getattr(self._workspace.read_made(), link))
         if identifier is None:
-            order = IdentificationOrder(**self._robot, **self._recordings(), options=self._order.identification)
-            identifier = self._submit(dependencies.identifications, IdentificationWorkspace, order)
-        self._record(identification=identifier)
-        self._wait(Workspace, dependencies.identifications, identifier, "identification")
-
-    def _diagnose(self, options: DiagnosisOptions) -> None:
-        """From the same recordings to what the model leaves out."""
-        dependencies, made = self._dependencies, self._workspace.read_made()
-        identifier = self._find_submitted(dependencies.diagnoses, made.diagnosis)
-        if identifier is None:
-            order = DiagnosisOrder(**self._robot, **self._recordings(), options=options)
-            identifier = self._submit(dependencies.diagnoses, DiagnosisWorkspace, order)
-        self._record(diagnosis=identifier)
-        self._wait(Workspace, dependencies.diagnoses, identifier, "diagnosis")
+            order = workspace.order_type(**self._robot, **self._recordings(), options=options)
+            identifier = self._submit(kind, workspace, order)
+        self._record(**{link: identifier})
+        self._wait(kind, identifier, link)
 
     def _recordings(self) -> dict[str, Any]:
-        """The recordings made so far, as an order holds them."""
         made = self._workspace.read_made()
         lists = {"recordings": made.recordings, "held_out": made.held_out}
         return {role: ordered_on_server(self._dependencies.recordings, names) for role, names in lists.items()}
@@ -273,11 +252,9 @@ class CampaignRunner:
         self._workspace.write_step(step)
 
     def _record(self, **made: object) -> None:
-        """Keep what was made."""
         self._workspace.write_made(self._workspace.read_made().model_copy(update=made))
 
     def _cancel_jobs(self) -> None:
-        """Nobody waits for what is still designed, identified or diagnosed."""
         made, dependencies = self._workspace.read_made(), self._dependencies
         jobs = [(dependencies.excitations, made.excitation), (dependencies.excitations, made.held_out_excitation)]
         jobs += [(dependencies.identifications, made.identification), (dependencies.diagnoses, made.diagnosis)]
@@ -302,7 +279,6 @@ class CampaignRunner:
 
 
 def _run_problem(identifier: str, record: RunRecord | None) -> JobProblem:
-    """Why a run brings a campaign to its end."""
     if record is None:
         return JobProblem(code="damaged", detail=f"run {identifier}: its files are missing or damaged; begin anew")
     if record.problem is not None:
@@ -365,7 +341,6 @@ class CampaignManager(Manager[CampaignRunner]):
         return state
 
     def _resume(self, workspace: CampaignWorkspace) -> None:
-        """Continue or end a campaign of an earlier service."""
         record, order = workspace.read_record(), workspace.read_order()
         if record is None or record.state.is_end:
             workspace.tell_lost_end()

@@ -58,7 +58,6 @@ class DeviceClaims:
 
     @staticmethod
     def _busy(device: str, holder: str) -> BusyError:
-        """Somebody has it."""
         return BusyError(one_line(f"{device}: {holder} has it; wait until that has ended, or stop it"))
 
 
@@ -67,15 +66,12 @@ class Permit(Protocol):
 
     def require(self) -> None:
         """Refuse a motion that may not begin. Raises LeaseError if it may not."""
-        ...
 
     def find_end_reason(self) -> str | None:
         """Why the motion may not go on; None while it may."""
-        ...
 
     def disarm(self) -> None:
         """Somebody stopped the arm: before it moves again, it has to be armed again."""
-        ...
 
 
 class FreePermit:
@@ -92,8 +88,7 @@ class FreePermit:
         """Nothing to take back."""
 
 
-FREE = FreePermit()
-"""Leave that is never taken back."""
+FREE = FreePermit()  # leave that is never taken back
 
 
 class LeaseError(AcquisitionError):
@@ -116,8 +111,7 @@ class NotArmedError(LeaseError):
     """The lease is good, but nobody has armed it."""
 
 
-LONGEST_TTL_S = 60.0
-"""Longest time for which a lease may be given without a sign of life [s]."""
+LONGEST_TTL_S = 60.0  # longest time for which a lease may be given without a sign of life [s]
 
 
 @dataclass(eq=False)
@@ -317,19 +311,16 @@ class Leases:
             raise self._refuse_leased(present)
 
     def _present(self, device: str) -> Lease | None:
-        """The lease that holds for an arm."""
         lease = self._active.get(device)
         return None if lease is None or self.find_end_reason(lease) is not None else lease
 
     def _finish(self, lease: Lease, why: str) -> None:
-        """A lease ends, once."""
         if lease.lost is None:
             lease.lost = why
             lease.is_armed = False
             self._on_end(lease, why)
 
     def _refuse_leased(self, lease: Lease) -> LeasedError:
-        """Somebody has the arm."""
         left = self.seconds_left(lease)
         return LeasedError(
             one_line(f"{lease.device}: {lease.holder} has its lease, for {left:.1f} s more unless it is renewed")

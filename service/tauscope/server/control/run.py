@@ -156,7 +156,6 @@ class RunWorkspace(JobFolder):
 
     @property
     def _has_begun(self) -> bool:
-        """Whether the control process has a record of its own."""
         return (self.control / RUN_FILE).exists()
 
 
@@ -195,8 +194,7 @@ Motion = Callable[[RunWorkspace, threading.Event], bool]
 Raises TauscopeError where there is none.
 """
 
-POLL_S = 0.05
-"""How often the state of a job is looked at by whoever waits for it [s]."""
+POLL_S = 0.05  # how often the state of a job is looked at by whoever waits for it [s]
 
 
 def ready_motion(run: RunWorkspace, stop: threading.Event) -> bool:

@@ -22,11 +22,8 @@ from tauscope.server.store.recordings import RecordingStore
 
 _log = logging.getLogger("tauscope.jobs")
 
-BEAT_S = 0.1
-"""How often the control process is told that its owner is alive, at least [s]."""
-
-BEATS_A_HEARTBEAT = 5
-"""How often it is told so in the time after which it counts its owner as gone."""
+BEAT_S = 0.1  # how often the control process is told that its owner is alive, at least [s]
+BEATS_A_HEARTBEAT = 5  # how often it is told so in the time after which it counts its owner as gone
 
 
 class ControlProcess(Protocol):
@@ -34,11 +31,9 @@ class ControlProcess(Protocol):
 
     def stop(self) -> None:
         """Ask it to stop; returns at once, may be called at any time and any number of times."""
-        ...
 
     def beat(self) -> None:
         """Say that the owner is alive."""
-        ...
 
     def wait(self, timeout_s: float | None = None) -> RunRecord:
         """Wait for the end of the run.
@@ -47,7 +42,6 @@ class ControlProcess(Protocol):
 
         `timeout_s`: how long; for good where None [s].
         """
-        ...
 
 
 StartControl = Callable[[RunWorkspace, Report], ControlProcess]
@@ -96,7 +90,6 @@ class RunSupervisor:
         self.stop()
 
     def _halt(self) -> None:
-        """Stop without disarming."""
         self._stop_requested.set()
         # Whoever starts the control process looks at the flag after it has told us of the process.
         control = self._control
@@ -155,7 +148,6 @@ class RunSupervisor:
             _log.exception("a step of run %s could not be written", self._workspace.folder.name)
 
     def _handle_event(self, event: Mapping[str, Any]) -> None:
-        """Tell what the control process said."""
         state = RunState(event["state"])
         if event["event"] == "state":
             self.live = Live(state, self.live.percent, self.live.figures)
@@ -167,7 +159,6 @@ class RunSupervisor:
             self._workspace.write_progress(self.live.percent, figures)
 
     def _end(self, state: RunState, code: str | None = None, detail: str = "") -> None:
-        """Give a run an end that has no control process to give it one."""
         if self._control is not None:
             self._control.stop()
             return
@@ -192,7 +183,6 @@ class RunManager(Manager[RunSupervisor]):
         is_alive: Callable[[], bool],
         on_end: Callable[[RunRecord], None] = lambda _record: None,
     ) -> None:
-        """Mark the unfinished runs of an earlier service as `interrupted`."""
         super().__init__(items)
         self.claims = claims
         self._recordings = recordings
@@ -270,7 +260,6 @@ class RunManager(Manager[RunSupervisor]):
             self._on_end(record)
 
     def _end(self, workspace: RunWorkspace, claim: tuple[str, str] | None) -> None:
-        """Put everything in its place after a run."""
         try:
             workspace.recover()
             self._conclude(workspace)
@@ -280,7 +269,6 @@ class RunManager(Manager[RunSupervisor]):
             self._release(claim)
 
     def _release(self, claim: tuple[str, str] | None) -> None:
-        """Let go of the arm, where the run took it itself."""
         if claim is not None:
             self.claims.release(*claim)
 

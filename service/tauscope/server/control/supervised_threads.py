@@ -16,15 +16,12 @@ class Supervisor(Protocol):
 
     def run(self) -> None:
         """Supervise to the end; never raises."""
-        ...
 
     def stop(self) -> None:
         """Stop, in any state; takes no lock, returns at once, may be called repeatedly."""
-        ...
 
     def interrupt(self) -> None:
         """Stop because the service ends; as `stop` otherwise."""
-        ...
 
 
 S = TypeVar("S", bound=Supervisor)

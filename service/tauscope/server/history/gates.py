@@ -126,7 +126,6 @@ def is_physical(link: LinkEntry) -> bool:
 
 
 def _ratios(rms: Sequence[float], floor: Sequence[float], joints: Sequence[str]) -> Iterator[tuple[float, str]]:
-    """For each joint how many times the floor its residual is."""
     for value, reference, joint in zip(rms, floor, joints, strict=True):
         yield (value / reference if reference > 0.0 else (1.0 if value == 0.0 else float("inf"))), joint
 

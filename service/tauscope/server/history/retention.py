@@ -75,7 +75,6 @@ def remove(
 
 
 def _is_gone(remove_one: Callable[[str], object], name: str) -> bool:
-    """Whether it was there, and went."""
     try:
         remove_one(name)
     except NotFoundError:

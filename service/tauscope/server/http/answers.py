@@ -2,7 +2,7 @@
 
 import math
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from fastapi import Path, Query, Request
 from pydantic import BeforeValidator, ConfigDict, Field
@@ -17,6 +17,12 @@ class AnswerModel(StrictModel):
 
     model_config = ConfigDict(from_attributes=True)
 
+    @classmethod
+    def describe(cls, entry: object, **more: Any) -> Self:
+        """The answer that holds an entry's attributes. `more`: those that it has not, or has by another name."""
+        names = (name for name in cls.model_fields if name not in more and hasattr(entry, name))
+        return cls.model_validate({name: getattr(entry, name) for name in names} | more)
+
 
 class PageAnswer(AnswerModel):
     """A page of a list."""
@@ -29,8 +35,7 @@ def _no_nan(value: Any) -> Any:
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
-Measured = Annotated[float | None, BeforeValidator(_no_nan)]
-"""A number, or null where there was nothing to measure."""
+Measured = Annotated[float | None, BeforeValidator(_no_nan)]  # A number, or null where there was nothing to measure
 
 
 Identifier = Annotated[str, Path(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])]

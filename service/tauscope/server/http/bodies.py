@@ -48,6 +48,8 @@ async def read_document(request: Request, kind: type[Model], limit: int) -> Mode
 
     `limit`: largest body [bytes].
     """
+    if media_type(request) != JSON:
+        raise refuse_media_type(request, JSON)
     content = bytearray()
     async for piece in request.stream():
         content += piece
@@ -120,6 +122,8 @@ async def receive_form(request: Request, rules: Mapping[str, PartRule]) -> Recei
     Raises ProblemError if the body is no form, or has a part that is not foreseen, or a file of a name that is not
     allowed; or the caller has sent enough for now. Raises LimitExceededError if a part is too large.
     """
+    if media_type(request) != FORM:
+        raise refuse_media_type(request, FORM)
     charge = require_upload_quota(request.scope)
     receiver = _Receiver(rules)
     with _form_errors():
@@ -148,7 +152,6 @@ def _feed(parser: MultipartParser, piece: bytes) -> None:
 
 @contextmanager
 def _form_errors() -> Iterator[None]:
-    """The parser's complaints as problems."""
     try:
         yield
     except FormParserError as error:
@@ -170,7 +173,6 @@ class _Receiver:
         self._file: IncomingFile | None = None
 
     def callbacks(self) -> "MultipartCallbacks":
-        """What the parser calls."""
         return {
             "on_part_begin": self._part_begin,
             "on_header_field": self._header_field,
@@ -183,7 +185,6 @@ class _Receiver:
         }
 
     def discard(self) -> None:
-        """Remove everything that was written."""
         if self._file is not None:
             self._file.discard()
         for file in (file for files in self.form.files.values() for file in files):
@@ -222,7 +223,6 @@ class _Receiver:
         self._file = IncomingFile(rule.folder, self._accept_name(name), rule.limit)
 
     def _accept_name(self, name: str | None) -> str:
-        """The name of a file, if the form may have such a file."""
         files = self.form.files.setdefault(self._part, [])
         if name is None:
             raise ProblemError("invalid-request", f"part {self._part}: is not a file; send it with a file name")

@@ -167,7 +167,6 @@ def result_of(services: Services, identifier: str, root: str) -> CampaignResult:
 
 
 def _steps(services: Services, order: CampaignOrder, made: CampaignLinks, root: str) -> Iterator[CampaignStepAnswer]:
-    """Every step with its state."""
     steps: list[tuple[StepName, str, Callable[[Services, str], Any], str | None, bool]] = [
         ("design", "excitations", EXCITATIONS.find, made.excitation, True),
         ("held-out design", "excitations", EXCITATIONS.find, made.held_out_excitation, order.held_out is not None),
@@ -186,7 +185,6 @@ def _steps(services: Services, order: CampaignOrder, made: CampaignLinks, root: 
 
 
 def _state(services: Services, find: Callable[[Services, str], Any], identifier: str) -> str:
-    """The state of a step's job or run."""
     try:
         folder = find(services, identifier)
     except NotFoundError:
@@ -196,7 +194,6 @@ def _state(services: Services, find: Callable[[Services, str], Any], identifier:
 
 
 def _links(here: str, root: str, made: CampaignLinks, *, has_result: bool) -> CampaignLinksAnswer:
-    """Where to go on."""
     identification = made.identification
     return CampaignLinksAnswer(
         self=here,

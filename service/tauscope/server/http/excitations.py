@@ -127,5 +127,4 @@ async def get_trajectory(
 
 
 def _name_file(suffix: str) -> dict[str, str]:
-    """The header by which a browser saves a trajectory."""
     return {"Content-Disposition": f'attachment; filename="trajectory.{suffix}"'}

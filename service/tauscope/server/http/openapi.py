@@ -12,7 +12,7 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel
-from pydantic.json_schema import models_json_schema
+from pydantic.json_schema import JsonSchemaMode, models_json_schema
 
 from tauscope.server.auth.gate import is_audited
 from tauscope.server.auth.keys import find_needed_scope, is_stop
@@ -38,11 +38,8 @@ _COMMON = (
 )
 """Problems that any request to the interface may meet, before its route or in it."""
 
-_VALUES = ("examples", "default", "enum", "const")
-"""Keywords of a schema that hold plain data."""
-
-_LEAST_SHARED = 150
-"""A shorter schema is not worth a name and two references [characters]."""
+_VALUES = ("examples", "default", "enum", "const")  # keywords of a schema that hold plain data
+_LEAST_SHARED = 150  # A shorter schema is not worth a name and two references [characters]
 
 SCHEMAS = "#/components/schemas/"
 
@@ -99,7 +96,6 @@ def _drop_descriptions_of_answers(document: dict[str, Any]) -> None:
 
 
 def _find_schemas(schemas: dict[str, Any], node: Any) -> set[str]:
-    """Names of the schemas to which a part of the document leads."""
     open_, found = [json.dumps(node)], set[str]()
     while open_:
         new = set(re.findall(r'"#/components/schemas/([^"]+)"', open_.pop())) - found
@@ -109,13 +105,11 @@ def _find_schemas(schemas: dict[str, Any], node: Any) -> set[str]:
 
 
 def _operations(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """Operations of all paths."""
     for operations in document["paths"].values():
         yield from operations.values()
 
 
 def _schema_nodes(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """Every schema of the document, within others too."""
     yield from _nodes([*document["components"]["schemas"].values(), *_operations(document)])
 
 
@@ -276,14 +270,18 @@ def _share_properties(document: dict[str, Any]) -> None:
 
 _REFERENCE = SCHEMAS + "{model}"
 
-Examples = Mapping[str, tuple[str, Any]]
-"""For each example its summary and its value."""
+Examples = Mapping[str, tuple[str, Any]]  # for each example its summary and its value
 
 
 def json_body(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
     """A JSON body of an operation. `examples`: mapping of str to (str, plain data), summary and value by name."""
     shown = {name: {"summary": summary, "value": value} for name, (summary, value) in examples.items()}
     return {"application/json": {"schema": refer_to_model(model), "examples": shown}}
+
+
+def json_request(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
+    """The further entries of an operation that takes JSON alone."""
+    return {"requestBody": {"required": True, "content": json_body(model, examples)}}
 
 
 def form_body(parts: Mapping[str, Any], required: Sequence[str]) -> dict[str, Any]:
@@ -320,8 +318,7 @@ def file_contents(*media_types: str) -> dict[str, Any]:
     return {media_type: {"schema": schemas.get(media_type, {"type": "string"})} for media_type in ordered}
 
 
-_referred: set[type[BaseModel]] = {Problem}
-"""Models of bodies that the framework does not see."""
+_referred: set[type[BaseModel]] = {Problem}  # models of bodies that the framework does not see
 
 
 def refer_to_model(model: type[BaseModel]) -> dict[str, str]:
@@ -353,7 +350,9 @@ def install_openapi(app: FastAPI) -> None:
                 description=app.description,
                 routes=app.routes,
             )
-            kinds = [(model, "validation") for model in sorted(_referred, key=lambda each: each.__name__)]
+            kinds: list[tuple[type[BaseModel], JsonSchemaMode]] = [
+                (model, "validation") for model in sorted(_referred, key=lambda each: each.__name__)
+            ]
             _, definitions = models_json_schema(kinds, ref_template=_REFERENCE)
             schemas = whole.setdefault("components", {}).setdefault("schemas", {})
             schemas.update(definitions.get("$defs", {}))
@@ -366,8 +365,7 @@ def install_openapi(app: FastAPI) -> None:
     app.openapi = document
 
 
-_REPEATED = ("not-repeatable", "key-reused")
-"""Further problems of a request that comes with the header `ONCE`."""
+_REPEATED = ("not-repeatable", "key-reused")  # further problems of a request that comes with the header `ONCE`
 
 _ONCE_PARAMETER = {
     "name": ONCE,

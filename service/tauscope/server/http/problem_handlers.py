@@ -47,14 +47,12 @@ async def require_known_query(request: Request) -> None:
 
 
 def _find_names(dependant: Dependant) -> Iterator[str]:
-    """Names of all query parameters of a route, and of what it depends on."""
     yield from (field.alias for field in dependant.query_params)
     for other in dependant.dependencies:
         yield from _find_names(other)
 
 
-Methods = Sequence[tuple[re.Pattern[str], frozenset[str]]]
-"""For each route the pattern of its path, and its methods."""
+Methods = Sequence[tuple[re.Pattern[str], frozenset[str]]]  # for each route the pattern of its path, and its methods
 
 
 def collect_methods(routers: Iterable[tuple[str, APIRouter]]) -> Methods:
@@ -93,7 +91,6 @@ def install_problem_handlers(app: FastAPI) -> None:
 
 
 async def _tauscope_error(request: Request, error: Exception) -> Response:
-    """A failure that Tauscope foresees."""
     if isinstance(error, QueueFullError):
         return problem_answer(make_problem("queue-full", str(error), request.url.path), {"Retry-After": "10"})
     if isinstance(error, BusyError):
@@ -105,7 +102,6 @@ async def _tauscope_error(request: Request, error: Exception) -> Response:
 
 
 async def _validation_error(request: Request, error: Exception) -> Response:
-    """Path or query parameters that are not as documented."""
     assert isinstance(error, RequestValidationError)  # noqa: S101 - Starlette looks handlers up by type
     fields = field_errors(error.errors())
     return problem_answer(make_problem("invalid-request", summarise(fields), request.url.path, fields))
@@ -138,5 +134,4 @@ async def _system_error(request: Request, error: Exception) -> Response:
 
 
 async def _client_gone(_request: Request, _error: Exception) -> Response:
-    """Nobody reads the answer."""
     return Response(status_code=400)

@@ -19,11 +19,8 @@ from prometheus_client.registry import Collector
 
 from tauscope.errors import StoreError
 
-BEAT_S = 0.1
-"""How often the event loop shows that it turns [s]."""
-
-SILENCE_S = 2.0
-"""Silence of the event loop after which it counts as stuck [s]."""
+BEAT_S = 0.1  # how often the event loop shows that it turns [s]
+SILENCE_S = 2.0  # silence of the event loop after which it counts as stuck [s]
 
 
 class Heartbeat:
@@ -101,17 +98,13 @@ async def notify_systemd() -> AsyncIterator[None]:
                 await task
 
 
-LEAST_FREE_BYTES = 64 * 2**20
-"""Room on the disk below which no run should begin [bytes]."""
-
-TIMEOUT_S = 2.0
-"""How long each part may take to answer [s]."""
+LEAST_FREE_BYTES = 64 * 2**20  # room on the disk below which no run should begin [bytes]
+TIMEOUT_S = 2.0  # how long each part may take to answer [s]
 
 EARLIEST = datetime(2026, 1, 1, tzinfo=UTC)
 """A clock before this moment was never set: identifiers, leases and schedules would be wrong."""
 
-MOST_SETBACK_S = 60.0
-"""How far the clock may be set back while the service runs: items are sorted by it [s]."""
+MOST_SETBACK_S = 60.0  # how far the clock may be set back while the service runs: items are sorted by it [s]
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,13 +12,10 @@ from starlette.concurrency import run_in_threadpool
 from tauscope.recording import EffortKind
 from tauscope.server.http.answers import After, AnswerModel, Measured, PageAnswer
 from tauscope.server.http.bodies import (
-    FORM,
     PartRule,
     file_answer,
-    media_type,
     parse_document,
     receive_form,
-    refuse_media_type,
 )
 from tauscope.server.http.evidence import require_no_evidence
 from tauscope.server.http.openapi import binary_part, file_contents, form_body, refer_to_model
@@ -149,8 +146,6 @@ _BODY = form_body({"file": binary_part("the recording: CSV, Parquet, MCAP or a r
 )
 async def keep_recording(request: Request, response: Response, services: ServicesDep) -> RecordingAnswer:
     """The file is kept under its own name; nothing is ever overwritten."""
-    if media_type(request) != FORM:
-        raise refuse_media_type(request, FORM)
     folder = await run_in_threadpool(services.recordings.stage)
     try:
         rules = {"file": PartRule(services.settings.max_upload_bytes, folder)}
@@ -244,7 +239,6 @@ def remove_recording(name: Name, services: ServicesDep) -> None:
 
 
 def _answer(recording: StoredRecording) -> RecordingAnswer:
-    """The answer that holds a recording's entry."""
     return RecordingAnswer.model_validate(recording)
 
 
@@ -269,8 +263,6 @@ _MAPPING_BODY = form_body(
 )
 async def check_sent_recording(request: Request, services: ServicesDep) -> UnderstandingAnswer:
     """Its columns and units as they are understood, and what it holds when it is read so; nothing is kept."""
-    if media_type(request) != FORM:
-        raise refuse_media_type(request, FORM)
     folder = await run_in_threadpool(services.recordings.stage)
     try:
         settings, robots = services.settings, folder / "robot"

@@ -17,14 +17,14 @@ from starlette.datastructures import Headers
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Send
 from starlette.types import Scope as AsgiScope
+from typing_extensions import override
 
 from tauscope.files import sync_folder, write_atomically
-from tauscope.server.auth.gate import find_caller
+from tauscope.server.auth.gate import HttpMiddleware, find_caller
 from tauscope.server.problems import make_problem, problem_answer
 from tauscope.strict_model import StrictModel
 
-LIFE_S = 24 * 3600.0
-"""How long an answer is kept [s]."""
+LIFE_S = 24 * 3600.0  # how long an answer is kept [s]
 
 
 class KeptAnswer(StrictModel):
@@ -131,8 +131,7 @@ class Fingerprint:
 
 HEADER = "Idempotency-Key"
 
-LONGEST_KEY = 200
-"""Most characters of the header's value."""
+LONGEST_KEY = 200  # most characters of the header's value
 
 _REPEATABLE = re.compile(
     r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|rollouts|recordings|schedules/[^/]+/run)"
@@ -140,16 +139,16 @@ _REPEATABLE = re.compile(
 _KEY = re.compile(rf"[\x21-\x7e]{{1,{LONGEST_KEY}}}")
 
 
-class IdempotentRequests:
+class IdempotentRequests(HttpMiddleware):
     """Answers a request that came before with the answer of then."""
 
     def __init__(self, app: ASGIApp) -> None:
-        self.app = app
+        super().__init__(app)
         self._underway: set[str] = set()
 
-    async def __call__(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
-        """Answer a request."""
-        key = Headers(scope=scope).get(HEADER) if scope["type"] == "http" else None
+    @override
+    async def answer(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
+        key = Headers(scope=scope).get(HEADER)
         if key is None or scope["method"] != "POST" or not is_repeatable(scope["path"]):
             return await self.app(scope, receive, send)
         if not _KEY.fullmatch(key):
@@ -172,7 +171,6 @@ class IdempotentRequests:
             self._underway.discard(name)
 
     async def _answer_first(self, scope: AsgiScope, receive: Receive, send: Send, name: str) -> None:
-        """Answer a request that is new, and keep the answer before it is sent."""
         store = _answers_of(scope)
         fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
         answer = _Captured()
@@ -195,7 +193,6 @@ def is_repeatable(path: str) -> bool:
 
 
 def _answers_of(scope: AsgiScope) -> StoredAnswers:
-    """Where answers are kept."""
     return cast(StoredAnswers, scope["app"].state.services.answers)
 
 
@@ -209,7 +206,6 @@ class _Captured:
         self._headers: list[tuple[bytes, bytes]] = []
 
     async def take(self, message: Message) -> None:
-        """Take a part of it."""
         self.messages.append(message)
         if message["type"] == "http.response.start":
             self.status, self._headers = message["status"], list(message["headers"])
@@ -217,13 +213,10 @@ class _Captured:
             self.body += message.get("body", b"")
 
     def header_texts(self) -> tuple[tuple[str, str], ...]:
-        """Its headers as text."""
         return tuple((name.decode("latin-1"), value.decode("latin-1")) for name, value in self._headers)
 
 
 def _count_body(receive: Receive, fingerprint: Fingerprint) -> Receive:
-    """The body on its way to the application."""
-
     async def received() -> Message:
         message = await receive()
         fingerprint.add(message.get("body", b"") or b"")
@@ -233,7 +226,6 @@ def _count_body(receive: Receive, fingerprint: Fingerprint) -> Receive:
 
 
 async def _repeat(scope: AsgiScope, receive: Receive, store: StoredAnswers, name: str, is_underway: bool) -> Response:
-    """The answer to a request that came before."""
     fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
     more = True
     while more:

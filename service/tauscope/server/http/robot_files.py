@@ -113,14 +113,11 @@ class RobotReportAnswer(AnswerModel):
         return cls.model_validate(report)
 
 
-FOLDERS = frozenset({"assetdir", "meshdir", "texturedir"})
-"""Attributes of an MJCF that name a folder."""
+FOLDERS = frozenset({"assetdir", "meshdir", "texturedir"})  # attributes of an MJCF that name a folder
 
 _MOST_BODIES = 1000
 _MOST_CELLS = 2**24  # a texture of 4096 by 4096
-
-INLINE_NAME = "robot.json"
-"""File name of a robot that came as JSON; YAML readers read JSON."""
+INLINE_NAME = "robot.json"  # file name of a robot that came as JSON; YAML readers read JSON
 
 
 def robot_part_rules(folder: Path) -> dict[str, PartRule]:

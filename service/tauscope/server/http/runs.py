@@ -73,7 +73,6 @@ class RunRequest(RunOptions, RobotRequest, strict=True):
 
     @model_validator(mode="after")
     def _check_motion(self) -> Self:
-        """One motion at most."""
         if self.excitation is not None and self.trajectory is not None:
             raise PydanticCustomError("motions", "excitation and trajectory are both given; give one motion")
         return self
@@ -197,28 +196,17 @@ def describe(services: Services, identifier: str, root: str) -> RunAnswer:
         problem = make_problem("damaged", detail, here)
         return RunAnswer(id=identifier, state="damaged", problem=problem, links=_links(here, None, None, workspace))
     goes_on = live is not None and not record.state.is_end
-    return RunAnswer(
+    return RunAnswer.describe(
+        record,
         id=identifier,
-        state=record.state,
         step=workspace.read_step() if goes_on else None,
         percent=live.percent if live is not None and goes_on else 100.0 * record.played,
         figures=dict(live.figures) if live is not None and goes_on else {},
         created=record.history[0].at,
         ended=record.history[-1].at if record.state.is_end else None,
-        robot=record.robot,
         backend=request.backend,
         options=request.options,
         campaign=request.campaign,
-        stop_policy=record.stop_policy,
-        ramp_s=record.ramp_s,
-        motion_s=record.motion_s,
-        holds=record.holds,
-        drives=record.drives,
-        kept=record.kept,
-        timing=record.timing,
-        real_time=record.real_time,
-        worst_following=record.worst_following,
-        stop=record.stop,
         problem=shown_problem(workspace.problem(), here),
         recording=_recording(services, identifier, record),
         links=_links(here, request.excitation and f"{root}/excitations/{request.excitation}", record, workspace),
@@ -242,18 +230,10 @@ def require_recording(services: Services, identifier: str, format_: RecordingFor
 
 
 def _recording(services: Services, identifier: str, record: RunRecord) -> RunRecordingAnswer | None:
-    """What a run left behind."""
     left, name = record.recording, run_recording_name(identifier)
     if left is None:
         return None
-    is_kept = services.recordings.holds(name)
-    return RunRecordingAnswer(
-        name=name if is_kept else None,
-        samples=left.samples,
-        partial=left.partial,
-        lost_rows=left.lost_rows,
-        remarks=left.remarks,
-    )
+    return RunRecordingAnswer.describe(left, name=name if services.recordings.holds(name) else None)
 
 
 def _links(here: str, excitation: str | None, record: RunRecord | None, workspace: RunWorkspace) -> RunLinks:
@@ -267,8 +247,7 @@ def _links(here: str, excitation: str | None, record: RunRecord | None, workspac
     )
 
 
-LARGEST_TRAJECTORY = 64 * 2**20
-"""Bytes of the largest trajectory file that is accepted."""
+LARGEST_TRAJECTORY = 64 * 2**20  # bytes of the largest trajectory file that is accepted
 
 
 async def submit_run(request: Request, services: Services) -> str:
@@ -317,7 +296,6 @@ def _put_robot(received: Received[RunRequest], services: Services, workspace: Ru
 def _prepare(
     received: Received[RunRequest], services: Services, workspace: RunWorkspace, robot_file: str, robot: Robot
 ) -> _Wanted:
-    """Put the trajectory into its place."""
     document = received.document
     uploaded = received.form.file("trajectory") is not None
     if document.trajectory is not None:
@@ -335,7 +313,6 @@ def _prepare(
 
 
 def _submit(wanted: _Wanted, services: Services, workspace: RunWorkspace, permit: Permit) -> str:
-    """Settle what is moved, and how, and begin."""
     document, backend = wanted.document, wanted.backend
     device = backend.device(wanted.robot.name)
     services.runs.claims.require_free(device)

@@ -90,17 +90,14 @@ async def _services_of(request: Request) -> Services:
     return cast(Services, request.app.state.services)
 
 
-ServicesDep = Annotated[Services, Depends(_services_of)]
-"""The services, as an argument of a route."""
+ServicesDep = Annotated[Services, Depends(_services_of)]  # the services, as an argument of a route
 
 
-PRUNING_S = 3600.0
-"""How often what is old is removed, where the operator asked for it [s]."""
+PRUNING_S = 3600.0  # how often what is old is removed, where the operator asked for it [s]
 
 DAY_S = 86400.0
 
-REQUESTS_PER_S = 200.0
-"""How often a key may call in the long run, where the operator says nothing [1/s]."""
+REQUESTS_PER_S = 200.0  # how often a key may call in the long run, where the operator says nothing [1/s]
 
 
 @contextmanager
@@ -238,8 +235,6 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
 def _collect_checks(
     ground: _Ground, jobs: JobQueue, readers: Executor, audit: AuditTrail, closing: threading.Event
 ) -> dict[str, Callable[[], str | None]]:
-    """What `/readyz` asks."""
-
     def check_workers() -> str | None:
         if not jobs.can_work():
             return "the Dask cluster does not answer, and jobs wait for it"
@@ -262,7 +257,6 @@ def open_readers(settings: Settings) -> Executor:
 
 
 def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind, JobKind, JobKind, JobKind]:
-    """Identifications, diagnoses, designed motions and rollouts."""
     where = {"server_recordings": settings.recordings_folder}
     return (
         JobKind(items["identification"], partial(run_identification, **where)),
@@ -304,7 +298,6 @@ def _retention(services: Services) -> list[Callable[[], object]]:
 
 
 def _watch(services: Services, drift: DriftMonitor) -> None:
-    """Numbers that are asked for when somebody looks at the metrics."""
     metrics, folder = services.metrics, services.settings.data_folder
     metrics.loops.live = services.runs.list_live
     metrics.watch_drift(drift)
@@ -316,7 +309,6 @@ def _watch(services: Services, drift: DriftMonitor) -> None:
 
 
 def _note_end(audit: AuditTrail, lease: Lease, why: str) -> None:
-    """A lease has ended."""
     audit.note("service", "lease ended", subject=lease.id, device=lease.device, holder=lease.holder, reason=why)
 
 

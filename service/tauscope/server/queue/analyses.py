@@ -125,8 +125,7 @@ def run_rollout(folder: Path, server_recordings: Path) -> JobProblem | None:
     return perform_job(RolloutWorkspace(folder), server_recordings)
 
 
-MOST_ROWS = 2_000_000
-"""Rows of the longest CSV that is made on request."""
+MOST_ROWS = 2_000_000  # rows of the longest CSV that is made on request
 
 
 class ExcitationOrder(TaskOrder):

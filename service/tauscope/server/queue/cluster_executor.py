@@ -62,11 +62,8 @@ _log = logging.getLogger("tauscope.jobs")
 SCHEDULER = "DASK_SCHEDULER_ADDRESS"
 """Environment variable that names the scheduler of a Dask cluster, as in ``tcp://scheduler:8786``."""
 
-TIMEOUT_S = 10
-"""How long a scheduler may take to answer [s]."""
-
-CHECK_S = 1.0
-"""How often the scheduler is looked at: whether it is there, and how many workers it has [s]."""
+TIMEOUT_S = 10  # how long a scheduler may take to answer [s]
+CHECK_S = 1.0  # how often the scheduler is looked at: whether it is there, and how many workers it has [s]
 
 
 class ClusterUnavailableError(BrokenExecutor):
@@ -177,7 +174,6 @@ class ClusterExecutor(Executor):
             self._there.clear()
 
     def _hand_on(self, inner: "Future[Any]", outer: "Future[Any]") -> None:
-        """Give the end of a task to who waits for it."""
         from distributed import KilledWorker
 
         if outer.cancelled():

@@ -257,7 +257,6 @@ class Workspace(JobFolder):
             self._tell_state(record)
 
     def _tell_state(self, record: JobRecord) -> None:
-        """The event of a state."""
         time = record.ended or record.started or record.created
         if record.state.is_end:
             self.tell(EndedEvent(time=time, state=record.state, problem=record.problem))

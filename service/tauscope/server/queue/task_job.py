@@ -212,7 +212,6 @@ class Preparable(Protocol):
 
     def prepare(self) -> None:
         """Make the folders that hold the input."""
-        ...
 
 
 Staged = TypeVar("Staged", bound=Preparable)

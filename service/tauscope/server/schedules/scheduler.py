@@ -19,8 +19,7 @@ from tauscope.server.store.data_folder import utc_now
 from tauscope.tasks.run import BackendChoice
 
 FOLDER = "interlocks"
-TIMEOUT_S = 10.0
-"""How long the program may take [s]."""
+TIMEOUT_S = 10.0  # how long the program may take [s]
 
 
 def find_objection(data_folder: Path, name: str, robot: str, device: str) -> str | None:
@@ -54,7 +53,6 @@ def find_objection(data_folder: Path, name: str, robot: str, device: str) -> str
 
 
 def _fault(path: Path) -> str | None:
-    """Why a program is not called."""
     try:
         status = path.lstat()
     except OSError:
@@ -68,8 +66,7 @@ def _fault(path: Path) -> str | None:
 
 _log = logging.getLogger("tauscope.jobs")
 
-_Outcome = tuple[str, str | None, tuple[str, str] | None]
-"""State of a firing, its reason, and what was started."""
+_Outcome = tuple[str, str | None, tuple[str, str] | None]  # state of a firing, its reason, and what was started
 
 
 class Scheduler:
@@ -111,7 +108,6 @@ class Scheduler:
         return self.repository.firing(number)
 
     def _fire(self, number: int, entry: ScheduleEntry, lateness: timedelta | None) -> None:
-        """Start what a schedule repeats, or write down why not."""
         try:
             outcome = self._outcome(entry, read_definition(entry), lateness)
         except Exception as error:
@@ -129,7 +125,6 @@ class Scheduler:
             self._unwritten.pop(number, None)
 
     def _outcome(self, entry: ScheduleEntry, definition: ScheduleDefinition, lateness: timedelta | None) -> _Outcome:
-        """What came of a firing."""
         if lateness is not None and self._is_too_late(entry, definition, lateness):
             minutes = lateness.total_seconds() / 60
             return "missed", f"no service looked at it until {minutes:.0f} minutes later; it is due again", None
@@ -173,7 +168,6 @@ class Scheduler:
         return firing.item_state is not None and not firing.is_final
 
     def _last_start(self, entry: ScheduleEntry) -> datetime | None:
-        """When it was started last."""
         return next((each.due for each in self.repository.firings(entry.name, 100) if each.state == "started"), None)
 
 

@@ -88,7 +88,6 @@ def _plain(value: Any) -> Any:
 
 
 def _convert_type(column: Column[Any], value: Any, connection: Connection) -> Any:
-    """A value as the database takes it."""
     if value is None or not isinstance(column.type, DateTime):
         return value
     moment = datetime.fromisoformat(value)
@@ -217,7 +216,6 @@ class _Hashing:
         return piece
 
     def digest(self) -> str:
-        """The sha256 of what was read, in hexadecimal."""
         return self._hash.hexdigest()
 
 
@@ -249,7 +247,6 @@ def _unpack(source: Path, staged: Path) -> dict[str, Any]:
 
 
 def _content(archive: tarfile.TarFile, entry: tarfile.TarInfo) -> IO[bytes]:
-    """The bytes of a regular file in an archive."""
     file = archive.extractfile(entry)
     assert file is not None  # noqa: S101 - it is a regular file
     return file
@@ -271,7 +268,6 @@ def _write(file: IO[bytes], path: Path) -> tuple[int, str]:
 
 
 def _is_confined(name: str) -> bool:
-    """Whether a name leads to where backups put things."""
     parts = name.split("/")
     return name in (_DATABASE, _MANIFEST) or (
         parts[0] == _DATA and len(parts) > 1 and all(part not in ("", ".", "..") and "\0" not in part for part in parts)
@@ -279,7 +275,6 @@ def _is_confined(name: str) -> bool:
 
 
 def _fill_database(lines: Path, address: Path | str) -> None:
-    """Fill an empty database."""
     engine = open_engine(address)
     try:
         with lines.open("rb") as file:
@@ -293,5 +288,4 @@ def _fill_database(lines: Path, address: Path | str) -> None:
 
 
 def _refuse(source: Path, reason: str) -> StoreError:
-    """A backup that is not used."""
     return StoreError(f"{source}: is damaged or no backup of Tauscope's ({reason}); use another one")

@@ -8,6 +8,7 @@ import shutil
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Literal
 
 from tauscope.errors import NotFoundError, StoreError, TauscopeError
 from tauscope.files import sync_folder, write_atomically
@@ -89,7 +90,9 @@ def staged_identifier(staged: Path) -> str:
     return staged.name.removeprefix(_STAGED)
 
 
-FOLDERS = {
+ItemKind = Literal["excitation", "run", "identification", "diagnosis", "rollout", "campaign"]
+
+FOLDERS: dict[ItemKind, str] = {
     "excitation": "excitations",
     "run": "runs",
     "identification": "identifications",

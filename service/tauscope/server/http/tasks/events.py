@@ -18,15 +18,11 @@ from tauscope.server.store.event_log import LoggedEvent
 
 EVENT_MODELS = (StateEvent, StepEvent, ProgressEvent, EndedEvent)
 
-HEARTBEAT_S = 10.0
-"""Silence after which a comment says that the connection lives [s]."""
-
-RETRY_MS = 1000
-"""How long a client waits before it connects again [ms]."""
+HEARTBEAT_S = 10.0  # silence after which a comment says that the connection lives [s]
+RETRY_MS = 1000  # how long a client waits before it connects again [ms]
 
 
-PRESENCE_S = 1.0
-"""How often a client without news is looked for [s]."""
+PRESENCE_S = 1.0  # how often a client without news is looked for [s]
 
 
 LastEvent = Annotated[
@@ -108,7 +104,6 @@ def _find_end(source: EventSource) -> int | None:
 
 
 def _format_event(event: LoggedEvent) -> bytes:
-    """An event as it is sent."""
     kind = event.content.get("kind")
     return format_sse_event(
         data_str=json.dumps(event.content, ensure_ascii=False),
@@ -118,7 +113,6 @@ def _format_event(event: LoggedEvent) -> bytes:
 
 
 def _stream_schema() -> dict[str, Any]:
-    """What the data of an event may be."""
     return {
         "type": "object",
         "additionalProperties": False,

@@ -152,7 +152,6 @@ class QueuedTask:
         wanted: Mapping[str, Any],
         caller: str,
     ) -> str:
-        """Check what was received beside the robot, and queue it."""
         recordings = {role: ordered_recordings(role, received, services.recordings) for role in workspace.roles}
         if recordings:
             check_recordings(recordings, services.settings.max_recordings)

@@ -112,11 +112,9 @@ class Folder(Protocol):
 
     def read_order(self) -> Any:
         """What was asked for; None where that is damaged."""
-        ...
 
     def has_ended(self) -> bool:
         """Whether nothing more will happen."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -357,7 +355,6 @@ def _lease_header(_lease: LeaseToken = None) -> None:
 
 
 def _read_files(folder: FilePath) -> list[RobotFileAnswer]:
-    """Text files of a folder, as far as such a file may be long."""
     answers = []
     for path in sorted(folder.iterdir()):
         if path.is_file() and not path.is_symlink():

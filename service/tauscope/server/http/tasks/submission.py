@@ -82,7 +82,6 @@ class RobotRequest(StrictModel):
 
 
 def _check_file_name(value: str) -> str:
-    """Refuse what cannot be a recording's name."""
     if not is_file_name(value):
         raise PydanticCustomError("file_name", "is no name of a recording; {rule}", {"rule": FILE_NAME_RULE})
     return value
@@ -97,7 +96,6 @@ class RecordingsRequest(RobotRequest):
 
     @model_validator(mode="after")
     def _check_once(self) -> Self:
-        """A recording counts once."""
         for names in (getattr(self, role, None) or [] for role in ROLES if role != "model"):
             twice = next((name for index, name in enumerate(names) if name in names[:index]), None)
             if twice is not None:

@@ -3,9 +3,10 @@
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from alembic import command
 from alembic.config import Config
@@ -20,8 +21,7 @@ from sqlalchemy.pool import NullPool
 from tauscope.errors import StoreError
 from tauscope.robot.messages import one_line
 
-TIMEOUT_S = 5
-"""How long a write waits for another one, and a connection for its server [s]."""
+TIMEOUT_S = 5  # how long a write waits for another one, and a connection for its server [s]
 
 WRITES = "tauscope_writes"
 """Execution option of a connection that will write: SQLite then takes its lock at the beginning.
@@ -73,7 +73,6 @@ def _prepare_sqlite(connection: sqlite3.Connection, _record: Any) -> None:
 
 
 def _begin_sqlite(connection: Connection) -> None:
-    """Begin a transaction."""
     writes = connection.get_execution_options().get(WRITES, False)
     connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
 
@@ -118,12 +117,19 @@ def _configuration(connection: Connection | None) -> Config:
     return configuration
 
 
-FILE_NAME = "tauscope.db"
-"""Of the SQLite database in a data folder."""
+FILE_NAME = "tauscope.db"  # of the SQLite database in a data folder
 
+
+Entry = TypeVar("Entry")
 
 _SQLITE_MAGIC = b"SQLite format 3\0"
 _DAMAGE_HINT = "restore a backup, or move it away: the index is made anew, schedules and the choice of models are not"
+
+
+def read_row(kind: type[Entry], row: object, **more: Any) -> Entry:
+    """What is given out of a row: a dataclass of the same attributes. `more`: those that the row has not so."""
+    names = (field.name for field in fields(kind) if field.name not in more)
+    return kind(**{name: getattr(row, name) for name in names}, **more)
 
 
 class Database:
@@ -215,7 +221,6 @@ def _check_file(url: URL) -> None:
 
 
 def _describe_fault(address: str, error: Exception) -> str:
-    """What is wrong with a database, and what to do."""
     reason = one_line(str(getattr(error, "orig", None) or error)).strip()
     lower = reason.lower()
     if "not a database" in lower or "malformed" in lower:
