@@ -10,8 +10,9 @@ import typer
 from tauscope.cli.verbs import make_group
 from tauscope.errors import TauscopeError
 from tauscope.server.auth.audit_log import AuditLog
-from tauscope.server.auth.keys import ApiKey, KeyFile, parse_scope, utc_now
+from tauscope.server.auth.keys import ApiKey, KeyFile, parse_scope
 from tauscope.server.http.settings import default_data_folder
+from tauscope.server.store.data_folder import utc_now
 
 DataFolder = Annotated[
     Path | None,

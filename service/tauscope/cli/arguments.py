@@ -20,38 +20,39 @@ def name_output(words: str, metavar: str = "OUT", *names: str) -> Any:
     return typer.Option(*names, metavar=metavar, dir_okay=False, help=words)
 
 
+def name_input(words: str, metavar: str | None = None, kind: Any = typer.Option, *names: str, **more: Any) -> Any:
+    """An option or an argument that names a file to read."""
+    stated: dict[str, Any] = {"exists": True, "dir_okay": False, "show_default": False, **more}
+    return kind(*names, metavar=metavar, help=words, **stated)
+
+
 def name_recordings(words: str) -> Any:
     """An argument that names recordings."""
-    return typer.Argument(metavar="RECORDING", exists=True, help=words, show_default=False)
+    return name_input(words, "RECORDING", typer.Argument, dir_okay=True)
 
 
 RobotFile = Annotated[
     Path,
-    typer.Argument(
-        metavar="ROBOT",
-        exists=True,
-        dir_okay=False,
-        help="Robot file (YAML), or a URDF or MJCF by itself.",
-        show_default=False,
-    ),
+    name_input("Robot file (YAML), or a URDF or MJCF by itself.", "ROBOT", typer.Argument),
 ]
 RecordingFile = Annotated[
     Path,
-    typer.Argument(
-        metavar="FILE",
-        exists=True,
-        help="Recording: CSV, Parquet, NumPy archive, MCAP, rosbag2 folder, or ROS 1 bag.",
-        show_default=False,
+    name_input(
+        "Recording: CSV, Parquet, NumPy archive, MCAP, rosbag2 folder, or ROS 1 bag.",
+        "FILE",
+        typer.Argument,
+        dir_okay=True,
     ),
 ]
 HeldOut = Annotated[
     list[Path] | None,
-    typer.Option(
-        "--held-out",
-        metavar="RECORDING...",
-        exists=True,
-        help="Recordings that the model is judged by, never made from. All files up to the next option, or up to --,"
+    name_input(
+        "Recordings that the model is judged by, never made from. All files up to the next option, or up to --,"
         " belong to it.",
+        "RECORDING...",
+        typer.Option,
+        "--held-out",
+        dir_okay=True,
     ),
 ]
 Cutoff = Annotated[

@@ -12,7 +12,7 @@ from tauscope.cli.arguments import RobotFile
 from tauscope.cli.diagnose_command import show_diagnosis
 from tauscope.cli.identify_command import show_identification
 from tauscope.cli.output_files import write_file
-from tauscope.cli.terminal import output, plain, shown_progress
+from tauscope.cli.terminal import output, plain, show_progress
 from tauscope.errors import ExportError
 from tauscope.runtime.drivers import DEFAULT_BACKEND, driver_names
 from tauscope.tasks import campaign as task
@@ -62,7 +62,7 @@ def campaign(
         out.mkdir()
     except OSError as error:
         raise ExportError(f"{out}: cannot be made ({error.strerror}); name a new folder") from error
-    with shown_progress() as progress:
+    with show_progress() as progress:
         result = task.perform(request, LocalFiles({"campaign": out}), progress)
         progress("write files")
         outputs = result.outputs

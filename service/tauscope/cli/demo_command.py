@@ -22,7 +22,7 @@ from tauscope.cli.identify_command import show_identification
 from tauscope.cli.output_files import write_file
 from tauscope.cli.run_command import keep_recording, why_unfinished
 from tauscope.cli.task_run import write_outputs
-from tauscope.cli.terminal import Told, output, plain, shown_progress, table
+from tauscope.cli.terminal import Told, output, plain, show_progress, table
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.errors import AcquisitionError
 from tauscope.excitation import ExcitationOptions, OptimiserProgress, design_excitation
@@ -113,7 +113,7 @@ def run_demo(folder: Path, page: PageShown) -> None:
     arm = read_robot(example_robot("paper_arm"))
     write_file(folder / ROBOT, robot_text_without_model(example_robot("paper_arm")).encode())
     write_file(folder / SCENARIO, SCENARIO_TEXT.encode())
-    with shown_progress() as told, TemporaryDirectory(prefix=".runs-", dir=folder) as runs:
+    with show_progress() as told, TemporaryDirectory(prefix=".runs-", dir=folder) as runs:
         design_motion(folder / ROBOT, folder / TRAIN_TRAJECTORY, TRAIN_MOTION, told)
         design_motion(folder / ROBOT, folder / HELD_OUT_TRAJECTORY, HELD_OUT_MOTION, told)
         for seed, (trajectory, out) in enumerate(((TRAIN_TRAJECTORY, TRAIN), (HELD_OUT_TRAJECTORY, HELD_OUT))):
@@ -123,10 +123,10 @@ def run_demo(folder: Path, page: PageShown) -> None:
     )
     exports = {folder / file.name: file.output for file in EXPORT_FILES.values() if file.name in EXPORTS}
     outputs = {folder / RESULT: "result.json", folder / REPORT: "report.html", **exports}
-    with shown_progress() as progress:
+    with show_progress() as progress:
         outcome, _ = write_outputs(identify, request, outputs, progress)
     _show(output(), folder, outcome, compare(arm, outcome.identification))
-    with shown_progress() as told:
+    with show_progress() as told:
         found = run_campaign(folder / DATA, example_robot("paper_arm"), CONCEALED, told)
     _show_findings(output(), found)
     if page is PageShown.HERE:

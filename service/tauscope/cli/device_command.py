@@ -10,8 +10,8 @@ import typer
 from numpy.typing import NDArray
 from rich.console import Console
 
-from tauscope.cli.arguments import RobotFile
-from tauscope.cli.terminal import output, plain, shown_progress, table
+from tauscope.cli.arguments import RobotFile, name_input
+from tauscope.cli.terminal import output, plain, show_progress, table
 from tauscope.cli.verbs import make_group
 from tauscope.errors import AcquisitionError, MissingExtraError
 from tauscope.extras import require_extra
@@ -46,27 +46,21 @@ BusOption = Annotated[
 ]
 DoctorRobotFile = Annotated[
     Path | None,
-    typer.Argument(
-        metavar="ROBOT",
-        exists=True,
-        dir_okay=False,
-        help="Robot file (YAML) whose drives are looked at; without one, the adapters of this machine.",
-        show_default=False,
+    name_input(
+        "Robot file (YAML) whose drives are looked at; without one, the adapters of this machine.",
+        "ROBOT",
+        typer.Argument,
     ),
 ]
 _MARKS = {Severity.GOOD: "ok", Severity.WARNING: "warning", Severity.FAILURE: "failure"}
 
 
-def doctor(
-    robot: DoctorRobotFile = None,
-    *,
-    backend: BusOption = None,
-) -> None:
+def doctor(robot: DoctorRobotFile = None, *, backend: BusOption = None) -> None:
     """Look at adapters and drives, and say what keeps an arm from running well, each with its remedy.
 
     Moves nothing and writes nothing. Exit status 1 where something keeps the arm from running.
     """
-    with shown_progress() as told:
+    with show_progress() as told:
         told("look at the adapters" if robot is None else "ask the drives")
         findings = _adapters(backend) if robot is None else _drives(robot, backend)
     console = output()
@@ -115,7 +109,7 @@ def scan(
     """
     found: list[FoundDevice] = []
     bus = find_bus(backend)
-    with shown_progress() as told, translate_driver_errors():
+    with show_progress() as told, translate_driver_errors():
         told(f"scan {port}")
         for device in bus.scan(port, bit_rate or None):
             found.append(device)

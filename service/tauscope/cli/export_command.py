@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from tauscope.cli.arguments import name_input
 from tauscope.cli.output_files import require_free, write_file
 from tauscope.cli.task_run import parse_export_format
 from tauscope.cli.terminal import output, plain
@@ -16,13 +17,7 @@ from tauscope.export.model_file import read_export_model
 
 ModelFile = Annotated[
     Path,
-    typer.Argument(
-        metavar="MODEL.json",
-        exists=True,
-        dir_okay=False,
-        help="Model that identify or diagnose wrote with --model.",
-        show_default=False,
-    ),
+    name_input("Model that identify or diagnose wrote with --model.", "MODEL.json", typer.Argument),
 ]
 Output = Annotated[
     Path,
@@ -50,11 +45,8 @@ def export(
     kv: Gains = None,
     onto: Annotated[
         Path | None,
-        typer.Option(
-            metavar="ARM.xml",
-            exists=True,
-            dir_okay=False,
-            help="Your own MJCF: its inertials and joints take the model's values, all else stays (.xml).",
+        name_input(
+            "Your own MJCF: its inertials and joints take the model's values, all else stays (.xml).", "ARM.xml"
         ),
     ] = None,
     isaac_lab: Annotated[

@@ -7,8 +7,9 @@ from typing import Annotated, Literal
 
 import typer
 
+from tauscope.cli.arguments import name_input
 from tauscope.cli.output_files import require_new
-from tauscope.cli.terminal import output, plain, shown_progress
+from tauscope.cli.terminal import output, plain, show_progress
 from tauscope.cli.verbs import make_group
 from tauscope.errors import ExportError, IdentificationError
 from tauscope.number_text import counted
@@ -31,11 +32,10 @@ CORES = os.cpu_count() or 1
 
 Manifest = Annotated[
     Path,
-    typer.Argument(
-        metavar="MANIFEST",
-        exists=True,
-        dir_okay=False,
-        help="CSV with the columns name,robot,recordings,held_out; recordings separated by ';', paths relative to it.",
+    name_input(
+        "CSV with the columns name,robot,recordings,held_out; recordings separated by ';', paths relative to it.",
+        "MANIFEST",
+        typer.Argument,
     ),
 ]
 Out = Annotated[
@@ -88,7 +88,7 @@ def _run(verb: str, manifest: Path, out: Path, workers: int, total: int) -> int:
     width = executor.width if isinstance(executor, ClusterExecutor) else workers
     failed = done = 0
     try:
-        with shown_progress() as tell, (out / TABLE).open("x", newline="", encoding="utf-8") as file:
+        with show_progress() as tell, (out / TABLE).open("x", newline="", encoding="utf-8") as file:
             table = csv.writer(file, lineterminator="\n")
             table.writerow(("line", "name", "state", *columns, "seconds", "error"))
             for result in analyse_fleet(read_manifest(manifest.resolve()), work, out, executor, width):

@@ -9,10 +9,10 @@ from typing import Annotated
 import typer
 
 from tauscope import robot as robots
-from tauscope.cli.arguments import LayoutFields, ReadingFields, RecordingFile, RobotFile, complete_reading
+from tauscope.cli.arguments import LayoutFields, ReadingFields, RecordingFile, RobotFile, complete_reading, name_input
 from tauscope.cli.device_command import check_drives, require_sound, show_finding
 from tauscope.cli.output_files import write_file
-from tauscope.cli.terminal import output, plain, shown_progress, table
+from tauscope.cli.terminal import output, plain, show_progress, table
 from tauscope.cli.verbs import make_group, make_request
 from tauscope.number_text import ABSENT, counted, given, significant
 from tauscope.recording import EffortKind, Reading, RecordingReport, check_recording, convert_recording
@@ -29,9 +29,7 @@ from tauscope.tasks.task import ReadingOptions
 
 RobotOption = Annotated[
     Path | None,
-    typer.Option(
-        exists=True, dir_okay=False, metavar="ROBOT", help="Robot file: its names, limits, masses and layout."
-    ),
+    name_input("Robot file: its names, limits, masses and layout.", "ROBOT"),
 ]
 
 EFFORT_WORDS = {
@@ -61,7 +59,7 @@ def check_recording_file(
 ) -> None:
     """Show what a recording holds, and what to look at before trusting it."""
     options = make_request(ReadingOptions, **complete_reading(reading)).reading
-    with shown_progress() as progress:
+    with show_progress() as progress:
         progress(f"read {file}")
         arm = None if robot is None else read_robot(robot)
         report = check_recording(file, joints, arm, options)
@@ -95,7 +93,7 @@ def convert_file(
         raise typer.BadParameter(
             f"{str(target)!r}: the suffix names no format; use {', '.join(FORMATS)}", param_hint="'TARGET'"
         )
-    with shown_progress() as progress:
+    with show_progress() as progress:
         progress(f"convert {source}")
         arm = None if robot is None else read_robot(robot)
         done = convert_recording(source, target, recover=recover, overwrite=overwrite, robot=arm, reading=options)

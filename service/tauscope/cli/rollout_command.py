@@ -3,10 +3,9 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
 from rich.console import Console
 
-from tauscope.cli.arguments import Json, ReadingFields, Report, RobotFile, complete_reading, name_recordings
+from tauscope.cli.arguments import Json, ReadingFields, Report, RobotFile, complete_reading, name_input, name_recordings
 from tauscope.cli.task_run import name_files, run_task
 from tauscope.cli.terminal import output, plain, table
 from tauscope.cli.verbs import make_request
@@ -20,27 +19,23 @@ from tauscope.tasks.task import ReadingOptions
 def rollout(
     robot: RobotFile,
     recordings: Annotated[
-        list[Path],
-        name_recordings("Recordings with commands (qref), or with torque: CSV, Parquet, MCAP or rosbag2."),
+        list[Path], name_recordings("Recordings with commands (qref), or with torque: CSV, Parquet, MCAP or rosbag2.")
     ],
     *,
     model: Annotated[
         Path | None,
-        typer.Option(
-            metavar="MODEL.json",
-            exists=True,
-            dir_okay=False,
-            help="Model that identify or diagnose wrote with --model: rolled out without and with its findings.",
+        name_input(
+            "Model that identify or diagnose wrote with --model: rolled out without and with its findings.",
+            "MODEL.json",
         ),
     ] = None,
     refine: Annotated[
         list[Path] | None,
-        typer.Option(
-            metavar="RECORDING...",
-            exists=True,
-            help="Recordings with commands by which the model is refined; the others judge it. All files up to the"
+        name_input(
+            "Recordings with commands by which the model is refined; the others judge it. All files up to the"
             " next option, or up to --, belong to it.",
-            show_default=False,
+            "RECORDING...",
+            dir_okay=True,
         ),
     ] = None,
     reading: ReadingFields,

@@ -11,10 +11,10 @@ from typing import Annotated, Any, Literal
 import typer
 from rich.console import Console
 
-from tauscope.cli.arguments import RobotFile
+from tauscope.cli.arguments import RobotFile, name_input
 from tauscope.cli.device_command import show_frames
 from tauscope.cli.output_files import keep_file, require_new
-from tauscope.cli.terminal import output, plain, shown_progress, table
+from tauscope.cli.terminal import output, plain, show_progress, table
 from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
 from tauscope.errors import AcquisitionError
 from tauscope.number_text import ABSENT, counted, significant
@@ -30,11 +30,8 @@ from tauscope.tasks.task import LocalFiles
 
 Trajectory = Annotated[
     Path | None,
-    typer.Option(
-        metavar="FILE",
-        exists=True,
-        dir_okay=False,
-        help="Motion to play: a trajectory (JSON, CSV). The default excitation is designed where none is given.",
+    name_input(
+        "Motion to play: a trajectory (JSON, CSV). The default excitation is designed where none is given.", "FILE"
     ),
 ]
 Out = Annotated[
@@ -47,7 +44,7 @@ Out = Annotated[
 ]
 Scenario = Annotated[
     Path | None,
-    typer.Option(metavar="FILE", exists=True, dir_okay=False, help="What the simulated arm conceals (YAML)."),
+    name_input("What the simulated arm conceals (YAML).", "FILE"),
 ]
 HELD = (
     "! The arm is under power where it stopped, and its watchdog is off. Support it, then let go of it with: tauscope "
@@ -117,7 +114,7 @@ def _run_arm(request: task.Request, asked: Path | None) -> None:
     out = _output(asked)
     folder, is_settled = _folder_beside(out), False
     try:
-        with shown_progress() as told:
+        with show_progress() as told:
             result = task.perform(request, LocalFiles({"run": folder / "run"}), told)
         made = keep_recording(result, out)
         journal = None if made else _unsaved_journal(result)
@@ -235,11 +232,7 @@ def _whole(record: RunRecord) -> Table:
 def _joints(record: RunRecord, robot: Robot) -> Table:
     stale = (0,) * robot.joint_count if record.timing is None else record.timing.stale_samples
     rows = [
-        (
-            joint.name,
-            f"{significant(following, 3)} {'rad' if joint.type is JointType.REVOLUTE else 'm'}",
-            str(count),
-        )
+        (joint.name, f"{significant(following, 3)} {'rad' if joint.type is JointType.REVOLUTE else 'm'}", str(count))
         for joint, following, count in zip(robot.joints, record.worst_following, stale, strict=True)
     ]
     return Table(("joint", "largest following error", "samples not answered"), rows)

@@ -9,8 +9,9 @@ from typing import Annotated
 
 import typer
 
+from tauscope.cli.arguments import name_input
 from tauscope.cli.output_files import require_new
-from tauscope.cli.terminal import output, plain, shown_progress, table
+from tauscope.cli.terminal import output, plain, show_progress, table
 from tauscope.cli.verbs import make_group
 from tauscope.errors import StoreError
 from tauscope.number_text import ABSENT, counted
@@ -36,7 +37,7 @@ from tauscope.version import tauscope_version
 
 DataFolder = Annotated[
     Path | None,
-    typer.Option(metavar="DIR", exists=True, file_okay=False, help="Data folder; the user's own by default."),
+    name_input("Data folder; the user's own by default.", "DIR", dir_okay=True, file_okay=False),
 ]
 DatabaseUrl = Annotated[
     str | None,
@@ -111,7 +112,7 @@ def check_store(
 
     Exit status 1 where a file is missing or is another one. No service may work with the folder meanwhile.
     """
-    with shown_progress() as progress, open_store(data, database) as store:
+    with show_progress() as progress, open_store(data, database) as store:
         progress(f"compare the files of {store.folder}")
         changed = store.keeper.check(deep=not quick)
         count = sum(len(store.keeper.index.stamps(kind)) for kind in item_stores(store.folder))
@@ -171,7 +172,7 @@ def backup(
     """Write everything that is kept into one file; a service may work with it meanwhile."""
     require_new(file)
     folder = data or default_data_folder()
-    with shown_progress() as progress, open_database(folder, database) as opened:
+    with show_progress() as progress, open_database(folder, database) as opened:
         progress(f"copy {folder}")
         try:
             count = write_backup(folder, opened, file, tauscope_version())
@@ -181,12 +182,12 @@ def backup(
 
 
 def restore(
-    file: Annotated[Path, typer.Argument(metavar="FILE", exists=True, dir_okay=False, help="Of `tauscope backup`.")],
+    file: Annotated[Path, name_input("Of `tauscope backup`.", "FILE", typer.Argument)],
     data: Annotated[Path, typer.Option(metavar="DIR", file_okay=False, help="Data folder to make.")],
     database: DatabaseUrl = None,
 ) -> None:
     """Make a data folder from a backup; also where the database was one of the other kind."""
-    with shown_progress() as progress:
+    with show_progress() as progress:
         progress(f"unpack {file}")
         try:
             count = restore_backup(file, data, database)

@@ -8,7 +8,7 @@ from typing import Any
 import typer
 
 from tauscope.cli.output_files import STANDARD_OUTPUT, require_distinct, require_free, write_file
-from tauscope.cli.terminal import Told, output, plain, shown_progress
+from tauscope.cli.terminal import Told, output, plain, show_progress
 from tauscope.export.formats import SUFFIXES, ExportFile, ExportFormat
 from tauscope.robot import Robot, Severity, read_robot
 from tauscope.robot.messages import one_line
@@ -16,10 +16,7 @@ from tauscope.tasks.task import LocalFiles
 
 
 def run_task(
-    task: ModuleType,
-    request: Any,
-    asked: Sequence[tuple[Path | None, str]],
-    show: Callable[[Any], None] | None = None,
+    task: ModuleType, request: Any, asked: Sequence[tuple[Path | None, str]], show: Callable[[Any], None] | None = None
 ) -> Any:
     """Perform a task, write its outputs, and show the result.
 
@@ -36,7 +33,7 @@ def run_task(
     require_free(paths, (robot_file, *inputs))
     robot = read_robot(robot_file)
     require_free(paths, [path for _, path in robot.files])
-    with shown_progress() as progress:
+    with show_progress() as progress:
         result, written = write_outputs(task, request, dict(outputs), progress)
     if show is not None:
         show(result)

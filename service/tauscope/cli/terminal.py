@@ -44,7 +44,7 @@ Told = Callable[..., None]
 
 
 @contextmanager
-def shown_progress() -> Iterator[Told]:
+def show_progress() -> Iterator[Told]:
     """A bar on standard error, where that is a terminal."""
     if not sys.stderr.isatty():
         yield lambda *_: None

@@ -18,15 +18,7 @@ from tauscope.runtime.drivers import Connection, make_backend
 from tauscope.runtime.loop import end_event
 from tauscope.runtime.options import RunOrder, read_order
 from tauscope.runtime.processes import RunLock
-from tauscope.runtime.record import (
-    FLUSH_S,
-    STOP_FILE,
-    ProcessName,
-    RecordKeeper,
-    RunProblem,
-    RunRecord,
-    read_record,
-)
+from tauscope.runtime.record import FLUSH_S, STOP_FILE, ProcessName, RecordKeeper, RunProblem, RunRecord, read_record
 from tauscope.runtime.run import OpenRecorder, Run, RunTask, Surroundings, open_recorder
 from tauscope.runtime.states import RunState
 from tauscope.runtime.stop_listener import StopListener
@@ -36,10 +28,7 @@ _LARGEST_EVENT = 4096
 
 
 def control(
-    folder: Path,
-    *,
-    make: Callable[..., Connection] = make_backend,
-    recorder: OpenRecorder = open_recorder,
+    folder: Path, *, make: Callable[..., Connection] = make_backend, recorder: OpenRecorder = open_recorder
 ) -> int:
     """Carry a run out, in the main thread of a process of its own."""
     report = _event_pipe()

@@ -117,13 +117,7 @@ class GuardLimits:
 
 
 def guard_limits(
-    robot: Robot,
-    low: Array,
-    high: Array,
-    speed: Array,
-    *,
-    following: float | None = None,
-    temperature_c: float = 80.0,
+    robot: Robot, low: Array, high: Array, speed: Array, *, following: float | None = None, temperature_c: float = 80.0
 ) -> GuardLimits:
     """The limits of a run: the robot file's where it states them, else a careful default or what the motion needs.
 

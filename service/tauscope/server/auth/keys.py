@@ -1,17 +1,15 @@
 """API keys and their scopes: the key file holds salted hashes only; what no rule names needs the highest scope."""
 
-import fcntl
 import hashlib
 import hmac
 import logging
-import os
 import re
 import secrets
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
 from typing import Literal
@@ -21,6 +19,8 @@ from pydantic import AwareDatetime, Field, ValidationError
 from tauscope.errors import TauscopeError
 from tauscope.files import write_atomically
 from tauscope.robot.messages import one_line, shown
+from tauscope.server.store.data_folder import utc_now
+from tauscope.server.store.files import lock_file
 from tauscope.strict_model import StrictModel
 
 
@@ -188,15 +188,10 @@ class KeyFile:
     @contextmanager
     def _changing(self) -> Iterator[list[ApiKey]]:
         """The keys, written back at the end; two programs never undo each other's change."""
-        lock = os.open(self.path.with_name(f".{KEY_FILE}.lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+        with lock_file(self.path.with_name(f".{KEY_FILE}.lock")):
             keys = list(self.read())
             yield keys
             write_atomically(self.path, _KeyList(keys=tuple(keys)).model_dump_json(indent=1).encode())
-        finally:
-            fcntl.flock(lock, fcntl.LOCK_UN)  # closing does not: a process forked meanwhile holds the descriptor, too
-            os.close(lock)
 
 
 def match_key(keys: tuple[ApiKey, ...], text: str) -> ApiKey | None:
@@ -207,11 +202,6 @@ def match_key(keys: tuple[ApiKey, ...], text: str) -> ApiKey | None:
     salt, expected = (_NOBODY[:32], _NOBODY) if found is None else (found.salt, found.hash)
     is_right = hmac.compare_digest(_hash(salt, secret), expected)
     return found if is_right and prefix == _PREFIX else None
-
-
-def utc_now() -> datetime:
-    """The present moment in UTC."""
-    return datetime.now(UTC)
 
 
 def _hash(salt: str, secret: str) -> str:

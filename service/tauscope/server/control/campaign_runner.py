@@ -34,13 +34,7 @@ from tauscope.server.queue.analyses import (
 )
 from tauscope.server.queue.job_folder import JobProblem, JobRecord, JobState, StoppedError, Workspace
 from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, JobKind, JobQueue, QueueFullError
-from tauscope.server.queue.task_job import (
-    Order,
-    TaskWorkspace,
-    ordered_on_server,
-    staged_workspace,
-    submit_job,
-)
+from tauscope.server.queue.task_job import Order, TaskWorkspace, order_kept, stage_workspace, submit_job
 from tauscope.server.store.data_folder import ItemStore, staged_identifier
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.tasks.campaign import backend_of_run
@@ -196,7 +190,7 @@ class CampaignRunner:
             campaign=self._workspace.folder.name,
             options=order.run,
         )
-        with staged_workspace(dependencies.runs.items, RunWorkspace) as staged:
+        with stage_workspace(dependencies.runs.items, RunWorkspace) as staged:
             self._put_robot(staged.robot)
             take_trajectory(ExcitationWorkspace(dependencies.excitations.items.folder(excitation)), staged)
             staged.write_request(request)
@@ -234,7 +228,7 @@ class CampaignRunner:
     def _recordings(self) -> dict[str, Any]:
         made = self._workspace.read_made()
         lists = {"recordings": made.recordings, "held_out": made.held_out}
-        return {role: ordered_on_server(self._dependencies.recordings, names) for role, names in lists.items()}
+        return {role: order_kept(self._dependencies.recordings, names) for role, names in lists.items()}
 
     def _find_submitted(self, kind: JobKind, identifier: str | None) -> str | None:
         """The job that this campaign handed in before the service was started again, where that one counts still."""

@@ -188,11 +188,7 @@ class Leases:
     """The leases of all arms. Reading takes no lock; every change does, and none of them waits but for `acquire`."""
 
     def __init__(
-        self,
-        claims: DeviceClaims,
-        *,
-        clock: Callable[[], float] = time.monotonic,
-        on_end: LeaseEnd | None = None,
+        self, claims: DeviceClaims, *, clock: Callable[[], float] = time.monotonic, on_end: LeaseEnd | None = None
     ) -> None:
         self._claims, self._numbers, self._clock = claims, count(1), clock
         self._on_end = on_end or (lambda _lease, _why: None)

@@ -16,14 +16,7 @@ from tauscope.errors import AcquisitionError
 from tauscope.runtime.drivers import find_driver
 from tauscope.runtime.loop import Report
 from tauscope.runtime.options import RunOptions
-from tauscope.runtime.record import (
-    RUN_FILE,
-    RunProblem,
-    RunRecord,
-    new_record,
-    read_record,
-    write_record,
-)
+from tauscope.runtime.record import RUN_FILE, RunProblem, RunRecord, new_record, read_record, write_record
 from tauscope.runtime.run_process import RunProcess, recover_run
 from tauscope.runtime.states import RunState
 from tauscope.server.queue.analyses import ExcitationWorkspace
@@ -178,13 +171,7 @@ def start_control(workspace: RunWorkspace, report: Report, *, sim_socket: Path |
         options=order.options,
     )
     return run.start(
-        request,
-        LocalFiles(),
-        trajectory,
-        workspace.control,
-        report,
-        sim_socket=sim_socket,
-        beats_by_itself=False,
+        request, LocalFiles(), trajectory, workspace.control, report, sim_socket=sim_socket, beats_by_itself=False
     )
 
 

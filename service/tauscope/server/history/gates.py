@@ -24,8 +24,7 @@ class ModelPolicy(ResultModel):
         default=1.5, description="largest residual on held-out recordings, in residuals of the training (or its noise)"
     )
     consistency_ratio: Ratio = Field(
-        default=1.2,
-        description="largest residual of the model with bodies, in residuals of the free estimate",
+        default=1.2, description="largest residual of the model with bodies, in residuals of the free estimate"
     )
     condition_number: Ratio = Field(default=500.0, description="largest condition number of the regressor")
     drift_std: Positive = Field(

@@ -59,10 +59,7 @@ def plan_removal(
 
 
 def remove(
-    removal: Removal,
-    removers: Mapping[str, Callable[[str], object]],
-    recordings: RecordingStore,
-    indexer: Indexer,
+    removal: Removal, removers: Mapping[str, Callable[[str], object]], recordings: RecordingStore, indexer: Indexer
 ) -> Removal:
     """Remove what was planned; what somebody else removed meanwhile is left out.
 

@@ -46,14 +46,7 @@ ENDINGS = ("not-finished", "cancelled", "interrupted", "damaged", "storage-full"
 """Problems of a job without result, beside those of its work."""
 
 
-SUBMISSION = (
-    "bad-request",
-    "limit-exceeded",
-    "media-type",
-    "robot-file",
-    "invalid-request",
-    "storage-full",
-)
+SUBMISSION = ("bad-request", "limit-exceeded", "media-type", "robot-file", "invalid-request", "storage-full")
 """Problems of handing anything in that comes with a robot file."""
 
 
@@ -100,11 +93,11 @@ class JobAnswer(AnswerModel):
     robot: str | None = Field(default=None, description="name of the robot")
 
 
-def job_fields(workspace: Workspace, here: str) -> dict[str, Any]:
+def describe_job(workspace: Workspace, here: str) -> dict[str, Any]:
     """The fields of `JobAnswer`; a job whose state cannot be read is said to be damaged."""
     identifier, record = workspace.folder.name, workspace.read_record()
     if record is None:
-        return damaged_fields(identifier, here)
+        return describe_damaged(identifier, here)
     return {
         "id": identifier,
         "state": record.state,
@@ -112,17 +105,17 @@ def job_fields(workspace: Workspace, here: str) -> dict[str, Any]:
         "created": record.created,
         "started": record.started,
         "ended": record.ended,
-        "problem": shown_problem(record.problem, here),
+        "problem": convert_problem(record.problem, here),
     }
 
 
-def damaged_fields(identifier: str, here: str) -> dict[str, Any]:
+def describe_damaged(identifier: str, here: str) -> dict[str, Any]:
     """The fields of `JobAnswer` of a job whose files are missing or damaged."""
     detail = f"files of {identifier} are missing or damaged; remove it and hand it in again"
     return {"id": identifier, "state": "damaged", "problem": make_problem("damaged", detail, here)}
 
 
-def shown_problem(problem: JobProblem | None, here: str) -> Problem | None:
+def convert_problem(problem: JobProblem | None, here: str) -> Problem | None:
     """The problem that a job ended in, as answers hold it."""
     return None if problem is None else make_problem(problem.code, problem.detail, here)
 

@@ -19,10 +19,9 @@ from tauscope.server.http.answers import (
     Identifier,
     JobAnswer,
     MotionLinks,
-    PageAnswer,
     collection,
-    damaged_fields,
-    job_fields,
+    describe_damaged,
+    describe_job,
     require_document,
     require_success,
 )
@@ -37,7 +36,7 @@ from tauscope.server.http.tasks.router import Resource, add_stopping, make_route
 from tauscope.server.http.tasks.submission import (
     BackendRequest,
     RobotRequest,
-    chosen_backend,
+    choose_backend,
     keep_robot,
     receive_request,
     stage_request,
@@ -97,12 +96,6 @@ class CampaignAnswer(JobAnswer):
     links: CampaignLinksAnswer = Field(description="where to go on")
 
 
-class CampaignListAnswer(PageAnswer):
-    """Campaigns that are kept."""
-
-    campaigns: list[CampaignAnswer] = Field(description="the newest first")
-
-
 class CampaignResult(AnswerModel):
     """What came of a campaign."""
 
@@ -139,8 +132,8 @@ def describe(services: Services, identifier: str, root: str) -> CampaignAnswer:
     here, made, order = f"{root}/campaigns/{identifier}", workspace.read_made(), workspace.read_order()
     if order is None:
         links = _links(here, root, made, has_result=False)
-        return CampaignAnswer(**damaged_fields(identifier, here), links=links)
-    fields = job_fields(workspace, here)
+        return CampaignAnswer(**describe_damaged(identifier, here), links=links)
+    fields = describe_job(workspace, here)
     links = _links(here, root, made, has_result=fields["state"] is JobState.SUCCEEDED)
     steps = tuple(_steps(services, order, made, root))
     return CampaignAnswer(**fields, robot=order.robot_name, backend=order.backend, steps=steps, links=links)
@@ -217,7 +210,7 @@ async def submit_campaign(request: Request, services: Services) -> str:
         received = await receive_request(request, CampaignRequest, services.settings, workspace.robot)
         robot_file = await run_in_threadpool(keep_robot, received, workspace.robot, services.robots)
         robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
-        backend = chosen_backend(services.settings, received.document.backend, robot)
+        backend = choose_backend(services.settings, received.document.backend, robot)
         permit = permit_of(request, services, backend.device(robot.name))
         order = CampaignOrder(
             robot_file=robot_file,
@@ -232,7 +225,7 @@ async def submit_campaign(request: Request, services: Services) -> str:
 CAMPAIGNS = Resource(
     noun="a campaign",
     plural="campaigns",
-    models=(CampaignRequest, CampaignAnswer, CampaignListAnswer),
+    models=(CampaignRequest, CampaignAnswer),
     examples=EXAMPLES,
     items=lambda services: services.campaigns.items,
     find=find_campaign,

@@ -8,7 +8,7 @@ from fastapi.responses import StreamingResponse
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.server.http.answers import ENDINGS, Identifier, JobAnswer, JobLinks, PageAnswer, require_document
+from tauscope.server.http.answers import ENDINGS, Identifier, JobAnswer, JobLinks, require_document
 from tauscope.server.http.openapi import file_contents
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robot_files import EXAMPLE_ROBOT
@@ -54,12 +54,6 @@ class ExcitationAnswer(JobAnswer):
     links: ExcitationLinks = Field(description="where to go on")
 
 
-class ExcitationListAnswer(PageAnswer):
-    """Excitations that are kept."""
-
-    excitations: list[ExcitationAnswer] = Field(description="the newest first")
-
-
 TrajectoryFormat = Annotated[
     Literal["json", "csv"],
     Query(alias="format", description="json: exact coefficients; csv: samples that any controller can play"),
@@ -71,7 +65,7 @@ EXCITATIONS = QueuedTask(
     plural="excitations",
     kind=lambda services: services.excitations,
     workspace=ExcitationWorkspace,
-    models=(ExcitationRequest, ExcitationAnswer, ExcitationListAnswer),
+    models=(ExcitationRequest, ExcitationAnswer),
     examples=EXAMPLES,
     summary="Have a motion designed",
     words="The robot is checked at once, the motion is designed by the job: follow `Location` until it has ended.",

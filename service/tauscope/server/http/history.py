@@ -135,8 +135,7 @@ class EventAnswer(AnswerModel):
     kind: str = Field(description="drift", examples=["drift"])
     parameter: str = Field(description="that drifted")
     text: str = Field(
-        description="one line",
-        examples=["joint3: viscous friction +40 % in 6 weeks (0.5 → 0.7, 12 standard errors)"],
+        description="one line", examples=["joint3: viscous friction +40 % in 6 weeks (0.5 → 0.7, 12 standard errors)"]
     )
     raised: datetime = Field(description="when it was seen first, UTC")
     last_seen: datetime = Field(description="when it was seen last, UTC")

@@ -37,7 +37,7 @@ class LeaseRequest(StrictModel):
 
 
 EXAMPLES: dict[str, tuple[str, Any]] = {
-    "lease": ("An arm for ten seconds, and longer with heartbeats", {"robot": "two-joint-arm", "backend": "sim"}),
+    "lease": ("An arm for ten seconds, and longer with heartbeats", {"robot": "two-joint-arm", "backend": "sim"})
 }
 
 

@@ -185,11 +185,7 @@ def _refer(
     codes = sorted(content["examples"])
     examples |= {code: {"value": content["examples"][code]["value"]} for code in codes}
     references = {code: {"$ref": f"#/components/examples/{code}"} for code in codes}
-    whole = {
-        **answer,
-        "description": ", ".join(codes),
-        "content": {MEDIA_TYPE: {**content, "examples": references}},
-    }
+    whole = {**answer, "description": ", ".join(codes), "content": {MEDIA_TYPE: {**content, "examples": references}}}
     if len(codes) == 1:
         name = codes[0]
     elif name.isdecimal():

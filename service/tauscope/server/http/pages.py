@@ -86,11 +86,7 @@ router = APIRouter(prefix="/docs", include_in_schema=False)
 _METHODS = ("get", "post", "put", "delete")
 _FOLDER = FilePath(__file__).parent / "templates"
 _templates = Environment(
-    loader=FileSystemLoader(_FOLDER),
-    autoescape=True,
-    undefined=StrictUndefined,
-    trim_blocks=True,
-    lstrip_blocks=True,
+    loader=FileSystemLoader(_FOLDER), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
 )
 
 

@@ -41,16 +41,24 @@ class Heartbeat:
     @asynccontextmanager
     async def keep_beating(self) -> AsyncIterator[None]:
         """Show signs of life as long as the event loop turns, within the context."""
-
-        async def beat() -> None:
-            while True:
-                self.beat()
-                await asyncio.sleep(BEAT_S)
-
-        task = asyncio.create_task(beat())
-        try:
+        async with _repeat(self.beat, BEAT_S):
             yield
-        finally:
+
+
+@asynccontextmanager
+async def _repeat(call: Callable[[], object], interval_s: float | None) -> AsyncIterator[None]:
+    """Call a function again and again, within the context; never where there is no interval."""
+
+    async def repeat(pause_s: float) -> None:
+        while True:
+            call()
+            await asyncio.sleep(pause_s)
+
+    task = None if interval_s is None else asyncio.create_task(repeat(interval_s))
+    try:
+        yield
+    finally:
+        if task is not None:
             task.cancel()
             with suppress(asyncio.CancelledError):
                 await task
@@ -79,23 +87,12 @@ def watchdog_interval_s(environment: Mapping[str, str] = os.environ) -> float | 
 @asynccontextmanager
 async def notify_systemd() -> AsyncIterator[None]:
     """Say that the service is ready, give signs of life as long as the event loop turns, and say that it ends."""
-
-    async def live(interval_s: float) -> None:
-        while True:
-            notify("WATCHDOG=1")
-            await asyncio.sleep(interval_s)
-
-    interval_s = watchdog_interval_s()
-    task = None if interval_s is None else asyncio.create_task(live(interval_s))
     notify("READY=1")
     try:
-        yield
+        async with _repeat(lambda: notify("WATCHDOG=1"), watchdog_interval_s()):
+            yield
     finally:
         notify("STOPPING=1")
-        if task is not None:
-            task.cancel()
-            with suppress(asyncio.CancelledError):
-                await task
 
 
 LEAST_FREE_BYTES = 64 * 2**20  # room on the disk below which no run should begin [bytes]

@@ -11,12 +11,7 @@ from starlette.concurrency import run_in_threadpool
 
 from tauscope.recording import EffortKind
 from tauscope.server.http.answers import After, AnswerModel, Measured, PageAnswer
-from tauscope.server.http.bodies import (
-    PartRule,
-    file_answer,
-    parse_document,
-    receive_form,
-)
+from tauscope.server.http.bodies import PartRule, file_answer, parse_document, receive_form
 from tauscope.server.http.evidence import require_no_evidence
 from tauscope.server.http.openapi import binary_part, file_contents, form_body, refer_to_model
 from tauscope.server.http.reading import READING

@@ -134,7 +134,7 @@ HEADER = "Idempotency-Key"
 LONGEST_KEY = 200  # most characters of the header's value
 
 _REPEATABLE = re.compile(
-    r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|rollouts|recordings|schedules/[^/]+/run)"
+    r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|rollouts|recordings|robots(?:/check)?|schedules/[^/]+/run)"
 )
 _KEY = re.compile(rf"[\x21-\x7e]{{1,{LONGEST_KEY}}}")
 

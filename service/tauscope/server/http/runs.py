@@ -29,7 +29,7 @@ from tauscope.server.control.run import (
     take_trajectory,
 )
 from tauscope.server.control.run_manager import run_recording_name
-from tauscope.server.http.answers import AnswerModel, Identifier, MotionLinks, PageAnswer, shown_problem
+from tauscope.server.http.answers import AnswerModel, Identifier, MotionLinks, convert_problem
 from tauscope.server.http.bodies import PartRule, file_answer, to_json_text
 from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.leases import permit_of
@@ -41,7 +41,7 @@ from tauscope.server.http.tasks.submission import (
     BackendRequest,
     Received,
     RobotRequest,
-    chosen_backend,
+    choose_backend,
     keep_robot,
     receive_request,
     stage_request,
@@ -147,12 +147,6 @@ class RunAnswer(AnswerModel):
     links: RunLinks = Field(description="where to go on")
 
 
-class RunListAnswer(PageAnswer):
-    """Runs that are kept."""
-
-    runs: list[RunAnswer] = Field(description="the newest first")
-
-
 class StopAnswer(AnswerModel):
     """What became of the wish to stop a run."""
 
@@ -176,7 +170,7 @@ class FollowedRun:
     has_ended: Callable[[], bool]
 
 
-def followed_run(services: Services, identifier: str) -> FollowedRun:
+def follow_run(services: Services, identifier: str) -> FollowedRun:
     """A run whose events are followed. Raises NotFoundError if there is none."""
     workspace = find_run(services, identifier)
 
@@ -207,7 +201,7 @@ def describe(services: Services, identifier: str, root: str) -> RunAnswer:
         backend=request.backend,
         options=request.options,
         campaign=request.campaign,
-        problem=shown_problem(workspace.problem(), here),
+        problem=convert_problem(workspace.problem(), here),
         recording=_recording(services, identifier, record),
         links=_links(here, request.excitation and f"{root}/excitations/{request.excitation}", record, workspace),
     )
@@ -308,7 +302,7 @@ def _prepare(
         uploaded = True
     if uploaded and document.excitation is not None:
         raise ProblemError("invalid-request", "excitation and trajectory were both given; give one motion")
-    backend = chosen_backend(services.settings, document.backend, robot)
+    backend = choose_backend(services.settings, document.backend, robot)
     return _Wanted(document, robot_file, robot, backend, uploaded)
 
 
@@ -355,11 +349,11 @@ Format = Annotated[RecordingFormat, Query(alias="format", description="mcap: the
 RUNS = Resource(
     noun="a run",
     plural="runs",
-    models=(RunRequest, RunAnswer, RunListAnswer),
+    models=(RunRequest, RunAnswer),
     examples=EXAMPLES,
     items=lambda services: services.runs.items,
     find=find_run,
-    followed=followed_run,
+    followed=follow_run,
     submit=submit_run,
     describe=describe,
     summary="Begin a run",

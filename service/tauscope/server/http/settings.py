@@ -56,8 +56,7 @@ class Settings(BaseModel):
     )
 
     require_lease: bool = Field(
-        default=False,
-        description="whether an arm moves by a lease only; where keys are asked for, it always does",
+        default=False, description="whether an arm moves by a lease only; where keys are asked for, it always does"
     )
     prune_older_than_days: float | None = Field(
         default=None, ge=0, description="what ended longer ago is removed, hour after hour [days]; null: nothing is"

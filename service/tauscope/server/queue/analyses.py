@@ -6,17 +6,11 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from tauscope.errors import LimitExceededError, NotFoundError, TauscopeError
+from tauscope.errors import LimitExceededError, NotFoundError
 from tauscope.export.formats import CODE_FILES, EXPORT_FILES
 from tauscope.robot import read_robot
-from tauscope.server.queue.job_folder import JobProblem, without_folders
-from tauscope.server.queue.task_job import (
-    TRAJECTORY,
-    OrderedRecording,
-    TaskOrder,
-    TaskWorkspace,
-    perform_job,
-)
+from tauscope.server.queue.job_folder import JobProblem, hide_folders
+from tauscope.server.queue.task_job import TRAJECTORY, OrderedRecording, TaskOrder, TaskWorkspace, perform_job
 from tauscope.tasks import design_excitation, diagnose, identify, rollout
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.diagnose import DiagnosisOptions
@@ -183,7 +177,5 @@ def check_trajectory(folder: Path, robot_file: Path) -> None:
     Raises ExcitationError if it is not valid, or was made for an arm of another number of joints.
     """
     (path,) = folder.iterdir()
-    try:
+    with hide_folders(folder, robot_file.parent):
         read_trajectory(path, read_robot(robot_file))
-    except TauscopeError as error:
-        raise type(error)(without_folders(str(error), folder, robot_file.parent)) from None

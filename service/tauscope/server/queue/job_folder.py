@@ -2,7 +2,8 @@
 
 import json
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
@@ -21,6 +22,15 @@ def without_folders(text: str, *folders: Path) -> str:
     for folder in folders:
         text = text.replace(f"{folder}/", "")
     return text
+
+
+@contextmanager
+def hide_folders(*folders: Path) -> Iterator[None]:
+    """Have errors call files by their names alone, and say nothing of the server's folders."""
+    try:
+        yield
+    except TauscopeError as error:
+        raise type(error)(without_folders(str(error), *folders)) from None
 
 
 class JobState(StrEnum):

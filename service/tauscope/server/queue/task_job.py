@@ -218,7 +218,7 @@ Staged = TypeVar("Staged", bound=Preparable)
 
 
 @contextmanager
-def staged_workspace(items: ItemStore, kind: Callable[[Path], Staged]) -> Iterator[Staged]:
+def stage_workspace(items: ItemStore, kind: Callable[[Path], Staged]) -> Iterator[Staged]:
     """A new folder that is removed in the end, unless it was handed in meanwhile."""
     staged = items.stage()
     try:
@@ -238,12 +238,12 @@ def submit_job(
 
     `put_robot`: writes the robot's files into a folder.
     """
-    with staged_workspace(kind.items, workspace) as staged:
+    with stage_workspace(kind.items, workspace) as staged:
         put_robot(staged.robot)
         staged.write_order(order)
         return jobs.submit(kind, staged.folder)
 
 
-def ordered_on_server(recordings: RecordingStore, names: Sequence[str]) -> tuple[OrderedRecording, ...]:
+def order_kept(recordings: RecordingStore, names: Sequence[str]) -> tuple[OrderedRecording, ...]:
     """Recordings that lie on the server, as an order holds them. Raises NotFoundError if one does not lie there."""
     return tuple(OrderedRecording(name=name, origin="server", sha256=recordings.digest(name)) for name in names)

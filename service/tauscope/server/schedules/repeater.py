@@ -14,12 +14,9 @@ from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
 from tauscope.server.control.campaign_runner import CampaignDependencies, CampaignManager
 from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.history.indexer import WORKSPACES
-from tauscope.server.queue.analyses import (
-    DiagnosisOrder,
-    IdentificationOrder,
-)
+from tauscope.server.queue.analyses import DiagnosisOrder, IdentificationOrder
 from tauscope.server.queue.job_folder import Workspace
-from tauscope.server.queue.task_job import OrderedRecording, ordered_on_server, staged_workspace, submit_job
+from tauscope.server.queue.task_job import OrderedRecording, order_kept, stage_workspace, submit_job
 from tauscope.server.schedules.definition import RecordingChoice, ScheduleDefinition
 from tauscope.server.schedules.repository import ScheduleEntry
 from tauscope.server.store.data_folder import ItemStore
@@ -70,7 +67,7 @@ class Repeater:
 
     def _campaign(self, entry: ScheduleEntry) -> str:
         order = _order(entry, CampaignOrder)
-        with staged_workspace(self.campaigns.items, CampaignWorkspace) as workspace:
+        with stage_workspace(self.campaigns.items, CampaignWorkspace) as workspace:
             write_robot(workspace.robot, entry)
             workspace.write_order(order)
             return self.campaigns.submit(workspace.folder, self.permit_for(order.backend.device(order.robot_name)))
@@ -97,7 +94,7 @@ def newest_recordings(
     if since is not None and wanted[-1].modified <= since:
         raise NothingToDoError(f"no recording that matches {choice.pattern} is newer than the last time; record more")
     names = [entry.name for entry in wanted]
-    return ordered_on_server(store, names[: choice.train]), ordered_on_server(store, names[choice.train :])
+    return order_kept(store, names[: choice.train]), order_kept(store, names[choice.train :])
 
 
 def write_robot(folder: Path, entry: ScheduleEntry) -> None:

@@ -26,7 +26,7 @@ from tauscope.server.store.database.database import (
     open_engine,
     present_revision,
     revisions,
-    shown_address,
+    show_address,
     upgrade,
 )
 
@@ -56,7 +56,7 @@ def load_lines(engine: Engine, lines: Iterable[bytes]) -> None:
         raise StoreError(f"the backup was made by a newer Tauscope (form {revision}); restore it with that one")
     with engine.connect() as connection:
         if present_revision(connection) is not None:
-            address = shown_address(engine)
+            address = show_address(engine)
             raise StoreError(f"{address}: there is something in this database; give the backup an empty one")
     upgrade(engine, revision)
     with engine.execution_options(**{WRITES: True}).begin() as connection:

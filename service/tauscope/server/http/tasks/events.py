@@ -53,10 +53,7 @@ def add_events_route(router: APIRouter, noun: str, find: Callable[[Services, str
         summary=f"Follow the events of {noun}",
         response_class=Response,
         responses={
-            200: {
-                "content": {"text/event-stream": {"schema": _stream_schema()}},
-                "description": _STREAM,
-            },
+            200: {"content": {"text/event-stream": {"schema": _stream_schema()}}, "description": _STREAM},
             204: {"description": "the job had ended before `Last-Event-ID`: do not connect again"},
             **problem_responses("not-found"),
         },

@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 from typing import Annotated, Any, Protocol
 
 from fastapi import APIRouter, Depends, Path, Request, Response
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, create_model
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import ExportError, NotFoundError
@@ -23,6 +23,7 @@ from tauscope.server.http.answers import (
     AnswerModel,
     Identifier,
     Limit,
+    PageAnswer,
     collection,
     require_document,
 )
@@ -130,7 +131,7 @@ class Resource:
 
     noun: str
     plural: str
-    models: tuple[type[RobotRequest], type[BaseModel], type[BaseModel]]
+    models: tuple[type[RobotRequest], type[BaseModel]]
     examples: Examples
     items: Callable[[Services], ItemStore]
     find: Callable[[Services, str], Folder]
@@ -153,7 +154,13 @@ def make_router(resource: Resource) -> APIRouter:
     """The routes that every resource has; those that end something are added by its kind."""
     plural, noun, singular = resource.plural, resource.noun, resource.singular
     router = APIRouter(prefix=f"/{plural}", tags=[plural])
-    request_model, answer_model, list_model = resource.models
+    request_model, answer_model = resource.models
+    list_model = create_model(
+        f"{singular.capitalize()}ListAnswer",
+        __base__=PageAnswer,
+        __doc__=f"{plural.capitalize()} that are kept.",
+        **{plural: (list[answer_model], Field(description="the newest first"))},
+    )
 
     @router.post(
         "",
@@ -303,10 +310,7 @@ def add_document_route(
 
 
 def add_export_route(
-    router: APIRouter,
-    finished: Callable[[Services, str], Any],
-    formats: Mapping[ExportFormat, ExportFile],
-    words: str,
+    router: APIRouter, finished: Callable[[Services, str], Any], formats: Mapping[ExportFormat, ExportFile], words: str
 ) -> None:
     """Give a resource the route ``/{identifier}/exports/{format}``."""
     content = file_contents(*{file.media_type for file in formats.values()})

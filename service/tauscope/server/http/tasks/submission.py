@@ -213,7 +213,7 @@ class BackendRequest(StrictModel):
     )
 
 
-def chosen_backend(settings: Settings, request: BackendRequest, robot: Robot) -> BackendChoice:
+def choose_backend(settings: Settings, request: BackendRequest, robot: Robot) -> BackendChoice:
     """The backend of a request.
 
     Raises ScenarioError if the scenario is no plain data. Raises RobotFileError if a drive block names a file that the

@@ -46,7 +46,7 @@ def open_engine(address: Path | str) -> Engine:
     )
 
 
-def shown_address(engine: Engine) -> str:
+def show_address(engine: Engine) -> str:
     """What messages call a database: its file, or its URL without the password."""
     url = engine.url
     return str(url.database) if url.get_backend_name() == "sqlite" else url.render_as_string(hide_password=True)
@@ -92,7 +92,7 @@ def upgrade(engine: Engine, target: str = "head") -> None:
         present = present_revision(connection)
         if present is not None and present not in revisions():
             hint = "use the Tauscope that wrote it, or restore a backup of before"
-            raise StoreError(f"{shown_address(engine)}: was written by a newer Tauscope (form {present}); {hint}")
+            raise StoreError(f"{show_address(engine)}: was written by a newer Tauscope (form {present}); {hint}")
         if present != (revisions()[-1] if target == "head" else target):
             command.upgrade(_configuration(connection), target)
 
@@ -187,7 +187,7 @@ class Database:
                 present = present_revision(connection)
         if present != revisions()[-1]:
             hint = "restore it from a backup, and start the service again"
-            raise StoreError(f"{shown_address(self._engine)}: its tables are gone or were changed; {hint}")
+            raise StoreError(f"{show_address(self._engine)}: its tables are gone or were changed; {hint}")
 
     def close(self) -> None:
         """Close every connection."""
@@ -201,7 +201,7 @@ class Database:
         except IntegrityError:
             raise
         except (DBAPIError, PoolTimeoutError) as error:
-            raise StoreError(_describe_fault(shown_address(self._engine), error)) from error
+            raise StoreError(_describe_fault(show_address(self._engine), error)) from error
 
 
 def _check_file(url: URL) -> None:
