@@ -7,10 +7,10 @@ from typing import Annotated, Any
 import typer
 from pydantic import SecretStr, ValidationError
 
+from tauscope.cli.store_command import Kind
 from tauscope.cli.verbs import OptionsOf
 from tauscope.server.http import server
 from tauscope.server.http.settings import Settings, default_data_folder
-from tauscope.server.store.data_folder import ItemKind
 
 _DIRECT = (
     *("host", "port", "backend", "sim_time", "sim_socket", "tls_certificate", "tls_key"),
@@ -55,7 +55,7 @@ def serve(
         typer.Option(min=0.0, metavar="DAYS", help="Remove what ended longer ago, as `tauscope store prune` does."),
     ] = None,
     prune_kind: Annotated[
-        list[ItemKind] | None, typer.Option(help="Kind of item that may go so, once for each; every kind by default.")
+        list[Kind] | None, typer.Option(help="Kind of item that may go so, once for each; every kind by default.")
     ] = None,
 ) -> None:
     """Offer everything over HTTP.
@@ -72,7 +72,7 @@ def serve(
         trusted_proxies=tuple(trusted_proxy or ()),
         requests_per_s=requests_per_second,
         prune_older_than_days=prune_older_than,
-        prune_kinds=tuple(prune_kind or ()),
+        prune_kinds=tuple(kind.value for kind in prune_kind or ()),
         **options,
     )
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -25,7 +26,6 @@ from tauscope.server.store.data_folder import (
     FOLDERS,
     RECORDINGS,
     FolderLock,
-    ItemKind,
     item_stores,
     site_identifier,
     utc_now,
@@ -49,6 +49,13 @@ DatabaseUrl = Annotated[
         help="PostgreSQL database; SQLite in the data folder by default.",
     ),
 ]
+
+
+class Kind(StrEnum):
+    """Kinds of items: a repeated option takes an enumeration, no literal."""
+
+    EXCITATION, RUN, IDENTIFICATION = "excitation", "run", "identification"
+    DIAGNOSIS, ROLLOUT, CAMPAIGN = "diagnosis", "rollout", "campaign"
 
 
 _OWN_FILES = "its state, its order or its result"
@@ -135,7 +142,7 @@ def prune_store(
     data: DataFolder = None,
     database: DatabaseUrl = None,
     kind: Annotated[
-        list[ItemKind] | None, typer.Option(help="Kind of item that may go, once for each; every kind by default.")
+        list[Kind] | None, typer.Option(help="Kind of item that may go, once for each; every kind by default.")
     ] = None,
     recordings: Annotated[
         bool, typer.Option("--recordings", help="Recordings too that nothing which stays was made from.")
