@@ -31,10 +31,7 @@ def name_recordings(words: str) -> Any:
     return name_input(words, "RECORDING", typer.Argument, dir_okay=True)
 
 
-RobotFile = Annotated[
-    Path,
-    name_input("Robot file (YAML), or a URDF or MJCF by itself.", "ROBOT", typer.Argument),
-]
+RobotFile = Annotated[Path, name_input("Robot file (YAML), or a URDF or MJCF by itself.", "ROBOT", typer.Argument)]
 RecordingFile = Annotated[
     Path,
     name_input(

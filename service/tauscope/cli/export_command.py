@@ -16,8 +16,7 @@ from tauscope.export.mjcf_patch import patch_mjcf
 from tauscope.export.model_file import read_export_model
 
 ModelFile = Annotated[
-    Path,
-    name_input("Model that identify or diagnose wrote with --model.", "MODEL.json", typer.Argument),
+    Path, name_input("Model that identify or diagnose wrote with --model.", "MODEL.json", typer.Argument)
 ]
 Output = Annotated[
     Path,

@@ -27,10 +27,7 @@ from tauscope.robot.recording_layout import Source
 from tauscope.robot.yaml_text import read_yaml
 from tauscope.tasks.task import ReadingOptions
 
-RobotOption = Annotated[
-    Path | None,
-    name_input("Robot file: its names, limits, masses and layout.", "ROBOT"),
-]
+RobotOption = Annotated[Path | None, name_input("Robot file: its names, limits, masses and layout.", "ROBOT")]
 
 EFFORT_WORDS = {
     EffortKind.TORQUE: "torque",

@@ -42,10 +42,7 @@ Out = Annotated[
         help="File to make: .csv, .parquet, or .mcap (with the ramp). Never replaces a file; run-TIME.csv by default.",
     ),
 ]
-Scenario = Annotated[
-    Path | None,
-    name_input("What the simulated arm conceals (YAML).", "FILE"),
-]
+Scenario = Annotated[Path | None, name_input("What the simulated arm conceals (YAML).", "FILE")]
 HELD = (
     "! The arm is under power where it stopped, and its watchdog is off. Support it, then let go of it with: tauscope "
     "release."

@@ -22,22 +22,14 @@ from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.history.retention import RetentionRule, plan_removal, remove
 from tauscope.server.http.settings import default_data_folder
 from tauscope.server.store.backup import restore_backup, write_backup
-from tauscope.server.store.data_folder import (
-    FOLDERS,
-    RECORDINGS,
-    FolderLock,
-    item_stores,
-    site_identifier,
-    utc_now,
-)
+from tauscope.server.store.data_folder import FOLDERS, RECORDINGS, FolderLock, item_stores, site_identifier, utc_now
 from tauscope.server.store.database.database import FILE_NAME, Database
 from tauscope.server.store.database.index import Index
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.version import tauscope_version
 
 DataFolder = Annotated[
-    Path | None,
-    name_input("Data folder; the user's own by default.", "DIR", dir_okay=True, file_okay=False),
+    Path | None, name_input("Data folder; the user's own by default.", "DIR", dir_okay=True, file_okay=False)
 ]
 DatabaseUrl = Annotated[
     str | None,

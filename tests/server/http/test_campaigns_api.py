@@ -165,7 +165,7 @@ def test_requests_that_are_refused(
 ) -> None:
     problem = assert_problem(arm.post(CAMPAIGNS, json=body), code, 422)
     assert words in problem["detail"] + str(problem.get("errors"))
-    assert list(settings.data_folder / "campaigns".iterdir()) == []
+    assert list((settings.data_folder / "campaigns").iterdir()) == []
 
 
 def test_a_scenario_that_is_no_plain_data(arm: TestClient) -> None:

@@ -275,8 +275,8 @@ def test_requests_that_are_refused(
 ) -> None:
     problem = assert_problem(arm.post(RUNS, json=body), code, 422)
     assert words in problem["detail"] + str(problem.get("errors"))
-    assert list(settings.data_folder / "runs".iterdir()) == []
-    assert list(settings.data_folder / "excitations".iterdir()) == []
+    assert list((settings.data_folder / "runs").iterdir()) == []
+    assert list((settings.data_folder / "excitations").iterdir()) == []
     assert controls.started == []
 
 

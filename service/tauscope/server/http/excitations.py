@@ -9,14 +9,13 @@ from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.server.http.answers import ENDINGS, Identifier, JobAnswer, JobLinks, require_document
-from tauscope.server.http.openapi import file_contents
+from tauscope.server.http.openapi import file_responses
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robot_files import EXAMPLE_ROBOT
 from tauscope.server.http.services import ServicesDep
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import JobDocument
 from tauscope.server.http.tasks.submission import RobotRequest
-from tauscope.server.problems import problem_responses
 from tauscope.server.queue.analyses import ExcitationWorkspace, write_trajectory_piece
 from tauscope.server.queue.job_folder import read_bytes
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
@@ -90,10 +89,9 @@ router = EXCITATIONS.router()
     "/{identifier}/trajectory",
     summary="Fetch the trajectory",
     response_class=Response,
-    responses={
-        200: {"content": file_contents("application/json", "text/csv"), "description": "the file"},
-        **problem_responses("not-found", *ENDINGS, "excitation", "internal", *READING),
-    },
+    responses=file_responses(
+        ("application/json", "text/csv"), "not-found", *ENDINGS, "excitation", "internal", *READING
+    ),
 )
 async def get_trajectory(
     request: Request,

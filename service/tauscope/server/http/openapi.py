@@ -314,6 +314,11 @@ def file_contents(*media_types: str) -> dict[str, Any]:
     return {media_type: {"schema": schemas.get(media_type, {"type": "string"})} for media_type in ordered}
 
 
+def file_responses(media_types: Sequence[str], *problems: str, description: str = "the file") -> dict[int | str, Any]:
+    """The answers of a route that sends a file, and its problems by their codes."""
+    return {200: {"content": file_contents(*media_types), "description": description}, **problem_responses(*problems)}
+
+
 _referred: set[type[BaseModel]] = {Problem}  # models of bodies that the framework does not see
 
 

@@ -13,7 +13,7 @@ from tauscope.recording import EffortKind
 from tauscope.server.http.answers import After, AnswerModel, Measured, PageAnswer
 from tauscope.server.http.bodies import PartRule, file_answer, parse_document, receive_form
 from tauscope.server.http.evidence import require_no_evidence
-from tauscope.server.http.openapi import binary_part, file_contents, form_body, refer_to_model
+from tauscope.server.http.openapi import binary_part, file_responses, form_body, refer_to_model
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robot_files import FindingAnswer, read_received_robot, robot_part_rules
 from tauscope.server.http.services import ServicesDep
@@ -187,13 +187,13 @@ async def report_on_recording(
     "/{name}/samples",
     summary="Fetch samples of a recording for a plot",
     response_class=Response,
-    responses={
-        200: {
-            "content": file_contents("application/octet-stream"),
-            "description": "columns of 32-bit floats behind a header",
-        },
-        **problem_responses("not-found", "recording", *READING),
-    },
+    responses=file_responses(
+        ("application/octet-stream",),
+        "not-found",
+        "recording",
+        *READING,
+        description="columns of 32-bit floats behind a header",
+    ),
 )
 async def get_samples(request: Request, name: Name, services: ServicesDep, most: MostSamples = 100_000) -> Response:
     """Time, positions and torques; of more samples than asked for, those that keep every column's look.
@@ -210,10 +210,7 @@ async def get_samples(request: Request, name: Name, services: ServicesDep, most:
     "/{name}/content",
     summary="Fetch a recording",
     response_class=FileResponse,
-    responses={
-        200: {"content": file_contents("application/octet-stream", "text/csv"), "description": "the file"},
-        **problem_responses("not-found"),
-    },
+    responses=file_responses(("application/octet-stream", "text/csv"), "not-found"),
 )
 def get_content(name: Name, services: ServicesDep) -> FileResponse:
     """The very bytes that are kept."""

@@ -33,7 +33,7 @@ from tauscope.server.http.answers import AnswerModel, Identifier, MotionLinks, c
 from tauscope.server.http.bodies import PartRule, file_answer, to_json_text
 from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.leases import permit_of
-from tauscope.server.http.openapi import binary_part, file_contents
+from tauscope.server.http.openapi import binary_part, file_responses
 from tauscope.server.http.robot_files import EXAMPLE_ROBOT, read_received_robot
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
@@ -46,7 +46,7 @@ from tauscope.server.http.tasks.submission import (
     receive_request,
     stage_request,
 )
-from tauscope.server.problems import Problem, ProblemError, make_problem, problem_responses
+from tauscope.server.problems import Problem, ProblemError, make_problem
 from tauscope.server.queue.analyses import ExcitationOrder, ExcitationWorkspace, check_trajectory
 from tauscope.server.queue.task_job import submit_job
 from tauscope.server.store.event_log import EventLog
@@ -401,10 +401,7 @@ add_stopping(
     name="get_recording_of_run",
     summary="Fetch the recording of a run",
     response_class=FileResponse,
-    responses={
-        200: {"content": file_contents("application/octet-stream", "text/csv"), "description": "the file"},
-        **problem_responses("not-found", "not-finished"),
-    },
+    responses=file_responses(("application/octet-stream", "text/csv"), "not-found", "not-finished"),
 )
 def get_recording(identifier: Identifier, services: ServicesDep, format_: Format = "csv") -> FileResponse:
     """What was measured; also of a run that was stopped or interrupted, as far as it came."""
