@@ -41,6 +41,7 @@ class Recorder(Protocol):
     @property
     def lost(self) -> int:
         """Rows that were not taken because the writer was behind."""
+        ...
 
     def put(self, row: NDArray[np.void]) -> None:
         """Take a cycle. `row`: (1,) of `journal_row_type`, the cycle; copied."""

@@ -220,7 +220,8 @@ class CampaignRunner:
         """Have the recordings analysed; goes on with what was submitted before the service was started again."""
         identifier = self._find_submitted(kind, getattr(self._workspace.read_made(), link))
         if identifier is None:
-            order = workspace.order_type(**self._robot, **self._recordings(), options=options)
+            order_type: type[Any] = workspace.order_type
+            order = order_type(**self._robot, **self._recordings(), options=options)
             identifier = self._submit(kind, workspace, order)
         self._record(**{link: identifier})
         self._wait(kind, identifier, link)

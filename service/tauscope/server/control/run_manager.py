@@ -42,6 +42,7 @@ class ControlProcess(Protocol):
 
         `timeout_s`: how long; for good where None [s].
         """
+        ...
 
 
 StartControl = Callable[[RunWorkspace, Report], ControlProcess]

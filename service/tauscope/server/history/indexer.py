@@ -4,7 +4,7 @@ import json
 import logging
 import os
 import threading
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,7 +25,7 @@ from tauscope.server.store.database.index import FileMetadata, Index, ItemMetada
 from tauscope.server.store.files import hash_file, identifier_time
 from tauscope.server.store.recordings import RecordingStore
 
-WORKSPACES: Mapping[str, Callable[[Path], Any]] = {
+WORKSPACES: Mapping[str, type[Any]] = {
     "excitation": ExcitationWorkspace,
     "identification": IdentificationWorkspace,
     "diagnosis": DiagnosisWorkspace,

@@ -92,7 +92,7 @@ def staged_identifier(staged: Path) -> str:
 
 ItemKind = Literal["excitation", "run", "identification", "diagnosis", "rollout", "campaign"]
 
-FOLDERS: dict[ItemKind, str] = {
+FOLDERS = {
     "excitation": "excitations",
     "run": "runs",
     "identification": "identifications",

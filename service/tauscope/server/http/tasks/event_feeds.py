@@ -21,9 +21,11 @@ class EventSource(Protocol):
     @property
     def events(self) -> EventLog:
         """What happened."""
+        ...
 
     def has_ended(self) -> bool:
         """Whether nothing more will happen."""
+        ...
 
 
 class Feed:

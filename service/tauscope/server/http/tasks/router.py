@@ -116,6 +116,7 @@ class Folder(Protocol):
 
     def has_ended(self) -> bool:
         """Whether nothing more will happen."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,11 +156,12 @@ def make_router(resource: Resource) -> APIRouter:
     plural, noun, singular = resource.plural, resource.noun, resource.singular
     router = APIRouter(prefix=f"/{plural}", tags=[plural])
     request_model, answer_model = resource.models
+    entries: Any = {plural: (list[answer_model], Field(description="the newest first"))}
     list_model = create_model(
         f"{singular.capitalize()}ListAnswer",
         __base__=PageAnswer,
         __doc__=f"{plural.capitalize()} that are kept.",
-        **{plural: (list[answer_model], Field(description="the newest first"))},
+        **entries,
     )
 
     @router.post(

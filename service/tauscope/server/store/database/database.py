@@ -128,7 +128,8 @@ _DAMAGE_HINT = "restore a backup, or move it away: the index is made anew, sched
 
 def read_row(kind: type[Entry], row: object, **more: Any) -> Entry:
     """What is given out of a row: a dataclass of the same attributes. `more`: those that the row has not so."""
-    names = (field.name for field in fields(kind) if field.name not in more)
+    known: Any = kind
+    names = (field.name for field in fields(known) if field.name not in more)
     return kind(**{name: getattr(row, name) for name in names}, **more)
 
 
