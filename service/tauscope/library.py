@@ -259,8 +259,8 @@ def simulate(
     from tauscope.recording import read_recording as read
     from tauscope.results import ExcitationResult, SimulationResult
     from tauscope.runtime.drivers import make_backend
-    from tauscope.runtime.in_process import run_trajectory
     from tauscope.runtime.options import RunOptions
+    from tauscope.runtime.run import run_trajectory
     from tauscope.runtime.states import RunState
     from tauscope.trajectory import Trajectory, read_trajectory
 

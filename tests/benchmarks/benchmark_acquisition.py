@@ -20,9 +20,9 @@ from runtime.control_double import RealClock  # noqa: E402
 from runtime.doubles import PointArm, point_robot, short_motion  # noqa: E402
 from tauscope.robot import Robot, read_robot  # noqa: E402
 from tauscope.runtime.drivers import Connection, make_backend  # noqa: E402
-from tauscope.runtime.in_process import run_trajectory  # noqa: E402
 from tauscope.runtime.options import RunOptions  # noqa: E402
 from tauscope.runtime.record import RunRecord  # noqa: E402
+from tauscope.runtime.run import run_trajectory  # noqa: E402
 from tauscope.trajectory import FourierSegment, FourierSeries, Trajectory  # noqa: E402
 from tauscope_sim.examples import example_robot  # noqa: E402
 

@@ -30,8 +30,8 @@ from tauscope.diagnosis import diagnose, document  # noqa: E402
 from tauscope.recording import Recording, read_recording, write_recording  # noqa: E402
 from tauscope.robot import Robot  # noqa: E402
 from tauscope.runtime.drivers import make_backend  # noqa: E402
-from tauscope.runtime.in_process import run_trajectory  # noqa: E402
 from tauscope.runtime.options import RunOptions  # noqa: E402
+from tauscope.runtime.run import run_trajectory  # noqa: E402
 from tauscope.trajectory import FourierSegment, FourierSeries, Trajectory  # noqa: E402
 
 ARM = "six"

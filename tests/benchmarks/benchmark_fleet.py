@@ -23,7 +23,7 @@ os.environ["PYTHONPATH"] = os.pathsep.join(sys.path[:2])  # the workers import w
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
 
 from server.queue.paper_files import PAPER_ROBOT, write_recording  # noqa: E402
-from tauscope.server.queue.executors import ClusterExecutor  # noqa: E402
+from tauscope.server.queue.cluster_executor import ClusterExecutor  # noqa: E402
 from tauscope.server.queue.fleet import (  # noqa: E402
     FleetEntry,
     FleetResult,

@@ -15,8 +15,7 @@ from server.auth.keyed import make_keys
 from server.http.serving import Served, served
 from server.queue.paper_files import PAPER_ROBOT
 from tauscope.client import ApiError, Client, HeldLease
-from tauscope.server.auth.keys import KeyFile
-from tauscope.server.auth.scopes import Scope
+from tauscope.server.auth.keys import KeyFile, Scope
 
 pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(1200)]
 

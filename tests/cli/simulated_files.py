@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tauscope.cli.demo import robot_text_without_model
+from tauscope.cli.demo_command import robot_text_without_model
 from tauscope.robot import Robot, read_robot
 from tauscope_sim.examples import example_robot
 from tauscope_sim.motion import random_fourier_motion

@@ -16,7 +16,7 @@ import pytest
 
 from cli.conftest import Ended
 from tauscope.cli import demo_command
-from tauscope.cli.demo import (
+from tauscope.cli.demo_command import (
     FILES,
     HELD_OUT,
     HELD_OUT_TRAJECTORY,
@@ -65,7 +65,7 @@ def test_it_ends_with_a_running_page_unless_none_is_wanted(
     monkeypatch: pytest.MonkeyPatch, is_terminal: bool, asked: bool | None, shown: PageShown
 ) -> None:
     said: list[PageShown] = []
-    monkeypatch.setattr("tauscope.cli.demo.run_demo", lambda _, page: said.append(page))
+    monkeypatch.setattr("tauscope.cli.demo_command.run_demo", lambda _, page: said.append(page))
     monkeypatch.setattr(sys, "stdout", Mock(isatty=lambda: is_terminal))
     demo_command.demo(Path("out"), asked)
     assert said == [shown]

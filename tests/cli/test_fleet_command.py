@@ -17,7 +17,7 @@ Run = Callable[..., Ended]
 @pytest.fixture
 def manifest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Three robots: one with a held-out recording, one whose recording is broken, one without a robot file."""
-    monkeypatch.setattr("tauscope.cli.fleet_run.open_executor", lambda *_: InlineExecutor())
+    monkeypatch.setattr("tauscope.cli.fleet_command.open_executor", lambda *_: InlineExecutor())
     data = unpacked(SNAPSHOTS[-1], tmp_path)
     robot = next((data / "identifications").glob("*/robot/robot.json"))
     lines = [

@@ -35,7 +35,7 @@ def done_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Work is done in this process: what is tested here are not the workers."""
     for name in ("open_readers", "open_executor"):
         monkeypatch.setattr(f"tauscope.server.http.services.{name}", lambda *_, **__: InlineExecutor())
-    monkeypatch.setattr("tauscope.cli.job_run.POLL_S", 0.02)
+    monkeypatch.setattr("tauscope.cli.job_command.POLL_S", 0.02)
 
 
 @pytest.mark.usefixtures("done_here")
@@ -76,7 +76,7 @@ def test_a_service_that_is_there_does_it(run: Run, data: Path) -> None:
 
 @pytest.mark.usefixtures("done_here")
 def test_a_service_that_does_not_take_it_on(run: Run, data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tauscope.cli.job_run.PATIENCE_S", 0.1)
+    monkeypatch.setattr("tauscope.cli.job_command.PATIENCE_S", 0.1)
     with connected(create_app(Settings(data_folder=data, fires_schedules=False), InlineExecutor())):
         ended = run("job", "run", "nightly", "--data", data)
     assert ended.status == 1

@@ -15,7 +15,7 @@ from cli.conftest import Ended
 from server.queue.paper_files import PAPER_ROBOT
 from server.queue.waiting import wait_until
 from shared_data import REPOSITORY
-from tauscope.cli.run_session import why_unfinished
+from tauscope.cli.run_command import why_unfinished
 from tauscope.recording import read_recording
 from tauscope.runtime.record import RunProblem, new_record
 from tauscope.runtime.states import RunState
@@ -92,8 +92,8 @@ def test_a_file_that_is_there_stays(run: Run, short: Path, tmp_path: Path) -> No
     [
         (["--out", "out.txt"], 2, "the suffix names no format"),
         (["--out", "gone/out.csv"], 2, "does not exist"),
-        (["--start", "a,b"], 2, "is no list of numbers"),
-        (["--start", "nan,0,0"], 2, "is no list of numbers"),
+        (["--start", "a,b"], 2, "is not numbers separated by commas"),
+        (["--start", "nan,0,0"], 2, "is not numbers separated by commas"),
         (["--backend", "real"], 2, "--backend"),
         (["--mode", "speed"], 2, "--mode"),
         (["--rate", "0"], 2, "--rate"),

@@ -16,9 +16,9 @@ from tauscope.client import ApiError, Client, HeldLease
 from tauscope.client.client import ENDS
 from tauscope.client.transport import Transport, form_content
 from tauscope.runtime.states import RunState
-from tauscope.server.auth.scopes import Scope
+from tauscope.server.auth.keys import Scope
 from tauscope.server.http import Settings, create_app
-from tauscope.server.queue.record import JobState
+from tauscope.server.queue.job_folder import JobState
 
 
 @pytest.fixture

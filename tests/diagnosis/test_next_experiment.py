@@ -17,8 +17,8 @@ from tauscope.excitation import require_within_limits
 from tauscope.identification import Identification, identify
 from tauscope.recording import Recording, read_recording
 from tauscope.runtime.drivers import make_backend
-from tauscope.runtime.in_process import run_trajectory
 from tauscope.runtime.options import RunOptions
+from tauscope.runtime.run import run_trajectory
 from tauscope.runtime.states import RunState
 from tauscope.trajectory import Trajectory, motion_limits, read_trajectory, write_trajectory
 

@@ -11,7 +11,7 @@ import pytest
 from arm_rigs import ExactRig, bench_robot
 from drivers import test_conformance_calls, test_conformance_motion, test_conformance_watchdog
 from drivers.conftest import RIGS, rig_parameters
-from tauscope.cli.driver_choice import DEFAULT_BACKEND as DEFAULT_OF_COMMANDS
+from tauscope.cli.run_command import DEFAULT_BACKEND as DEFAULT_OF_COMMANDS
 from tauscope.runtime.drivers import DEFAULT_BACKEND, driver_names, find_driver
 
 MODULES = (test_conformance_calls, test_conformance_motion, test_conformance_watchdog)

@@ -9,9 +9,9 @@ from emulator_process import EmulatorProcess
 from tauscope.excitation import ExcitationOptions, design_excitation
 from tauscope.robot import Robot, read_robot
 from tauscope.runtime.drivers import Connection
-from tauscope.runtime.in_process import run_trajectory
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.record import RunRecord
+from tauscope.runtime.run import run_trajectory
 from tauscope.trajectory import Trajectory
 from tauscope_drivers import ArmState, Backend, Capabilities, ControlMode, DriveLimits, Setpoint, StopPolicy
 from tauscope_drivers.clock import Clock

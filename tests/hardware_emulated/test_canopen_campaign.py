@@ -20,9 +20,9 @@ from tauscope.identification import document, identify
 from tauscope.recording import read_recording
 from tauscope.robot import read_robot
 from tauscope.runtime.drivers import Connection
-from tauscope.runtime.in_process import run_trajectory
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.record import RunRecord
+from tauscope.runtime.run import run_trajectory
 from tauscope.runtime.states import RunState
 from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_sim.canopen_bus.order import CanOrder

@@ -21,8 +21,7 @@ from runtime.control_runs import wait_for
 from runtime.doubles import short_motion
 from tauscope.robot import read_robot
 from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
-from tauscope.runtime.recovery import recover_runs
-from tauscope.runtime.run_process import RunProcess
+from tauscope.runtime.run_process import RunProcess, recover_runs
 from tauscope.runtime.states import RunState
 from tauscope.trajectory import write_trajectory
 from tauscope_drivers.canopen.arm import CanopenArm

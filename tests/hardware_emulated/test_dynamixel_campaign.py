@@ -29,9 +29,9 @@ from tauscope.identification import document, identify
 from tauscope.recording import read_recording
 from tauscope.robot import read_robot
 from tauscope.runtime.drivers import Connection, find_driver, to_drive_joints
-from tauscope.runtime.in_process import run_trajectory
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.record import RunRecord
+from tauscope.runtime.run import run_trajectory
 from tauscope.runtime.states import RunState
 from tauscope_drivers import ControlMode, StopPolicy
 from tauscope_drivers.dynamixel.arm import DynamixelArm

@@ -17,8 +17,8 @@ from tauscope.identification import document, identify
 from tauscope.recording import read_recording
 from tauscope.robot import read_robot
 from tauscope.runtime.drivers import Connection, find_driver, to_drive_joints
-from tauscope.runtime.in_process import run_trajectory
 from tauscope.runtime.options import RunOptions
+from tauscope.runtime.run import run_trajectory
 from tauscope.runtime.states import RunState
 from tauscope_drivers.feetech.arm import FeetechArm
 from tauscope_sim.emulation import FaultKind, InjectedFault

@@ -12,7 +12,7 @@ from diagnosis.diagnosed_arm import recordings
 from diagnosis.held_out_residual import squares
 from diagnosis.test_diagnosis_of_simulated_arms import spring
 from identification.simulated import PAPER_NOISE, paper_robot
-from tauscope.cli.diagnose_summary import show_diagnosis
+from tauscope.cli.diagnose_command import show_diagnosis
 from tauscope.diagnosis import Diagnosis, DiagnosisDocument, Verdict, document
 from tauscope.diagnosis.documents.result import HeadroomEntry
 from tauscope.errors import IdentificationError

@@ -16,7 +16,7 @@ from tauscope.export.compensation.drive_units import drive_units
 from tauscope.recording import EffortKind, read_recording
 from tauscope.robot import Joint, read_robot
 from tauscope.runtime.drivers import make_backend
-from tauscope.runtime.in_process import run_trajectory
+from tauscope.runtime.run import run_trajectory
 from tauscope.server.store.data_folder import site_identifier
 from tauscope.server.store.database.database import Database
 from tauscope.trajectory import read_trajectory

@@ -24,8 +24,7 @@ from server.queue.controls import HandControls
 from server.queue.executors import ManualExecutor
 from shared_data import REPOSITORY
 from tauscope.server.auth.gate import RateLimit
-from tauscope.server.auth.keys import KeyFile
-from tauscope.server.auth.scopes import Scope
+from tauscope.server.auth.keys import KeyFile, Scope
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.services import Services
 from tauscope.server.problems import KINDS
@@ -237,7 +236,7 @@ def a_job_that_kills_the_service(bench: Bench) -> Response:
     first, second = Bench(settings), Bench(settings)
     with TestClient(first.app, base_url=HOST):
         job = first.identify()
-    state = settings.identifications_folder / job["id"] / "state.json"
+    state = settings.data_folder / "identifications" / job["id"] / "state.json"
     record = json.loads(state.read_text(encoding="utf-8"))
     state.write_text(json.dumps({**record, "attempts": MOST_ATTEMPTS}), encoding="utf-8")
     with TestClient(second.app, base_url=HOST):
@@ -246,7 +245,7 @@ def a_job_that_kills_the_service(bench: Bench) -> Response:
 
 def a_file_that_was_changed(bench: Bench) -> Response:
     job = bench.identify()
-    (bench.settings.identifications_folder / job["id"] / "state.json").write_bytes(b"\0")
+    (bench.settings.data_folder / "identifications" / job["id"] / "state.json").write_bytes(b"\0")
     return bench.result(job)
 
 
@@ -300,7 +299,7 @@ def a_fault_in_a_request(bench: Bench) -> Response:
     def fail(*_: object) -> None:
         raise KeyError("x")
 
-    bench.patch.setattr("tauscope.server.store.items.ItemStore.identifiers", fail)
+    bench.patch.setattr("tauscope.server.store.data_folder.ItemStore.identifiers", fail)
     return bench.client().get(RUNS)
 
 

@@ -16,8 +16,8 @@ from tauscope.recording import read_recording
 from tauscope.robot import JointLimits, Model, Robot
 from tauscope.robot.robot import STANDARD_PARAMETERS
 from tauscope.runtime.drivers import make_backend
-from tauscope.runtime.in_process import run_trajectory
 from tauscope.runtime.options import RunOptions
+from tauscope.runtime.run import run_trajectory
 from tauscope.runtime.states import RunState
 from tauscope.trajectory import FourierSegment, Trajectory
 from tauscope_sim.model import build_model

@@ -7,8 +7,7 @@ from pathlib import Path
 from tauscope.errors import RecordingError, TauscopeError
 from tauscope.files import write_atomically
 from tauscope.server.queue.analyses import IdentificationWorkspace
-from tauscope.server.queue.job_folder import begin_step, do_work
-from tauscope.server.queue.record import JobProblem
+from tauscope.server.queue.job_folder import JobProblem, begin_step, do_work
 from tauscope.server.store.files import hash_file
 
 SCHEMA = "tauscope.identification/1"

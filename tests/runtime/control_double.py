@@ -18,8 +18,8 @@ from tauscope.robot import Robot
 from tauscope.runtime import recorder as recorder_module
 from tauscope.runtime.control import control
 from tauscope.runtime.drivers import Connection
-from tauscope.runtime.in_process import open_recorder
 from tauscope.runtime.recorder import Recorder, RecorderProcess
+from tauscope.runtime.run import open_recorder
 from tauscope.runtime.states import Stops
 from tauscope_drivers import MonotonicClock
 

@@ -28,7 +28,7 @@ from tauscope.robot import read_robot
 from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
 from tauscope.runtime.processes import child_environment
 from tauscope.runtime.record import RunRecord, read_record
-from tauscope.runtime.recovery import recover_runs
+from tauscope.runtime.run_process import recover_runs
 from tauscope.runtime.states import RunState
 from tauscope.trajectory import write_trajectory
 from tauscope_sim.device.activity import COMMANDED

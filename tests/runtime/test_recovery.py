@@ -13,11 +13,11 @@ import pytest
 from runtime.doubles import PointArm, connection, point_robot, short_motion
 from tauscope.errors import AcquisitionError
 from tauscope.recording import read_recording
-from tauscope.runtime.in_process import run_trajectory
 from tauscope.runtime.options import RunOrder, write_order
 from tauscope.runtime.processes import RunLock, child_environment
 from tauscope.runtime.record import ProcessName, RunRecord, read_record, write_process, write_record
-from tauscope.runtime.recovery import recover_runs
+from tauscope.runtime.run import run_trajectory
+from tauscope.runtime.run_process import recover_runs
 from tauscope.runtime.states import RunState, may_follow
 
 GONE = ProcessName(pid=2**22 + 5, start=1)

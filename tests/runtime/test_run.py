@@ -14,9 +14,9 @@ from tauscope.recording import EffortKind, read_recording
 from tauscope.recording.journal_reading import read_journal
 from tauscope.recording.journal_rows import Phase
 from tauscope.robot import Robot
-from tauscope.runtime.in_process import run_trajectory
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.record import RunRecord, read_record
+from tauscope.runtime.run import run_trajectory
 from tauscope.runtime.states import ManualStop, RunState, StopSource
 from tauscope_drivers import ArmState, ControlMode, DriverError, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind

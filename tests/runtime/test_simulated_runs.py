@@ -11,8 +11,8 @@ from tauscope.errors import AcquisitionError, ScenarioError
 from tauscope.recording import read_recording
 from tauscope.robot import Robot, read_robot
 from tauscope.runtime.drivers import DEFAULT_BACKEND, driver_names, find_driver, make_backend
-from tauscope.runtime.in_process import run_trajectory
 from tauscope.runtime.options import RunOptions
+from tauscope.runtime.run import run_trajectory
 from tauscope.runtime.states import RunState
 from tauscope.trajectory import FourierSegment, FourierSeries, Trajectory
 from tauscope_sim.examples import example_robot

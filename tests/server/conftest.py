@@ -16,8 +16,8 @@ from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.paper_files import PAPER_ROBOT, write_recording
 from tauscope.report import diagnosis_report, identification_report
 from tauscope.server.http import Settings, create_app
+from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.database.database import FILE_NAME, Database
-from tauscope.server.store.items import ItemStore
 
 __all__ = ["address", "database", "diagnosis_report", "identification_report", "postgres"]
 

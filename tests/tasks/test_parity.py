@@ -5,18 +5,19 @@ from typing import Any
 
 import pytest
 from pydantic import BaseModel
+from typer import Context
 from typer.core import TyperGroup
 from typer.main import get_command
 
 from tauscope.cli.program import app
 from tauscope.runtime.options import RunOptions
-from tauscope.server.http.backends import BackendRequest
 from tauscope.server.http.campaigns import CampaignRequest
 from tauscope.server.http.diagnoses import DIAGNOSES, DiagnosisRequest
 from tauscope.server.http.excitations import ExcitationRequest
 from tauscope.server.http.identifications import IDENTIFICATIONS, IdentificationRequest
 from tauscope.server.http.runs import RunRequest
 from tauscope.server.http.settings import Settings
+from tauscope.server.http.tasks.submission import BackendRequest
 from tauscope.tasks import campaign, design_excitation, diagnose, identify, run
 
 FILES = {"robot", "recordings", "held_out", "simulated", "model"}
@@ -80,11 +81,13 @@ def fields(verb: str, models: tuple[type[BaseModel], ...]) -> dict[str, Any]:
 
 def options(verb: str) -> dict[str, Any]:
     """Options of the command line by each of their names."""
-    command = get_command(app)
-    assert isinstance(command, TyperGroup)
+    program = get_command(app)
+    assert isinstance(program, TyperGroup)
+    command = program.get_command(Context(program), verb)
+    assert command is not None
     return {
         name.removeprefix("--").replace("-", "_"): parameter
-        for parameter in command.commands[verb].params
+        for parameter in command.params
         for name in parameter.opts
         if name.startswith("--")
     }

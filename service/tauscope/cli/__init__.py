@@ -1,7 +1,6 @@
 """The command line: ``tauscope identify``, ``run``, ``robot``, ``recording``, ``serve``, ``demo`` and more.
 
-Modules named ``*_command`` only declare arguments, and import what does the work when they are called: ``--help``
-answers at once.
+Each module named ``*_command`` is loaded when one of its verbs is called: ``tauscope --help`` answers at once.
 """
 
 from tauscope.cli.program import main

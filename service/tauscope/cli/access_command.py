@@ -1,13 +1,18 @@
-"""``tauscope key`` and ``tauscope audit``: their arguments."""
+"""``tauscope key`` and ``tauscope audit``: who may use the service, and who did."""
 
+import os
+from datetime import timedelta
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from tauscope.cli.verbs import add_verb
-
-key = typer.Typer(help="API keys of the service.", no_args_is_help=True, rich_markup_mode=None)
+from tauscope.cli.verbs import make_group
+from tauscope.errors import TauscopeError
+from tauscope.server.auth.audit_log import AuditLog
+from tauscope.server.auth.keys import ApiKey, KeyFile, parse_scope
+from tauscope.server.http.settings import default_data_folder
+from tauscope.server.store.data_folder import utc_now
 
 DataFolder = Annotated[
     Path | None,
@@ -15,7 +20,7 @@ DataFolder = Annotated[
 ]
 
 
-def add(
+def add_key(
     name: Annotated[str, typer.Argument(help="Who gets the key.")],
     scope: Annotated[
         Literal["read", "analyse", "move", "admin"],
@@ -25,41 +30,40 @@ def add(
     data: DataFolder = None,
 ) -> None:
     """Make a key and print it: it is kept nowhere else. From then on the service asks for keys."""
-    from tauscope.cli.access_run import add_key
+    folder = data or default_data_folder()
+    folder.mkdir(parents=True, exist_ok=True)
+    life = timedelta(days=days) if days else None
+    key, text = KeyFile(folder).add(name, parse_scope(scope), utc_now(), life)
+    until = "for good" if key.expires is None else f"until {key.expires:%Y-%m-%d}"
+    _note(folder, "key add", key)
+    typer.echo(f"key {key.id} of {name}: scope {key.scope}, {until}; this is the only time that it is shown", err=True)
+    typer.echo(text)
 
-    add_key(name, scope, days, data)
 
-
-def list_(data: DataFolder = None) -> None:
+def list_keys(data: DataFolder = None) -> None:
     """List all keys: who has them, what they may do, whether they still hold."""
-    from tauscope.cli.access_run import list_keys
+    now = utc_now()
+    for key in KeyFile(data or default_data_folder()).read():
+        expires = "never" if key.expires is None else f"{key.expires:%Y-%m-%d}"
+        typer.echo(f"{key.id}  {key.scope:<8} {key.state(now):<8} expires {expires:<11} {key.name}")
 
-    list_keys(data)
 
-
-def revoke(
+def revoke_key(
     name: Annotated[str, typer.Argument(help="Name or identifier of the key.")], data: DataFolder = None
 ) -> None:
     """Take a key back; a service that runs refuses it within seconds."""
-    from tauscope.cli.access_run import revoke_key
-
-    revoke_key(name, data)
-
-
-add_verb(key, add)
-add_verb(key, list_, name="list")
-add_verb(key, revoke)
+    folder = data or default_data_folder()
+    key = KeyFile(folder).revoke(name, utc_now())
+    _note(folder, "key revoke", key)
+    typer.echo(f"key {key.id} of {key.name} is revoked")
 
 
-audit = typer.Typer(help="Who did what through the service.", no_args_is_help=True, rich_markup_mode=None)
+def _note(folder: Path, action: str, key: ApiKey) -> None:
+    """Leave an entry in the audit log, in the name of whoever is logged in."""
+    AuditLog(folder).append(f"user {os.getuid()}", action, subject=key.name, key=key.id, scope=key.scope.value)
 
 
-@audit.callback()
-def _audit() -> None:
-    """Make `verify` a verb of its own, as a second one will be."""
-
-
-def verify(
+def verify_audit(
     data: DataFolder = None,
     head: Annotated[
         str | None, typer.Option(metavar="HASH", help="Hash of an entry, noted earlier, that has to be in the log.")
@@ -72,9 +76,15 @@ def verify(
 
     Note that hash now and then where the machine's owner cannot reach it: --head finds out whether the end was cut off.
     """
-    from tauscope.cli.access_run import verify_audit
+    log = AuditLog(data or default_data_folder())
+    if file is not None:
+        log.path = file
+    found = log.verify(head)
+    if found.fault is not None:
+        hint = f"the {found.entries} entries before it are whole; compare the file with a backup"
+        raise TauscopeError(f"{log.path}: {found.fault}; {hint}")
+    typer.echo(f"{found.entries} entries, none changed, moved or missing; the last one's hash is {found.head}")
 
-    verify_audit(data, head, file)
 
-
-add_verb(audit, verify)
+key = make_group("API keys of the service.", add=add_key, list=list_keys, revoke=revoke_key)
+audit = make_group("Who did what through the service.", verify=verify_audit)

@@ -1,16 +1,25 @@
-"""``tauscope campaign``: its arguments."""
+"""``tauscope campaign``: perform the task in a new folder, write what came of it, and show it."""
 
+import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from pydantic import ValidationError
 
 from tauscope.cli.arguments import RobotFile
-from tauscope.cli.driver_choice import DEFAULT_BACKEND, check_backend
+from tauscope.cli.diagnose_command import show_diagnosis
+from tauscope.cli.identify_command import show_identification
+from tauscope.cli.output_files import write_file
+from tauscope.cli.terminal import output, plain, show_progress
+from tauscope.errors import ExportError
+from tauscope.runtime.drivers import DEFAULT_BACKEND, driver_names
+from tauscope.tasks import campaign as task
+from tauscope.tasks.task import LocalFiles
 
 
 def _step(words: str) -> Any:
-    """An option that holds the options of a step."""
     return typer.Option(metavar="JSON", help=f"{words}: an object as in the REST API, or none.")
 
 
@@ -21,7 +30,10 @@ def campaign(
         Path, typer.Option(metavar="DIR", file_okay=False, help="New folder for motions, recordings and results.")
     ],
     backend: Annotated[
-        str, typer.Option(metavar="[{backends}|JSON]", help="What moves the arm, by name or as in the REST API.")
+        str,
+        typer.Option(
+            metavar=f"[{'|'.join(driver_names())}|JSON]", help="What moves the arm, by name or as in the REST API."
+        ),
     ] = DEFAULT_BACKEND,
     excitation: Annotated[str, _step("How the training motion is designed")] = "{}",
     held_out: Annotated[str, _step("The motion that the model is judged by")] = "{}",
@@ -33,17 +45,50 @@ def campaign(
 
     Ctrl-C stops the arm; motions and recordings made until then are kept.
     """
-    import json
-
-    from tauscope.cli.campaign_run import run_campaign
-
-    named = backend if backend.lstrip().startswith("{") else json.dumps({"name": check_backend(backend)})
+    if not backend.lstrip().startswith("{"):
+        if backend not in driver_names():
+            raise typer.BadParameter(f"{backend!r} is not one of {', '.join(map(repr, driver_names()))}.")
+        backend = json.dumps({"name": backend})
     steps = {
-        "backend": named,
+        "backend": backend,
         "excitation": excitation,
         "held_out": held_out,
         "run": run,
         "identification": identification,
         "diagnosis": diagnosis,
     }
-    run_campaign(robot, steps, out)
+    request = _request(robot, steps)
+    try:
+        out.mkdir()
+    except OSError as error:
+        raise ExportError(f"{out}: cannot be made ({error.strerror}); name a new folder") from error
+    with show_progress() as progress:
+        result = task.perform(request, LocalFiles({"campaign": out}), progress)
+        progress("write files")
+        outputs = result.outputs
+        for name in outputs:
+            _write(out / name, outputs, name)
+    show_identification(output(), result.identification.document, result.identification.robot)
+    if result.diagnosis is not None:
+        show_diagnosis(output(), result.diagnosis.document)
+    output().print(plain(f"wrote {out}"), soft_wrap=True)
+
+
+def _request(robot: Path, steps: Mapping[str, str]) -> task.Request:
+    fields = ", ".join(f'"{name}": {"null" if text == "none" else text}' for name, text in steps.items())
+    try:
+        return task.Request.model_validate_json(f'{{"robot": {json.dumps(str(robot))}, {fields}}}')
+    except ValidationError as error:
+        fault = error.errors(include_url=False, include_context=False)[0]
+        place = ".".join(str(part) for part in fault["loc"])
+        option = f"'--{str(fault['loc'][0]).replace('_', '-')}'" if fault["loc"] else None
+        raise typer.BadParameter(f"{place}: {fault['msg']}", param_hint=option) from None
+
+
+def _write(path: Path, outputs: Mapping[str, bytes], name: str) -> None:
+    """Write an output, unless its format cannot hold the model."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        write_file(path, outputs[name])
+    except ExportError as error:
+        output().print(plain(f"! {error}"), soft_wrap=True)

@@ -15,8 +15,8 @@ from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
 from tauscope.server.http.campaigns import describe, result_of
 from tauscope.server.http.services import Services, open_services
 from tauscope.server.http.settings import Settings
-from tauscope.server.queue.record import JobState
-from tauscope.server.queue.task_job import staged_workspace
+from tauscope.server.queue.job_folder import JobState
+from tauscope.server.queue.task_job import stage_workspace
 from tauscope.tasks.campaign import HeldOutMotion
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.diagnose import DiagnosisOptions
@@ -40,8 +40,7 @@ def run_campaign(data: Path, robot_file: Path, scenario: Mapping[str, Any], told
 
 
 def _begin(services: Services, robot_file: Path, scenario: Mapping[str, Any]) -> str:
-    """Hand the campaign in."""
-    with staged_workspace(services.campaigns.items, CampaignWorkspace) as workspace:
+    with stage_workspace(services.campaigns.items, CampaignWorkspace) as workspace:
         shutil.copy(robot_file, workspace.robot)
         workspace.write_order(
             CampaignOrder(

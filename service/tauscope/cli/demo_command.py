@@ -1,10 +1,82 @@
-"""``tauscope demo``: its arguments."""
+"""``tauscope demo``: a whole campaign on the seed paper's arm, simulated, and what it found beside the truth.
 
+Nothing but the simulated arm knows its model: the motions are designed, and the arm is identified, from a robot file
+without one.
+"""
+
+import io
 import sys
+from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
+import numpy as np
 import typer
+from rich.console import Console
+from ruamel.yaml import YAML
+
+from tauscope.cli.demo_campaign import run_campaign
+from tauscope.cli.demo_page import DATA, LEFT_FOR_S, PORT, PageShown, leave_page, prepare_folder, show_page
+from tauscope.cli.identify_command import show_identification
+from tauscope.cli.output_files import write_file
+from tauscope.cli.run_command import keep_recording, why_unfinished
+from tauscope.cli.task_run import write_outputs
+from tauscope.cli.terminal import Told, output, plain, show_progress, table
+from tauscope.diagnosis import DiagnosisDocument
+from tauscope.errors import AcquisitionError
+from tauscope.excitation import ExcitationOptions, OptimiserProgress, design_excitation
+from tauscope.export.formats import EXPORT_FILES
+from tauscope.identification import Identification
+from tauscope.number_text import given, with_uncertainty
+from tauscope.report.table import Table
+from tauscope.robot import Robot, read_robot
+from tauscope.runtime.options import RunOptions
+from tauscope.runtime.states import RunState
+from tauscope.tasks import identify, run
+from tauscope.tasks.task import LocalFiles
+from tauscope.trajectory import write_trajectory
+from tauscope_sim.examples import example_robot
+
+NOISE_STD_NM = (0.5, 0.3, 0.7)  # σ_τ of the seed paper's section 5
+
+RATE_HZ = 200.0
+TRAIN_MOTION = ExcitationOptions(periods=5, slow_postures=1, seed=0)
+HELD_OUT_MOTION = ExcitationOptions(periods=2, slow_postures=0, closing_period=False, seed=1)
+
+ROBOT, TRAIN, HELD_OUT = "robot.yaml", "train.csv", "held-out.csv"
+SCENARIO, TRAIN_TRAJECTORY, HELD_OUT_TRAJECTORY = "scenario.yaml", "train.json", "held-out.json"
+RESULT, REPORT = "identification.json", "report.html"
+EXPORTS = ("friction.json", "friction.yaml", "friction.h", "friction.py", "model.xml")
+FILES = (ROBOT, SCENARIO, TRAIN_TRAJECTORY, HELD_OUT_TRAJECTORY, TRAIN, HELD_OUT, RESULT, REPORT, *EXPORTS)
+"""What the demo writes, and may therefore write again."""
+
+CONCEALED = {"torque_noise_std": list(NOISE_STD_NM), "seed": 1} | {
+    "effects": [{"effect": "joint_spring", "joint": 1, "stiffness": 0.6}]
+}
+"""What the arm of that campaign conceals: a scenario, by which the diagnosis is put to the test."""
+
+SCENARIO_TEXT = f"torque_noise_std: {list(NOISE_STD_NM)}\n"
+"""What the simulated arm conceals, but for the seed of its noise."""
+
+_HEADING = """\
+The seed paper's arm, Table 1, as `tauscope demo` hands it to the design and to the identification: what its links weigh
+and how its joints rub is left out. Of the friction curve only the shape constants are given."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A parameter's truth beside its estimate."""
+
+    name: str
+    truth: float
+    value: float
+    std: float
+
+    @property
+    def z(self) -> float:
+        """The error in standard errors."""
+        return (self.value - self.truth) / self.std
 
 
 def demo(
@@ -27,8 +99,118 @@ def demo(
     arm from the noisy recordings, and compares the estimate with the truth. Then a campaign through the service on the
     same arm with a concealed spring, which the page shows. Takes a minute or two.
     """
-    from tauscope.cli.demo import run_demo
-    from tauscope.cli.demo_page import PageShown
-
     by_default = PageShown.HERE if sys.stdout.isatty() else PageShown.LEFT
     run_demo(out, {None: by_default, True: PageShown.HERE, False: PageShown.NOT}[page])
+
+
+def run_demo(folder: Path, page: PageShown) -> None:
+    """Design, run, identify, compare, and say where everything is.
+
+    Raises TauscopeError where the folder holds somebody else's files of the same names, cannot be written, or the page
+    not be served.
+    """
+    prepare_folder(folder, (*FILES, DATA))
+    arm = read_robot(example_robot("paper_arm"))
+    write_file(folder / ROBOT, robot_text_without_model(example_robot("paper_arm")).encode())
+    write_file(folder / SCENARIO, SCENARIO_TEXT.encode())
+    with show_progress() as told, TemporaryDirectory(prefix=".runs-", dir=folder) as runs:
+        design_motion(folder / ROBOT, folder / TRAIN_TRAJECTORY, TRAIN_MOTION, told)
+        design_motion(folder / ROBOT, folder / HELD_OUT_TRAJECTORY, HELD_OUT_MOTION, told)
+        for seed, (trajectory, out) in enumerate(((TRAIN_TRAJECTORY, TRAIN), (HELD_OUT_TRAJECTORY, HELD_OUT))):
+            run_motion(Path(runs).resolve() / Path(out).stem, folder / trajectory, folder / out, seed, told)
+    request = identify.Request(
+        robot=str(folder / ROBOT), recordings=(str(folder / TRAIN),), held_out=(str(folder / HELD_OUT),)
+    )
+    exports = {folder / file.name: file.output for file in EXPORT_FILES.values() if file.name in EXPORTS}
+    outputs = {folder / RESULT: "result.json", folder / REPORT: "report.html", **exports}
+    with show_progress() as progress:
+        outcome, _ = write_outputs(identify, request, outputs, progress)
+    _show(output(), folder, outcome, compare(arm, outcome.identification))
+    with show_progress() as told:
+        found = run_campaign(folder / DATA, example_robot("paper_arm"), CONCEALED, told)
+    _show_findings(output(), found)
+    if page is PageShown.HERE:
+        return show_page(folder)
+    hint = f"tauscope serve --data {folder / DATA} (or make page)"
+    said = f"Look at it: {hint}, then open http://127.0.0.1:{PORT}"
+    if page is PageShown.LEFT:
+        said = f"Look at it: {leave_page(folder).address}, for {LEFT_FOR_S / 60.0:.0f} minutes; after that: {hint}"
+    output().print(plain(said), soft_wrap=True)
+
+
+def design_motion(robot: Path, out: Path, options: ExcitationOptions, told: Told) -> None:
+    """Design a motion and write it as a trajectory file."""
+
+    def tell(progress: OptimiserProgress) -> None:
+        told(f"design {out.stem} motion", 100.0 * progress.fraction)
+
+    write_trajectory(design_excitation(read_robot(robot), options, progress=tell).trajectory, out)
+
+
+def run_motion(folder: Path, trajectory: Path, out: Path, seed: int, told: Told) -> None:
+    """Play a motion on the simulated arm, and keep what it recorded.
+
+    Raises AcquisitionError if the run does not finish.
+    """
+    scenario = folder.with_suffix(".yaml")
+    scenario.write_text(f"{SCENARIO_TEXT}seed: {seed}\n", encoding="utf-8")
+    request = run.Request(
+        robot=str(example_robot("paper_arm")),
+        scenario=str(scenario),
+        trajectory=str(trajectory),
+        # What the arm weighs is the simulation's secret: nobody may feed it forward.
+        options=RunOptions(rate_hz=RATE_HZ, feed_forward=False),
+    )
+    result = run.perform(request, LocalFiles({"run": folder}), told)
+    if result.record.state is not RunState.FINISHED:
+        raise AcquisitionError(why_unfinished(result.record, None))
+    keep_recording(result, out)
+
+
+def robot_text_without_model(path: Path) -> str:
+    """Text of a robot file without what it believes about links and friction; a heading says so."""
+    yaml = YAML()
+    yaml.width = 4096
+    content = yaml.load(path.read_text(encoding="utf-8"))
+    content.pop("model", None)
+    content.yaml_set_start_comment(_HEADING)
+    stream = io.StringIO()
+    yaml.dump(content, stream)
+    return stream.getvalue()
+
+
+def compare(arm: Robot, identification: Identification) -> list[Comparison]:
+    """The estimate beside the truth: base parameters, then every joint's friction."""
+    structure, std = identification.structure, np.sqrt(np.diag(identification.covariance))
+    standard = np.concatenate([link.to_vector() for link in arm.model.links or ()])
+    truth = dict(zip(structure.base.expressions, structure.base.project(standard), strict=True))
+    for joint, friction in zip(arm.joints, arm.model.friction or (), strict=True):
+        truth |= {f"{name} {joint.name}": getattr(friction, name) for name in ("stiction", "stribeck", "viscous")}
+        truth[f"offset {joint.name}"] = 0.0
+    rows = zip(structure.names, identification.parameters, std, strict=False)
+    return [Comparison(name, float(truth[name]), float(value), float(error)) for name, value, error in rows]
+
+
+def _show(console: Console, folder: Path, outcome: identify.Result, comparisons: list[Comparison]) -> None:
+    show_identification(console, outcome.document, outcome.robot)
+    rows = [
+        (row.name, given(round(row.truth, 6)), *with_uncertainty(row.value, row.std), f"{row.z:+.2f}")
+        for row in comparisons
+    ]
+    console.print()
+    console.print(table("Truth and estimate", Table(("parameter", "truth", "estimate", "± std", "z"), rows)))
+    rms = float(np.sqrt(np.mean([row.z**2 for row in comparisons])))
+    console.print(
+        plain(f"z is the error in standard errors; its rms over all {len(rows)} parameters is {rms:.2f} (1 expected)")
+    )
+    for name in FILES:
+        console.print(plain(f"wrote {folder / name}"), soft_wrap=True)
+
+
+def _show_findings(console: Console, found: DiagnosisDocument) -> None:
+    console.print()
+    console.print(plain("The same arm once more, a spring concealed at its first joint; what the diagnosis found:"))
+    for finding in found.findings:
+        console.print(plain(finding.statement), soft_wrap=True)
+    console.print(plain(f"verdict: {found.verdict}"))
+    console.print()

@@ -20,7 +20,7 @@ from typing import IO, cast
 import typer
 
 from tauscope.cli.output_files import write_file
-from tauscope.cli.serving import run_server
+from tauscope.cli.serve_command import run_server
 from tauscope.errors import ExportError, StoreError, TauscopeError
 from tauscope.server.http.server import serve
 from tauscope.server.http.settings import Settings
@@ -58,14 +58,9 @@ def _list_own(mark: Path) -> set[str]:
     return {MARK, *filter(None, names)} if first == _FIRST_LINE else set()
 
 
-DATA = "service"
-"""Data folder of a service within the demo's, which holds a campaign on an arm that conceals an effect."""
-
-PORT = 8000
-"""Where the page is, unless something else is there already."""
-
-LEFT_FOR_S = 900.0
-"""How long a page that nobody waits for stays [s]."""
+DATA = "service"  # data folder of a service within the demo's, which holds a campaign on an arm that conceals an effect
+PORT = 8000  # where the page is, unless something else is there already
+LEFT_FOR_S = 900.0  # how long a page that nobody waits for stays [s]
 
 _LOOK_S = 0.5
 

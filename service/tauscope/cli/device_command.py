@@ -1,38 +1,73 @@
-"""``tauscope doctor``, ``tauscope release`` and ``tauscope bus``: their arguments."""
+"""``tauscope doctor``, ``tauscope release`` and ``tauscope bus``: what drives say, and what is sent to them."""
 
+import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
+import numpy as np
 import typer
+from numpy.typing import NDArray
+from rich.console import Console
 
-from tauscope.cli.arguments import RobotFile
-from tauscope.cli.driver_choice import BusOption, DriverCommand, check_bus
-from tauscope.cli.verbs import add_verb
+from tauscope.cli.arguments import RobotFile, name_input
+from tauscope.cli.terminal import output, plain, show_progress, table
+from tauscope.cli.verbs import make_group
+from tauscope.errors import AcquisitionError, MissingExtraError
+from tauscope.extras import require_extra
+from tauscope.number_text import counted
+from tauscope.report.table import Table
+from tauscope.robot import Robot, read_robot
+from tauscope.runtime.drivers import (
+    Finding,
+    FoundDevice,
+    FrameRequest,
+    Severity,
+    bus_drivers,
+    describe_neighbours,
+    find_bus,
+    find_driver,
+    select_bus,
+    to_drive_joints,
+    translate_driver_errors,
+)
+from tauscope.runtime.guard import guard_limits
+from tauscope.runtime.options import RunOptions
+from tauscope.runtime.release import release as release_drives
+from tauscope.trajectory import read_trajectory
 
+if TYPE_CHECKING:
+    BusName = str
+else:
+    BusName = Literal[tuple(bus_drivers())]
+    """A name of a registered driver of a field bus: help lists the choices."""
+
+BusOption = Annotated[
+    BusName | None, typer.Option(help="Field bus; the one that the robot file's drives speak of by default.")
+]
 DoctorRobotFile = Annotated[
     Path | None,
-    typer.Argument(
-        metavar="ROBOT",
-        exists=True,
-        dir_okay=False,
-        help="Robot file (YAML) whose drives are looked at; without one, the adapters of this machine.",
-        show_default=False,
+    name_input(
+        "Robot file (YAML) whose drives are looked at; without one, the adapters of this machine.",
+        "ROBOT",
+        typer.Argument,
     ),
 ]
+_MARKS = {Severity.GOOD: "ok", Severity.WARNING: "warning", Severity.FAILURE: "failure"}
 
 
-def doctor(
-    robot: DoctorRobotFile = None,
-    *,
-    backend: BusOption = None,
-) -> None:
+def doctor(robot: DoctorRobotFile = None, *, backend: BusOption = None) -> None:
     """Look at adapters and drives, and say what keeps an arm from running well, each with its remedy.
 
     Moves nothing and writes nothing. Exit status 1 where something keeps the arm from running.
     """
-    from tauscope.cli.device_run import show_findings
-
-    show_findings(robot, backend)
+    with show_progress() as told:
+        told("look at the adapters" if robot is None else "ask the drives")
+        findings = _adapters(backend) if robot is None else _drives(robot, backend)
+    console = output()
+    for finding in findings:
+        show_finding(console, finding)
+    require_sound(findings)
 
 
 def release(
@@ -47,24 +82,21 @@ def release(
 
     Support the arm first: joints without a brake fall. Settings that a run changed in servos' EEPROM are put back.
     """
-    from tauscope.cli.device_run import release_arm
-
-    release_arm(robot, backend, is_supported=supported)
-
-
-bus = typer.Typer(help="Look at field buses.", no_args_is_help=True, rich_markup_mode=None)
-
-
-@bus.callback()
-def _bus() -> None:
-    """Make `scan` a verb of its own, as a second one will be."""
+    arm = read_robot(robot)
+    bus = select_bus(arm) if backend is None else find_bus(backend)
+    if not supported and not _ask(arm.name):
+        raise AcquisitionError(f"{arm.name} holds on; support it, then state --supported")
+    release_drives(bus.name, arm, {})
+    output().print(plain(f"{arm.name}: no drive is under power"), soft_wrap=True)
 
 
 def scan(
-    backend: Annotated[str, typer.Argument(parser=check_bus, metavar="BUS", help="{buses}.")],
+    backend: Annotated[BusName, typer.Argument(metavar="BUS", help="Field bus.")],
     port: Annotated[
         str,
-        typer.Argument(metavar="PORT", help="{ports}."),
+        typer.Argument(
+            metavar="PORT", help=", ".join(f"{bus.port_help} ({name})" for name, bus in bus_drivers().items()) + "."
+        ),
     ],
     *,
     bit_rate: Annotated[
@@ -76,9 +108,105 @@ def scan(
 
     Moves nothing and writes nothing. Exit status 1 where nobody answers.
     """
-    from tauscope.cli.device_run import show_devices
+    found: list[FoundDevice] = []
+    bus = find_bus(backend)
+    with show_progress() as told, translate_driver_errors():
+        told(f"scan {port}")
+        for device in bus.scan(port, bit_rate or None):
+            found.append(device)
+            told(f"scan {port}: {len(found)} found")
+    if not found:
+        others = f" ({known})" if (known := describe_neighbours(bus)) else ""
+        raise AcquisitionError(f"{port}: nobody answers{others}; check power, cable, termination and bit rate")
+    rows = [(str(one.address), one.model, one.firmware, str(one.bit_rate)) for one in found]
+    output().print(table("Devices", Table(("address", "model", "firmware", "bit/s"), rows, words=2)))
 
-    show_devices(backend, port, bit_rate)
+
+def require_sound(findings: Sequence[Finding]) -> None:
+    """Refuse to go on where a finding is a failure. Raises AcquisitionError, which names the first."""
+    failures = [finding for finding in findings if finding.severity is Severity.FAILURE]
+    if failures:
+        first = failures[0]
+        raise AcquisitionError(
+            f"{counted(len(failures), 'finding')} of {len(findings)} to mend first: {first.subject}: {first.detail}; "
+            f"{first.remedy}"
+        )
 
 
-add_verb(bus, scan, DriverCommand)
+def check_drives(path: Path) -> list[Finding]:
+    """Everything doubtful in a robot file's ``drive`` blocks and the files that they name, without a port.
+
+    Nothing where no bus is meant, or where the drivers are not installed. Raises AcquisitionError where a joint has no
+    ``drive`` block, and another one has.
+    """
+    robot = read_robot(path)
+    meant = [bus for bus in bus_drivers().values() if any(bus.is_meant(joint.drive or {}) for joint in robot.joints)]
+    if len(meant) != 1:
+        return []
+    (bus,) = meant
+    try:
+        with require_extra("checking the drives"):
+            return bus.check_blocks(to_drive_joints(bus, robot))
+    except MissingExtraError as error:
+        return [Finding(Severity.WARNING, bus.name, "its files were not read", str(error))]
+
+
+def _adapters(backend: str | None) -> list[Finding]:
+    buses = bus_drivers().values() if backend is None else [find_bus(backend)]
+    found: list[Finding] = []
+    for bus in buses:
+        adapters = bus.list_adapters()
+        found += adapters or [Finding(Severity.WARNING, bus.name, "no adapter is there", "plug one in")]
+    return list(dict.fromkeys(found))  # several buses may hang on one kind of adapter
+
+
+def _drives(path: Path, backend: str | None) -> Sequence[Finding]:
+    robot = read_robot(path)
+    bus = select_bus(robot) if backend is None else find_bus(backend)
+    with translate_driver_errors():
+        return bus.examine(to_drive_joints(bus, robot))
+
+
+def show_finding(console: Console, finding: Finding) -> None:
+    """Show one finding on a line."""
+    remedy = f"; {finding.remedy}" if finding.remedy else ""
+    line = f"{_MARKS[finding.severity]}: {finding.subject}: {finding.detail}{remedy}"
+    console.print(plain(line), soft_wrap=True)
+
+
+def _ask(name: str) -> bool:
+    return sys.stdin.isatty() and typer.confirm(f"{name} will be without torque. Is it supported?")
+
+
+SHOWN_CYCLES = 3  # cycles of a run whose frames are shown
+
+_RATE_HZ = 200.0
+
+
+def show_frames(robot_file: Path, backend: str, trajectory: Path | None, options: RunOptions) -> None:
+    """Show the frames that a run would send: connecting, enabling, its first cycles, stopping.
+
+    Raises AcquisitionError where a drive block or a limit is not possible.
+    """
+    robot = read_robot(robot_file)
+    targets = _targets(robot, trajectory, options)
+    rate_hz = options.rate_hz or _RATE_HZ
+    speed = np.abs(np.diff(targets, axis=0)).max(axis=0) * rate_hz
+    limits = guard_limits(robot, targets.min(axis=0), targets.max(axis=0), speed).drive_limits
+    request = FrameRequest(options.mode, limits, options.watchdog_s, targets[:SHOWN_CYCLES], 1.0 / rate_hz)
+    console = output()
+    bus = select_bus(robot) if find_driver(backend).is_simulated else find_bus(backend)
+    with translate_driver_errors():
+        for frame in bus.plan_frames(to_drive_joints(bus, robot), request):
+            console.print(plain(f"{frame.phase} | {frame.wire} | {frame.meaning}"), soft_wrap=True)
+
+
+def _targets(robot: Robot, trajectory: Path | None, options: RunOptions) -> NDArray[np.float64]:
+    if trajectory is None:
+        ends = [joint.limits.position or (0.0, 0.0) for joint in robot.joints]
+        place = np.array([min(max(0.0, low), high) for low, high in ends])
+        return np.tile(place, (SHOWN_CYCLES, 1))
+    return read_trajectory(trajectory, robot).samples(options.rate_hz or _RATE_HZ).position
+
+
+bus = make_group("Look at field buses.", scan=scan)

@@ -1,20 +1,35 @@
-"""``tauscope diagnose``: its arguments."""
+"""``tauscope diagnose``: what an arm's model leaves out, as tables and sentences."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich.console import Console
 
 from tauscope.cli.arguments import (
     Cutoff,
     HeldOut,
     Json,
-    ReadingArguments,
+    ReadingFields,
     RobotFile,
+    complete_reading,
     name_output,
     name_recordings,
     parse_cutoff,
 )
+from tauscope.cli.task_run import export_outputs, name_files, run_task
+from tauscope.cli.terminal import output, plain, table
+from tauscope.cli.verbs import OptionsOf, make_request
+from tauscope.diagnosis import DiagnosisDocument
+from tauscope.diagnosis.documents.result import FindingEntry
+from tauscope.export.formats import CODE_FILES, EXPORT_FILES
+from tauscope.number_text import significant
+from tauscope.report.diagnosis_words import MOST_FINDINGS, VERDICTS, refutations
+from tauscope.report.table import Table
+from tauscope.report.tables import difference_table, headroom_table, residual_table, shift_table
+from tauscope.report.words import noise_words
+from tauscope.tasks import diagnose as task
 
 Against = Annotated[
     list[str],
@@ -40,10 +55,8 @@ def diagnose(
     held_out: HeldOut = None,
     against: Against,
     cutoff: Cutoff = "auto",
-    reading: ReadingArguments,
-    headroom: Annotated[
-        bool, typer.Option("--headroom", help="Train a black box, and say what it still predicts of held-out motion.")
-    ] = False,
+    reading: ReadingFields,
+    options: Annotated[dict[str, Any], OptionsOf(task.DiagnosisOptions, ("headroom",))],
     json: Json = None,
     report: Annotated[
         Path | None, name_output("Write a page with verdict, findings and residuals.", "OUT.html")
@@ -67,16 +80,10 @@ def diagnose(
     Where recordings and model differ, which physics is missing, how sure that is, how large it is, what it had been
     hiding in the other parameters, and how much better recordings that were held out are then predicted.
     """
-    fields = {"cutoff_hz": parse_cutoff(cutoff), **reading.fields()}
+    fields = {"cutoff_hz": parse_cutoff(cutoff), **complete_reading(reading), **options}
     motion = [] if next_trajectory is None else [(next_trajectory, f"trajectory{_trajectory_suffix(next_trajectory)}")]
-    from tauscope.cli.diagnose_summary import show_diagnosis
-    from tauscope.cli.task_run import export_outputs, make_request, name_files, run_task
-    from tauscope.cli.terminal import output
-    from tauscope.export.formats import CODE_FILES, EXPORT_FILES
-    from tauscope.tasks import diagnose as task
-
     compared = parse_against(against)
-    fields |= {"against": compared.pop("against"), "next_trajectory": bool(motion), "headroom": headroom}
+    fields |= {"against": compared.pop("against"), "next_trajectory": bool(motion)}
     request = task.Request(
         robot=str(robot),
         recordings=name_files(recordings),
@@ -100,7 +107,6 @@ def diagnose(
 
 
 def _trajectory_suffix(path: Path) -> str:
-    """Format of the motion to record next."""
     if path.suffix.lower() not in TRAJECTORIES:
         text = f"{str(path)!r}: a trajectory file ends in .json or .csv"
         raise typer.BadParameter(text, param_hint="--next-trajectory")
@@ -121,3 +127,55 @@ def parse_against(words: list[str]) -> dict[str, Any]:
     if len(words) == 1 and Path(words[0]).suffix.lower() == ".json":
         return {"against": "saved", "model": str(Path(words[0]))}
     return {"against": "simulation", "simulated": tuple(str(Path(word)) for word in words)}
+
+
+def show_diagnosis(console: Console, document: DiagnosisDocument) -> None:
+    """Show the verdict, the findings, and what they change."""
+    console.print(plain(f"Robot {document.robot}: {document.headline}"), soft_wrap=True)
+    console.print(plain(f"Verdict {document.verdict}: {VERDICTS[document.verdict]}"), soft_wrap=True)
+    console.print(plain(f"Noise: {noise_words(document.noise_method)}"), soft_wrap=True)
+    for warning in document.warnings:
+        console.print(plain(f"! {warning.sentence}."), soft_wrap=True)
+    console.print()
+    _show_findings(console, document.findings)
+    if document.tentative:
+        console.print(plain("Tentative: held-out motion does not confirm these"), soft_wrap=True)
+        _show_findings(console, document.tentative)
+    for sentence in document.wrong_values:
+        console.print(plain(f"* {sentence}"), soft_wrap=True)
+    if document.wrong_values:
+        console.print()
+    console.print(table("Mismatch with the nominal model", _mismatch(document)))
+    console.print(table("Residual at the recorded rate [Nm or N]", residual_table(document)))
+    if document.headroom is not None:
+        title = f"Headroom: held-out residual below {significant(document.cutoff_hz, 3)} Hz [Nm or N]"
+        console.print(table(title, headroom_table(document)))
+        for sentence in refutations(document):
+            console.print(plain(f"* {sentence}"), soft_wrap=True)
+    if document.parameter_differences:
+        console.print(table("What the simulation has wrong", difference_table(document)))
+    if document.parameter_shifts:
+        console.print(table("What the left-out effects had done to the parameters", shift_table(document)))
+    invisible = sorted({e.effect + (f"@{e.joint}" if e.joint else "") for e in document.detectable if not e.visible})
+    if invisible:
+        console.print(plain(f"No such data can show: {', '.join(invisible)}"), soft_wrap=True)
+    if document.next_experiment is not None:
+        console.print(plain(f"Next: {document.next_experiment.why}"), soft_wrap=True)
+
+
+def _show_findings(console: Console, findings: Sequence[FindingEntry]) -> None:
+    for finding in findings[:MOST_FINDINGS]:
+        console.print(plain(f"* {finding.statement}"), soft_wrap=True)
+    if len(findings) > MOST_FINDINGS:
+        console.print(plain(f"  and {len(findings) - MOST_FINDINGS} more, see --json"), soft_wrap=True)
+    if findings:
+        console.print()
+
+
+def _mismatch(document: DiagnosisDocument) -> Table:
+    rows = []
+    for entry in document.mismatch:
+        place = entry.where or entry.time
+        where = "" if place is None else f"{place.variable} {place.range[0]:.3g} … {place.range[1]:.3g}"
+        rows.append((entry.joint, "yes" if entry.significant else "no", where, significant(entry.excess_rms, 3)))
+    return Table(("joint", "significant", "mostly at", "excess rms"), rows, words=3)

@@ -1,11 +1,20 @@
-"""``tauscope excite``: its arguments."""
+"""``tauscope excite``: the motion that tells most about an arm, and what it leaves of the limits."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any
 
 import typer
+from rich.console import Console
 
-from tauscope.cli.arguments import RobotFile, name_output, parse_numbers
+from tauscope.cli.arguments import RobotFile, name_output
+from tauscope.cli.task_run import run_task
+from tauscope.cli.terminal import output, plain, table
+from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
+from tauscope.excitation import ExcitationDesign
+from tauscope.number_text import ABSENT, counted, percent, significant
+from tauscope.report.table import Table
+from tauscope.robot import Robot
+from tauscope.tasks import design_excitation as task
 
 Boxes = Annotated[
     list[str] | None,
@@ -17,66 +26,15 @@ Boxes = Annotated[
         " May be repeated.",
     ),
 ]
-NoiseStd = Annotated[
-    str | None,
-    typer.Option(
-        metavar="S1,S2,...", help="Expected torque noise of each joint [Nm or N], which weights its equations."
-    ),
-]
 
 
 def excite(
     robot: RobotFile,
     *,
-    duration: Annotated[
-        float,
-        typer.Option(
-            "--duration",
-            "--duration-s",
-            metavar="S",
-            min=0.1,
-            max=600.0,
-            help="Length of one period [s]; the period is repeated.",
-        ),
-    ] = 10.0,
-    harmonics: Annotated[int, typer.Option(metavar="M", min=2, max=30, help="Harmonics of the Fourier series.")] = 5,
-    periods: Annotated[int, typer.Option(metavar="P", min=1, max=100, help="How often the period is repeated.")] = 5,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of the optimiser's random starts.")] = 0,
-    starts: Annotated[int, typer.Option(metavar="N", min=1, max=64, help="Random series that are improved.")] = 3,
-    criterion: Annotated[
-        Literal["cond-f", "log-det", "cond-2"],
-        typer.Option(help="What is minimised: Cond_F or -ln det of the normal matrix, or the condition number."),
-    ] = "cond-f",
-    scaling: Annotated[
-        Literal["none", "typical"],
-        typer.Option(help="Units in which parameters are counted: SI, or the rms of their columns."),
-    ] = "none",
-    floor: Annotated[
-        float | None,
-        typer.Option(
-            "--floor",
-            "--floor-m",
-            metavar="Z",
-            help="Height in the base frame [m] below which no joint origin and no tool may come.",
-        ),
-    ] = None,
+    options: Annotated[dict[str, Any], OptionsOf(task.ExcitationDesignOptions, without=("boxes",))],
     box: Boxes = None,
-    tool: Annotated[
-        str, typer.Option("--tool", "--tool-m", metavar="X,Y,Z", help="Tool point in the last link's frame [m].")
-    ] = "0,0,0",
-    torque_margin: Annotated[
-        float, typer.Option(min=0.0, max=0.99, help="Part of each torque limit kept free for what the model lacks.")
-    ] = 0.2,
-    limit_fraction: Annotated[
-        float, typer.Option(min=0.01, max=1.0, help="Part of the other limits that is used.")
-    ] = 0.95,
-    noise_std: NoiseStd = None,
-    slow_postures: Annotated[int, typer.Option(min=0, max=60, help="Postures at which all joints reverse slowly.")] = 3,
     slow_reversals: Annotated[
         bool, typer.Option("--slow-reversals/--no-slow-reversals", help="None with --no-slow-reversals.")
-    ] = True,
-    closing_period: Annotated[
-        bool, typer.Option("--closing-period/--no-closing-period", help="Repeat the first period at the end.")
     ] = True,
     json: Annotated[
         Path | None, name_output("Write the design, trajectory included, as JSON; - is standard output.")
@@ -93,34 +51,47 @@ def excite(
     with the robot file's model) and space; repeated, then slow reversals, and the first period again.
     """
     corners = [parse_numbers(text, "--box", 6) for text in box or ()]
-    tool_m = parse_numbers(tool, "--tool", 3)
-    noise = None if noise_std is None else parse_numbers(noise_std, "--noise-std")
-    from tauscope.cli.result_summary import show_design
-    from tauscope.cli.task_run import make_request, run_task
-    from tauscope.cli.terminal import output
-    from tauscope.tasks import design_excitation as task
-
-    options = make_request(
-        task.ExcitationDesignOptions,
-        duration_s=duration,
-        harmonics=harmonics,
-        periods=periods,
-        seed=seed,
-        starts=starts,
-        criterion=criterion,
-        scaling=scaling,
-        limit_fraction=limit_fraction,
-        torque_margin=torque_margin,
-        slow_postures=slow_postures if slow_reversals else 0,
-        closing_period=closing_period,
-        floor_m=floor,
-        boxes=tuple(make_request(task.ForbiddenBox, low=c[:3], high=c[3:]) for c in corners),
-        tool_m=tool_m,
-        noise_std=noise,
-    )
+    options["boxes"] = tuple(make_request(task.ForbiddenBox, low=c[:3], high=c[3:]) for c in corners)
+    if not slow_reversals:
+        options["slow_postures"] = 0
+    made = make_request(task.ExcitationDesignOptions, **options)
     run_task(
         task,
-        make_request(task.Request, robot=str(robot), options=options, rate_hz=rate),
+        make_request(task.Request, robot=str(robot), options=made, rate_hz=rate),
         [(json, "result.json"), (csv, "trajectory.csv")],
         show=None if Path("-") in (json, csv) else lambda result: show_design(output(), result.design, result.robot),
     )
+
+
+CRITERIA = {"cond-f": "Cond_F(LᵀL)", "log-det": "-ln det(LᵀL)/p", "cond-2": "condition number of L"}
+
+
+def show_design(console: Console, design: ExcitationDesign, robot: Robot) -> None:
+    """Show what a design is good for, what it leaves of the limits, and what limits it."""
+    trajectory = design.trajectory
+    console.print(
+        plain(
+            f"Excitation of {robot.name}: {counted(robot.joint_count, 'joint')}, {counted(design.periods, 'period')} "
+            f"of {design.series.period_s:.4g} s, {trajectory.duration_s:.4g} s in all"
+        )
+    )
+    rows = [
+        ("condition number", significant(design.condition_number, 4)),
+        (CRITERIA[design.criterion.value], significant(design.value, 4)),
+        ("  of the best random motion", significant(design.random_value, 4)),
+        ("motions tried", str(design.evaluations)),
+        ("seconds", significant(design.seconds, 3)),
+    ]
+    if design.margins.workspace_m is not None:
+        rows.append(("clearance [m]", significant(design.margins.workspace_m, 3)))
+    console.print(table("Design", Table(("figure", "value"), rows)))
+    margins = design.margins.as_table()
+    cells = [
+        (joint.name, *(ABSENT if values[j] is None else percent(values[j]) for values in margins.values()))
+        for j, joint in enumerate(robot.joints)
+    ]
+    console.print(table("Margins: part of each limit that is left", Table(("joint", *margins), cells)))
+    if design.active:
+        console.print(plain(f"Limited by {', '.join(design.active)}"), soft_wrap=True)
+    for note in design.notes:
+        console.print(plain(f"! {note}"), soft_wrap=True)

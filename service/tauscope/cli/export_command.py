@@ -1,19 +1,22 @@
-"""``tauscope export``: its arguments."""
+"""``tauscope export``: a model for a controller or a simulator."""
 
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
+from tauscope.cli.arguments import name_input
+from tauscope.cli.output_files import require_free, write_file
+from tauscope.cli.task_run import parse_export_format
+from tauscope.cli.terminal import output, plain
+from tauscope.export.actuators import ActuatorChoice, ActuatorKind
+from tauscope.export.formats import EXPORT_FILES, ExportFormat, make_export
+from tauscope.export.isaac_lab import to_isaac_lab
+from tauscope.export.mjcf_patch import patch_mjcf
+from tauscope.export.model_file import read_export_model
+
 ModelFile = Annotated[
-    Path,
-    typer.Argument(
-        metavar="MODEL.json",
-        exists=True,
-        dir_okay=False,
-        help="Model that identify or diagnose wrote with --model.",
-        show_default=False,
-    ),
+    Path, name_input("Model that identify or diagnose wrote with --model.", "MODEL.json", typer.Argument)
 ]
 Output = Annotated[
     Path,
@@ -41,11 +44,8 @@ def export(
     kv: Gains = None,
     onto: Annotated[
         Path | None,
-        typer.Option(
-            metavar="ARM.xml",
-            exists=True,
-            dir_okay=False,
-            help="Your own MJCF: its inertials and joints take the model's values, all else stays (.xml).",
+        name_input(
+            "Your own MJCF: its inertials and joints take the model's values, all else stays (.xml).", "ARM.xml"
         ),
     ] = None,
     isaac_lab: Annotated[
@@ -56,15 +56,6 @@ def export(
 
     Findings of a diagnosis are included as far as the format can hold them; the file's comment lists the others.
     """
-    from tauscope.cli.output_files import require_free, write_file
-    from tauscope.cli.task_run import parse_export_format
-    from tauscope.cli.terminal import output, plain
-    from tauscope.export.actuators import ActuatorChoice, ActuatorKind
-    from tauscope.export.formats import EXPORT_FILES, ExportFormat, make_export
-    from tauscope.export.isaac_lab import to_isaac_lab
-    from tauscope.export.mjcf_patch import patch_mjcf
-    from tauscope.export.model_file import read_export_model
-
     kind = parse_export_format(out, EXPORT_FILES, "'OUT'")
     if isaac_lab and kind is not ExportFormat.PYTHON:
         raise typer.BadParameter(f"{str(out)!r}: Isaac Lab reads Python (.py)", param_hint="'--isaac-lab'")
@@ -85,7 +76,6 @@ def export(
 
 
 def _numbers(text: str | None, option: str) -> tuple[float, ...]:
-    """Numbers of an option, zero or more."""
     try:
         values = tuple(float(word) for word in text.split(",")) if text else ()
     except ValueError:

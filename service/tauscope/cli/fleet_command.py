@@ -1,26 +1,41 @@
-"""``tauscope fleet``: its arguments."""
+"""``tauscope fleet``: the manifest read, the work handed out, the table written row by row."""
 
+import csv
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
-from tauscope.cli.verbs import add_verb
-
-fleet = typer.Typer(
-    help="The same analysis for many robots, results in one table.", no_args_is_help=True, rich_markup_mode=None
+from tauscope.cli.arguments import name_input
+from tauscope.cli.output_files import require_new
+from tauscope.cli.terminal import output, plain, show_progress
+from tauscope.cli.verbs import make_group
+from tauscope.errors import ExportError, IdentificationError
+from tauscope.number_text import counted
+from tauscope.server.queue.cluster_executor import ClusterExecutor, open_executor
+from tauscope.server.queue.fleet import (
+    DIAGNOSIS_COLUMNS,
+    IDENTIFICATION_COLUMNS,
+    FleetResult,
+    analyse_fleet,
+    diagnose_robot,
+    identify_robot,
+    read_manifest,
 )
 
+TABLE = "table.csv"
+
+CLUSTER_PATIENCE_S = 60.0
+"""How long a robot waits for a cluster that is away, as when its scheduler is started anew [s]."""
 CORES = os.cpu_count() or 1
 
 Manifest = Annotated[
     Path,
-    typer.Argument(
-        metavar="MANIFEST",
-        exists=True,
-        dir_okay=False,
-        help="CSV with the columns name,robot,recordings,held_out; recordings separated by ';', paths relative to it.",
+    name_input(
+        "CSV with the columns name,robot,recordings,held_out; recordings separated by ';', paths relative to it.",
+        "MANIFEST",
+        typer.Argument,
     ),
 ]
 Out = Annotated[
@@ -35,19 +50,63 @@ Workers = Annotated[
 ]  # fmt: skip
 
 
-def identify(manifest: Manifest, out: Out, workers: Workers = CORES) -> None:
+def identify_fleet(manifest: Manifest, out: Out, workers: Workers = CORES) -> None:
     """Identify every robot of a manifest. A failure is a row of the table; exit status 1 where there is any."""
-    from tauscope.cli.fleet_run import run_fleet
-
     run_fleet("identify", manifest, out, workers)
 
 
-def diagnose(manifest: Manifest, out: Out, workers: Workers = CORES) -> None:
+def diagnose_fleet(manifest: Manifest, out: Out, workers: Workers = CORES) -> None:
     """Diagnose every robot of a manifest. A failure is a row of the table; exit status 1 where there is any."""
-    from tauscope.cli.fleet_run import run_fleet
-
     run_fleet("diagnose", manifest, out, workers)
 
 
-add_verb(fleet, identify)
-add_verb(fleet, diagnose)
+def run_fleet(verb: Literal["identify", "diagnose"], manifest: Path, out: Path, workers: int) -> None:
+    """Analyse every robot of a manifest.
+
+    Raises RecordingError if the manifest is not valid: nothing is begun then. Raises ExportError if the results cannot
+    be written. Raises IdentificationError if any robot failed.
+    """
+    total = sum(1 for _ in read_manifest(manifest))
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ExportError(f"{out}: cannot be made ({error.strerror}); choose another --out") from error
+    require_new(out / TABLE)
+    failed = _run(verb, manifest, out.resolve(), workers, total)
+    output().print(plain(f"wrote {out / TABLE}: {counted(total, 'robot')}, {failed} failed"), soft_wrap=True)
+    if failed:
+        text = f"{manifest}: {failed} of {counted(total, 'robot')} failed; see the column error of {out / TABLE}"
+        raise IdentificationError(text)
+
+
+def _run(verb: str, manifest: Path, out: Path, workers: int, total: int) -> int:
+    """Do the work, and write each row as it comes; how many failed."""
+    columns, work = (
+        (IDENTIFICATION_COLUMNS, identify_robot) if verb == "identify" else (DIAGNOSIS_COLUMNS, diagnose_robot)
+    )
+    executor = open_executor(workers, CLUSTER_PATIENCE_S)
+    width = executor.width if isinstance(executor, ClusterExecutor) else workers
+    failed = done = 0
+    try:
+        with show_progress() as tell, (out / TABLE).open("x", newline="", encoding="utf-8") as file:
+            table = csv.writer(file, lineterminator="\n")
+            table.writerow(("line", "name", "state", *columns, "seconds", "error"))
+            for result in analyse_fleet(read_manifest(manifest.resolve()), work, out, executor, width):
+                table.writerow(_row(result, columns))
+                file.flush()
+                done, failed = done + 1, failed + (result.error is not None)
+                tell(f"{verb} {result.entry.name}", 100.0 * done / total)
+    finally:
+        executor.shutdown(wait=True, cancel_futures=True)
+    return failed
+
+
+def _row(result: FleetResult, columns: tuple[str, ...]) -> list[str]:
+    state = "succeeded" if result.error is None else "failed"
+    figures = (result.figures.get(column, "") for column in columns)
+    return [str(result.entry.row), result.entry.name, state, *figures, f"{result.seconds:.2f}", result.error or ""]
+
+
+fleet = make_group(
+    "The same analysis for many robots, results in one table.", identify=identify_fleet, diagnose=diagnose_fleet
+)

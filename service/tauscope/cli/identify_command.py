@@ -1,21 +1,33 @@
-"""``tauscope identify``: its arguments."""
+"""``tauscope identify``: the parameters of an arm from its recordings, shown as tables."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any
 
-import typer
+from rich.console import Console
 
 from tauscope.cli.arguments import (
     Cutoff,
     HeldOut,
     Json,
-    ReadingArguments,
+    ReadingFields,
     Report,
     RobotFile,
+    complete_reading,
     name_output,
     name_recordings,
     parse_cutoff,
 )
+from tauscope.cli.task_run import export_outputs, name_files, run_task
+from tauscope.cli.terminal import output, plain, table
+from tauscope.cli.verbs import OptionsOf, make_request
+from tauscope.export.formats import EXPORT_FILES
+from tauscope.identification import IdentificationDocument
+from tauscope.number_text import counted, percent, significant
+from tauscope.report.table import Table
+from tauscope.report.tables import base_parameter_table, fit_table, friction_table, rotor_table
+from tauscope.report.words import band_words, cautions, fit_sentences, masked_samples, noise_words
+from tauscope.robot import Robot
+from tauscope.tasks import identify as task
 
 
 def identify(
@@ -25,18 +37,9 @@ def identify(
     ],
     *,
     held_out: HeldOut = None,
-    estimator: Annotated[Literal["ls", "wls"], typer.Option(help="How the joints' equations are weighted.")] = "wls",
     cutoff: Cutoff = "auto",
-    rotor_inertia: Annotated[
-        bool, typer.Option("--rotor-inertia/--no-rotor-inertia", help="Add rotors where the data ask for them.")
-    ] = True,
-    prior: Annotated[
-        bool,
-        typer.Option(
-            "--prior/--no-prior", help="Deliver the most probable bodies, or the free least-squares estimate."
-        ),
-    ] = True,
-    reading: ReadingArguments,
+    options: Annotated[dict[str, Any], OptionsOf(task.IdentificationOptions, ("estimator", "rotor_inertia", "prior"))],
+    reading: ReadingFields,
     json: Json = None,
     report: Report = None,
     export: Annotated[
@@ -54,14 +57,7 @@ def identify(
     Base parameters, friction and their uncertainty, the nearest physically consistent links, and how well all of it
     explains recordings that were held out.
     """
-    fields = {"cutoff_hz": parse_cutoff(cutoff), **reading.fields()}
-    from tauscope.cli.result_summary import show_identification
-    from tauscope.cli.task_run import export_outputs, make_request, name_files, run_task
-    from tauscope.cli.terminal import output
-    from tauscope.export.formats import EXPORT_FILES
-    from tauscope.tasks import identify as task
-
-    fields |= {"estimator": estimator, "rotor_inertia": rotor_inertia, "prior": prior}
+    fields = {"cutoff_hz": parse_cutoff(cutoff), **complete_reading(reading), **options}
     request = task.Request(
         robot=str(robot),
         recordings=name_files(recordings),
@@ -72,3 +68,39 @@ def identify(
     outputs += export_outputs(export or (), EXPORT_FILES)
     show = None if json else lambda result: show_identification(output(), result.document, result.robot)
     run_task(task, request, outputs, show)
+
+
+def show_identification(console: Console, document: IdentificationDocument, robot: Robot) -> None:
+    """Show parameters, friction, noise and fit."""
+    console.print(
+        plain(f"Robot {document.robot}: {counted(len(document.joints), 'joint')}, {document.estimator.upper()}")
+    )
+    for sentence in cautions(document):
+        console.print(plain(f"! {sentence}"), soft_wrap=True)
+    console.print(table("Base parameters", base_parameter_table(document)))
+    if document.unidentifiable:
+        names = ", ".join(document.unidentifiable)
+        console.print(plain(f"No motion of this arm shows {names}"), soft_wrap=True)
+        console.print()
+    console.print(table("Friction [SI units]; in brackets: these data cannot tell", friction_table(document)))
+    if document.rotor_inertia:
+        console.print(table("Rotors", rotor_table(document)))
+    console.print(table("Noise and residual", fit_table(document, robot)))
+    console.print(table("Whole arm", _whole_arm(document)))
+    for sentence in fit_sentences(document):
+        console.print(plain(sentence), soft_wrap=True)
+
+
+def _whole_arm(document: IdentificationDocument) -> Table:
+    fit = document.fit
+    entries = (*document.conditioning, *document.held_out_conditioning)
+    rows = [
+        ("relative error", percent(fit.train.relative_error)),
+        ("relative error, held out", percent(fit.held_out.relative_error if fit.held_out else None)),
+        ("condition number", significant(document.condition_number, 3)),
+        ("band", band_words(document)),
+        ("noise", noise_words(document.noise_method)),
+        ("samples", str(sum(entry.samples for entry in entries))),
+        ("masked samples", str(masked_samples(document))),
+    ]
+    return Table(("figure", "value"), rows, words=2)

@@ -1,58 +1,79 @@
-"""``tauscope robot`` and ``tauscope recording``: their arguments."""
+"""``tauscope robot`` and ``tauscope recording``: what inputs hold, and how another tool's columns are mapped."""
 
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tauscope.cli.arguments import LayoutArguments, ReadingArguments, RecordingFile, RobotFile
-from tauscope.cli.verbs import add_verb
+from tauscope import robot as robots
+from tauscope.cli.arguments import LayoutFields, ReadingFields, RecordingFile, RobotFile, complete_reading, name_input
+from tauscope.cli.device_command import check_drives, require_sound, show_finding
+from tauscope.cli.output_files import write_file
+from tauscope.cli.terminal import output, plain, show_progress, table
+from tauscope.cli.verbs import make_group, make_request
+from tauscope.number_text import ABSENT, counted, given, significant
+from tauscope.recording import EffortKind, Reading, RecordingReport, check_recording, convert_recording
+from tauscope.recording.columns import map_columns
+from tauscope.recording.convert import FORMATS
+from tauscope.recording.layout.guess import guess_parts, layout_text
+from tauscope.recording.reading import read_header
+from tauscope.report.table import Table
+from tauscope.robot import JointSummary, RecordingLayout, RobotReport, layout_from_dict, read_robot
+from tauscope.robot.messages import listed
+from tauscope.robot.recording_layout import Source
+from tauscope.robot.yaml_text import read_yaml
+from tauscope.tasks.task import ReadingOptions
 
-robot = typer.Typer(help="Look at robot files.", no_args_is_help=True, rich_markup_mode=None)
+RobotOption = Annotated[Path | None, name_input("Robot file: its names, limits, masses and layout.", "ROBOT")]
+
+EFFORT_WORDS = {
+    EffortKind.TORQUE: "torque",
+    EffortKind.CURRENT: "drive units",
+    EffortKind.COMMAND: "none; commands of position",
+}
+
+QUESTIONS = {
+    "t": "time",
+    "q": "position of every joint",
+    "tau": "torque of every joint",
+    "i": "current of every joint",
+    "qd": "velocity of every joint",
+}
+NONE = "-"
 
 
-@robot.callback()
-def _robot() -> None:
-    """Make `check` a verb of its own, as a second one will be."""
-
-
-def check_robot(file: RobotFile) -> None:
-    """Show what a robot file says, and everything doubtful in it."""
-    from tauscope.cli.inputs_summary import show_robot
-
-    show_robot(file)
-
-
-add_verb(robot, check_robot, name="check")
-
-
-RobotOption = Annotated[
-    Path | None,
-    typer.Option(
-        exists=True, dir_okay=False, metavar="ROBOT", help="Robot file: its names, limits, masses and layout."
-    ),
-]
-
-recording = typer.Typer(help="Look at recordings, and convert them.", no_args_is_help=True, rich_markup_mode=None)
-
-
-def check(
+def check_recording_file(
     file: RecordingFile,
     *,
     joints: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Number of joints that it has to have.")
     ] = None,
     robot: RobotOption = None,
-    reading: ReadingArguments,
+    reading: ReadingFields,
 ) -> None:
     """Show what a recording holds, and what to look at before trusting it."""
-    options = reading.options()
-    from tauscope.cli.inputs_summary import show_recording
+    options = make_request(ReadingOptions, **complete_reading(reading)).reading
+    with show_progress() as progress:
+        progress(f"read {file}")
+        arm = None if robot is None else read_robot(robot)
+        report = check_recording(file, joints, arm, options)
+    console = output()
+    console.print(
+        plain(f"{report.name}: {counted(len(report.joints), 'joint')}, {counted(report.samples, 'sample')}"),
+        soft_wrap=True,
+    )
+    console.print(table("Recording", _clock(report)))
+    console.print(table("Joints", _joints(report)))
+    for finding in report.findings:
+        console.print(plain(f"{finding.severity}: {finding.where}: {finding.text}"), soft_wrap=True)
+    report.require_usable()
+    console.print(plain(f"{file}: valid"), soft_wrap=True)
 
-    show_recording(file, joints, robot, options.reading)
 
-
-def convert(
+def convert_file(
     source: RecordingFile,
     target: Annotated[
         Path, typer.Argument(metavar="TARGET", dir_okay=False, help="File to make: .csv, .parquet or .mcap.")
@@ -61,13 +82,24 @@ def convert(
     recover: Annotated[bool, typer.Option(help="Keep what comes before the damage of a truncated MCAP file.")] = False,
     overwrite: Annotated[bool, typer.Option(help="Replace TARGET where it exists.")] = False,
     robot: RobotOption = None,
-    reading: LayoutArguments,
+    reading: LayoutFields,
 ) -> None:
     """Write a recording in another format, in SI; the source stays as it is."""
-    options = reading.options()
-    from tauscope.cli.inputs_summary import convert_file
-
-    convert_file(source, target, robot, options.reading, recover=recover, overwrite=overwrite)
+    options = make_request(ReadingOptions, **complete_reading(reading)).reading
+    if target.suffix.lower() not in FORMATS:
+        raise typer.BadParameter(
+            f"{str(target)!r}: the suffix names no format; use {', '.join(FORMATS)}", param_hint="'TARGET'"
+        )
+    with show_progress() as progress:
+        progress(f"convert {source}")
+        arm = None if robot is None else read_robot(robot)
+        done = convert_recording(source, target, recover=recover, overwrite=overwrite, robot=arm, reading=options)
+    console = output()
+    console.print(plain(f"wrote {done.target}: {counted(done.samples, 'sample')}"), soft_wrap=True)
+    if done.dropped_columns:
+        console.print(plain(f"left out: {', '.join(done.dropped_columns)}"), soft_wrap=True)
+    if done.damage is not None:
+        console.print(plain(f"damage passed over: {done.damage}"), soft_wrap=True)
 
 
 def map_file(
@@ -81,11 +113,116 @@ def map_file(
     ] = None,
 ) -> None:
     """Write the mapping of another tool's columns: a guess, which questions correct."""
-    from tauscope.cli.recording_mapping import map_recording
+    arm = None if robot is None else read_robot(robot)
+    reading = Reading().for_robot(arm)
+    header = read_header(file)
+    layout = guess_parts(header, reading.joint_names, prefers_torque=reading.prefers_torque)
+    if sys.stdin.isatty() if ask is None else ask:
+        typer.echo(f"columns: {listed(header)}", err=True)
+        layout = _ask(layout)
+    found = map_columns(header, replace(reading, columns=layout.columns or None, units=layout.units), str(file))
+    text = layout_text(layout) + "\n"
+    if out is not None:
+        write_file(out, text.encode())
+        output().print(plain(f"wrote {out}: {found.joint_count} joints"), soft_wrap=True)
+    else:
+        typer.echo(text, nl=False)
 
-    map_recording(file, robot, out, ask)
+
+def _ask(layout: RecordingLayout) -> RecordingLayout:
+    typer.echo(
+        f"{{0}} or {{1}} stands for the joint's number from 0 or 1, {{name}} for its name; {NONE}: none", err=True
+    )
+    guessed: Mapping[str, Source] = layout.columns if isinstance(layout.columns, Mapping) else {}
+    columns = dict(guessed)
+    for group, words in QUESTIONS.items():
+        default = columns.pop(group, NONE)
+        shown = (
+            default
+            if isinstance(default, str)
+            else ", ".join(map(str, default if isinstance(default, list) else [default]))
+        )
+        answer = typer.prompt(f"{group}, {words}", default=shown, err=True).strip()
+        if answer != NONE:
+            columns[group] = answer if "," not in answer else read_yaml(f"[{answer}]", group).data
+    return layout_from_dict({"columns": columns, "units": dict(layout.units)})
 
 
-add_verb(recording, map_file, name="map")
-add_verb(recording, check)
-add_verb(recording, convert)
+def _clock(report: RecordingReport) -> Table:
+    periods = report.periods
+    rows = [
+        ("duration", f"{significant(report.duration_s, 6)} s"),
+        ("rate", f"{significant(report.rate_hz, 5)} Hz"),
+        ("steps", f"{significant(1e3 * report.steps.minimum)} … {significant(1e3 * report.steps.maximum)} ms"),
+        ("gaps", str(report.gaps.count)),
+        (
+            "periods",
+            ABSENT if periods is None else f"{periods.count} of {periods.shortest} … {periods.longest} samples",
+        ),
+        ("missed values (NaN)", str(sum(report.missed.values()))),
+        ("effort", EFFORT_WORDS[report.effort_kind]),
+        ("columns", " ".join(report.columns)),
+    ]
+    return Table(("figure", "value"), rows, words=2)
+
+
+def _joints(report: RecordingReport) -> Table:
+    rows = []
+    for number, joint in enumerate(report.joints, start=1):
+        ranges = (" … ".join(significant(value) for value in pair) for pair in (joint.position, joint.effort))
+        rows.append([str(number), *ranges, significant(joint.position_step, 3)])
+    return Table(("joint", "position [rad, m]", "effort", "position step"), rows)
+
+
+def check_robot_file(file: RobotFile) -> None:
+    """Show what a robot file says, and everything doubtful in it."""
+    report = robots.check_robot(file)
+    console = output()
+    gravity = ", ".join(given(value) for value in report.gravity)
+    console.print(
+        plain(f"Robot {report.name}: {counted(len(report.joints), 'joint')}, gravity [{gravity}] m/s²{_mass(report)}")
+    )
+    columns = (
+        "joint",
+        "name",
+        "type",
+        "position",
+        "velocity",
+        "acceleration",
+        "torque",
+        "gear",
+        "per unit",
+        "mass [kg]",
+    )
+    console.print(table("Joints", Table(columns, [_row(joint) for joint in report.joints], words=3)))
+    for finding in report.findings:
+        console.print(plain(f"{finding.severity}: {finding.where}: {finding.text}"), soft_wrap=True)
+    findings = check_drives(file)
+    for finding in findings:
+        show_finding(console, finding)
+    require_sound(findings)
+    console.print(plain(f"{file}: valid"), soft_wrap=True)
+
+
+def _mass(report: RobotReport) -> str:
+    return "" if report.total_mass is None else f", model of {given(report.total_mass)} kg"
+
+
+def _row(joint: JointSummary) -> list[str]:
+    limits = joint.limits
+    reach = ABSENT if limits.position is None else " … ".join(given(value) for value in limits.position)
+    return [
+        str(joint.number),
+        joint.name,
+        joint.type.value,
+        reach,
+        *(given(value) for value in (limits.velocity, limits.acceleration, limits.torque, joint.gear_ratio)),
+        given(joint.sign * joint.torque_constant),
+        given(joint.mass),
+    ]
+
+
+robot = make_group("Look at robot files.", check=check_robot_file)
+recording = make_group(
+    "Look at recordings, and convert them.", map=map_file, check=check_recording_file, convert=convert_file
+)

@@ -1,18 +1,19 @@
-"""``tauscope model``: its arguments."""
+"""``tauscope model``: the history of models on the terminal."""
 
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tauscope.cli.store_command import DatabaseUrl, DataFolder
-from tauscope.cli.verbs import add_verb
-
-model = typer.Typer(
-    name="model",
-    help="Models of each robot over time: which one is active, and what drifts.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
+from tauscope.cli.store_command import DatabaseUrl, DataFolder, open_database
+from tauscope.cli.terminal import output, plain, table
+from tauscope.cli.verbs import make_group
+from tauscope.errors import StoreError
+from tauscope.number_text import ABSENT, counted, significant
+from tauscope.report.table import Table
+from tauscope.server.history.model_history import ModelEntry, ModelHistory
+from tauscope.server.history.trend import parameter_trends
 
 RobotName = Annotated[str, typer.Argument(metavar="ROBOT", help="Name of the robot, as in its file.")]
 Identifier = Annotated[str, typer.Argument(metavar="MODEL", help="Identifier of the identification.")]
@@ -20,41 +21,81 @@ Reason = Annotated[str, typer.Option(metavar="TEXT", help="Why; kept with the ch
 Count = Annotated[int, typer.Option("--limit", min=1, max=1000, metavar="N", help="Most rows.")]
 
 
-def list_(robot: RobotName, data: DataFolder = None, database: DatabaseUrl = None, limit: Count = 20) -> None:
+def list_models(robot: RobotName, data: DataFolder = None, database: DatabaseUrl = None, limit: Count = 20) -> None:
     """Show the models of a robot, the newest first, and why those that were refused were."""
-    from tauscope.cli.model_run import list_models
+    with open_database(data, database) as opened:
+        history = ModelHistory(opened)
+        history.policy(robot)
+        models = history.models(robot, limit)
+    rows = [(entry.identifier, _state(entry), entry.source, _reason(entry)) for entry in models]
+    output().print(table(f"Models of {robot}", Table(("model", "state", "measured", "because"), rows, words=4)))
 
-    list_models(robot, data, database, limit)
 
-
-def trend(robot: RobotName, data: DataFolder = None, database: DatabaseUrl = None) -> None:
+def show_trend(robot: RobotName, data: DataFolder = None, database: DatabaseUrl = None) -> None:
     """Show how every parameter of a robot has changed, from the first active model to the present one."""
-    from tauscope.cli.model_run import show_trend
+    with open_database(data, database) as opened:
+        trends = parameter_trends(ModelHistory(opened).documents(robot))
+    rows = []
+    for trend in trends:
+        first, last, line = trend.points[0][1], trend.points[-1][1], trend.line
+        slope = ABSENT if line is None else f"{significant(line.slope, 3)} ± {significant(line.slope_std, 2)}"
+        rows.append(
+            (trend.name, str(len(trend.points)), significant(first.value, 4), significant(last.value, 4), slope)
+        )
+    columns = ("parameter", "models", "first [SI]", "last [SI]", "change a week")
+    output().print(table(f"Parameters of {robot}", Table(columns, rows)))
 
-    show_trend(robot, data, database)
 
-
-def events(robot: RobotName, data: DataFolder = None, database: DatabaseUrl = None, limit: Count = 20) -> None:
+def show_events(robot: RobotName, data: DataFolder = None, database: DatabaseUrl = None, limit: Count = 20) -> None:
     """Show the drifts of a robot that nobody has taken note of. Exit status 1 where there are any."""
-    from tauscope.cli.model_run import show_events
+    with open_database(data, database) as opened:
+        history = ModelHistory(opened)
+        history.policy(robot)
+        events = history.events(robot, only_open=True, limit=limit)
+    if not events:
+        output().print(plain(f"{robot}: nothing has drifted beyond its bounds"), soft_wrap=True)
+        return
+    for event in events:
+        output().print(plain(event.text), soft_wrap=True)
+    hint = "look at the arm; `tauscope model reference` counts from a new model on"
+    raise StoreError(f"{robot}: {counted(len(events), 'parameter')} drifted beyond the bounds; {hint}")
 
-    show_events(robot, data, database, limit)
 
-
-def activate(identifier: Identifier, reason: Reason, data: DataFolder = None, database: DatabaseUrl = None) -> None:
+def activate_model(
+    identifier: Identifier, reason: Reason, data: DataFolder = None, database: DatabaseUrl = None
+) -> None:
     """Make a model the active one, also one that was refused; the one before is kept."""
-    from tauscope.cli.model_run import choose_model
-
-    choose_model(identifier, "active", reason, data, database)
+    _choose(identifier, "active", reason, data, database)
 
 
-def reference(identifier: Identifier, reason: Reason, data: DataFolder = None, database: DatabaseUrl = None) -> None:
+def make_reference(
+    identifier: Identifier, reason: Reason, data: DataFolder = None, database: DatabaseUrl = None
+) -> None:
     """Count drift from this model on, say after maintenance; drifts that are open are closed."""
-    from tauscope.cli.model_run import choose_model
-
-    choose_model(identifier, "reference", reason, data, database)
+    _choose(identifier, "reference", reason, data, database)
 
 
-model.command("list", help="Show the models of a robot, and why those that were refused were.")(list_)
-for verb in (trend, events, activate, reference):
-    add_verb(model, verb)
+def _choose(identifier: str, role: str, reason: str, data: Path | None, database: str | None) -> None:
+    with open_database(data, database) as opened:
+        entry = ModelHistory(opened).activate(identifier, role, reason, datetime.now(UTC))
+    noun = "active model" if role == "active" else "reference"
+    output().print(plain(f"{entry.identifier} is the {noun} of {entry.robot}"), soft_wrap=True)
+
+
+def _state(entry: ModelEntry) -> str:
+    return f"{entry.state}, reference" if entry.is_reference else entry.state
+
+
+def _reason(entry: ModelEntry) -> str:
+    failed = [f"{gate.name}: {gate.reason}" for gate in entry.gates if not gate.passed]
+    return "; ".join(failed) or (ABSENT if entry.state == "unreadable" else "all gates passed")
+
+
+model = make_group(
+    "Models of each robot over time: which one is active, and what drifts.",
+    list=list_models,
+    trend=show_trend,
+    events=show_events,
+    activate=activate_model,
+    reference=make_reference,
+)

@@ -9,8 +9,7 @@ import typer
 
 from tauscope.errors import ExportError
 
-STANDARD_OUTPUT = Path("-")
-"""Stands for standard output where a file to write is asked for."""
+STANDARD_OUTPUT = Path("-")  # stands for standard output where a file to write is asked for
 
 
 def require_distinct(inputs: Sequence[Path]) -> None:
@@ -93,7 +92,6 @@ def write_file(path: Path, content: bytes) -> None:
 
 
 def _replace(path: Path, content: bytes) -> None:
-    """Write beside the file and move into place."""
     partial = path.with_name(f".tauscope-{secrets.token_hex(6)}.partial")
     try:
         with partial.open("xb") as file:
@@ -106,5 +104,4 @@ def _replace(path: Path, content: bytes) -> None:
 
 
 def _is_same_file(path: Path, other: Path) -> bool:
-    """Whether two names lead to one file, as hard links do."""
     return path.exists() and other.exists() and path.samefile(other)

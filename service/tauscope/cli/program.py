@@ -14,35 +14,17 @@ import traceback
 import warnings
 from collections.abc import Sequence
 from enum import IntEnum
-from typing import Annotated
+from importlib import import_module
+from typing import Annotated, Any
 
 import typer
-from typer.main import get_command
+from typer.core import TyperGroup
+from typer.main import get_command, get_group
 
-from tauscope.cli.access_command import audit, key
-from tauscope.cli.campaign_command import campaign
-from tauscope.cli.demo_command import demo
-from tauscope.cli.device_command import bus, doctor, release
-from tauscope.cli.diagnose_command import diagnose
-from tauscope.cli.driver_choice import DriverCommand
-from tauscope.cli.excite_command import excite
-from tauscope.cli.export_command import export
-from tauscope.cli.fleet_command import fleet
-from tauscope.cli.identify_command import identify
-from tauscope.cli.inputs_command import recording, robot
-from tauscope.cli.job_command import job
-from tauscope.cli.model_command import model
-from tauscope.cli.prove_command import prove
-from tauscope.cli.rollout_command import rollout
-from tauscope.cli.run_command import run
-from tauscope.cli.serve_command import serve
-from tauscope.cli.store_command import backup, restore, store
-from tauscope.cli.verbs import SeveralValuesCommand, add_verb
 from tauscope.errors import TauscopeError
 from tauscope.extras import require_extra
 
-DEBUG = "TAUSCOPE_DEBUG"
-"""Environment variable that makes every failure show its traceback."""
+DEBUG = "TAUSCOPE_DEBUG"  # environment variable that makes every failure show its traceback
 
 
 class ExitStatus(IntEnum):
@@ -54,8 +36,68 @@ class ExitStatus(IntEnum):
     INTERRUPTED = 130
 
 
+VERBS = {
+    "identify": ("identify", "Find an arm's parameters from recordings."),
+    "diagnose": ("diagnose", "Say what an arm's model leaves out."),
+    "rollout": ("rollout", "Say how far the simulated arm strays from the real one."),
+    "excite": ("excite", "Design the motion that tells most about an arm."),
+    "export": ("export", "Write a model for a controller or a simulator."),
+    "robot": ("inputs", "Look at robot files."),
+    "recording": ("inputs", "Look at recordings, and convert them."),
+    "run": ("run", "Move an arm and record it."),
+    "campaign": ("campaign", "Go from a robot to its model: design a motion, run it, identify and diagnose."),
+    "release": ("device", "Let go of an arm that holds: its drives give no torque any more."),
+    "doctor": ("device", "Look at adapters and drives, and say what keeps an arm from running well."),
+    "bus": ("device", "Look at field buses."),
+    "serve": ("serve", "Offer everything over HTTP."),
+    "key": ("access", "API keys of the service."),
+    "audit": ("access", "Who did what through the service."),
+    "store": ("store", "Look after what is kept."),
+    "backup": ("store", "Write everything that is kept into one file."),
+    "restore": ("store", "Make a data folder from a backup."),
+    "model": ("model", "Models of each robot over time: which one is active, and what drifts."),
+    "job": ("job", "Do what a schedule repeats, from a timer of the system or by hand."),
+    "fleet": ("fleet", "The same analysis for many robots, results in one table."),
+    "demo": ("demo", "Run a whole campaign on a simulated arm."),
+    "prove": ("prove", "Put the diagnosis to the test: conceal effects, seal the truth, diagnose, count."),
+}
+"""For each verb the module ``tauscope.cli.…_command`` that has it, and one line of help.
+
+A module is loaded when its verb is called or asked for its own help: the program's own help answers at once.
+"""
+
+
+class Verbs(TyperGroup):
+    """The verbs of the program, each loaded when it is needed."""
+
+    def list_commands(self, ctx: typer.Context) -> list[str]:
+        """Names of all verbs."""
+        return [*VERBS]
+
+    def get_command(self, ctx: typer.Context, cmd_name: str) -> Any:
+        """A verb; None where there is none of that name."""
+        if cmd_name not in VERBS:
+            return None
+        from tauscope.cli.verbs import add_verb
+
+        found = vars(import_module(f"tauscope.cli.{VERBS[cmd_name][0]}_command"))[cmd_name]
+        if isinstance(found, typer.Typer):
+            group = get_group(found)
+            group.name = cmd_name
+            return group
+        single = typer.Typer(rich_markup_mode=None, add_completion=False)
+        add_verb(single, found)
+        return get_command(single)
+
+    def format_commands(self, ctx: typer.Context, formatter: Any) -> None:
+        """Write one line a verb."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, words) for name, (_, words) in VERBS.items()])
+
+
 app = typer.Typer(
     name="tauscope",
+    cls=Verbs,
     help="Find a robot arm's true dynamics from its own motion, and what its simulation left out.",
     epilog="Exit status: 0 done, 1 the data or the robot cannot answer, 2 wrong usage.",
     rich_markup_mode=None,  # a message stays one line that `grep` finds, however long its path
@@ -63,29 +105,6 @@ app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
 )
-add_verb(app, identify, SeveralValuesCommand)
-add_verb(app, diagnose, SeveralValuesCommand)
-add_verb(app, rollout)
-add_verb(app, excite)
-add_verb(app, export)
-app.add_typer(robot, name="robot")
-app.add_typer(recording, name="recording")
-add_verb(app, run, DriverCommand)
-add_verb(app, campaign, DriverCommand)
-add_verb(app, release, DriverCommand)
-add_verb(app, doctor, DriverCommand)
-app.add_typer(bus, name="bus")
-add_verb(app, serve, DriverCommand)
-app.add_typer(key, name="key")
-app.add_typer(audit, name="audit")
-app.add_typer(store, name="store")
-add_verb(app, backup)
-add_verb(app, restore)
-app.add_typer(model, name="model")
-app.add_typer(job, name="job")
-app.add_typer(fleet, name="fleet")
-add_verb(app, demo)
-add_verb(app, prove)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -111,7 +130,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _show_version(asked: bool) -> None:
-    """Answer ``--version``."""
     if asked:
         from importlib.metadata import PackageNotFoundError, version
 
@@ -125,8 +143,7 @@ def _show_version(asked: bool) -> None:
 @app.callback()
 def _program(
     version: Annotated[
-        bool,
-        typer.Option("--version", help="Show the version and exit.", callback=_show_version, is_eager=True),
+        bool, typer.Option("--version", help="Show the version and exit.", callback=_show_version, is_eager=True)
     ] = False,
 ) -> None:
     """Options of the program itself."""
@@ -142,7 +159,6 @@ def _prepare_process() -> None:
 
 
 def _fail(message: str) -> int:
-    """Say why, in one line."""
     if os.environ.get(DEBUG):
         traceback.print_exc()
     from tauscope.robot.messages import one_line
@@ -152,7 +168,6 @@ def _fail(message: str) -> int:
 
 
 def _status(exit_: SystemExit) -> int:
-    """The status that an exit carries, as `sys.exit` reads it."""
     if exit_.code is None:
         return ExitStatus.DONE
     return exit_.code if isinstance(exit_.code, int) else ExitStatus.CANNOT_ANSWER

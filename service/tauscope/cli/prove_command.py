@@ -10,8 +10,7 @@ import typer
 from tauscope.errors import NotFoundError
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-REPORTING = 1_000_000
-"""First seed of reports: seeds below 10,000 were looked at while the diagnosis was made."""
+REPORTING = 1_000_000  # first seed of reports: seeds below 10,000 were looked at while the diagnosis was made
 
 
 def prove(

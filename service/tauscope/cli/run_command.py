@@ -1,22 +1,37 @@
-"""``tauscope run``: its arguments."""
+"""``tauscope run``: perform the task beside the file to make, keep the recording, show what came."""
 
-import math
-from dataclasses import asdict, dataclass
+import shutil
+import tempfile
+from collections.abc import Collection
+from datetime import UTC, datetime
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
+from rich.console import Console
 
-from tauscope.cli.arguments import RobotFile
-from tauscope.cli.driver_choice import DEFAULT_BACKEND, check_backend, require_options
+from tauscope.cli.arguments import RobotFile, name_input
+from tauscope.cli.device_command import show_frames
+from tauscope.cli.output_files import keep_file, require_new
+from tauscope.cli.terminal import output, plain, show_progress, table
+from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
+from tauscope.errors import AcquisitionError
+from tauscope.number_text import ABSENT, counted, significant
+from tauscope.report.table import Table
+from tauscope.robot import JointType, Robot
+from tauscope.robot.messages import one_line
+from tauscope.runtime.drivers import DEFAULT_BACKEND, BackendName, driver_names, find_driver
+from tauscope.runtime.options import RunOptions
+from tauscope.runtime.record import RunRecord
+from tauscope.runtime.states import RunState
+from tauscope.tasks import run as task
+from tauscope.tasks.task import LocalFiles
 
 Trajectory = Annotated[
     Path | None,
-    typer.Option(
-        metavar="FILE",
-        exists=True,
-        dir_okay=False,
-        help="Motion to play: a trajectory (JSON, CSV). The default excitation is designed where none is given.",
+    name_input(
+        "Motion to play: a trajectory (JSON, CSV). The default excitation is designed where none is given.", "FILE"
     ),
 ]
 Out = Annotated[
@@ -27,82 +42,28 @@ Out = Annotated[
         help="File to make: .csv, .parquet, or .mcap (with the ramp). Never replaces a file; run-TIME.csv by default.",
     ),
 ]
-Scenario = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE", exists=True, dir_okay=False, help="What the simulated arm conceals (YAML)."),
-]
-Start = Annotated[
-    str | None, typer.Option(metavar="Q1,Q2,...", help="Where the simulated arm stands at first [rad or m].")
-]
-
-
-@dataclass(frozen=True, kw_only=True)
-class RunArguments:
-    """How a run is made: fields of `RunOptions`.
-
-    `rate_hz`: cycles a second [Hz].
-    """
-
-    mode: Annotated[Literal["position", "torque"], typer.Option(help="Who closes the loop: drives or host.")] = (
-        "position"
-    )
-    rate_hz: Annotated[
-        float | None,
-        typer.Option(
-            "--rate", "--rate-hz", metavar="HZ", min=1.0, max=10_000.0, help="Cycles a second; 500 where possible."
-        ),
-    ] = None
-    stop_policy: Annotated[
-        Literal["hold", "damp", "torque_off", "release"] | None,
-        typer.Option(
-            help="How the arm is stopped; as the robot file says by default, else hold. "
-            "release: hold, then let go once it stands still, where the robot file states that."
-        ),
-    ] = None
-    watchdog_s: Annotated[
-        float, typer.Option(metavar="S", help="Time without a cycle after which the device stops itself.")
-    ] = 0.1
-    heartbeat_s: Annotated[
-        float, typer.Option(metavar="S", help="Silence of its owner after which a run is interrupted.")
-    ] = 1.0
-    following_error: Annotated[
-        float | None, typer.Option(help="Allowed distance of arm and target; 0.2 rad or 0.05 m by default.")
-    ] = None
-    missed: Annotated[int, typer.Option(help="Readings in a row that a joint may not fail to answer.")] = 3
-    lost_s: Annotated[
-        float, typer.Option(metavar="S", help="Time after which a joint that does not answer counts as lost.")
-    ] = 0.05
-    stale_ms: Annotated[
-        float, typer.Option(metavar="MS", help="How much later than usual an answer may come and be a sample.")
-    ] = 1.0
-    least_kept: Annotated[
-        float, typer.Option(help="Share of the motion's samples below which the run ends as degraded.")
-    ] = 0.98
-    temperature_c: Annotated[float, typer.Option(metavar="C", help="Hottest motor that is allowed [°C].")] = 80.0
-    feed_forward: Annotated[
-        bool, typer.Option("--feed-forward/--no-feed-forward", help="Give the drives the torque of the robot's model.")
-    ] = True
-    bandwidth_rad_s: Annotated[float, typer.Option(help="Of the host's loop in torque mode [rad/s].")] = 25.0
-    settle_s: Annotated[float, typer.Option(metavar="S", help="Pause between the ramp and the motion.")] = 0.25
-    acknowledge_faults: Annotated[
-        bool, typer.Option("--acknowledge-faults", help="Clear the faults that the drives have latched.")
-    ] = False
+Scenario = Annotated[Path | None, name_input("What the simulated arm conceals (YAML).", "FILE")]
+HELD = (
+    "! The arm is under power where it stopped, and its watchdog is off. Support it, then let go of it with: tauscope "
+    "release."
+)
+SUFFIXES = (".csv", ".parquet", ".mcap")  # formats of a recording, by suffix
 
 
 def run(
     robot: RobotFile,
     *,
-    backend: Annotated[
-        str, typer.Option(parser=check_backend, metavar="[{backends}]", help="What moves the arm.")
-    ] = DEFAULT_BACKEND,
+    backend: Annotated[BackendName, typer.Option(help="What moves the arm.")] = DEFAULT_BACKEND,
     trajectory: Trajectory = None,
     out: Out = None,
     scenario: Scenario = None,
     time: Annotated[
         Literal["virtual", "real"], typer.Option(help="Of the simulated arm: as fast as it computes, or by the clock.")
     ] = "virtual",
-    start: Start = None,
-    arguments: RunArguments,
+    start: Annotated[
+        str | None, typer.Option(metavar="Q1,Q2,...", help="Where the simulated arm stands at first [rad or m].")
+    ] = None,
+    options: Annotated[dict[str, Any], OptionsOf(RunOptions)],
     seed: Annotated[int, typer.Option(min=0, help="Of the default excitation.")] = 0,
     keep_settings: Annotated[
         bool, typer.Option("--keep-settings", help="Leave in servos' EEPROM what the run changed; else it is put back.")
@@ -115,41 +76,160 @@ def run(
 
     Ctrl-C stops the arm by its stop policy; what was recorded until then is kept, and the exit status is 1.
     """
-    posture = parse_posture(start)
+    posture = None if start is None else parse_numbers(start, "--start")
     given = {"scenario": scenario, "start": start, "time": None if time == "virtual" else time}
     given["keep_settings"] = keep_settings or None
     require_options(backend, [name for name, value in given.items() if value is not None])
-    from tauscope.cli.task_run import make_request
-    from tauscope.runtime.options import RunOptions
-
-    options = make_request(RunOptions, **asdict(arguments))
+    made = make_request(RunOptions, **options)
     if dry_run:
-        from tauscope.cli.device_run import show_frames
-
-        show_frames(robot, backend, trajectory, options)
-        return
-    from tauscope.cli.run_session import run_arm
-    from tauscope.tasks import run as task
-
+        return show_frames(robot, backend, trajectory, made)
     request = task.Request(
         robot=str(robot),
         backend=make_request(task.BackendChoice, name=backend, time=time, start=posture, keep_settings=keep_settings),
         scenario=None if scenario is None else str(scenario),
         trajectory=None if trajectory is None else str(trajectory),
         seed=seed,
-        options=options,
+        options=made,
     )
-    run_arm(request, out)
+    _run_arm(request, out)
 
 
-def parse_posture(text: str | None) -> tuple[float, ...] | None:
-    """Read the value of ``--start``. Raises typer.BadParameter for anything else."""
-    if text is None:
-        return None
+def require_options(backend: str, options: Collection[str]) -> None:
+    """Refuse options that a driver does not have. Raises typer.BadParameter naming the drivers that have the option."""
+    for option in options:
+        owners = [name for name in driver_names() if option in find_driver(name).option_names]
+        if backend not in owners:
+            raise typer.BadParameter(f"--{option.replace('_', '-')} belongs to --backend {' or '.join(owners)}")
+
+
+def _run_arm(request: task.Request, asked: Path | None) -> None:
+    """Run to the end, keep the recording, and show what came.
+
+    Raises typer.BadParameter where an option is out of place. Raises TauscopeError where the run cannot start, or ended
+    before its time.
+    """
+    out = _output(asked)
+    folder, is_settled = _folder_beside(out), False
     try:
-        values = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        values = (math.nan,)
-    if not all(math.isfinite(value) for value in values):
-        raise typer.BadParameter(f"{text!r} is no list of numbers like 0,0.5,-1", param_hint="'--start'")
-    return values
+        with show_progress() as told:
+            result = task.perform(request, LocalFiles({"run": folder / "run"}), told)
+        made = keep_recording(result, out)
+        journal = None if made else _unsaved_journal(result)
+        is_settled = journal is None
+    finally:
+        # Whatever happened, a journal that nobody has saved stays.
+        if is_settled or not task.recording_file(folder / "run", "mcap").exists():
+            shutil.rmtree(folder, ignore_errors=True)
+    show_run(output(), result.record, result.robot)
+    if made:
+        output().print(plain(f"wrote {out}"), soft_wrap=True)
+    if result.record.state is not RunState.FINISHED:
+        raise AcquisitionError(why_unfinished(result.record, out if made else None, journal))
+
+
+def keep_recording(result: task.Result, out: Path) -> bool:
+    """Give the recording of a run its place; no file is ever replaced.
+
+    Raises ExportError if there is such a file by now, or it cannot be written.
+
+    Returns bool: False where nothing was recorded.
+    """
+    recording = result.recording(out.suffix.lower().removeprefix("."))
+    if recording is not None:
+        keep_file(recording, out)
+    return recording is not None
+
+
+def _unsaved_journal(result: task.Result) -> Path | None:
+    """The journal of a run whose recording could not be saved; None where it holds nothing."""
+    journal, recording = task.recording_file(result.folder, "mcap"), result.record.recording
+    is_empty = recording is not None and not recording.samples and not recording.remarks
+    return None if is_empty or not journal.exists() else journal
+
+
+def why_unfinished(record: RunRecord, recording: Path | None, journal: Path | None = None) -> str:
+    """One line on a run that did not finish."""
+    reason = record.stop if record.problem is None else record.problem.detail
+    until = "" if record.state is RunState.DEGRADED else " until then"
+    kept = "nothing was recorded" if recording is None else f"what was recorded{until} is in {recording}"
+    if journal is not None:
+        kept = f"its journal is {journal}; free disk space, then tauscope recording convert"
+    return one_line(f"the run {record.state}: {reason or 'no reason is known'}; {_describe_arm(record)}{kept}")
+
+
+def _describe_arm(record: RunRecord) -> str:
+    """What the arm does now; empty where it never had power, or did all that was asked for."""
+    if record.state is RunState.DEGRADED or not record.played:
+        return ""
+    if record.holds is None:
+        return "nobody has confirmed its stop, so its drives stop by themselves: look at the arm; "
+    return f"the arm was stopped and {'holds' if record.holds else 'is without power'}; "
+
+
+def _output(asked: Path | None) -> Path:
+    """The recording to make, refused before any work where it cannot be made."""
+    out = asked or Path(f"run-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.csv")
+    if out.suffix.lower() not in SUFFIXES:
+        known = ", ".join(SUFFIXES)
+        raise typer.BadParameter(f"{str(out)!r}: the suffix names no format; use {known}", param_hint="'--out'")
+    if out.suffix.lower() == ".parquet" and find_spec("pyarrow") is None:
+        raise AcquisitionError(f"{out}: Parquet needs pyarrow, which is not installed; name a .csv file")
+    require_new(out)
+    return out
+
+
+def _folder_beside(out: Path) -> Path:
+    """A hidden folder beside the recording, on the same disk; what is in it outlives a crash."""
+    try:
+        return Path(tempfile.mkdtemp(prefix=".tauscope-run-", dir=out.resolve().parent))
+    except OSError as error:
+        raise AcquisitionError(
+            f"{out}: cannot be written there ({error.strerror or error}); choose another place"
+        ) from error
+
+
+def show_run(console: Console, record: RunRecord, robot: Robot) -> None:
+    """Show how a run went, and how it kept its time."""
+    reason = f": {record.problem.detail}" if record.problem is not None else ""
+    console.print(plain(f"Robot {record.robot} on {record.backend}: {record.state}{reason}"), soft_wrap=True)
+    for line in record.drives:
+        console.print(plain(f"! {line}."), soft_wrap=True)
+    for warning in robot.warnings:
+        console.print(plain(f"! {warning.sentence}."), soft_wrap=True)
+    if record.holds and not find_driver(record.backend).is_simulated:
+        console.print(plain(HELD), soft_wrap=True)
+    console.print(table("Run", _whole(record)))
+    if record.worst_following:
+        console.print(table("Joints", _joints(record, robot)))
+    for remark in record.recording.remarks if record.recording is not None else ():
+        console.print(plain(f"! {remark}"), soft_wrap=True)
+
+
+def _whole(record: RunRecord) -> Table:
+    timing, recording = record.timing, record.recording
+    rows = [
+        ("played", f"{significant(100.0 * record.played, 4)} %"),
+        ("ramp", ABSENT if record.ramp_s is None else f"{significant(record.ramp_s)} s"),
+        ("motion", ABSENT if record.motion_s is None else f"{significant(record.motion_s, 4)} s"),
+        ("stop policy", record.stop_policy or ABSENT),
+        ("samples", ABSENT if recording is None else str(recording.samples)),
+        ("samples kept", ABSENT if record.kept is None else f"{significant(100.0 * record.kept, 4)} %"),
+    ]
+    if timing is not None:
+        lateness = ", ".join(f"{name} {significant(value, 3)}" for name, value in timing.lateness_us.items())
+        rows += [
+            ("rate", f"{significant(timing.achieved_rate_hz or 0.0, 5)} of {significant(timing.rate_hz, 5)} Hz"),
+            ("lateness", f"{lateness} µs"),
+            ("missed periods", counted(timing.missed_periods, "period")),
+            ("scheduler", ABSENT if record.real_time is None else record.real_time.scheduler),
+        ]
+    return Table(("figure", "value"), rows, words=2)
+
+
+def _joints(record: RunRecord, robot: Robot) -> Table:
+    stale = (0,) * robot.joint_count if record.timing is None else record.timing.stale_samples
+    rows = [
+        (joint.name, f"{significant(following, 3)} {'rad' if joint.type is JointType.REVOLUTE else 'm'}", str(count))
+        for joint, following, count in zip(robot.joints, record.worst_following, stale, strict=True)
+    ]
+    return Table(("joint", "largest following error", "samples not answered"), rows)

@@ -1,21 +1,27 @@
-"""``tauscope serve``: its arguments."""
+"""``tauscope serve``: the HTTP service in this process."""
 
 import os
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any
 
 import typer
+from pydantic import SecretStr, ValidationError
 
-from tauscope.cli.driver_choice import DEFAULT_BACKEND, check_backend
 from tauscope.cli.store_command import Kind
+from tauscope.cli.verbs import OptionsOf
+from tauscope.server.http import server
+from tauscope.server.http.settings import Settings, default_data_folder
+
+_DIRECT = (
+    *("host", "port", "backend", "sim_time", "sim_socket", "tls_certificate", "tls_key"),
+    *("log_format", "require_lease", "prune_recordings"),
+)
+"""Settings whose options have the same name."""
 
 
 def serve(
     *,
-    host: Annotated[
-        str, typer.Option(help="Address to listen at; one that others can reach needs an API key (tauscope key add).")
-    ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 takes any free one.")] = 8000,
+    options: Annotated[dict[str, Any], OptionsOf(Settings, _DIRECT)],
     data: Annotated[
         Path | None,
         typer.Option(
@@ -31,41 +37,16 @@ def serve(
             help="PostgreSQL database; SQLite in the data folder by default.",
         ),
     ] = None,
-    backend: Annotated[
-        str,
-        typer.Option(
-            parser=check_backend, metavar="[{backends}]", help="What moves the arm where a request does not say."
-        ),
-    ] = DEFAULT_BACKEND,
-    sim_time: Annotated[
-        Literal["virtual", "real"], typer.Option(help="Of the simulated arm, where a request does not say.")
-    ] = "virtual",
-    sim_socket: Annotated[
-        Path | None,
-        typer.Option(metavar="SOCKET", help="Where a simulated arm that runs by the clock listens; else one a run."),
-    ] = None,
     workers: Annotated[
         int | None, typer.Option(min=1, show_default="one a core", help="Analyses that are worked on at a time.")
     ] = None,
     name: Annotated[
         list[str] | None, typer.Option(metavar="HOST", help="Host name by which it is called too; may be repeated.")
     ] = None,
-    tls_certificate: Annotated[
-        Path | None, typer.Option(metavar="FILE", dir_okay=False, help="Certificate (PEM); else plain HTTP.")
-    ] = None,
-    tls_key: Annotated[
-        Path | None, typer.Option(metavar="FILE", dir_okay=False, help="Private key of the certificate (PEM).")
-    ] = None,
     trusted_proxy: Annotated[
         list[str] | None,
         typer.Option(metavar="ADDRESS", help="Reverse proxy that tells the client's address; may be repeated."),
     ] = None,
-    log_format: Annotated[
-        Literal["text", "json"], typer.Option(help="Of standard error; json: one object a line, requests included.")
-    ] = "text",
-    require_lease: Annotated[
-        bool, typer.Option("--require-lease", help="Move arms by a lease only, as with API keys, without them too.")
-    ] = False,
     requests_per_second: Annotated[
         float | None, typer.Option(min=0.1, help="How often a caller may call; 200 with API keys, else unlimited.")
     ] = None,
@@ -76,37 +57,42 @@ def serve(
     prune_kind: Annotated[
         list[Kind] | None, typer.Option(help="Kind of item that may go so, once for each; every kind by default.")
     ] = None,
-    prune_recordings: Annotated[
-        bool, typer.Option("--prune-recordings", help="Recordings too that nothing which stays was made from.")
-    ] = False,
 ) -> None:
     """Offer everything over HTTP.
 
     REST under /api/v1, its documentation under /docs. When it ends, arms that move are stopped first.
     """
-    from pydantic import SecretStr
-
-    from tauscope.cli.serving import run_server
-
-    if prune_older_than is None and (prune_kind or prune_recordings):
+    if prune_older_than is None and (prune_kind or options["prune_recordings"]):
         raise typer.BadParameter("--prune-kind and --prune-recordings need --prune-older-than")
     run_server(
         data,
-        host=host,
-        port=port,
         database=None if database is None else SecretStr(database),
-        backend=backend,
-        sim_time=sim_time,
-        sim_socket=sim_socket,
         workers=workers or len(os.sched_getaffinity(0)),
         names=tuple(name or ()),
-        tls_certificate=tls_certificate,
-        tls_key=tls_key,
         trusted_proxies=tuple(trusted_proxy or ()),
-        log_format=log_format,
-        require_lease=require_lease,
         requests_per_s=requests_per_second,
         prune_older_than_days=prune_older_than,
         prune_kinds=tuple(kind.value for kind in prune_kind or ()),
-        prune_recordings=prune_recordings,
+        **options,
     )
+
+
+def run_server(data: Path | None, **choices: Any) -> None:
+    """Serve until interrupted.
+
+    Raises typer.BadParameter if a setting is out of its range. Raises TauscopeError if the address cannot be listened
+    at, or is one that others could reach without a key.
+    """
+    try:
+        settings = Settings(data_folder=data or default_data_folder(), **choices)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise typer.BadParameter(f"{first['loc'][0]}: {first['msg']}") from error
+    server.serve(settings, lambda address: _announce(settings, address))
+
+
+def _announce(settings: Settings, address: str) -> None:
+    if not settings.is_local and settings.tls_certificate is None:
+        hint = "give --tls-certificate, or put a proxy in front that does TLS (deploy/)"
+        typer.echo(f"warning: whoever listens on the network of {settings.host} sees keys and data; {hint}", err=True)
+    typer.echo(f"Tauscope at {address}, documentation at {address}/docs; Ctrl-C ends it")

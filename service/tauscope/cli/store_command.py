@@ -1,18 +1,35 @@
-"""``tauscope store``, ``tauscope backup`` and ``tauscope restore``: their arguments."""
+"""``tauscope store``, ``tauscope backup`` and ``tauscope restore``: a data folder that no service works with."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import timedelta
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tauscope.cli.verbs import add_verb
-
-store = typer.Typer(help="Look after what is kept.", no_args_is_help=True, rich_markup_mode=None)
+from tauscope.cli.arguments import name_input
+from tauscope.cli.output_files import require_new
+from tauscope.cli.terminal import output, plain, show_progress, table
+from tauscope.cli.verbs import make_group
+from tauscope.errors import StoreError
+from tauscope.number_text import ABSENT, counted
+from tauscope.report.table import Table
+from tauscope.server.history.indexer import Indexer, open_index
+from tauscope.server.history.model_history import ModelHistory
+from tauscope.server.history.retention import RetentionRule, plan_removal, remove
+from tauscope.server.http.settings import default_data_folder
+from tauscope.server.store.backup import restore_backup, write_backup
+from tauscope.server.store.data_folder import FOLDERS, RECORDINGS, FolderLock, item_stores, site_identifier, utc_now
+from tauscope.server.store.database.database import FILE_NAME, Database
+from tauscope.server.store.database.index import Index
+from tauscope.server.store.recordings import RecordingStore
+from tauscope.version import tauscope_version
 
 DataFolder = Annotated[
-    Path | None,
-    typer.Option(metavar="DIR", exists=True, file_okay=False, help="Data folder; the user's own by default."),
+    Path | None, name_input("Data folder; the user's own by default.", "DIR", dir_okay=True, file_okay=False)
 ]
 DatabaseUrl = Annotated[
     str | None,
@@ -27,17 +44,65 @@ DatabaseUrl = Annotated[
 
 
 class Kind(StrEnum):
-    """Kinds of items."""
+    """Kinds of items: a repeated option takes an enumeration, no literal."""
 
-    EXCITATION = "excitation"
-    RUN = "run"
-    IDENTIFICATION = "identification"
-    DIAGNOSIS = "diagnosis"
-    ROLLOUT = "rollout"
-    CAMPAIGN = "campaign"
+    EXCITATION, RUN, IDENTIFICATION = "excitation", "run", "identification"
+    DIAGNOSIS, ROLLOUT, CAMPAIGN = "diagnosis", "rollout", "campaign"
 
 
-def check(
+_OWN_FILES = "its state, its order or its result"
+
+
+@dataclass(frozen=True, eq=False)
+class OpenStore:
+    """A data folder that is this process's own for a while."""
+
+    folder: Path
+    database: Database
+    keeper: Indexer
+
+
+@contextmanager
+def open_store(data: Path | None, database: str | None) -> Iterator[OpenStore]:
+    """Take a data folder.
+
+    Raises StoreError if there is no such folder, or its database cannot be used. Raises TauscopeError if a service
+    works with it.
+    """
+    folder = data or default_data_folder()
+    if not folder.is_dir():
+        raise StoreError(f"{folder}: there is no such data folder; name it with --data")
+    lock = FolderLock(folder)
+    try:
+        opened = Database(database or folder / FILE_NAME)
+        try:
+            index = Index(opened, site_identifier(folder))
+            keeper = open_index(index, item_stores(folder), RecordingStore(folder / RECORDINGS), folder.name)
+            keeper.sync(thorough=True)
+            yield OpenStore(folder, opened, keeper)
+        finally:
+            opened.close()
+    finally:
+        lock.release()
+
+
+@contextmanager
+def open_database(data: Path | None, database: str | None) -> Iterator[Database]:
+    """Open the database alone, beside a service that may work with it.
+
+    Raises StoreError if there is none, or it cannot be used.
+    """
+    path = (data or default_data_folder()) / FILE_NAME
+    if database is None and not path.is_file():
+        raise StoreError(f"{path}: there is no such database; name the data folder with --data, or serve it once")
+    opened = Database(database or path)
+    try:
+        yield opened
+    finally:
+        opened.close()
+
+
+def check_store(
     data: DataFolder = None,
     database: DatabaseUrl = None,
     quick: Annotated[bool, typer.Option("--quick", help="Compare sizes only, not every byte.")] = False,
@@ -46,12 +111,23 @@ def check(
 
     Exit status 1 where a file is missing or is another one. No service may work with the folder meanwhile.
     """
-    from tauscope.cli.store_run import check_store
+    with show_progress() as progress, open_store(data, database) as store:
+        progress(f"compare the files of {store.folder}")
+        changed = store.keeper.check(deep=not quick)
+        count = sum(len(store.keeper.index.stamps(kind)) for kind in item_stores(store.folder))
+        recordings = len(RecordingStore(store.folder / RECORDINGS).entries())
+    kept = f"{counted(count, 'item')} and {counted(recordings, 'recording')}"
+    if not changed:
+        output().print(plain(f"{store.folder}: {kept}, all as they were"), soft_wrap=True)
+        return
+    own = {"recording": "its bytes"}
+    rows = [(item.kind, item.identifier, item.path or own.get(item.kind, _OWN_FILES)) for item in changed]
+    output().print(table("Missing or changed", Table(("kind", "item", "file"), rows, words=3)))
+    hint = "restore what is damaged from a backup, or remove it"
+    raise StoreError(f"{store.folder}: of {kept}, {len(changed)} damaged; {hint}")
 
-    check_store(data, database, quick=quick)
 
-
-def prune(
+def prune_store(
     older_than: Annotated[
         float, typer.Option("--older-than", min=0.0, metavar="DAYS", help="What ended longer ago may go.")
     ],
@@ -69,13 +145,22 @@ def prune(
 
     No service may work with the folder meanwhile.
     """
-    from tauscope.cli.store_run import prune_store
-
-    prune_store(data, database, older_than, [each.value for each in kind or []], recordings=recordings, dry_run=dry_run)
-
-
-add_verb(store, check)
-add_verb(store, prune)
+    rule = RetentionRule(timedelta(days=older_than), frozenset(kind or FOLDERS), recordings)
+    with open_store(data, database) as store:
+        kept = RecordingStore(store.folder / RECORDINGS)
+        removal = plan_removal(store.keeper, ModelHistory(store.database), kept, rule, utc_now())
+        if not dry_run:
+            try:
+                removers = {kind: items.remove for kind, items in item_stores(store.folder).items()}
+                removal = remove(removal, removers, kept, store.keeper)
+            except OSError as error:
+                raise StoreError(f"{store.folder}: cannot be removed from ({error.strerror or error})") from error
+    rows = [(entry.kind, entry.identifier, entry.robot or ABSENT) for entry in removal.items]
+    rows += [("recording", name, ABSENT) for name in removal.recordings]
+    done = "would go" if dry_run else "removed"
+    if rows:
+        output().print(table(done.capitalize(), Table(("kind", "item", "robot"), rows, words=3)))
+    output().print(plain(f"{store.folder}: {counted(len(rows), 'item')} {done}"), soft_wrap=True)
 
 
 def backup(
@@ -84,17 +169,30 @@ def backup(
     database: DatabaseUrl = None,
 ) -> None:
     """Write everything that is kept into one file; a service may work with it meanwhile."""
-    from tauscope.cli.store_run import make_backup
-
-    make_backup(file, data, database)
+    require_new(file)
+    folder = data or default_data_folder()
+    with show_progress() as progress, open_database(folder, database) as opened:
+        progress(f"copy {folder}")
+        try:
+            count = write_backup(folder, opened, file, tauscope_version())
+        except OSError as error:
+            raise StoreError(f"{file}: cannot be written ({error.strerror or error}); choose another place") from error
+    output().print(plain(f"wrote {file}: {counted(count, 'file')} and the database"), soft_wrap=True)
 
 
 def restore(
-    file: Annotated[Path, typer.Argument(metavar="FILE", exists=True, dir_okay=False, help="Of `tauscope backup`.")],
+    file: Annotated[Path, name_input("Of `tauscope backup`.", "FILE", typer.Argument)],
     data: Annotated[Path, typer.Option(metavar="DIR", file_okay=False, help="Data folder to make.")],
     database: DatabaseUrl = None,
 ) -> None:
     """Make a data folder from a backup; also where the database was one of the other kind."""
-    from tauscope.cli.store_run import use_backup
+    with show_progress() as progress:
+        progress(f"unpack {file}")
+        try:
+            count = restore_backup(file, data, database)
+        except OSError as error:
+            raise StoreError(f"{data}: cannot be written ({error.strerror or error}); choose another place") from error
+    output().print(plain(f"restored {data}: {counted(count, 'file')} and the database"), soft_wrap=True)
 
-    use_backup(file, data, database)
+
+store = make_group("Look after what is kept.", check=check_store, prune=prune_store)

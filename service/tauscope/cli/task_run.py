@@ -3,36 +3,20 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any
 
 import typer
-from pydantic import BaseModel, ValidationError
 
 from tauscope.cli.output_files import STANDARD_OUTPUT, require_distinct, require_free, write_file
-from tauscope.cli.terminal import Told, output, plain, shown_progress
+from tauscope.cli.terminal import Told, output, plain, show_progress
 from tauscope.export.formats import SUFFIXES, ExportFile, ExportFormat
 from tauscope.robot import Robot, Severity, read_robot
 from tauscope.robot.messages import one_line
 from tauscope.tasks.task import LocalFiles
 
-Model = TypeVar("Model", bound=BaseModel)
-
-
-def make_request(kind: type[Model], **fields: Any) -> Model:
-    """A request or its options. Raises typer.BadParameter naming the field."""
-    try:
-        return kind(**fields)
-    except ValidationError as error:
-        fault = error.errors(include_url=False, include_context=False)[0]
-        option = f"--{fault['loc'][0]}".replace("_", "-") if fault["loc"] else kind.__name__
-        raise typer.BadParameter(f"{fault['msg']}", param_hint=f"'{option}'") from None
-
 
 def run_task(
-    task: ModuleType,
-    request: Any,
-    asked: Sequence[tuple[Path | None, str]],
-    show: Callable[[Any], None] | None = None,
+    task: ModuleType, request: Any, asked: Sequence[tuple[Path | None, str]], show: Callable[[Any], None] | None = None
 ) -> Any:
     """Perform a task, write its outputs, and show the result.
 
@@ -49,7 +33,7 @@ def run_task(
     require_free(paths, (robot_file, *inputs))
     robot = read_robot(robot_file)
     require_free(paths, [path for _, path in robot.files])
-    with shown_progress() as progress:
+    with show_progress() as progress:
         result, written = write_outputs(task, request, dict(outputs), progress)
     if show is not None:
         show(result)

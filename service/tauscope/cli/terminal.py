@@ -13,8 +13,7 @@ from rich.text import Text
 from tauscope.report.table import Table
 from tauscope.robot.messages import one_line
 
-PIPE_WIDTH = 240
-"""Columns where nobody looks: wide enough for every table."""
+PIPE_WIDTH = 240  # columns where nobody looks: wide enough for every table
 
 
 def output() -> Console:
@@ -45,7 +44,7 @@ Told = Callable[..., None]
 
 
 @contextmanager
-def shown_progress() -> Iterator[Told]:
+def show_progress() -> Iterator[Told]:
     """A bar on standard error, where that is a terminal."""
     if not sys.stderr.isatty():
         yield lambda *_: None

@@ -1,16 +1,24 @@
-"""Registering functions as commands: help from the docstring, options also from dataclasses that group them."""
+"""Functions as commands: help from the docstring, and options from the fields of a model."""
 
 import inspect
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import MISSING, fields, is_dataclass
+import math
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import wraps
-from typing import Any, get_type_hints
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 import typer
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 from typer.core import TyperCommand, TyperOption
 
-SEVERAL = "..."
-"""A metavar that ends so marks an option that takes several values: what --help shows is what is parsed."""
+SEVERAL = "..."  # A metavar that ends so marks an option that takes several values: what --help shows is what is parsed
+
+Model = TypeVar("Model", bound=BaseModel)
+
+_UNIT = re.compile(r"_(s|ms|m|hz|c|rad_s)$")
 
 
 def spread_values(words: Sequence[str], options: Collection[str]) -> list[str]:
@@ -43,19 +51,59 @@ class SeveralValuesCommand(TyperCommand):
 
 
 def add_verb(
-    app: typer.Typer, function: Callable[..., None], cls: type[TyperCommand] = TyperCommand, name: str | None = None
+    app: typer.Typer,
+    function: Callable[..., None],
+    cls: type[TyperCommand] = SeveralValuesCommand,
+    name: str | None = None,
 ) -> None:
     """Make a function a command of the same name; its docstring is the help."""
     app.command(name, cls=cls, help=inspect.getdoc(function))(expand_groups(function))
 
 
+def make_group(words: str, **verbs: Callable[..., None]) -> typer.Typer:
+    """A group of commands; `words` is its help."""
+    group = typer.Typer(help=words, no_args_is_help=True, rich_markup_mode=None)
+    for name, function in verbs.items():
+        add_verb(group, function, name=name)
+    return group
+
+
+@dataclass(frozen=True)
+class OptionsOf:
+    """Marks a parameter that takes fields of a model, by name: each is an option, described and bounded as there.
+
+    `only`: the fields; all where empty. `without`: fields that the command states itself.
+    """
+
+    model: type[BaseModel]
+    only: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+
+    @property
+    def fields(self) -> dict[str, FieldInfo]:
+        """The fields, in their order."""
+        known = self.model.model_fields
+        return {name: known[name] for name in self.only or known if name not in self.without}
+
+
+def make_request(kind: type[Model], **fields: Any) -> Model:
+    """A request or its options. Raises typer.BadParameter naming the field."""
+    try:
+        return kind(**fields)
+    except ValidationError as error:
+        fault = error.errors(include_url=False, include_context=False)[0]
+        option = f"--{fault['loc'][0]}".replace("_", "-") if fault["loc"] else kind.__name__
+        raise typer.BadParameter(f"{fault['msg']}", param_hint=f"'{option}'") from None
+
+
 def expand_groups(function: Callable[..., None]) -> Callable[..., None]:
-    """A command in which each parameter of a dataclass type becomes one option per field of that class."""
+    """A command in which each parameter marked by `OptionsOf` becomes one option per field."""
     signature = inspect.signature(function, eval_str=True)
-    groups: dict[str, Any] = {
-        name: parameter.annotation
+    groups: dict[str, OptionsOf] = {
+        name: mark
         for name, parameter in signature.parameters.items()
-        if is_dataclass(parameter.annotation)
+        for mark in getattr(parameter.annotation, "__metadata__", ())
+        if isinstance(mark, OptionsOf)
     }
     if not groups:
         return function
@@ -65,25 +113,83 @@ def expand_groups(function: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(function)
     def command(**values: Any) -> None:
-        made = {
-            name: group(**{field.name: values.pop(field.name) for field in fields(group)})
-            for name, group in groups.items()
-        }
-        function(**values, **made)
+        taken = {name: _take_fields(group, values) for name, group in groups.items()}
+        function(**values, **taken)
 
     vars(command)["__signature__"] = signature.replace(parameters=parameters)
     return command
 
 
-def _list_options(group: Any) -> list[inspect.Parameter]:
-    """The fields of a group as keyword parameters."""
-    hints = get_type_hints(group, include_extras=True)
-    return [
-        inspect.Parameter(
-            field.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=inspect.Parameter.empty if field.default is MISSING else field.default,
-            annotation=hints[field.name],
+def _take_fields(group: OptionsOf, values: dict[str, Any]) -> dict[str, Any]:
+    fields = {name: values.pop(name) for name in group.fields}
+    for name, text in fields.items():
+        if isinstance(text, str) and tuple in _list_types(group.model.model_fields[name].annotation):
+            fields[name] = parse_numbers(text, f"--{_UNIT.sub('', name).replace('_', '-')}")
+    return fields
+
+
+def _list_options(group: OptionsOf) -> Iterator[inspect.Parameter]:
+    for name, field in group.fields.items():
+        kind, choices = _option_type(field)
+        short = _UNIT.sub("", name)
+        flags = [f"--{each.replace('_', '-')}" for each in dict.fromkeys((short, name))]
+        default = field.get_default(call_default_factory=True)
+        if kind is bool:
+            flags = [f"{flag}/--no-{flag[2:]}" for flag in flags] if default else flags
+        elif isinstance(default, tuple):
+            default = ",".join(f"{value:g}" for value in default)
+        bounds = {
+            edge: getattr(mark, limit) for mark in field.metadata for edge, limit in _EDGES if hasattr(mark, limit)
+        }
+        option = typer.Option(
+            *flags,
+            help=describe_field(field),
+            metavar="|".join(choices) or None,
+            show_default=default is not None,
+            **(bounds if kind in (int, float) else {}),
         )
-        for field in fields(group)
+        annotation = Annotated[kind if default is not None else kind | None, option]
+        yield inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+_EDGES = (("min", "ge"), ("max", "le"))
+
+
+def describe_field(field: FieldInfo) -> str:
+    """What a field is, as a command's help says it."""
+    words = re.sub(r"[;,] null(?: for|:)? (.*)", r" (by default \1)", field.description or "")
+    return f"{words[:1].upper()}{words[1:]}."
+
+
+def _list_types(annotation: Any) -> list[Any]:
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        return _list_types(get_args(annotation)[0])
+    if origin in (Union, UnionType):
+        return [kind for each in get_args(annotation) for kind in _list_types(each)]
+    return [annotation if origin in (None, Literal) else origin]
+
+
+def _option_type(field: FieldInfo) -> tuple[Any, list[str]]:
+    """The type of an option, and the choices that its metavar shows where the type does not."""
+    kinds = [kind for kind in _list_types(field.annotation) if kind is not NoneType]
+    if len(kinds) == 1 and not isinstance(kinds[0], type):
+        return kinds[0], []
+    if len(kinds) == 1 and not issubclass(kinds[0], tuple | Mapping):
+        return kinds[0], []
+    choices = [
+        str(choice) for kind in kinds for choice in (get_args(kind) or getattr(kind, "__members__", {}).values())
     ]
+    return str, choices or (["N,..."] if tuple in kinds else [])
+
+
+def parse_numbers(text: str, option: str, count: int | None = None) -> tuple[float, ...]:
+    """Numbers separated by commas, as many as `count` says. Raises typer.BadParameter for anything else."""
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        numbers = ()
+    if not numbers or not all(map(math.isfinite, numbers)) or (count is not None and len(numbers) != count):
+        wanted = "numbers" if count is None else f"{count} numbers"
+        raise typer.BadParameter(f"{text!r} is not {wanted} separated by commas", param_hint=f"'{option}'")
+    return numbers

@@ -16,8 +16,8 @@ from tauscope.server.http.diagnoses import DiagnosisAnswer
 from tauscope.server.http.excitations import ExcitationAnswer
 from tauscope.server.http.identifications import IdentificationAnswer
 from tauscope.server.http.leases import LeaseAnswer, StopAllAnswer
-from tauscope.server.http.recordings.models import RecordingAnswer
-from tauscope.server.http.robots.models import RobotReportAnswer
+from tauscope.server.http.recordings import RecordingAnswer
+from tauscope.server.http.robot_files import RobotReportAnswer
 from tauscope.server.http.rollouts import RolloutAnswer
 from tauscope.server.http.runs import RunAnswer, StopAnswer
 

@@ -15,33 +15,20 @@ from typing import Any
 from tauscope.errors import AcquisitionError, TauscopeError
 from tauscope.robot import read_robot
 from tauscope.runtime.drivers import Connection, make_backend
-from tauscope.runtime.in_process import open_recorder
+from tauscope.runtime.loop import end_event
 from tauscope.runtime.options import RunOrder, read_order
 from tauscope.runtime.processes import RunLock
-from tauscope.runtime.progress import end_event
-from tauscope.runtime.record import (
-    FLUSH_S,
-    STOP_FILE,
-    ProcessName,
-    RecordKeeper,
-    RunProblem,
-    RunRecord,
-    read_record,
-)
-from tauscope.runtime.run import Run
+from tauscope.runtime.record import FLUSH_S, STOP_FILE, ProcessName, RecordKeeper, RunProblem, RunRecord, read_record
+from tauscope.runtime.run import OpenRecorder, Run, RunTask, Surroundings, open_recorder
 from tauscope.runtime.states import RunState
 from tauscope.runtime.stop_listener import StopListener
-from tauscope.runtime.task import OpenRecorder, RunTask, Surroundings
 from tauscope.trajectory import read_trajectory
 
 _LARGEST_EVENT = 4096
 
 
 def control(
-    folder: Path,
-    *,
-    make: Callable[..., Connection] = make_backend,
-    recorder: OpenRecorder = open_recorder,
+    folder: Path, *, make: Callable[..., Connection] = make_backend, recorder: OpenRecorder = open_recorder
 ) -> int:
     """Carry a run out, in the main thread of a process of its own."""
     report = _event_pipe()
@@ -75,7 +62,6 @@ def control(
 
 
 def _task(order: RunOrder, folder: Path, make: Callable[..., Connection]) -> RunTask:
-    """Read what the order names."""
     robot = read_robot(order.robot)
     trajectory = read_trajectory(order.trajectory, robot)
     name, settings = order.backend.name, order.backend.settings
@@ -83,7 +69,6 @@ def _task(order: RunOrder, folder: Path, make: Callable[..., Connection]) -> Run
 
 
 def _refuse(record: RunRecord, error: TauscopeError) -> RunRecord:
-    """The record of a run that could not begin."""
     problem = RunProblem(code=error.code, detail=str(error))
     return record.moved(RunState.STOPPING, problem=problem).moved(RunState.FAILED)
 

@@ -56,7 +56,6 @@ class Violation:
     detail: str
 
     def __str__(self) -> str:
-        """One line for a message."""
         return f"{self.detail} ({self.rule})"
 
 
@@ -118,13 +117,7 @@ class GuardLimits:
 
 
 def guard_limits(
-    robot: Robot,
-    low: Array,
-    high: Array,
-    speed: Array,
-    *,
-    following: float | None = None,
-    temperature_c: float = 80.0,
+    robot: Robot, low: Array, high: Array, speed: Array, *, following: float | None = None, temperature_c: float = 80.0
 ) -> GuardLimits:
     """The limits of a run: the robot file's where it states them, else a careful default or what the motion needs.
 
@@ -152,8 +145,7 @@ def guard_limits(
     )
 
 
-PERSISTENCE = 3
-"""Cycles in a row after which a measured speed counts: one noisy reading is no runaway."""
+PERSISTENCE = 3  # cycles in a row after which a measured speed counts: one noisy reading is no runaway
 
 _ROUNDING = 1e-9
 _NANOSECOND = 1e-9

@@ -14,11 +14,8 @@ from tauscope.runtime.drivers import DEFAULT_BACKEND
 from tauscope.strict_model import StrictModel
 from tauscope_drivers import Capabilities, ControlMode, StopPolicy
 
-DEFAULT_RATE_HZ = 500.0
-"""Cycles a second where nothing is stated and the bus allows as many."""
-
-RELEASE = "release"
-"""Stop policy: hold, and let go once the arm stands still."""
+DEFAULT_RATE_HZ = 500.0  # cycles a second where nothing is stated and the bus allows as many
+RELEASE = "release"  # stop policy: hold, and let go once the arm stands still
 
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 

@@ -60,8 +60,7 @@ def _parameters(robot: Robot) -> Array | None:
     return np.concatenate([link.to_vector() for link in robot.model.links])
 
 
-MOST_CYCLES = 4_000_000
-"""A longer run must be a mistake: it is more than two hours at 500 cycles a second."""
+MOST_CYCLES = 4_000_000  # A longer run must be a mistake: it is more than two hours at 500 cycles a second
 
 _ROUNDING = 1e-9
 

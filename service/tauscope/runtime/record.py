@@ -166,8 +166,7 @@ def read_record(folder: Path) -> RunRecord:
         raise AcquisitionError(f"{path}: is not a run's record ({place}: {first['msg']})") from None
 
 
-FLUSH_S = 5.0
-"""Time that the disk may take for the last record."""
+FLUSH_S = 5.0  # time that the disk may take for the last record
 
 
 class RecordKeeper:

@@ -27,14 +27,9 @@ from tauscope.runtime.processes import child_environment
 from tauscope.runtime.record import JOURNAL_FILE, RECORDING_STEM, RecordingFiles
 from tauscope.runtime.states import Stops, raise_if_requested
 
-PIPE_BYTES = 2**20
-"""Room between loop and writer: some seconds of cycles."""
-
-OPENING_S = 20.0
-"""Time that the writer may take to start."""
-
-CLOSING_S = 5.0
-"""Time that the writer may take to write what is left."""
+PIPE_BYTES = 2**20  # room between loop and writer: some seconds of cycles
+OPENING_S = 20.0  # time that the writer may take to start
+CLOSING_S = 5.0  # time that the writer may take to write what is left
 
 _LARGEST_FRAME = select.PIPE_BUF
 _ROWS_AT_ONCE = 32
@@ -50,15 +45,12 @@ class Recorder(Protocol):
 
     def put(self, row: NDArray[np.void]) -> None:
         """Take a cycle. `row`: (1,) of `journal_row_type`, the cycle; copied."""
-        ...
 
     def event(self, time_ns: int, event: Mapping[str, Any]) -> None:
         """Take an event. `time_ns`: when, by the clock of the rows [ns]."""
-        ...
 
     def close(self) -> str | None:
         """Bring everything to the file; why that did not work, None where it did."""
-        ...
 
 
 class DirectRecorder:
@@ -195,8 +187,7 @@ def _cannot_open(path: Path, reason: str | None) -> AcquisitionError:
     return AcquisitionError(f"{path}: the journal cannot be created ({reason or 'unknown reason'}); nothing has moved")
 
 
-UNKNOWN_LOSS = -1
-"""Number of lost rows where the process that counted them is gone."""
+UNKNOWN_LOSS = -1  # number of lost rows where the process that counted them is gone
 
 
 def save_recording(folder: Path, *, is_whole: bool, lost_rows: int) -> RecordingFiles:

@@ -1,29 +1,120 @@
 """One run from its beginning to its end. It fails closed: whatever happens, the arm is stopped and the state told."""
 
 import sys
+import time
 import traceback
+from collections.abc import Callable
 from contextlib import nullcontext, suppress
-from typing import Any
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
 
 from tauscope.errors import AcquisitionError, TauscopeError
-from tauscope.recording.journal_rows import Phase
+from tauscope.recording.journal_rows import JournalHeader, Phase
+from tauscope.robot import Robot
 from tauscope.robot.messages import one_line
+from tauscope.runtime.drivers import DEFAULT_BACKEND, Connection
 from tauscope.runtime.guard import Guard, GuardViolationError
-from tauscope.runtime.loop import Cycles, GuardedArm
-from tauscope.runtime.options import RELEASE, choose_stop_policy, is_released
-from tauscope.runtime.plan import Plan
-from tauscope.runtime.progress import ProgressReporter, end_event, state_event
-from tauscope.runtime.record import JOURNAL_FILE, RunProblem, RunRecord, Transition
-from tauscope.runtime.recorder import Recorder, save_recording
+from tauscope.runtime.loop import Cycles, GuardedArm, ProgressReporter, Report, end_event, state_event
+from tauscope.runtime.options import ORDER_FILE, RELEASE, RunOptions, choose_stop_policy, is_released
+from tauscope.runtime.plan import Plan, make_plan
+from tauscope.runtime.record import JOURNAL_FILE, RUN_FILE, RunProblem, RunRecord, Transition, new_record, write_record
+from tauscope.runtime.recorder import DirectRecorder, Recorder, RecorderProcess, save_recording
 from tauscope.runtime.release import release_settled
-from tauscope.runtime.states import RunState, StopAskedError, raise_if_requested
-from tauscope.runtime.task import RunTask, Surroundings, journal_header, prepare
+from tauscope.runtime.states import ManualStop, RunState, StopAskedError, Stops, raise_if_requested
 from tauscope.runtime.timing import SIMULATED_TIME, Metronome, real_time
 from tauscope.runtime.torque_control import torque_control
-from tauscope_drivers import Backend, ControlMode, DriverError
+from tauscope.trajectory import Trajectory
+from tauscope_drivers import ArmState, Backend, ControlMode, DriverError
 
-INTERNAL = "internal"
-"""Code of a problem that is a fault of Tauscope's own."""
+OpenRecorder = Callable[[Path, JournalHeader, Stops, bool], Recorder]
+"""Opens a journal: its path, its header, requests to stop, and whether the arm runs in real time."""
+
+
+class Keeper(Protocol):
+    """Takes a run's record whenever it changes."""
+
+    def keep(self, record: RunRecord) -> None:
+        """Keep the newest record; must not take time."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunTask:
+    """What is to be run."""
+
+    robot: Robot
+    trajectory: Trajectory
+    options: RunOptions
+    connect: Callable[[], Connection]
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a run talks to while it runs."""
+
+    folder: Path
+    stops: Stops
+    keeper: Keeper
+    open_recorder: OpenRecorder
+    report: Report
+
+
+LEAST_CYCLES_A_WATCHDOG = 2  # A watchdog has to outlast this many cycles, or every late one stops the arm
+
+
+def prepare(task: RunTask, backend: Backend, state: ArmState) -> Plan:
+    """Plan a run for the arm as it was found, or refuse it: no torque is on yet.
+
+    Raises AcquisitionError where the backend cannot do what was asked for, a drive reports a fault, or the motion does
+    not fit.
+    """
+    options, capabilities = task.options, backend.capabilities
+    choose_stop_policy(options, task.robot.joints, capabilities)
+    if options.mode not in capabilities.modes:
+        can = ", ".join(sorted(capabilities.modes))
+        raise AcquisitionError(f"mode {options.mode}: this arm's drives cannot do that; choose {can}")
+    shortest, longest = capabilities.watchdog_range_s
+    if not shortest <= options.watchdog_s <= longest:
+        raise AcquisitionError(
+            f"a watchdog of {options.watchdog_s:g} s: this arm's drives take {shortest:g} to {longest:g} s"
+        )
+    plan = make_plan(task.robot, task.trajectory, _sound(backend, state, options).position, options, capabilities)
+    least = LEAST_CYCLES_A_WATCHDOG * plan.period_ns * 1e-9
+    if options.watchdog_s < least:
+        raise AcquisitionError(
+            f"a watchdog of {options.watchdog_s:g} s is too short for {plan.rate_hz:g} cycles a second; "
+            f"take {least:.3g} s or more"
+        )
+    return plan
+
+
+def journal_header(robot: Robot, plan: Plan, backend: Backend, state: ArmState, mode: str) -> JournalHeader:
+    """What all rows of a run's journal have in common."""
+    unit = backend.capabilities.effort_unit
+    return JournalHeader(
+        robot=robot.name,
+        joint_names=tuple(joint.name for joint in robot.joints),
+        rate_hz=plan.rate_hz,
+        mode=mode,
+        effort_unit=unit,
+        torque_per_effort=tuple(1.0 if unit == "Nm" else joint.torque_constant for joint in robot.joints),
+        has_velocity=bool(np.isfinite(state.velocity).any()),
+        epoch_offset_ns=time.time_ns() - backend.clock.now_ns(),
+    )
+
+
+def _sound(backend: Backend, state: ArmState, options: RunOptions) -> ArmState:
+    """The state without faults, where the operator has said that they may be cleared."""
+    if state.faults and options.acknowledge_faults:
+        state = backend.acknowledge_faults()
+    if state.faults:
+        raise AcquisitionError(f"{state.faults[0]}; then acknowledge the fault")
+    return state
+
+
+INTERNAL = "internal"  # code of a problem that is a fault of Tauscope's own
 
 
 class Run:
@@ -58,7 +149,6 @@ class Run:
         return self._conclude(end)
 
     def _move(self) -> None:
-        """Everything up to the end of the motion."""
         raise_if_requested(self._around.stops)
         self._enter(RunState.CONNECTING)
         connection = self._task.connect()
@@ -86,7 +176,6 @@ class Run:
                 self._stop_arm()
 
     def _enable_and_play(self, plan: Plan, backend: Backend, recorder: Recorder) -> None:
-        """The part in which the arm is under power."""
         options, stops = self._task.options, self._around.stops
         torque_mode = options.mode is ControlMode.TORQUE
         control = torque_control(self._task.robot, plan, options.bandwidth_rad_s) if torque_mode else None
@@ -111,7 +200,6 @@ class Run:
         self._is_played = True
 
     def _each_cycle(self, cycles: Cycles) -> None:
-        """Follow the phase, and report from time to time."""
         if self.record.state is RunState.RAMPING and cycles.plan.phase[cycles.metronome.index] == Phase.MOTION:
             self._enter(RunState.RUNNING)
         self._progress(cycles, self.record.state)
@@ -142,7 +230,6 @@ class Run:
         self._is_stopped = True
 
     def _conclude(self, end: RunState) -> RunRecord:
-        """Save what was recorded, and enter the end state."""
         lost, recording, problem = 0, None, self.record.problem
         if self._recorder is not None:
             remark = self._recorder.close()
@@ -181,7 +268,6 @@ class Run:
         return RunProblem(code=AcquisitionError.code, detail=detail)
 
     def _account(self) -> dict[str, Any]:
-        """What the loop leaves behind."""
         cycles = self._cycles
         if cycles is None:
             return {}
@@ -194,7 +280,6 @@ class Run:
         }
 
     def _enter(self, state: RunState, **changes: Any) -> None:
-        """Change the state, have it kept and tell it."""
         self.record = self.record.moved(state, **changes)
         self._around.keeper.keep(self.record)
         transition = self.record.history[-1]
@@ -204,13 +289,11 @@ class Run:
                 self._recorder.event(self._backend.clock.now_ns(), self._journal_event(transition))
 
     def _journal_event(self, transition: Transition) -> dict[str, Any]:
-        """A transition and, where there is one, its reason."""
         reason = self.record.stop if self.record.problem is None else self.record.problem.detail
         event = state_event(transition.state, transition.at)
         return event if reason is None else {**event, "reason": reason}
 
     def _tell(self, event: Any) -> None:
-        """Tell the owner, who may not be there any more."""
         try:
             self._around.report(event)
         except Exception:
@@ -219,7 +302,6 @@ class Run:
 
 
 def _outcome(cause: BaseException | None) -> tuple[RunState, dict[str, Any]]:
-    """The end that a run comes to, and what the record says of its cause."""
     if cause is None:
         return RunState.FINISHED, {}
     if isinstance(cause, StopAskedError):
@@ -240,5 +322,75 @@ def _problem(error: BaseException) -> RunProblem:
 
 
 def _reason(error: BaseException) -> str:
-    """The first line of what an error says."""
     return one_line(str(error)) or type(error).__name__
+
+
+def run_trajectory(
+    robot: Robot,
+    trajectory: Trajectory,
+    connect: Callable[[], Connection],
+    folder: Path,
+    options: RunOptions | None = None,
+    *,
+    backend_name: str = DEFAULT_BACKEND,
+    stops: Stops | None = None,
+    report: Report | None = None,
+) -> RunRecord:
+    """Run a motion in this process and return when it is over.
+
+    A run in real time belongs into a process of its own (`tauscope.runtime.RunProcess`), which does nothing else.
+    Raises AcquisitionError where the folder holds a run, or cannot be written to.
+    """
+    options = options or RunOptions()
+    prepare_folder(folder)
+    record = new_record(robot.name, backend_name, options.mode.value)
+    keeper = _DirectKeeper(folder)
+    around = Surroundings(folder, stops or ManualStop(), keeper, open_recorder, report or _nobody)
+    run = Run(RunTask(robot, trajectory, options, connect), record, around)
+    keeper.keep(record)
+    return run.execute()
+
+
+def prepare_folder(folder: Path) -> None:
+    """Make a run's folder. Raises AcquisitionError where it does, or it cannot be made."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise AcquisitionError(f"{folder}: the run's folder cannot be made ({error.strerror or error})") from error
+    for name in (RUN_FILE, ORDER_FILE):
+        if (folder / name).exists():
+            raise AcquisitionError(f"{folder}: holds a run already; give another folder")
+
+
+def open_recorder(path: Path, header: JournalHeader, stops: Stops, is_real_time: bool) -> Recorder:
+    """Open a journal in the way that suits the arm's time.
+
+    Raises AcquisitionError where the journal cannot be created.
+    """
+    if not is_real_time:
+        return DirectRecorder(path, header)
+    recorder = RecorderProcess(path, header)
+    try:
+        recorder.wait_until_open(stops)
+    except BaseException:
+        recorder.close()
+        raise
+    return recorder
+
+
+class _DirectKeeper:
+    """Writes the record at once: in virtual time nobody is late."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def keep(self, record: RunRecord) -> None:
+        try:
+            write_record(self._folder, record)
+        except OSError as error:
+            place = f"{self._folder}: the run's record cannot be written"
+            raise AcquisitionError(f"{place} ({error.strerror or error})") from error
+
+
+def _nobody(event: Any) -> None:
+    del event

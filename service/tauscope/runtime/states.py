@@ -94,19 +94,15 @@ class Stops(Protocol):
     @property
     def requested(self) -> StopRequest | None:
         """The first request, None where there is none."""
-        ...
 
     def enter_real_time(self) -> None:
         """The arm moves by the wall clock: apply the limits of real time from here on."""
-        ...
 
     def acknowledge(self) -> None:
         """The run has begun to stop."""
-        ...
 
     def done(self) -> None:
         """The arm is stopped, or nothing more can be done for it: nobody breaks into the run any more."""
-        ...
 
 
 class ManualStop:

@@ -15,11 +15,8 @@ from pydantic import Field
 from tauscope.strict_model import StrictModel
 from tauscope_drivers import Clock
 
-PRIORITY = 80
-"""Real-time priority of the loop: above the drivers of most devices, below the kernel's own threads."""
-
-BESIDE = 20
-"""By how much the other threads of the process are below the loop."""
+PRIORITY = 80  # real-time priority of the loop: above the drivers of most devices, below the kernel's own threads
+BESIDE = 20  # by how much the other threads of the process are below the loop
 
 _TASKS = Path("/proc/self/task")
 _LOCK_CURRENT_AND_FUTURE = 3
@@ -88,7 +85,6 @@ def _schedule(thread: int, policy: int, priority: int) -> None:
 
 
 def _lock_memory() -> bool:
-    """Ask for all pages to stay in memory."""
     try:
         return _library().mlockall(_LOCK_CURRENT_AND_FUTURE) == 0
     except (OSError, AttributeError):

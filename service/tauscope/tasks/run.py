@@ -9,8 +9,8 @@ from pydantic import Field, FiniteFloat
 
 from tauscope.robot import Robot, read_robot
 from tauscope.runtime.drivers import DEFAULT_BACKEND, find_driver
+from tauscope.runtime.loop import Report
 from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
-from tauscope.runtime.progress import Report
 from tauscope.runtime.record import JOURNAL_FILE, RECORDING_STEM, RunRecord
 from tauscope.runtime.run_process import RunProcess
 from tauscope.strict_model import StrictModel

@@ -7,8 +7,7 @@ from fastapi import FastAPI
 from starlette.testclient import TestClient
 
 from server.conftest import HOST
-from tauscope.server.auth.keys import KeyFile
-from tauscope.server.auth.scopes import Scope
+from tauscope.server.auth.keys import KeyFile, Scope
 
 
 def make_keys(data_folder: Path) -> dict[Scope, str]:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from tauscope.cli.program import main
 from tauscope.errors import NotFoundError
-from tauscope.server.auth.audit_log import AUDIT_FILE, GENESIS, AuditLog, AuditTrail, chained_line, verify_lines
+from tauscope.server.auth.audit_log import AUDIT_FILE, GENESIS, AuditLog, AuditTrail, chain_line, verify_lines
 
 NOW = datetime(2026, 11, 22, tzinfo=UTC)
 
@@ -53,7 +53,7 @@ def test_the_hash_is_what_anybody_can_compute(tmp_path: Path) -> None:
 def test_every_changed_bit_is_found(place: int, position: int, bit: int) -> None:
     lines, entry = [], None
     for number in range(6):
-        line = chained_line(entry, {"actor": "ann", "action": f"act {number}"})
+        line = chain_line(entry, {"actor": "ann", "action": f"act {number}"})
         entry = json.loads(line)
         lines.append(line + b"\n")
     assert verify_lines(lines).fault is None

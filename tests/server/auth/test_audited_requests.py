@@ -16,7 +16,7 @@ from server.http.motions import ROBOT, move_document
 from server.queue.controls import HandControls, finish_at_once
 from server.queue.executors import InlineExecutor
 from tauscope.server.auth.audit_log import AuditLog
-from tauscope.server.auth.scopes import Scope, find_needed_scope
+from tauscope.server.auth.keys import Scope, find_needed_scope
 from tauscope.server.http import Settings, create_app
 
 RUNS, LEASES = "/api/v1/runs", "/api/v1/leases"

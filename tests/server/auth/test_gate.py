@@ -15,8 +15,7 @@ from server.http.problem_check import assert_problem
 from server.queue.controls import HandControls
 from server.queue.executors import InlineExecutor
 from tauscope.server.auth.gate import RateLimit
-from tauscope.server.auth.keys import CHECK_S, KeyFile
-from tauscope.server.auth.scopes import Scope
+from tauscope.server.auth.keys import CHECK_S, KeyFile, Scope
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.services import Services
 

@@ -11,8 +11,7 @@ import pytest
 
 from tauscope.errors import TauscopeError
 from tauscope.server.auth.gate import MOST_CALLERS, RateLimit
-from tauscope.server.auth.keys import KEY_FILE, LOCAL, Caller, KeyFile, KeyRing, match_key
-from tauscope.server.auth.scopes import Scope
+from tauscope.server.auth.keys import KEY_FILE, LOCAL, Caller, KeyFile, KeyRing, Scope, match_key
 
 NOW = datetime(2026, 11, 22, tzinfo=UTC)
 DAY = timedelta(days=1)

@@ -14,18 +14,14 @@ from tauscope.runtime.record import RunProblem
 from tauscope.runtime.states import RunState
 from tauscope.server.control import campaign_runner
 from tauscope.server.control.campaign import CampaignLinks, CampaignOrder, CampaignWorkspace
-from tauscope.server.control.campaign_manager import CampaignManager
-from tauscope.server.control.campaign_runner import CampaignDependencies
-from tauscope.server.control.device_claims import BusyError, DeviceClaims
+from tauscope.server.control.campaign_runner import CampaignDependencies, CampaignManager
+from tauscope.server.control.leases import BusyError, DeviceClaims
 from tauscope.server.control.run import RunWorkspace
-from tauscope.server.control.run_manager import RunManager
-from tauscope.server.control.run_supervisor import StartControl
-from tauscope.server.queue.analyses import DiagnosisWorkspace, IdentificationWorkspace
-from tauscope.server.queue.excitation import ExcitationWorkspace
-from tauscope.server.queue.job_folder import Workspace
+from tauscope.server.control.run_manager import RunManager, StartControl
+from tauscope.server.queue.analyses import DiagnosisWorkspace, ExcitationWorkspace, IdentificationWorkspace
+from tauscope.server.queue.job_folder import JobProblem, JobRecord, JobState, Workspace
 from tauscope.server.queue.queue import JobKind, JobQueue
-from tauscope.server.queue.record import JobProblem, JobRecord, JobState
-from tauscope.server.store.items import ItemStore
+from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.tasks.campaign import HeldOutMotion
 from tauscope.tasks.design_excitation import ExcitationDesignOptions

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tauscope.server.control.interlock import FOLDER, find_objection
+from tauscope.server.schedules.scheduler import FOLDER, find_objection
 
 
 def program(data: Path, text: str, mode: int = 0o755) -> Path:
@@ -34,7 +34,7 @@ def test_no_with_its_reason(tmp_path: Path) -> None:
 
 
 def test_no_answer_is_a_no(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tauscope.server.control.interlock.TIMEOUT_S", 0.1)
+    monkeypatch.setattr("tauscope.server.schedules.scheduler.TIMEOUT_S", 0.1)
     program(tmp_path, "exec sleep 30")
     assert ask(tmp_path) == "interlock free: did not answer within 0.1 s"
 

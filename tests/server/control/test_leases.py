@@ -4,8 +4,16 @@ import threading
 
 import pytest
 
-from tauscope.server.control.device_claims import BusyError, DeviceClaims
-from tauscope.server.control.leases import Lease, LeasedError, LeaseLostError, LeaseNeededError, Leases, NotArmedError
+from tauscope.server.control.leases import (
+    BusyError,
+    DeviceClaims,
+    Lease,
+    LeasedError,
+    LeaseLostError,
+    LeaseNeededError,
+    Leases,
+    NotArmedError,
+)
 
 ARM, OTHER = "arm on sim", "other on sim"
 

@@ -10,12 +10,11 @@ from server.queue.waiting import wait_until
 from tauscope.errors import AcquisitionError, NotFoundError
 from tauscope.runtime.record import RunProblem
 from tauscope.runtime.states import RunState
-from tauscope.server.control.device_claims import BusyError, DeviceClaims
-from tauscope.server.control.motions import Motion, StepFailedError, ready_motion
-from tauscope.server.control.run import RunRequestRecord, RunWorkspace
+from tauscope.server.control.leases import BusyError, DeviceClaims
+from tauscope.server.control.run import Motion, RunRequestRecord, RunWorkspace, StepFailedError, ready_motion
 from tauscope.server.control.run_manager import RunManager, run_recording_name
-from tauscope.server.queue.record import JobProblem
-from tauscope.server.store.items import ItemStore
+from tauscope.server.queue.job_folder import JobProblem
+from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.tasks.run import BackendChoice
 

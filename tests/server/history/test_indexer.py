@@ -12,8 +12,7 @@ from snapshots import SNAPSHOTS, unpacked
 from tauscope.errors import StoreError
 from tauscope.server.history.indexer import ChangedItem, Indexer, open_index
 from tauscope.server.queue.housekeeping import Housekeeping
-from tauscope.server.queue.job_folder import Workspace
-from tauscope.server.queue.record import JobRecord, JobState
+from tauscope.server.queue.job_folder import JobRecord, JobState, Workspace
 from tauscope.server.store.data_folder import RECORDINGS, item_stores
 from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index, ItemEntry, ItemQuery

@@ -18,7 +18,7 @@ from tauscope.runtime.record import RunProblem
 from tauscope.runtime.states import RunState
 from tauscope.server.control.campaign import CampaignWorkspace
 from tauscope.server.http import Settings, create_app
-from tauscope.server.queue.excitation import ExcitationWorkspace
+from tauscope.server.queue.analyses import ExcitationWorkspace
 
 CAMPAIGNS, RUNS = "/api/v1/campaigns", "/api/v1/runs"
 QUICK = {"duration_s": 4.0, "harmonics": 2, "periods": 2, "starts": 1, "slow_postures": 0, "closing_period": False}
@@ -137,9 +137,9 @@ def test_a_run_that_fails_ends_the_campaign_with_its_problem(
 ) -> None:
     campaign = waiting_arm.post(CAMPAIGNS, json={"robot": ROBOT, "held_out": None}).json()
     wait_until(lambda: bool(executor.tasks))
-    made = CampaignWorkspace(settings.campaigns_folder / campaign["id"]).read_made
+    made = CampaignWorkspace(settings.data_folder / "campaigns" / campaign["id"]).read_made
     wait_until(lambda: made().excitation is not None)
-    ExcitationWorkspace(settings.excitations_folder / str(made().excitation)).trajectory.touch()
+    ExcitationWorkspace(settings.data_folder / "excitations" / str(made().excitation)).trajectory.touch()
     future, _ = executor.tasks.pop(0)
     future.set_result(None)
     controls.next().finish(RunState.FAILED, RunProblem(code="acquisition", detail="joint1: too fast"), csv="")
@@ -165,7 +165,7 @@ def test_requests_that_are_refused(
 ) -> None:
     problem = assert_problem(arm.post(CAMPAIGNS, json=body), code, 422)
     assert words in problem["detail"] + str(problem.get("errors"))
-    assert list(settings.campaigns_folder.iterdir()) == []
+    assert list((settings.data_folder / "campaigns").iterdir()) == []
 
 
 def test_a_scenario_that_is_no_plain_data(arm: TestClient) -> None:
@@ -179,7 +179,7 @@ def test_a_damaged_campaign_is_shown_as_damaged(file: str, waiting_arm: TestClie
     campaign = waiting_arm.post(CAMPAIGNS, json={"robot": ROBOT}).json()
     waiting_arm.post(campaign["links"]["stop"])
     ended(waiting_arm, campaign)
-    (settings.campaigns_folder / campaign["id"] / file).write_bytes(b"\0")
+    (settings.data_folder / "campaigns" / campaign["id"] / file).write_bytes(b"\0")
     (listed,) = waiting_arm.get(CAMPAIGNS).json()["campaigns"]
     assert listed["state"] == "damaged"
 

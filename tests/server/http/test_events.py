@@ -18,9 +18,8 @@ from tauscope.server.http import Settings, create_app
 from tauscope.server.http.services import Services
 from tauscope.server.http.tasks import events as event_routes
 from tauscope.server.http.tasks.event_feeds import EventFeeds
-from tauscope.server.queue.job_folder import Workspace
-from tauscope.server.queue.record import JobRecord, JobState
-from tauscope.server.store.items import utc_now
+from tauscope.server.queue.job_folder import JobRecord, JobState, Workspace
+from tauscope.server.store.data_folder import utc_now
 
 
 @pytest.fixture
@@ -78,7 +77,7 @@ def test_events_outlive_the_service(settings: Settings, files: list[Any], execut
 def test_a_job_of_the_time_before_there_were_events(settings: Settings, files: list[Any]) -> None:
     with connected(create_app(settings, InlineExecutor())) as client:
         status = client.post(IDENTIFICATIONS, files=files).json()
-    (settings.identifications_folder / status["id"] / "events.jsonl").unlink()
+    (settings.data_folder / "identifications" / status["id"] / "events.jsonl").unlink()
     with connected(create_app(settings, InlineExecutor())) as client:
         (only,) = events(client, status["links"]["self"])
     assert (only.id, only.kind, only.data["state"]) == ("1", "ended", "failed")
@@ -89,7 +88,7 @@ def test_a_stream_ends_also_where_files_are_damaged(
     damage: str, client: TestClient, settings: Settings, files: list[Any]
 ) -> None:
     status = client.post(IDENTIFICATIONS, files=files).json()
-    folder: Path = settings.identifications_folder / status["id"]
+    folder: Path = settings.data_folder / "identifications" / status["id"]
     if damage == "the end is missing":
         log = Workspace(folder).events.path
         log.write_bytes(log.read_bytes()[:-20])
@@ -104,7 +103,7 @@ def test_what_work_does_after_it_was_cancelled_is_not_told(
 ) -> None:
     status = waiting_client.post(IDENTIFICATIONS, files=files).json()
     waiting_client.delete(status["links"]["self"])
-    Workspace(settings.identifications_folder / status["id"]).write_step("too late")
+    Workspace(settings.data_folder / "identifications" / status["id"]).write_step("too late")
     executor.run()
     told = events(waiting_client, status["links"]["self"])
     assert [event.data.get("state") for event in told] == ["queued", "running", "cancelled"]
@@ -145,7 +144,7 @@ def test_a_quiet_stream_lives_by_comments_and_ends_with_service_or_client(
         services: Services = app.state.services
 
         async def listen() -> list[bytes]:
-            workspace = Workspace(settings.identifications_folder / status["id"])
+            workspace = Workspace(settings.data_folder / "identifications" / status["id"])
             feeds = EventFeeds(services.closing)
             heard: list[bytes] = []
             async for piece in event_routes._stream(cast(Request, caller), feeds, workspace, 0):

@@ -12,7 +12,7 @@ from server.http.problem_check import assert_problem
 from server.queue.executors import ManualExecutor
 from tauscope.robot import read_robot
 from tauscope.server.http import Settings
-from tauscope.server.queue.excitation import ExcitationWorkspace
+from tauscope.server.queue.analyses import ExcitationWorkspace
 from tauscope.trajectory import parse_trajectory_json
 
 EXCITATIONS = "/api/v1/excitations"
@@ -30,7 +30,7 @@ def test_a_design_all_the_way(client: TestClient, settings: Settings) -> None:
     assert result.headers["content-type"] == "application/json"
     assert result.json()["schema"] == "tauscope.excitation/1"
 
-    workspace = ExcitationWorkspace(settings.excitations_folder / status["id"])
+    workspace = ExcitationWorkspace(settings.data_folder / "excitations" / status["id"])
     robot = read_robot(workspace.robot / "robot.json")
     exact = client.get(status["links"]["trajectory"])
     trajectory = parse_trajectory_json(exact.content, "it", robot)
@@ -72,7 +72,7 @@ def test_a_box_that_is_none(client: TestClient) -> None:
 def designed(client: TestClient, executor: ManualExecutor, settings: Settings) -> str:
     """A design that ended with a motion that the test knows."""
     answer = client.post(EXCITATIONS, files={"robot": ("arm.yaml", ROBOT_FILE)}).json()
-    workspace = ExcitationWorkspace(settings.excitations_folder / answer["id"])
+    workspace = ExcitationWorkspace(settings.data_folder / "excitations" / answer["id"])
     workspace.trajectory.write_text(json.dumps(move_document()), encoding="utf-8")
     future, _ = executor.tasks.pop(0)
     future.set_running_or_notify_cancel()
@@ -108,7 +108,7 @@ def test_trajectories_that_are_not_made(
 def test_a_table_that_would_be_too_long(
     waiting_client: TestClient, executor: ManualExecutor, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tauscope.server.queue.excitation.MOST_ROWS", 1000)
+    monkeypatch.setattr("tauscope.server.queue.analyses.MOST_ROWS", 1000)
     here = designed(waiting_client, executor, settings)
     assert waiting_client.get(f"{here}/trajectory?format=csv&rate_hz=900").status_code == 200
     assert_problem(waiting_client.get(f"{here}/trajectory?format=csv&rate_hz=1100"), "limit-exceeded", 413)
@@ -116,7 +116,7 @@ def test_a_table_that_would_be_too_long(
 
 def test_files_that_are_damaged(waiting_client: TestClient, executor: ManualExecutor, settings: Settings) -> None:
     here = designed(waiting_client, executor, settings)
-    workspace = ExcitationWorkspace(settings.excitations_folder / here.rsplit("/", 1)[1])
+    workspace = ExcitationWorkspace(settings.data_folder / "excitations" / here.rsplit("/", 1)[1])
     assert_problem(waiting_client.get(f"{here}/result"), "damaged", 409)
     workspace.trajectory.write_bytes(b"\0")
     assert_problem(waiting_client.get(f"{here}/trajectory?format=csv"), "excitation", 422)

@@ -7,16 +7,16 @@ from server.conftest import connected
 from server.queue.executors import InlineExecutor
 from server.queue.waiting import wait_until
 from tauscope.server.http import Settings, create_app
-from tauscope.server.http.heartbeat import TIMEOUT_S, Heartbeat
+from tauscope.server.http.readiness import SILENCE_S, Heartbeat
 
 
 def test_a_pulse_that_is_not_shown_is_not_felt_for_long() -> None:
     now = [100.0]
     heartbeat = Heartbeat(lambda: now[0])
-    for elapsed in (0.0, 0.9 * TIMEOUT_S):
+    for elapsed in (0.0, 0.9 * SILENCE_S):
         now[0] = 100.0 + elapsed
         assert heartbeat.is_alive()
-    now[0] = 100.0 + 1.1 * TIMEOUT_S
+    now[0] = 100.0 + 1.1 * SILENCE_S
     assert not heartbeat.is_alive()
     heartbeat.beat()
     assert heartbeat.is_alive()

@@ -35,7 +35,7 @@ def client(module_client: TestClient) -> TestClient:
 @pytest.fixture(autouse=True)
 def nothing_is_kept(settings: Settings, client: TestClient) -> Any:
     yield
-    assert list(settings.identifications_folder.iterdir()) == []
+    assert list((settings.data_folder / "identifications").iterdir()) == []
 
 
 @pytest.fixture

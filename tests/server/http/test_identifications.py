@@ -159,7 +159,9 @@ def test_the_step_of_a_running_identification_is_told(
 ) -> None:
     status = waiting_client.post(IDENTIFICATIONS, files=files).json()
     assert status["step"] is None
-    (settings.identifications_folder / status["id"] / "progress").write_text("estimate parameters", encoding="utf-8")
+    (settings.data_folder / "identifications" / status["id"] / "progress").write_text(
+        "estimate parameters", encoding="utf-8"
+    )
     assert waiting_client.get(status["links"]["self"]).json()["step"] == "estimate parameters"
 
 
@@ -202,7 +204,7 @@ def test_a_damaged_identification_is_shown_as_damaged(
     file: str, waiting_client: TestClient, settings: Settings, files: Files
 ) -> None:
     status = waiting_client.post(IDENTIFICATIONS, files=files).json()
-    (settings.identifications_folder / status["id"] / file).write_bytes(b"\0\1\2")
+    (settings.data_folder / "identifications" / status["id"] / file).write_bytes(b"\0\1\2")
     (listed,) = waiting_client.get(IDENTIFICATIONS).json()["identifications"]
     assert listed["state"] == "damaged"
     assert listed["problem"]["code"] == "damaged"
@@ -211,7 +213,7 @@ def test_a_damaged_identification_is_shown_as_damaged(
 
 def test_a_damaged_result_is_a_problem_and_no_result(client: TestClient, settings: Settings, files: Files) -> None:
     status = client.post(IDENTIFICATIONS, files=files, data=form(QUICK)).json()
-    folder: Path = settings.identifications_folder / status["id"]
+    folder: Path = settings.data_folder / "identifications" / status["id"]
     (folder / "result.json").write_bytes((folder / "result.json").read_bytes()[:100])
     (folder / "exports" / "friction.h").unlink()
     assert_problem(client.get(f"{status['links']['self']}/result"), "damaged", 409)

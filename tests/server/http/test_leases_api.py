@@ -17,7 +17,7 @@ from server.queue.controls import HandControls
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.waiting import wait_until
 from tauscope.runtime.states import RunState
-from tauscope.server.auth.scopes import Scope
+from tauscope.server.auth.keys import Scope
 from tauscope.server.control.leases import Lease
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.services import Services

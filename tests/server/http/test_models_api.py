@@ -14,7 +14,7 @@ from tauscope.server.control.campaign import CampaignLinks, CampaignWorkspace
 from tauscope.server.history.model_judgement import Candidate
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.services import Services
-from tauscope.server.queue.record import JobRecord, JobState
+from tauscope.server.queue.job_folder import JobRecord, JobState
 
 MODELS, ROBOT = "/api/v1/models", "paper-arm"
 

@@ -12,12 +12,11 @@ from server.conftest import IDENTIFICATIONS, connected
 from server.http.problem_check import assert_problem
 from server.queue.executors import InlineExecutor
 from tauscope.errors import TauscopeError
-from tauscope.server.auth.keys import KeyFile
-from tauscope.server.auth.scopes import Scope
+from tauscope.server.auth.keys import KeyFile, Scope
 from tauscope.server.http import Settings, create_app, default_data_folder, serve
 from tauscope.server.http.protection import HEADERS
 from tauscope.server.http.services import require_data_folder
-from tauscope.server.store.items import ItemStore
+from tauscope.server.store.data_folder import ItemStore
 
 
 @pytest.fixture

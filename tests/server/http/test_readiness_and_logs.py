@@ -14,7 +14,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from server.http.problem_check import assert_problem
-from tauscope.server.http import Settings, heartbeat, readiness
+from tauscope.server.http import Settings, readiness
 from tauscope.server.http.server import log_as_json
 from tauscope.server.http.services import Services
 
@@ -144,7 +144,7 @@ def test_systemd_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         heard: list[bytes] = []
 
         async def session() -> None:
-            async with heartbeat.notify_systemd():
+            async with readiness.notify_systemd():
                 while heard.count(b"WATCHDOG=1") < 3:
                     heard.append(await asyncio.to_thread(listener.recv, 100))
 
@@ -157,11 +157,11 @@ def test_systemd_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 
 @pytest.mark.parametrize("address", ["", "relative", "/nowhere/at/all"])
 def test_without_systemd_nobody_is_told(address: str) -> None:
-    assert not heartbeat.notify("READY=1", {"NOTIFY_SOCKET": address})
+    assert not readiness.notify("READY=1", {"NOTIFY_SOCKET": address})
 
 
 def test_whose_watchdog_it_is() -> None:
-    assert heartbeat.watchdog_interval_s({"WATCHDOG_USEC": "10000000"}) == 5.0
-    assert heartbeat.watchdog_interval_s({"WATCHDOG_USEC": "10000000", "WATCHDOG_PID": "1"}) is None
-    assert heartbeat.watchdog_interval_s({"WATCHDOG_USEC": "x"}) is None
-    assert heartbeat.watchdog_interval_s({}) is None
+    assert readiness.watchdog_interval_s({"WATCHDOG_USEC": "10000000"}) == 5.0
+    assert readiness.watchdog_interval_s({"WATCHDOG_USEC": "10000000", "WATCHDOG_PID": "1"}) is None
+    assert readiness.watchdog_interval_s({"WATCHDOG_USEC": "x"}) is None
+    assert readiness.watchdog_interval_s({}) is None

@@ -15,8 +15,7 @@ from server.conftest import RECORDINGS, connected
 from server.http.problem_check import assert_problem
 from server.queue.executors import InlineExecutor
 from tauscope.server.auth.gate import CALLER
-from tauscope.server.auth.keys import Caller
-from tauscope.server.auth.scopes import Scope
+from tauscope.server.auth.keys import Caller, Scope
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.reading import MOST_WAITING_EACH, ReadingQueue
 from tauscope.server.problems import ProblemError
@@ -80,7 +79,7 @@ def test_a_caller_who_asks_for_much_keeps_nobody_else_waiting(pool: WorkerPool) 
 @pytest.mark.usefixtures("reader_processes")
 def test_reading_has_a_deadline(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = settings.model_copy(update={"reading_timeout_s": 0.3})
-    monkeypatch.setattr("tauscope.server.http.recordings.router.check_kept_recording", wait_for_ever)
+    monkeypatch.setattr("tauscope.server.http.recordings.check_kept_recording", wait_for_ever)
     with connected(create_app(settings, InlineExecutor())) as client:
         send(client)
         problem = client.get(f"{RECORDINGS}/a.csv/report")

@@ -16,11 +16,10 @@ from server.http.motions import ROBOT, move_document
 from server.http.problem_check import assert_problem
 from server.queue.controls import HandControls, finish_at_once
 from server.queue.executors import InlineExecutor
-from tauscope.server.auth.scopes import Scope
+from tauscope.server.auth.keys import Scope
 from tauscope.server.control.run_manager import RunManager
 from tauscope.server.http import Settings, create_app
-from tauscope.server.http.repeated_answers import LIFE_S, KeptAnswer, StoredAnswers
-from tauscope.server.http.repeated_requests import Fingerprint
+from tauscope.server.http.repeated_requests import LIFE_S, Fingerprint, KeptAnswer, StoredAnswers
 from tauscope.server.http.services import Services
 
 RUNS, LEASES = "/api/v1/runs", "/api/v1/leases"

@@ -20,7 +20,7 @@ from tauscope.runtime.states import RunState
 from tauscope.server.control.run import RunWorkspace
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.tasks import event_feeds
-from tauscope.server.queue.excitation import ExcitationWorkspace
+from tauscope.server.queue.analyses import ExcitationWorkspace
 from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import RecordingStore, StoredRecording
 
@@ -218,7 +218,7 @@ def test_a_damaged_run_is_shown_as_damaged(
     run = begin(arm)
     controls.next().finish()
     ended(arm, run)
-    (settings.runs_folder / run["id"] / file).write_bytes(b"\0\1")
+    (settings.data_folder / "runs" / run["id"] / file).write_bytes(b"\0\1")
     (listed,) = arm.get(RUNS).json()["runs"]
     assert (listed["state"], listed["problem"]["code"]) == ("damaged", "damaged")
 
@@ -236,7 +236,7 @@ def test_robot_and_trajectory_as_files(
 ) -> None:
     answer = arm.post(RUNS, files=parts, data={"request": json.dumps({"rate_hz": 100.0})})
     assert answer.status_code == 202, answer.text
-    workspace = RunWorkspace(settings.runs_folder / answer.json()["id"])
+    workspace = RunWorkspace(settings.data_folder / "runs" / answer.json()["id"])
     assert workspace.trajectory is not None
     assert workspace.trajectory.name == parts["trajectory"][0]
     assert answer.json()["links"]["excitation"] is None
@@ -275,8 +275,8 @@ def test_requests_that_are_refused(
 ) -> None:
     problem = assert_problem(arm.post(RUNS, json=body), code, 422)
     assert words in problem["detail"] + str(problem.get("errors"))
-    assert list(settings.runs_folder.iterdir()) == []
-    assert list(settings.excitations_folder.iterdir()) == []
+    assert list((settings.data_folder / "runs").iterdir()) == []
+    assert list((settings.data_folder / "excitations").iterdir()) == []
     assert controls.started == []
 
 
@@ -301,7 +301,7 @@ def waiting_arm(settings: Settings, controls: HandControls, executor: ManualExec
 
 def finish_design(settings: Settings, executor: ManualExecutor, identifier: str) -> None:
     """Let a design end with a motion that the test knows."""
-    workspace = ExcitationWorkspace(settings.excitations_folder / identifier)
+    workspace = ExcitationWorkspace(settings.data_folder / "excitations" / identifier)
     workspace.trajectory.write_text(json.dumps(move_document()), encoding="utf-8")
     future, _ = executor.tasks.pop(0)
     future.set_running_or_notify_cancel()

@@ -116,7 +116,7 @@ def test_a_schedule_outlives_what_it_was_made_from_and_the_service(old: Settings
     with connected(create_app(old, InlineExecutor())) as client:
         like = newest(client, "identification")
         made = put(client, like, kind="identification", every_s=3600, recordings={"pattern": "*day.csv"})
-        shutil.rmtree(old.identifications_folder / like)  # by hand: it is the active model
+        shutil.rmtree(old.data_folder / "identifications" / like)  # by hand: it is the active model
     with connected(create_app(old, InlineExecutor())) as client:
         assert client.get(f"{SCHEDULES}/nightly").json() == made
         firing = client.post(f"{SCHEDULES}/nightly/run", json=WHY).json()

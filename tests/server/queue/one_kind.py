@@ -3,10 +3,9 @@
 from concurrent.futures import Executor
 from pathlib import Path
 
-from tauscope.server.queue.job_folder import Workspace
+from tauscope.server.queue.job_folder import JobState, Workspace
 from tauscope.server.queue.queue import JobKind, JobQueue, Work
-from tauscope.server.queue.record import JobState
-from tauscope.server.store.items import ItemStore
+from tauscope.server.store.data_folder import ItemStore
 
 
 def succeed(_: Path) -> None:

@@ -20,15 +20,13 @@ from server.queue.paper_files import PAPER_ROBOT, write_recording
 from server.queue.waiting import wait_until
 from tauscope.errors import StoreError
 from tauscope.server.queue.analyses import IdentificationOrder, IdentificationWorkspace, run_identification
-from tauscope.server.queue.cluster_executor import SCHEDULER, ClusterExecutor, ClusterUnavailableError
-from tauscope.server.queue.executors import open_executor
-from tauscope.server.queue.job_folder import Workspace
+from tauscope.server.queue.cluster_executor import SCHEDULER, ClusterExecutor, ClusterUnavailableError, open_executor
+from tauscope.server.queue.job_folder import JobState, Workspace
 from tauscope.server.queue.queue import JobKind, JobQueue
-from tauscope.server.queue.record import JobState
 from tauscope.server.queue.task_job import OrderedRecording
 from tauscope.server.queue.worker_pool import WorkerPool
+from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.files import hash_file
-from tauscope.server.store.items import ItemStore
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster

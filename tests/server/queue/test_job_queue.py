@@ -10,10 +10,9 @@ import pytest
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.one_kind import make_queue, problem_of, state_of, succeed
 from tauscope.errors import NotFoundError
-from tauscope.server.queue.job_folder import Workspace
+from tauscope.server.queue.job_folder import JobProblem, JobState, Workspace
 from tauscope.server.queue.queue import MOST_ATTEMPTS, JobKind, JobQueue, QueueFullError, Work
-from tauscope.server.queue.record import JobProblem, JobState
-from tauscope.server.store.items import ItemStore
+from tauscope.server.store.data_folder import ItemStore
 
 
 def fail(_: Path) -> JobProblem:

@@ -6,7 +6,7 @@ from server.queue.executors import ManualExecutor
 from server.queue.one_kind import make_queue, problem_of, state_of, succeed
 from tauscope.server.queue.cluster_executor import ClusterUnavailableError
 from tauscope.server.queue.queue import MOST_ATTEMPTS, JobKind, JobQueue
-from tauscope.server.store.items import ItemStore
+from tauscope.server.store.data_folder import ItemStore
 
 
 def test_a_job_that_was_lost_with_its_cluster_is_done_again_before_the_others(

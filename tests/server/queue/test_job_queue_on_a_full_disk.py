@@ -7,9 +7,8 @@ import pytest
 
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.one_kind import make_queue, problem_of, state_of
-from tauscope.server.queue.job_folder import Workspace, do_work
-from tauscope.server.queue.record import JobProblem
-from tauscope.server.store.items import ItemStore
+from tauscope.server.queue.job_folder import JobProblem, Workspace, do_work
+from tauscope.server.store.data_folder import ItemStore
 
 
 def full(*_: object) -> None:
@@ -84,7 +83,7 @@ def test_a_job_that_the_disk_does_not_take_is_no_job(
 ) -> None:
     queue, staged = make_queue(items, executor), items.stage()
     with monkeypatch.context() as patched:
-        patched.setattr("tauscope.server.store.items.sync_folder", full)
+        patched.setattr("tauscope.server.store.data_folder.sync_folder", full)
         with pytest.raises(OSError, match="No space"):
             queue.submit(staged)
     assert (items.identifiers(), queue.queue.waiting(), executor.tasks) == ([], 0, [])

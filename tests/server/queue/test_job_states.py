@@ -5,7 +5,7 @@ from itertools import product
 
 import pytest
 
-from tauscope.server.queue.record import TRANSITIONS, JobProblem, JobRecord, JobState, may_follow
+from tauscope.server.queue.job_folder import TRANSITIONS, JobProblem, JobRecord, JobState, may_follow
 
 Q, R, S, F, C, I = JobState  # noqa: E741
 ALLOWED = {(Q, R), (Q, C), (Q, I), (R, S), (R, F), (R, C), (R, I), (R, Q)}

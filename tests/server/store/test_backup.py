@@ -17,9 +17,8 @@ from postgres import Postgres
 from snapshots import SNAPSHOTS, unpacked
 from tauscope.errors import StoreError
 from tauscope.server.history.model_history import ModelHistory
-from tauscope.server.store.backup import restore_backup, write_backup
+from tauscope.server.store.backup import dump_lines, restore_backup, write_backup
 from tauscope.server.store.database.database import FILE_NAME, Database
-from tauscope.server.store.database.dump import dump_lines
 from tauscope.server.store.database.index import Index, ItemMetadata
 
 

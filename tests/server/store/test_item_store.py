@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from tauscope.errors import NotFoundError, TauscopeError
-from tauscope.server.store.data_folder import FolderLock
-from tauscope.server.store.items import ItemStore
+from tauscope.server.store.data_folder import FolderLock, ItemStore
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ No line is changed, moved or left out unseen. A chain alone cannot show that its
 written anew: note the head now and then out of the machine owner's reach, and `verify` looks for that entry.
 """
 
-import fcntl
 import hashlib
 import json
 import logging
@@ -20,13 +19,13 @@ from typing import Any
 
 from tauscope.errors import NotFoundError
 from tauscope.files import sync_folder
-from tauscope.server.auth.keys import utc_now
+from tauscope.server.store.data_folder import utc_now
+from tauscope.server.store.files import lock_file
 
-GENESIS = "0" * 64
-"""What the first line names as the hash before."""
+GENESIS = "0" * 64  # what the first line names as the hash before
 
 
-def chained_line(previous: Mapping[str, Any] | None, content: Mapping[str, Any]) -> bytes:
+def chain_line(previous: Mapping[str, Any] | None, content: Mapping[str, Any]) -> bytes:
     """The line that follows another one. `previous`: the entry before; None for the first."""
     entry = {
         "number": 1 if previous is None else previous["number"] + 1,
@@ -90,7 +89,6 @@ def is_line_of_ours(line: bytes) -> bool:
 
 
 def _fault(entry: dict[str, Any] | None, number: int, previous: str, torn: bytes | None) -> str | None:
-    """What is wrong with an entry in its place."""
     if entry is None:
         return "is damaged"
     rest = {name: value for name, value in entry.items() if name != "hash"}
@@ -109,20 +107,14 @@ def _digest(entry: Mapping[str, Any]) -> str:
 
 
 def _canonical(entry: Mapping[str, Any]) -> bytes:
-    """One spelling of the same data."""
     return json.dumps(entry, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
 
 
 _log = logging.getLogger("tauscope.audit")
 
-AUDIT_FILE = "audit.jsonl"
-"""Name of the file, in the data folder."""
-
-_TAIL = 2**20
-"""Where the last entry is looked for; entries are far shorter [bytes]."""
-
-MOST_WAITING = 10_000
-"""Entries that wait for a disk that does not take them."""
+AUDIT_FILE = "audit.jsonl"  # name of the file, in the data folder
+_TAIL = 2**20  # where the last entry is looked for; entries are far shorter [bytes]
+MOST_WAITING = 10_000  # entries that wait for a disk that does not take them
 
 
 class AuditLog:
@@ -145,27 +137,21 @@ class AuditLog:
             raise NotFoundError(f"{self.path}: there is no audit log; name the service's data folder") from None
 
     def _content(self, actor: str, action: str, details: Mapping[str, Any]) -> dict[str, Any]:
-        """What an entry says."""
         known = {name: value for name, value in details.items() if value is not None}
         return {"time": self._clock().isoformat(), "actor": actor, "action": action, **known}
 
     def _append(self, content: dict[str, Any]) -> None:
         """Chain an entry to the last one; a line that a crash cut off stays, and the next entry says so."""
         is_new = not self.path.exists()
-        descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o600)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        with lock_file(self.path, os.O_APPEND) as descriptor:
             size = os.fstat(descriptor).st_size
             *whole, last = os.pread(descriptor, _TAIL, max(0, size - _TAIL)).split(b"\n")
             if last:
                 content = {**content, "torn_bytes": len(last)}
             entries = (parse_entry(line) for line in reversed(whole))
-            line = chained_line(next((entry for entry in entries if entry is not None), None), content) + b"\n"
+            line = chain_line(next((entry for entry in entries if entry is not None), None), content) + b"\n"
             os.write(descriptor, b"\n" + line if last else line)
             os.fsync(descriptor)
-        finally:
-            fcntl.flock(descriptor, fcntl.LOCK_UN)  # closing does not where a process forked meanwhile holds it, too
-            os.close(descriptor)
         if is_new:
             sync_folder(self.path.parent)
 

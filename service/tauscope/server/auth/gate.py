@@ -1,5 +1,6 @@
-"""What every request passes before its route: who calls, whether they may, and not too often."""
+"""What every request passes before its route: who calls, whether they may, not too often; each change is audited."""
 
+import logging
 import math
 import time
 from collections import OrderedDict
@@ -8,17 +9,17 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import cast
 
+from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
-from starlette.types import ASGIApp, Receive, Send
+from starlette.types import ASGIApp, Message, Receive, Send
 from starlette.types import Scope as AsgiScope
+from typing_extensions import override
 
 from tauscope.server.auth.audit_log import AuditTrail
-from tauscope.server.auth.keys import LOCAL, Caller, KeyRing
-from tauscope.server.auth.scopes import find_needed_scope, is_stop
+from tauscope.server.auth.keys import LOCAL, Caller, KeyRing, Scope, find_needed_scope, is_stop
 from tauscope.server.problems import ProblemError, make_problem, problem_answer
 
-MOST_CALLERS = 10_000
-"""Callers that are remembered; the one that was silent longest is forgotten first."""
+MOST_CALLERS = 10_000  # callers that are remembered; the one that was silent longest is forgotten first
 
 
 class RateLimit:
@@ -46,8 +47,7 @@ class RateLimit:
         self._buckets[caller] = (tokens - amount, then)
 
 
-CALLER = "tauscope.caller"
-"""Where the request's ASGI scope holds its `Caller`."""
+CALLER = "tauscope.caller"  # where the request's ASGI scope holds its `Caller`
 
 FAILURES_PER_S, FAILURE_BURST = 0.5, 20.0
 """How often an address may come with a wrong key before it is told to wait; right keys always pass."""
@@ -73,16 +73,26 @@ class _Refusal:
     headers: dict[str, str] = field(default_factory=dict)
 
 
-class Gate:
-    """Lets a request pass that comes with a key of the scope that it needs."""
+class HttpMiddleware:
+    """Answers requests over HTTP; whatever else comes to the application passes."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
-        """Answer a request, or refuse it."""
-        if scope["type"] != "http":
-            return await self.app(scope, receive, send)
+        """Answer a request, or pass it on."""
+        await (self.answer if scope["type"] == "http" else self.app)(scope, receive, send)
+
+    async def answer(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
+        """Answer a request over HTTP."""
+        raise NotImplementedError
+
+
+class Gate(HttpMiddleware):
+    """Lets a request pass that comes with a key of the scope that it needs."""
+
+    @override
+    async def answer(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
         outcome = _admit(cast(Access, scope["app"].state.services.access), scope)
         if isinstance(outcome, _Refusal):
             _note_refusal(scope, outcome)
@@ -98,7 +108,6 @@ def find_caller(scope: AsgiScope) -> Caller:
 
 
 def _admit(access: Access, scope: AsgiScope) -> Caller | _Refusal:
-    """Who calls, or why they may not."""
     method, path = scope["method"], scope["path"]
     needed = find_needed_scope(method, path)
     if needed is None:
@@ -152,6 +161,52 @@ def require_upload_quota(scope: AsgiScope) -> Callable[[int], None]:
 
 
 def _too_often(wait_s: float) -> _Refusal:
-    """The caller has to wait."""
     seconds = max(1, math.ceil(wait_s))
     return _Refusal("rate-limited", f"too many requests; go on after {seconds} s", {"Retry-After": str(seconds)})
+
+
+_log = logging.getLogger("tauscope.audit")
+
+
+class AuditedRequests(HttpMiddleware):
+    """Notes who asked for what, and what was answered."""
+
+    @override
+    async def answer(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
+        if not is_audited(scope["method"], scope["path"]):
+            return await self.app(scope, receive, send)
+        trail = cast(AuditTrail, scope["app"].state.services.audit)
+        method, path = scope["method"], scope["path"]
+        actor, action = find_caller(scope).name, f"{method} {path[:300]}"
+        address = (scope.get("client") or (None,))[0]
+        if _is_asked_first(method, path):
+            # Where the log takes nothing, nothing moves: the failure ends the request.
+            try:
+                await run_in_threadpool(trail.log.append, actor, f"asked: {action}", address=address)
+            except OSError as error:
+                _log.error("the audit log takes no entry: %s", error.strerror)
+                text = "the audit log takes no entry, and nothing moves or goes without one; make room on the disk"
+                return await problem_answer(make_problem("storage-full", text, path))(scope, receive, send)
+        status, subject = 500, None
+
+        async def send_noting(message: Message) -> None:
+            nonlocal status, subject
+            if message["type"] == "http.response.start":
+                status, subject = message["status"], Headers(raw=message["headers"]).get("location")
+            await send(message)
+
+        try:
+            await self.app(scope, receive, send_noting)
+        finally:
+            trail.note(actor, action, address=address, status=status, subject=subject)
+
+
+def is_audited(method: str, path: str) -> bool:
+    """Whether a request leaves an entry: not where it only reads, and not for signs of life."""
+    return method not in ("GET", "HEAD", "OPTIONS") and not path.endswith("/heartbeat")
+
+
+def _is_asked_first(method: str, path: str) -> bool:
+    """Whether the entry has to be on the disk before the request is looked at; never so for a stop."""
+    scope = find_needed_scope(method, path)
+    return scope is not None and scope.includes(Scope.MOVE) and not is_stop(method, path)

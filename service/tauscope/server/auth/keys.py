@@ -1,16 +1,16 @@
-"""API keys: the key file, which holds salted hashes only, and the key ring of the running service."""
+"""API keys and their scopes: the key file holds salted hashes only; what no rule names needs the highest scope."""
 
-import fcntl
 import hashlib
 import hmac
 import logging
-import os
+import re
 import secrets
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
+from enum import StrEnum
 from pathlib import Path
 from typing import Literal
 
@@ -19,11 +19,80 @@ from pydantic import AwareDatetime, Field, ValidationError
 from tauscope.errors import TauscopeError
 from tauscope.files import write_atomically
 from tauscope.robot.messages import one_line, shown
-from tauscope.server.auth.scopes import Scope
+from tauscope.server.store.data_folder import utc_now
+from tauscope.server.store.files import lock_file
 from tauscope.strict_model import StrictModel
 
-KEY_FILE = "keys.json"
-"""Name of the file, in the data folder."""
+
+class Scope(StrEnum):
+    """What a key may do; each scope includes those before it."""
+
+    READ = "read"
+    """look at everything, and stop every arm"""
+    ANALYSE = "analyse"
+    """send recordings and robots, hand in and cancel analyses"""
+    MOVE = "move"
+    """take, arm and move arms"""
+    ADMIN = "admin"
+    """remove what was measured, take an arm from somebody else"""
+
+    def includes(self, other: "Scope") -> bool:
+        """Whether this scope is the other one, or a higher one."""
+        order = list(Scope)
+        return order.index(self) >= order.index(other)
+
+
+def parse_scope(text: str) -> Scope:
+    """The scope of a name. Raises TauscopeError if there is none of that name."""
+    try:
+        return Scope(text)
+    except ValueError:
+        raise TauscopeError(f"scope {text[:40]!r}: not known; give one of {', '.join(Scope)}") from None
+
+
+_ITEM = r"[^/]+"
+_ANALYSES = "(identifications|diagnoses|excitations|rollouts)"
+
+# Of requests that are no plain reading: the first rule that fits decides.
+_RULES: tuple[tuple[str, re.Pattern[str], Scope], ...] = tuple(
+    (method, re.compile(f"/api/v1/{path}"), scope)
+    for method, path, scope in (
+        # Whoever may see an arm move may stop it.
+        ("POST", "stop", Scope.READ),
+        ("POST", f"(runs|campaigns)/{_ITEM}/stop", Scope.READ),
+        ("POST", "(robots|mappings)/check", Scope.ANALYSE),
+        ("POST", "(recordings|robots)", Scope.ANALYSE),
+        ("POST", _ANALYSES, Scope.ANALYSE),
+        ("DELETE", f"{_ANALYSES}/{_ITEM}", Scope.ANALYSE),
+        ("POST", f"events/{_ITEM}/acknowledge", Scope.ANALYSE),
+        ("POST", f"schedules/{_ITEM}/run", Scope.MOVE),
+        ("POST", "(runs|campaigns|leases)", Scope.MOVE),
+        ("POST", f"leases/{_ITEM}/(heartbeat|arm|disarm)", Scope.MOVE),
+        ("DELETE", f"leases/{_ITEM}", Scope.MOVE),
+        ("DELETE", f"(recordings|robots/versions|runs|campaigns|schedules)/{_ITEM}", Scope.ADMIN),
+        # What is compared with, and what moves at night, is the operator's to decide.
+        ("POST", f"models/{_ITEM}/(activate|make-reference)", Scope.ADMIN),
+        ("PUT", f"model-policy|schedules/{_ITEM}", Scope.ADMIN),
+    )
+)
+
+
+def find_needed_scope(method: str, path: str) -> Scope | None:
+    """The scope that a request needs; None for what anybody may read: pages, the interface's description, health."""
+    is_reading = method in ("GET", "HEAD", "OPTIONS")
+    if not path.startswith("/api/") and path != "/metrics":
+        return None if is_reading else Scope.ADMIN
+    if is_reading:
+        return Scope.READ
+    return next((scope for verb, rule, scope in _RULES if verb == method and rule.fullmatch(path)), Scope.ADMIN)
+
+
+def is_stop(method: str, path: str) -> bool:
+    """Whether a request stops an arm: nothing that can fail or wait may stand in its way."""
+    return method == "POST" and re.fullmatch(rf"/api/v1/(stop|(runs|campaigns)/{_ITEM}/stop)", path) is not None
+
+
+KEY_FILE = "keys.json"  # name of the file, in the data folder
 
 _PREFIX = "tsk"
 _NOBODY = "0" * 64
@@ -119,15 +188,10 @@ class KeyFile:
     @contextmanager
     def _changing(self) -> Iterator[list[ApiKey]]:
         """The keys, written back at the end; two programs never undo each other's change."""
-        lock = os.open(self.path.with_name(f".{KEY_FILE}.lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+        with lock_file(self.path.with_name(f".{KEY_FILE}.lock")):
             keys = list(self.read())
             yield keys
             write_atomically(self.path, _KeyList(keys=tuple(keys)).model_dump_json(indent=1).encode())
-        finally:
-            fcntl.flock(lock, fcntl.LOCK_UN)  # closing does not: a process forked meanwhile holds the descriptor, too
-            os.close(lock)
 
 
 def match_key(keys: tuple[ApiKey, ...], text: str) -> ApiKey | None:
@@ -140,13 +204,7 @@ def match_key(keys: tuple[ApiKey, ...], text: str) -> ApiKey | None:
     return found if is_right and prefix == _PREFIX else None
 
 
-def utc_now() -> datetime:
-    """The present moment in UTC."""
-    return datetime.now(UTC)
-
-
 def _hash(salt: str, secret: str) -> str:
-    """What is kept of a secret."""
     return hashlib.sha256(bytes.fromhex(salt) + secret.encode("utf-8", "surrogatepass")).hexdigest()
 
 
@@ -165,8 +223,7 @@ class Caller:
     scope: Scope
 
 
-LOCAL = Caller("local", None, Scope.ADMIN)
-"""Anybody on this machine, as long as the service has no keys."""
+LOCAL = Caller("local", None, Scope.ADMIN)  # anybody on this machine, as long as the service has no keys
 
 
 class KeyRing:

@@ -1,4 +1,4 @@
-"""The runner of one campaign: design, run, held-out run, identification and diagnosis, one job or run each."""
+"""Campaigns on their way: one runner each, and the manager that starts, stops and removes them."""
 
 import logging
 import shutil
@@ -14,45 +14,36 @@ from tauscope.errors import NotFoundError, TauscopeError
 from tauscope.runtime.record import RunRecord
 from tauscope.runtime.states import RunState
 from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
-from tauscope.server.control.leases import FREE, Permit
-from tauscope.server.control.motions import (
+from tauscope.server.control.leases import FREE, BusyError, Permit
+from tauscope.server.control.run import (
+    RunRequestRecord,
+    RunWorkspace,
     StepFailedError,
     ready_motion,
     require_succeeded,
     take_trajectory,
     wait_for_end,
 )
-from tauscope.server.control.run import RunRequestRecord, RunWorkspace
 from tauscope.server.control.run_manager import RunManager, run_recording_name
+from tauscope.server.control.supervised_threads import Manager
 from tauscope.server.queue.analyses import (
-    DiagnosisOrder,
     DiagnosisWorkspace,
-    IdentificationOrder,
+    ExcitationOrder,
+    ExcitationWorkspace,
     IdentificationWorkspace,
 )
-from tauscope.server.queue.excitation import ExcitationOrder, ExcitationWorkspace
-from tauscope.server.queue.job_folder import StoppedError, Workspace
+from tauscope.server.queue.job_folder import JobProblem, JobRecord, JobState, StoppedError, Workspace
 from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, JobKind, JobQueue, QueueFullError
-from tauscope.server.queue.record import JobProblem, JobState
-from tauscope.server.queue.task_job import (
-    Order,
-    TaskWorkspace,
-    ordered_on_server,
-    staged_workspace,
-    submit_job,
-)
+from tauscope.server.queue.task_job import Order, TaskWorkspace, order_kept, stage_workspace, submit_job
+from tauscope.server.store.data_folder import ItemStore, staged_identifier
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.tasks.campaign import backend_of_run
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
-from tauscope.tasks.diagnose import DiagnosisOptions
 
 _log = logging.getLogger("tauscope.jobs")
 
-POLL_S = 0.2
-"""How often the progress of a run is told [s]."""
-
-RETRY_S = 0.5
-"""How often a queue, or a disk, that is full is asked again [s]."""
+POLL_S = 0.2  # how often the progress of a run is told [s]
+RETRY_S = 0.5  # how often a queue, or a disk, that is full is asked again [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,29 +131,29 @@ class CampaignRunner:
         return JobState.SUCCEEDED, None
 
     def _run_steps(self) -> None:
-        """Every step that is not done yet, one after the other."""
         made, order = self._workspace.read_made(), self._order
         if not made.recordings:
             self._begin("design the motion")
             excitation = self._design(order.excitation, "excitation")
             held_out_options = order.held_out_options()
             held_out = held_out_options and self._design(held_out_options, "held_out_excitation")
-            self._wait(ExcitationWorkspace, self._dependencies.excitations, excitation, "excitation")
+            self._wait(self._dependencies.excitations, excitation, "excitation")
             self._begin("run the motion")
             recordings = (self._run_motion(excitation, "run"),)
             judges: tuple[str, ...] = ()
             if held_out:
                 self._begin("design the held-out motion")
-                self._wait(ExcitationWorkspace, self._dependencies.excitations, held_out, "excitation")
+                self._wait(self._dependencies.excitations, held_out, "excitation")
                 self._begin("run the held-out motion")
                 judges = (self._run_motion(held_out, "held_out_run"),)
             self._record(recordings=recordings, held_out=judges)
         self._release_arm()
         self._begin("identify")
-        self._identify()
+        kinds = self._dependencies
+        self._analyse("identification", kinds.identifications, IdentificationWorkspace, order.identification)
         if order.diagnosis is not None:
             self._begin("diagnose")
-            self._diagnose(order.diagnosis)
+            self._analyse("diagnosis", kinds.diagnoses, DiagnosisWorkspace, order.diagnosis)
 
     def _design(self, options: ExcitationDesignOptions, link: str) -> str:
         """Have a motion designed; returns at once."""
@@ -172,7 +163,6 @@ class CampaignRunner:
         return identifier
 
     def _submit(self, kind: JobKind, workspace: type[TaskWorkspace[Order]], order: Order) -> str:
-        """Hand a job in, as soon as the queue takes one."""
         while True:
             try:
                 return submit_job(self._dependencies.jobs, kind, workspace, order, self._put_robot)
@@ -181,12 +171,10 @@ class CampaignRunner:
                     raise StoppedError from None
 
     def _put_robot(self, folder: Path) -> None:
-        """Copy the robot's files into a job's or a run's folder."""
         shutil.copytree(self._workspace.robot, folder, dirs_exist_ok=True)
 
-    def _wait(self, workspace: type[Workspace], kind: JobKind, identifier: str, noun: str) -> None:
-        """Wait for a job to succeed."""
-        record = wait_for_end(workspace(kind.items.folder(identifier)), self._stop_requested)
+    def _wait(self, kind: JobKind, identifier: str, noun: str) -> None:
+        record = wait_for_end(Workspace(kind.items.folder(identifier)), self._stop_requested)
         if record is None:
             raise StoppedError
         require_succeeded(record, f"{noun} {identifier}")
@@ -202,7 +190,7 @@ class CampaignRunner:
             campaign=self._workspace.folder.name,
             options=order.run,
         )
-        with staged_workspace(dependencies.runs.items, RunWorkspace) as staged:
+        with stage_workspace(dependencies.runs.items, RunWorkspace) as staged:
             self._put_robot(staged.robot)
             take_trajectory(ExcitationWorkspace(dependencies.excitations.items.folder(excitation)), staged)
             staged.write_request(request)
@@ -228,31 +216,20 @@ class CampaignRunner:
                 self._workspace.write_progress(told, {"run": run, "state": live.state.value})
             threading.Event().wait(POLL_S)
 
-    def _identify(self) -> None:
-        """From the recordings to the model."""
-        dependencies, made = self._dependencies, self._workspace.read_made()
-        identifier = self._find_submitted(dependencies.identifications, made.identification)
+    def _analyse(self, link: str, kind: JobKind, workspace: type[TaskWorkspace[Any]], options: Any) -> None:
+        """Have the recordings analysed; goes on with what was submitted before the service was started again."""
+        identifier = self._find_submitted(kind, getattr(self._workspace.read_made(), link))
         if identifier is None:
-            order = IdentificationOrder(**self._robot, **self._recordings(), options=self._order.identification)
-            identifier = self._submit(dependencies.identifications, IdentificationWorkspace, order)
-        self._record(identification=identifier)
-        self._wait(Workspace, dependencies.identifications, identifier, "identification")
-
-    def _diagnose(self, options: DiagnosisOptions) -> None:
-        """From the same recordings to what the model leaves out."""
-        dependencies, made = self._dependencies, self._workspace.read_made()
-        identifier = self._find_submitted(dependencies.diagnoses, made.diagnosis)
-        if identifier is None:
-            order = DiagnosisOrder(**self._robot, **self._recordings(), options=options)
-            identifier = self._submit(dependencies.diagnoses, DiagnosisWorkspace, order)
-        self._record(diagnosis=identifier)
-        self._wait(Workspace, dependencies.diagnoses, identifier, "diagnosis")
+            order_type: type[Any] = workspace.order_type
+            order = order_type(**self._robot, **self._recordings(), options=options)
+            identifier = self._submit(kind, workspace, order)
+        self._record(**{link: identifier})
+        self._wait(kind, identifier, link)
 
     def _recordings(self) -> dict[str, Any]:
-        """The recordings made so far, as an order holds them."""
         made = self._workspace.read_made()
         lists = {"recordings": made.recordings, "held_out": made.held_out}
-        return {role: ordered_on_server(self._dependencies.recordings, names) for role, names in lists.items()}
+        return {role: order_kept(self._dependencies.recordings, names) for role, names in lists.items()}
 
     def _find_submitted(self, kind: JobKind, identifier: str | None) -> str | None:
         """The job that this campaign handed in before the service was started again, where that one counts still."""
@@ -270,11 +247,9 @@ class CampaignRunner:
         self._workspace.write_step(step)
 
     def _record(self, **made: object) -> None:
-        """Keep what was made."""
         self._workspace.write_made(self._workspace.read_made().model_copy(update=made))
 
     def _cancel_jobs(self) -> None:
-        """Nobody waits for what is still designed, identified or diagnosed."""
         made, dependencies = self._workspace.read_made(), self._dependencies
         jobs = [(dependencies.excitations, made.excitation), (dependencies.excitations, made.held_out_excitation)]
         jobs += [(dependencies.identifications, made.identification), (dependencies.diagnoses, made.diagnosis)]
@@ -299,10 +274,73 @@ class CampaignRunner:
 
 
 def _run_problem(identifier: str, record: RunRecord | None) -> JobProblem:
-    """Why a run brings a campaign to its end."""
     if record is None:
         return JobProblem(code="damaged", detail=f"run {identifier}: its files are missing or damaged; begin anew")
     if record.problem is not None:
         return JobProblem(code=record.problem.code, detail=f"run {identifier}: {record.problem.detail}")
     asked = "" if record.stop is None else f" ({record.stop})"
     return JobProblem(code="acquisition", detail=f"run {identifier}: was {record.state}{asked}; begin anew")
+
+
+class CampaignManager(Manager[CampaignRunner]):
+    """The active campaigns, and the folders of all campaigns."""
+
+    def __init__(self, items: ItemStore, dependencies: CampaignDependencies) -> None:
+        """Continue the analysis of unfinished campaigns whose motions were all recorded.
+
+        The others become `interrupted`: nothing moves by itself.
+        """
+        super().__init__(items)
+        self._dependencies = dependencies
+        for identifier in items.identifiers():
+            self._resume(CampaignWorkspace(items.folder(identifier)))
+
+    def submit(self, staged: Path, permit: Permit = FREE) -> str:
+        """Start a campaign; it claims the arm until its motions are done.
+
+        Raises BusyError if somebody else has the arm; the folder stays staged. Raises LeaseError if the arm may not be
+        moved by that leave; the folder stays staged.
+        """
+        workspace = CampaignWorkspace(staged)
+        order = workspace.read_order()
+        if order is None:
+            raise TauscopeError("the campaign's order.json is missing or damaged; hand the campaign in again")
+        claim = order.backend.device(order.robot_name), f"campaign {staged_identifier(staged)}"
+        with self._lock:
+            if self._is_closed:
+                raise BusyError("the service is ending; hand the campaign in when it is up again")
+            self._dependencies.runs.claims.take(*claim)
+            try:
+                permit.require()
+                workspace.write_record(JobRecord(state=JobState.QUEUED, created=self.items.clock()))
+                identifier = self.items.publish(staged)
+            except BaseException:
+                self._dependencies.runs.claims.release(*claim)
+                raise
+            workspace = CampaignWorkspace(self.items.folder(identifier))
+            claims = self._dependencies.runs.claims
+            runner = CampaignRunner(workspace, order, self._dependencies, lambda: claims.release(*claim), permit)
+            self._threads.start(identifier, runner)
+        return identifier
+
+    def stop(self, identifier: str) -> JobState | None:
+        """Stop a campaign: takes no lock, waits for nothing, may be called any number of times.
+
+        Returns JobState or None: where the campaign stood; None where nothing of it goes on.
+        """
+        runner = self._threads.find(identifier)
+        if runner is None:
+            return None
+        state = runner.state
+        runner.stop()
+        return state
+
+    def _resume(self, workspace: CampaignWorkspace) -> None:
+        record, order = workspace.read_record(), workspace.read_order()
+        if record is None or record.state.is_end:
+            workspace.tell_lost_end()
+        elif order is not None and workspace.read_made().recordings:
+            runner = CampaignRunner(workspace, order, self._dependencies, lambda: None)
+            self._threads.start(workspace.folder.name, runner)
+        else:
+            workspace.write_record(record.moved(JobState.INTERRUPTED, self.items.clock(), INTERRUPTED))

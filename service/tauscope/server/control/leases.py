@@ -1,4 +1,4 @@
-"""Who controls which arm: exclusive leases that expire unless renewed, and permits to move.
+"""Who has which arm: claims of what moves, leases that expire unless renewed, and permits to move.
 
 A lease holds while the clock is before its end; no thread has to be alive for it to expire. Its secret is drawn anew:
 a former holder is never taken for the present one.
@@ -17,7 +17,48 @@ from typing_extensions import override
 
 from tauscope.errors import AcquisitionError
 from tauscope.robot.messages import one_line
-from tauscope.server.control.device_claims import DeviceClaims
+
+
+class BusyError(AcquisitionError):
+    """Somebody else has the arm, or too many runs go on at a time."""
+
+
+class DeviceClaims:
+    """Arms and their holders; every method may be called from any thread and returns at once."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._lock = threading.Lock()
+        self._holders: dict[str, str] = {}
+
+    def take(self, device: str, holder: str) -> None:
+        """Take an arm. Raises BusyError if somebody else has it, or as many arms are held as are allowed."""
+        with self._lock:
+            present = self._holders.get(device)
+            if present is not None and present != holder:
+                raise self._busy(device, present)
+            if present is None and len(self._holders) >= self._most:
+                raise BusyError(f"{len(self._holders)} arms move already; wait until one of them has ended")
+            self._holders[device] = holder
+
+    def require_free(self, device: str) -> None:
+        """Say at once that somebody has an arm, before work is begun for whoever wants it.
+
+        Raises BusyError if somebody has it.
+        """
+        holder = self._holders.get(device)
+        if holder is not None:
+            raise self._busy(device, holder)
+
+    def release(self, device: str, holder: str) -> None:
+        """Let go of an arm; nothing happens where somebody else has it."""
+        with self._lock:
+            if self._holders.get(device) == holder:
+                del self._holders[device]
+
+    @staticmethod
+    def _busy(device: str, holder: str) -> BusyError:
+        return BusyError(one_line(f"{device}: {holder} has it; wait until that has ended, or stop it"))
 
 
 class Permit(Protocol):
@@ -25,15 +66,12 @@ class Permit(Protocol):
 
     def require(self) -> None:
         """Refuse a motion that may not begin. Raises LeaseError if it may not."""
-        ...
 
     def find_end_reason(self) -> str | None:
         """Why the motion may not go on; None while it may."""
-        ...
 
     def disarm(self) -> None:
         """Somebody stopped the arm: before it moves again, it has to be armed again."""
-        ...
 
 
 class FreePermit:
@@ -50,8 +88,7 @@ class FreePermit:
         """Nothing to take back."""
 
 
-FREE = FreePermit()
-"""Leave that is never taken back."""
+FREE = FreePermit()  # leave that is never taken back
 
 
 class LeaseError(AcquisitionError):
@@ -74,8 +111,7 @@ class NotArmedError(LeaseError):
     """The lease is good, but nobody has armed it."""
 
 
-LONGEST_TTL_S = 60.0
-"""Longest time for which a lease may be given without a sign of life [s]."""
+LONGEST_TTL_S = 60.0  # longest time for which a lease may be given without a sign of life [s]
 
 
 @dataclass(eq=False)
@@ -152,11 +188,7 @@ class Leases:
     """The leases of all arms. Reading takes no lock; every change does, and none of them waits but for `acquire`."""
 
     def __init__(
-        self,
-        claims: DeviceClaims,
-        *,
-        clock: Callable[[], float] = time.monotonic,
-        on_end: LeaseEnd | None = None,
+        self, claims: DeviceClaims, *, clock: Callable[[], float] = time.monotonic, on_end: LeaseEnd | None = None
     ) -> None:
         self._claims, self._numbers, self._clock = claims, count(1), clock
         self._on_end = on_end or (lambda _lease, _why: None)
@@ -275,19 +307,16 @@ class Leases:
             raise self._refuse_leased(present)
 
     def _present(self, device: str) -> Lease | None:
-        """The lease that holds for an arm."""
         lease = self._active.get(device)
         return None if lease is None or self.find_end_reason(lease) is not None else lease
 
     def _finish(self, lease: Lease, why: str) -> None:
-        """A lease ends, once."""
         if lease.lost is None:
             lease.lost = why
             lease.is_armed = False
             self._on_end(lease, why)
 
     def _refuse_leased(self, lease: Lease) -> LeasedError:
-        """Somebody has the arm."""
         left = self.seconds_left(lease)
         return LeasedError(
             one_line(f"{lease.device}: {lease.holder} has its lease, for {left:.1f} s more unless it is renewed")

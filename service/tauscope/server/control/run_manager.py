@@ -1,22 +1,175 @@
-"""The run manager: it starts, stops and removes runs, and stores their recordings."""
+"""Runs on their way: one supervisor each, and the manager that starts, stops and removes them."""
 
 import logging
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
+from typing import Any, Protocol
 
 from tauscope.errors import TauscopeError
-from tauscope.runtime.record import RunRecord
-from tauscope.server.control.device_claims import BusyError, DeviceClaims
-from tauscope.server.control.leases import FREE, Permit
-from tauscope.server.control.motions import Motion
-from tauscope.server.control.run import RunWorkspace
-from tauscope.server.control.run_supervisor import Live, RunSupervisor, StartControl
+from tauscope.runtime.loop import Report
+from tauscope.runtime.record import RunProblem, RunRecord
+from tauscope.runtime.states import RunState
+from tauscope.server.control.leases import FREE, BusyError, DeviceClaims, Permit
+from tauscope.server.control.run import Motion, RunWorkspace, StepFailedError
 from tauscope.server.control.supervised_threads import Manager
+from tauscope.server.queue.job_folder import StateEvent
+from tauscope.server.store.data_folder import ItemStore, staged_identifier
 from tauscope.server.store.files import KeptFile, hash_file
-from tauscope.server.store.items import ItemStore, staged_identifier
 from tauscope.server.store.recordings import RecordingStore
 
 _log = logging.getLogger("tauscope.jobs")
+
+BEAT_S = 0.1  # how often the control process is told that its owner is alive, at least [s]
+BEATS_A_HEARTBEAT = 5  # how often it is told so in the time after which it counts its owner as gone
+
+
+class ControlProcess(Protocol):
+    """The process that moves the arm, as its owner sees it."""
+
+    def stop(self) -> None:
+        """Ask it to stop; returns at once, may be called at any time and any number of times."""
+
+    def beat(self) -> None:
+        """Say that the owner is alive."""
+
+    def wait(self, timeout_s: float | None = None) -> RunRecord:
+        """Wait for the end of the run.
+
+        Raises TimeoutError if it has not come by then.
+
+        `timeout_s`: how long; for good where None [s].
+        """
+        ...
+
+
+StartControl = Callable[[RunWorkspace, Report], ControlProcess]
+"""Starts the control process of a run, which reports its events; raises TauscopeError where that cannot be."""
+
+
+@dataclass(frozen=True)
+class Live:
+    """What is known of a run that goes on."""
+
+    state: RunState
+    percent: float | None
+    figures: Mapping[str, Any]
+
+
+class RunSupervisor:
+    """One run on its way.
+
+    `stop` takes no lock and touches no disk: whatever else is stuck, it reaches the control process.
+    """
+
+    def __init__(
+        self,
+        workspace: RunWorkspace,
+        start: StartControl,
+        motion: Motion,
+        is_alive: Callable[[], bool],
+        permit: Permit = FREE,
+    ) -> None:
+        self.live = Live(RunState.CREATED, None, {})
+        self._workspace = workspace
+        self._start = start
+        self._motion = motion
+        self._is_alive = is_alive
+        self._permit = permit
+        self._control: ControlProcess | None = None
+        self._stop_requested = threading.Event()
+
+    def stop(self) -> None:
+        """Stop the run, in whatever state it is; the arm has to be armed again before it moves again."""
+        self._permit.disarm()
+        self._halt()
+
+    def interrupt(self) -> None:
+        """Stop because the service ends."""
+        self.stop()
+
+    def _halt(self) -> None:
+        self._stop_requested.set()
+        # Whoever starts the control process looks at the flag after it has told us of the process.
+        control = self._control
+        if control is not None:
+            control.stop()
+
+    def run(self) -> None:
+        """Take the run to its end; never raises."""
+        try:
+            if self._motion(self._workspace, self._stop_requested):
+                if not self._stop_requested.is_set():
+                    self._permit.require()
+                self._supervise()
+            else:
+                self._end(RunState.STOPPED)
+        except StepFailedError as error:
+            self._end(RunState.FAILED, error.problem.code, error.problem.detail)
+        except TauscopeError as error:
+            self._end(RunState.FAILED, error.code, self._workspace.in_user_terms(str(error)))
+        except Exception:
+            _log.exception("run %s failed for an unforeseen reason", self._workspace.folder.name)
+            self._end(RunState.FAILED, "internal", "the run met a fault of Tauscope's own; the service's log says more")
+
+    def _supervise(self) -> None:
+        """Start the control process, and stay with it until it has ended."""
+        self._control = control = self._start(self._workspace, self._handle_event)
+        if self._stop_requested.is_set():
+            control.stop()
+        request = self._workspace.read_order()
+        beat_s = BEAT_S if request is None else min(BEAT_S, request.options.heartbeat_s / BEATS_A_HEARTBEAT)
+        has_ended = False
+        while not has_ended:
+            # Two ways to the same end: the run is asked to stop, and hears nothing of its owner any more.
+            if (lost := self._permit.find_end_reason()) is not None:
+                self._stop_without_permit(lost)
+            elif self._is_alive():
+                control.beat()
+            try:
+                control.wait(beat_s)
+                has_ended = True
+            except TimeoutError:
+                continue
+
+    def _stop_without_permit(self, why: str) -> None:
+        """The leave to move has ended: stop, and say why; nothing is new where somebody has stopped the run already."""
+        if not self._stop_requested.is_set():
+            self._halt()
+            _log.info("run %s is stopped: %s", self._workspace.folder.name, why)
+            self._report_step(f"stop: {why}")
+
+    def _report_step(self, step: str) -> None:
+        """Tell a step; a disk that takes none holds nothing up."""
+        try:
+            self._workspace.write_step(step)
+        except OSError:
+            _log.exception("a step of run %s could not be written", self._workspace.folder.name)
+
+    def _handle_event(self, event: Mapping[str, Any]) -> None:
+        state = RunState(event["state"])
+        if event["event"] == "state":
+            self.live = Live(state, self.live.percent, self.live.figures)
+            if not state.is_end:
+                self._workspace.tell(StateEvent(time=datetime.fromisoformat(event["at"]), state=state))
+        elif event["event"] == "progress":
+            figures = {name: value for name, value in event.items() if name not in ("event", "state", "percent")}
+            self.live = Live(state, float(event["percent"]), figures)
+            self._workspace.write_progress(self.live.percent, figures)
+
+    def _end(self, state: RunState, code: str | None = None, detail: str = "") -> None:
+        if self._control is not None:
+            self._control.stop()
+            return
+        problem = None if code is None else RunProblem(code=code, detail=detail)
+        try:
+            self._workspace.end_before_start(state, problem)
+            self.live = Live(state, None, {})
+        except OSError:
+            # The disk is full or gone: the run becomes `interrupted` with the next start.
+            _log.exception("the state of run %s could not be written", self._workspace.folder.name)
 
 
 class RunManager(Manager[RunSupervisor]):
@@ -31,7 +184,6 @@ class RunManager(Manager[RunSupervisor]):
         is_alive: Callable[[], bool],
         on_end: Callable[[RunRecord], None] = lambda _record: None,
     ) -> None:
-        """Mark the unfinished runs of an earlier service as `interrupted`."""
         super().__init__(items)
         self.claims = claims
         self._recordings = recordings
@@ -109,7 +261,6 @@ class RunManager(Manager[RunSupervisor]):
             self._on_end(record)
 
     def _end(self, workspace: RunWorkspace, claim: tuple[str, str] | None) -> None:
-        """Put everything in its place after a run."""
         try:
             workspace.recover()
             self._conclude(workspace)
@@ -119,7 +270,6 @@ class RunManager(Manager[RunSupervisor]):
             self._release(claim)
 
     def _release(self, claim: tuple[str, str] | None) -> None:
-        """Let go of the arm, where the run took it itself."""
         if claim is not None:
             self.claims.release(*claim)
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from tauscope.server.store.items import ItemStore
+from tauscope.server.store.data_folder import ItemStore
 
 CLOSE_TIMEOUT_S = 15.0
 """How long a run or a campaign may take to stop when the service ends [s]. Its control process may last longer."""
@@ -16,15 +16,12 @@ class Supervisor(Protocol):
 
     def run(self) -> None:
         """Supervise to the end; never raises."""
-        ...
 
     def stop(self) -> None:
         """Stop, in any state; takes no lock, returns at once, may be called repeatedly."""
-        ...
 
     def interrupt(self) -> None:
         """Stop because the service ends; as `stop` otherwise."""
-        ...
 
 
 S = TypeVar("S", bound=Supervisor)

@@ -24,8 +24,7 @@ class ModelPolicy(ResultModel):
         default=1.5, description="largest residual on held-out recordings, in residuals of the training (or its noise)"
     )
     consistency_ratio: Ratio = Field(
-        default=1.2,
-        description="largest residual of the model with bodies, in residuals of the free estimate",
+        default=1.2, description="largest residual of the model with bodies, in residuals of the free estimate"
     )
     condition_number: Ratio = Field(default=500.0, description="largest condition number of the regressor")
     drift_std: Positive = Field(
@@ -126,7 +125,6 @@ def is_physical(link: LinkEntry) -> bool:
 
 
 def _ratios(rms: Sequence[float], floor: Sequence[float], joints: Sequence[str]) -> Iterator[tuple[float, str]]:
-    """For each joint how many times the floor its residual is."""
     for value, reference, joint in zip(rms, floor, joints, strict=True):
         yield (value / reference if reference > 0.0 else (1.0 if value == 0.0 else float("inf"))), joint
 

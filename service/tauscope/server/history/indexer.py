@@ -4,7 +4,7 @@ import json
 import logging
 import os
 import threading
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,15 +13,28 @@ from typing import Any
 from tauscope.errors import NotFoundError
 from tauscope.server.control.campaign import CampaignWorkspace
 from tauscope.server.control.run import RunWorkspace
-from tauscope.server.queue.analyses import DiagnosisWorkspace, IdentificationWorkspace, RolloutWorkspace
-from tauscope.server.queue.excitation import ExcitationWorkspace
-from tauscope.server.queue.job_folder import Workspace
-from tauscope.server.queue.record import JobState
+from tauscope.server.queue.analyses import (
+    DiagnosisWorkspace,
+    ExcitationWorkspace,
+    IdentificationWorkspace,
+    RolloutWorkspace,
+)
+from tauscope.server.queue.job_folder import JobState
+from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.database.index import FileMetadata, Index, ItemMetadata, RecordingRole
 from tauscope.server.store.files import hash_file, identifier_time
-from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 
+WORKSPACES: Mapping[str, type[Any]] = {
+    "excitation": ExcitationWorkspace,
+    "identification": IdentificationWorkspace,
+    "diagnosis": DiagnosisWorkspace,
+    "rollout": RolloutWorkspace,
+    "campaign": CampaignWorkspace,
+}
+"""The folder of each kind of item that has a job's record; a run has a record of its own."""
+
+_ANALYSES = (IdentificationWorkspace, DiagnosisWorkspace, RolloutWorkspace)
 DAMAGED = "damaged"
 _ROLES = ("recordings", "held_out", "simulated", "refine")
 _LIVING = {"state.json", "events.jsonl", "progress", "cancel", "run.json", "stop", "control.log"}
@@ -30,7 +43,7 @@ _LIVING = {"state.json", "events.jsonl", "progress", "cancel", "run.json", "stop
 
 def read_metadata(kind: str, folder: Path) -> ItemMetadata:
     """What an item's folder shows."""
-    facts = _READERS[kind](folder)
+    facts = _read_run(folder) if kind == "run" else _read_job(kind, folder)
     if not facts.is_final:
         return facts
     try:
@@ -76,10 +89,10 @@ def _artefacts(folder: Path) -> Iterator[FileMetadata]:
             yield FileMetadata(path.relative_to(folder).as_posix(), path.stat().st_size, hash_file(path))
 
 
-def _job(kind: str, workspace: Workspace, order: Any, read_result: Callable[[], bytes | None] | None) -> ItemMetadata:
-    """What every job in the queue shows."""
-    folder = workspace.folder
-    mark, record = stamp(kind, folder), workspace.read_record()
+def _read_job(kind: str, folder: Path) -> ItemMetadata:
+    """What every job in the queue, and a campaign, shows."""
+    workspace = WORKSPACES[kind](folder)
+    mark, record, order = stamp(kind, folder), workspace.read_record(), workspace.read_order()
     if record is None or order is None:
         return _describe_damage(kind, folder, mark, "order.json" if order is None else "state.json")
     facts = ItemMetadata(
@@ -94,9 +107,9 @@ def _job(kind: str, workspace: Workspace, order: Any, read_result: Callable[[], 
         problem=None if record.problem is None else (record.problem.code, record.problem.detail),
         recordings=tuple(_roles(order)),
     )
-    if record.state is not JobState.SUCCEEDED or read_result is None:
+    if record.state is not JobState.SUCCEEDED or not isinstance(workspace, _ANALYSES):
         return facts
-    content = read_result()
+    content = workspace.read_result()
     if content is None:
         return _describe_damage(kind, folder, mark, "result.json")
     return replace(facts, figures=_figures(kind, json.loads(content)))
@@ -133,33 +146,7 @@ def _describe_damage(kind: str, folder: Path, mark: str, file: str) -> ItemMetad
     return ItemMetadata(kind, folder.name, DAMAGED, True, mark, created, problem=(DAMAGED, detail))
 
 
-def _excitation(folder: Path) -> ItemMetadata:
-    workspace = ExcitationWorkspace(folder)
-    return _job("excitation", workspace, workspace.read_order(), None)
-
-
-def _identification(folder: Path) -> ItemMetadata:
-    workspace = IdentificationWorkspace(folder)
-    return _job("identification", workspace, workspace.read_order(), workspace.read_result)
-
-
-def _diagnosis(folder: Path) -> ItemMetadata:
-    workspace = DiagnosisWorkspace(folder)
-    return _job("diagnosis", workspace, workspace.read_order(), workspace.read_result)
-
-
-def _rollout(folder: Path) -> ItemMetadata:
-    workspace = RolloutWorkspace(folder)
-    return _job("rollout", workspace, workspace.read_order(), workspace.read_result)
-
-
-def _campaign(folder: Path) -> ItemMetadata:
-    workspace = CampaignWorkspace(folder)
-    return _job("campaign", workspace, workspace.read_order(), None)
-
-
-def _run(folder: Path) -> ItemMetadata:
-    """A run has a record of its own."""
+def _read_run(folder: Path) -> ItemMetadata:
     workspace, mark = RunWorkspace(folder), stamp("run", folder)
     request, record = workspace.read_order(), workspace.read_run()
     if request is None or record is None:
@@ -179,20 +166,9 @@ def _run(folder: Path) -> ItemMetadata:
     )
 
 
-_READERS: Mapping[str, Callable[[Path], ItemMetadata]] = {
-    "excitation": _excitation,
-    "run": _run,
-    "identification": _identification,
-    "diagnosis": _diagnosis,
-    "rollout": _rollout,
-    "campaign": _campaign,
-}
-
-
 _log = logging.getLogger("tauscope.jobs")
 
-BATCH = 200
-"""Items that are indexed at once."""
+BATCH = 200  # items that are indexed at once
 
 LONGEST_WAIT_S = 1.0
 """How long a search waits for what is new; while an old folder is indexed it finds what is indexed until then [s]."""
@@ -284,7 +260,6 @@ class Indexer:
         return []
 
     def _sync_kind(self, kind: str, store: ItemStore, *, thorough: bool) -> None:
-        """Items of a kind that are new, gone, or go on."""
         known, present = self._known[kind], store.identifiers()
         gone = known.keys() - set(present)
         if gone:
@@ -326,7 +301,6 @@ class Indexer:
         self._known[kind] |= {facts.identifier: (facts.stamp, facts.is_final) for facts in found}
 
     def _sync_recordings(self) -> None:
-        """The recordings, where any of them changed."""
         entries = self._recordings.entries()
         if entries != self._seen_recordings:
             self.index.put_recordings(entries)

@@ -13,7 +13,7 @@ from tauscope.identification import IdentificationDocument
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.server.history.gates import Gate, ModelPolicy
 from tauscope.server.history.model_judgement import Candidate, choose, judge
-from tauscope.server.store.database.database import Database
+from tauscope.server.store.database.database import Database, read_row
 from tauscope.server.store.database.tables import Item, Model, ModelEvent, Robot, RobotPolicy
 
 
@@ -202,7 +202,6 @@ def _policy(session: Session, robot: Robot) -> ModelPolicy:
 
 
 def _model(session: Session, identifier: str) -> Model:
-    """The row of a model."""
     model = session.scalars(select(Model).where(Model.identifier == identifier).limit(1)).first()
     if model is None:
         hint = "list the models; an identification is judged within seconds of its end"
@@ -211,31 +210,9 @@ def _model(session: Session, identifier: str) -> Model:
 
 
 def _entry(model: Model) -> ModelEntry:
-    """What is given out of a model."""
-    return ModelEntry(
-        identifier=model.identifier,
-        site=model.site,
-        robot=model.robot.name,
-        created=model.created,
-        considered=model.considered,
-        source=model.source,
-        state=model.state,
-        gates=tuple(Gate(**gate) for gate in model.gates),
-        is_reference=model.is_reference,
-    )
+    gates = tuple(Gate(**gate) for gate in model.gates)
+    return read_row(ModelEntry, model, robot=model.robot.name, gates=gates)
 
 
 def _event(event: ModelEvent) -> ModelEventEntry:
-    """What is given out of an event."""
-    return ModelEventEntry(
-        number=event.id,
-        robot=event.robot.name,
-        kind=event.kind,
-        parameter=event.parameter,
-        text=event.text,
-        details=event.details,
-        raised=event.raised,
-        last_seen=event.last_seen,
-        closed=event.closed,
-        note=event.note,
-    )
+    return read_row(ModelEventEntry, event, number=event.id, robot=event.robot.name)

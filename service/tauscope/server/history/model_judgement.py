@@ -183,20 +183,17 @@ def _raise_drift_events(
 
 
 def _open_drifts(robot_id: int):
-    """The drifts of a robot that nobody has taken note of."""
     return select(ModelEvent).where(
         ModelEvent.robot_id == robot_id, ModelEvent.kind == "drift", ModelEvent.closed.is_(None)
     )
 
 
 def _current(session: Session, robot: Robot, *, is_active: bool) -> Model | None:
-    """The active model of a robot, or its reference."""
     column = Model.is_active if is_active else Model.is_reference
     return session.scalar(select(Model).options(undefer(Model.document)).where(Model.robot_id == robot.id, column))
 
 
 def _document(model: Model | None) -> IdentificationDocument | None:
-    """What a model says."""
     return None if model is None or model.document is None else IdentificationDocument.model_validate(model.document)
 
 

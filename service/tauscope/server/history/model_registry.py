@@ -17,7 +17,7 @@ from tauscope.server.history.drift import Drift
 from tauscope.server.history.model_history import ModelEntry, ModelHistory
 from tauscope.server.history.model_judgement import Candidate, compare_models
 from tauscope.server.queue.analyses import DiagnosisWorkspace, IdentificationOrder, IdentificationWorkspace
-from tauscope.server.store.items import ItemStore
+from tauscope.server.store.data_folder import ItemStore
 
 _log = logging.getLogger("tauscope.jobs")
 
@@ -71,7 +71,6 @@ class ModelRegistry:
         return entry
 
     def _campaign(self, identification: str) -> CampaignWorkspace | None:
-        """The campaign that an identification is of."""
         for name in self._campaigns.identifiers():
             with suppress(NotFoundError):
                 workspace = CampaignWorkspace(self._campaigns.folder(name))
@@ -137,7 +136,6 @@ class DriftMonitor:
         }
 
     def _drifts(self, known: RobotDrift | None, active: str, reference: str) -> tuple[Drift, ...]:
-        """The change between two models."""
         if known is not None and (known.active, known.reference) == (active, reference):
             return known.drifts
         try:

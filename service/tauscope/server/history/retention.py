@@ -7,8 +7,8 @@ from datetime import datetime, timedelta
 from tauscope.errors import NotFoundError
 from tauscope.server.history.indexer import DAMAGED, Indexer
 from tauscope.server.history.model_history import ModelHistory
+from tauscope.server.store.data_folder import utc_now
 from tauscope.server.store.database.index import ItemEntry, ItemQuery
-from tauscope.server.store.items import utc_now
 from tauscope.server.store.recordings import RecordingStore
 
 _ALL = 10**9
@@ -59,10 +59,7 @@ def plan_removal(
 
 
 def remove(
-    removal: Removal,
-    removers: Mapping[str, Callable[[str], object]],
-    recordings: RecordingStore,
-    indexer: Indexer,
+    removal: Removal, removers: Mapping[str, Callable[[str], object]], recordings: RecordingStore, indexer: Indexer
 ) -> Removal:
     """Remove what was planned; what somebody else removed meanwhile is left out.
 
@@ -75,7 +72,6 @@ def remove(
 
 
 def _is_gone(remove_one: Callable[[str], object], name: str) -> bool:
-    """Whether it was there, and went."""
     try:
         remove_one(name)
     except NotFoundError:

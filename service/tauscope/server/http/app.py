@@ -6,105 +6,57 @@ from contextlib import asynccontextmanager
 
 from fastapi import Depends, FastAPI
 
-from tauscope.closed_loop import RolloutDocument
-from tauscope.diagnosis import DiagnosisDocument
-from tauscope.diagnosis.documents.plots import DiagnosisPlots
-from tauscope.export.model_file import ModelFile
-from tauscope.identification import IdentificationDocument
-from tauscope.report.identification_plots import IdentificationPlots
-from tauscope.server.auth.audited_requests import AuditedRequests
-from tauscope.server.auth.gate import Gate
-from tauscope.server.control.run_supervisor import StartControl
-from tauscope.server.history.gates import ModelPolicy
-from tauscope.server.http import health, pages
-from tauscope.server.http.campaigns import CampaignRequest, CampaignResult
-from tauscope.server.http.campaigns import router as campaigns
-from tauscope.server.http.diagnoses import DiagnosisRequest
-from tauscope.server.http.diagnoses import router as diagnoses
-from tauscope.server.http.excitations import ExcitationRequest
-from tauscope.server.http.excitations import router as excitations
-from tauscope.server.http.heartbeat import notify_systemd
-from tauscope.server.http.history import ReasonRequest
-from tauscope.server.http.history import router as history
-from tauscope.server.http.identifications import IdentificationRequest
-from tauscope.server.http.identifications import router as identifications
-from tauscope.server.http.items import router as items
-from tauscope.server.http.leases import LeaseRequest, stop_router
-from tauscope.server.http.leases import router as leases
-from tauscope.server.http.methods import collect_methods, require_known_query
+from tauscope.server.auth.gate import AuditedRequests, Gate
+from tauscope.server.control.run_manager import StartControl
+from tauscope.server.http import (
+    campaigns,
+    diagnoses,
+    excitations,
+    health,
+    history,
+    identifications,
+    items,
+    leases,
+    pages,
+    recordings,
+    robots,
+    rollouts,
+    runs,
+    schedules,
+)
 from tauscope.server.http.openapi import install_openapi
-from tauscope.server.http.problem_handlers import install_problem_handlers
+from tauscope.server.http.problem_handlers import collect_methods, install_problem_handlers, require_known_query
 from tauscope.server.http.protection import BodyLimit, ConcurrencyLimiter, OriginCheck, RequestLog, ResponseProtection
-from tauscope.server.http.recordings.mappings import router as mappings
-from tauscope.server.http.recordings.models import ReadingRequest
-from tauscope.server.http.recordings.router import router as recordings
+from tauscope.server.http.readiness import notify_systemd
 from tauscope.server.http.repeated_requests import IdempotentRequests
-from tauscope.server.http.robots.models import RobotCheckRequest
-from tauscope.server.http.robots.router import router as robots
-from tauscope.server.http.rollouts import RolloutRequest
-from tauscope.server.http.rollouts import router as rollouts
-from tauscope.server.http.runs import RunRequest
-from tauscope.server.http.runs import router as runs
-from tauscope.server.http.schedules import ScheduleRequest
-from tauscope.server.http.schedules import router as schedules
 from tauscope.server.http.services import open_services
 from tauscope.server.http.settings import Settings
-from tauscope.server.http.tasks.events import EVENT_MODELS
 from tauscope.server.page.router import router as page
-from tauscope.server.problems import Problem
-from tauscope.trajectory.document import TrajectoryDocument
 
-API_VERSION = "1.21.0"
+API_VERSION = "1.22.0"
 """Of the interface, not of the package; a change of tests/server/http/openapi.json goes with a change here."""
 
 PREFIX = "/api/v1"
 
-
 VERBS = (
-    campaigns,
-    excitations,
-    runs,
-    recordings,
-    mappings,
-    identifications,
-    diagnoses,
-    rollouts,
-    robots,
-    items,
-    history,
-    schedules,
-    leases,
-    stop_router,
+    campaigns.router,
+    excitations.router,
+    runs.router,
+    recordings.router,
+    recordings.mapping_router,
+    identifications.router,
+    diagnoses.router,
+    rollouts.router,
+    robots.router,
+    items.router,
+    history.router,
+    schedules.router,
+    leases.router,
+    leases.stop_router,
 )
 """Routers of everything that a client may ask for, below `PREFIX`."""
 
-FORMATS = (
-    IdentificationDocument,
-    IdentificationPlots,
-    DiagnosisDocument,
-    DiagnosisPlots,
-    RolloutDocument,
-    CampaignResult,
-    ModelFile,
-    TrajectoryDocument,
-)
-"""Formats of files that tasks write, with versions of their own; `/docs/schemas/NAME` is the JSON Schema of each."""
-
-REQUESTS = (
-    IdentificationRequest,
-    DiagnosisRequest,
-    RolloutRequest,
-    ExcitationRequest,
-    RunRequest,
-    CampaignRequest,
-    RobotCheckRequest,
-    ReadingRequest,
-    LeaseRequest,
-    ReasonRequest,
-    ModelPolicy,
-    ScheduleRequest,
-)
-"""Bodies that are read by hand, so that FastAPI does not find them."""
+PAGES = (health.router, pages.router, page)
 
 
 def create_app(settings: Settings, executor: Executor | None = None, start: StartControl | None = None) -> FastAPI:
@@ -132,13 +84,11 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
     )
     for router in VERBS:
         app.include_router(router, prefix=PREFIX, dependencies=[Depends(require_known_query)])
-    pages_too = [("", router) for router in (health.router, pages.router, page)]
-    app.state.methods = collect_methods([*((PREFIX, router) for router in VERBS), *pages_too])
-    app.include_router(health.router)
-    app.include_router(pages.router)
-    app.include_router(page)
+    for router in PAGES:
+        app.include_router(router)
+    app.state.methods = collect_methods([*((PREFIX, router) for router in VERBS), *(("", router) for router in PAGES)])
     install_problem_handlers(app)
-    install_openapi(app, [*REQUESTS, Problem, *EVENT_MODELS], FORMATS)
+    install_openapi(app)
     # The last one added is the first to see a request.
     app.add_middleware(IdempotentRequests)
     app.add_middleware(AuditedRequests)

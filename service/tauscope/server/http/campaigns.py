@@ -13,29 +13,36 @@ from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
 from tauscope.server.control.campaign import CampaignLinks, CampaignOrder, CampaignWorkspace
 from tauscope.server.control.run import RunWorkspace
-from tauscope.server.http.backends import BackendRequest, chosen_backend
+from tauscope.server.http.answers import (
+    ENDINGS,
+    AnswerModel,
+    Identifier,
+    JobAnswer,
+    MotionLinks,
+    collection,
+    describe_damaged,
+    describe_job,
+    require_document,
+    require_success,
+)
 from tauscope.server.http.diagnoses import DIAGNOSES
 from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.identifications import IDENTIFICATIONS
 from tauscope.server.http.leases import permit_of
-from tauscope.server.http.robots.files import read_received_robot
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.robot_files import EXAMPLE_ROBOT, read_received_robot
 from tauscope.server.http.runs import find_run
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.answers import (
-    JobAnswer,
-    MotionLinks,
-    damaged_fields,
-    job_fields,
-    require_document,
-    require_success,
-)
 from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
-from tauscope.server.http.tasks.routes import ENDINGS, Identifier, collection
-from tauscope.server.http.tasks.submission import RobotRequest, keep_robot, receive_request, stage_request
-from tauscope.server.models import AnswerModel, PageAnswer
+from tauscope.server.http.tasks.submission import (
+    BackendRequest,
+    RobotRequest,
+    choose_backend,
+    keep_robot,
+    receive_request,
+    stage_request,
+)
 from tauscope.server.problems import problem_responses
-from tauscope.server.queue.record import JobState
+from tauscope.server.queue.job_folder import JobState
 from tauscope.tasks.campaign import CampaignOptions
 from tauscope.tasks.run import BackendChoice
 
@@ -89,12 +96,6 @@ class CampaignAnswer(JobAnswer):
     links: CampaignLinksAnswer = Field(description="where to go on")
 
 
-class CampaignListAnswer(PageAnswer):
-    """Campaigns that are kept."""
-
-    campaigns: list[CampaignAnswer] = Field(description="the newest first")
-
-
 class CampaignResult(AnswerModel):
     """What came of a campaign."""
 
@@ -131,8 +132,8 @@ def describe(services: Services, identifier: str, root: str) -> CampaignAnswer:
     here, made, order = f"{root}/campaigns/{identifier}", workspace.read_made(), workspace.read_order()
     if order is None:
         links = _links(here, root, made, has_result=False)
-        return CampaignAnswer(**damaged_fields(identifier, here), links=links)
-    fields = job_fields(workspace, here)
+        return CampaignAnswer(**describe_damaged(identifier, here), links=links)
+    fields = describe_job(workspace, here)
     links = _links(here, root, made, has_result=fields["state"] is JobState.SUCCEEDED)
     steps = tuple(_steps(services, order, made, root))
     return CampaignAnswer(**fields, robot=order.robot_name, backend=order.backend, steps=steps, links=links)
@@ -159,7 +160,6 @@ def result_of(services: Services, identifier: str, root: str) -> CampaignResult:
 
 
 def _steps(services: Services, order: CampaignOrder, made: CampaignLinks, root: str) -> Iterator[CampaignStepAnswer]:
-    """Every step with its state."""
     steps: list[tuple[StepName, str, Callable[[Services, str], Any], str | None, bool]] = [
         ("design", "excitations", EXCITATIONS.find, made.excitation, True),
         ("held-out design", "excitations", EXCITATIONS.find, made.held_out_excitation, order.held_out is not None),
@@ -178,7 +178,6 @@ def _steps(services: Services, order: CampaignOrder, made: CampaignLinks, root: 
 
 
 def _state(services: Services, find: Callable[[Services, str], Any], identifier: str) -> str:
-    """The state of a step's job or run."""
     try:
         folder = find(services, identifier)
     except NotFoundError:
@@ -188,7 +187,6 @@ def _state(services: Services, find: Callable[[Services, str], Any], identifier:
 
 
 def _links(here: str, root: str, made: CampaignLinks, *, has_result: bool) -> CampaignLinksAnswer:
-    """Where to go on."""
     identification = made.identification
     return CampaignLinksAnswer(
         self=here,
@@ -212,7 +210,7 @@ async def submit_campaign(request: Request, services: Services) -> str:
         received = await receive_request(request, CampaignRequest, services.settings, workspace.robot)
         robot_file = await run_in_threadpool(keep_robot, received, workspace.robot, services.robots)
         robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
-        backend = chosen_backend(services.settings, received.document.backend, robot)
+        backend = choose_backend(services.settings, received.document.backend, robot)
         permit = permit_of(request, services, backend.device(robot.name))
         order = CampaignOrder(
             robot_file=robot_file,
@@ -227,7 +225,7 @@ async def submit_campaign(request: Request, services: Services) -> str:
 CAMPAIGNS = Resource(
     noun="a campaign",
     plural="campaigns",
-    models=(CampaignRequest, CampaignAnswer, CampaignListAnswer),
+    models=(CampaignRequest, CampaignAnswer),
     examples=EXAMPLES,
     items=lambda services: services.campaigns.items,
     find=find_campaign,

@@ -8,10 +8,10 @@ from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.plots import DiagnosisPlots
 from tauscope.diagnosis.extended_model import LARGEST_FILE
 from tauscope.export.model_file import ModelFile
+from tauscope.server.http.answers import JobAnswer, JobLinks, require_document
 from tauscope.server.http.openapi import binary_part, binary_parts
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.robot_files import EXAMPLE_ROBOT
 from tauscope.server.http.services import Services
-from tauscope.server.http.tasks.answers import JobAnswer, JobLinks, require_document
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import (
     JobDocument,
@@ -28,7 +28,6 @@ from tauscope.server.http.tasks.submission import (
     RecordingsRequest,
     keep_model,
 )
-from tauscope.server.models import PageAnswer
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.analyses import DiagnosisWorkspace
 from tauscope.server.queue.task_job import SAVED_MODEL, TRAJECTORY, OrderedRecording
@@ -110,12 +109,6 @@ class DiagnosisAnswer(JobAnswer):
     links: DiagnosisLinksAnswer = Field(description="where to go on")
 
 
-class DiagnosisListAnswer(PageAnswer):
-    """Diagnoses that are kept."""
-
-    diagnoses: list[DiagnosisAnswer] = Field(description="the newest first")
-
-
 YAML = "text/yaml"  # an alias of application/yaml (RFC 9512), which generators of clients do not read
 
 
@@ -145,7 +138,7 @@ DIAGNOSES = QueuedTask(
     plural="diagnoses",
     kind=lambda services: services.diagnoses,
     workspace=DiagnosisWorkspace,
-    models=(DiagnosisRequest, DiagnosisAnswer, DiagnosisListAnswer),
+    models=(DiagnosisRequest, DiagnosisAnswer),
     examples=EXAMPLES,
     summary="Hand in a diagnosis",
     words="The robot is checked at once, recordings are read by the job: follow `Location` until it has ended.",
@@ -157,14 +150,7 @@ DIAGNOSES = QueuedTask(
     },
     further=place_model,
     further_parts={"model": (SAVED_MODEL, LARGEST_FILE)},
-    work_problems=(
-        "robot-file",
-        "recording",
-        "recording-mismatch",
-        "identification",
-        "excitation",
-        "invalid-request",
-    ),
+    work_problems=("robot-file", "recording", "recording-mismatch", "identification", "excitation", "invalid-request"),
     documents=(
         result_document("a diagnosis", "diagnose", DiagnosisDocument),
         plots_document("the diagnosis", DiagnosisPlots, "residuals over time and by variable, before and after"),

@@ -48,7 +48,6 @@ def _judge_new(services: Services) -> None:
 
 
 def _require_free(services: Services, name: str, users: Collection[str]) -> None:
-    """Refuse to remove something while a model that is in use rests on it."""
     models = services.models.history.list_protected().intersection(users)
     if models:
         hint = "make another model active, and the reference, first; identify again where there is no other"

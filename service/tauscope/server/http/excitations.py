@@ -8,18 +8,15 @@ from fastapi.responses import StreamingResponse
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.server.http.openapi import file_contents
+from tauscope.server.http.answers import ENDINGS, Identifier, JobAnswer, JobLinks, require_document
+from tauscope.server.http.openapi import file_responses
 from tauscope.server.http.reading import READING
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.robot_files import EXAMPLE_ROBOT
 from tauscope.server.http.services import ServicesDep
-from tauscope.server.http.tasks.answers import JobAnswer, JobLinks, require_document
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import JobDocument
-from tauscope.server.http.tasks.routes import ENDINGS, Identifier
 from tauscope.server.http.tasks.submission import RobotRequest
-from tauscope.server.models import PageAnswer
-from tauscope.server.problems import problem_responses
-from tauscope.server.queue.excitation import ExcitationWorkspace, write_trajectory_piece
+from tauscope.server.queue.analyses import ExcitationWorkspace, write_trajectory_piece
 from tauscope.server.queue.job_folder import read_bytes
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.trajectory.csv_format import PIECE_ROWS
@@ -56,12 +53,6 @@ class ExcitationAnswer(JobAnswer):
     links: ExcitationLinks = Field(description="where to go on")
 
 
-class ExcitationListAnswer(PageAnswer):
-    """Excitations that are kept."""
-
-    excitations: list[ExcitationAnswer] = Field(description="the newest first")
-
-
 TrajectoryFormat = Annotated[
     Literal["json", "csv"],
     Query(alias="format", description="json: exact coefficients; csv: samples that any controller can play"),
@@ -73,7 +64,7 @@ EXCITATIONS = QueuedTask(
     plural="excitations",
     kind=lambda services: services.excitations,
     workspace=ExcitationWorkspace,
-    models=(ExcitationRequest, ExcitationAnswer, ExcitationListAnswer),
+    models=(ExcitationRequest, ExcitationAnswer),
     examples=EXAMPLES,
     summary="Have a motion designed",
     words="The robot is checked at once, the motion is designed by the job: follow `Location` until it has ended.",
@@ -98,10 +89,9 @@ router = EXCITATIONS.router()
     "/{identifier}/trajectory",
     summary="Fetch the trajectory",
     response_class=Response,
-    responses={
-        200: {"content": file_contents("application/json", "text/csv"), "description": "the file"},
-        **problem_responses("not-found", *ENDINGS, "excitation", "internal", *READING),
-    },
+    responses=file_responses(
+        ("application/json", "text/csv"), "not-found", *ENDINGS, "excitation", "internal", *READING
+    ),
 )
 async def get_trajectory(
     request: Request,
@@ -129,5 +119,4 @@ async def get_trajectory(
 
 
 def _name_file(suffix: str) -> dict[str, str]:
-    """The header by which a browser saves a trajectory."""
     return {"Content-Disposition": f'attachment; filename="trajectory.{suffix}"'}

@@ -6,10 +6,10 @@ from fastapi import APIRouter, Response
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
+from tauscope.server.http.answers import AnswerModel
 from tauscope.server.http.metrics import CONTENT_TYPE
-from tauscope.server.http.openapi import file_contents
+from tauscope.server.http.openapi import file_responses
 from tauscope.server.http.services import ServicesDep
-from tauscope.server.models import AnswerModel
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.version import tauscope_version
 
@@ -48,7 +48,7 @@ async def get_readiness(services: ServicesDep) -> ReadyAnswer:
     "/metrics",
     summary="Fetch the metrics",
     response_class=Response,
-    responses={200: {"content": file_contents("text/plain"), "description": "in Prometheus' text format"}},
+    responses=file_responses(("text/plain",), description="in Prometheus' text format"),
 )
 async def get_metrics(services: ServicesDep) -> Response:
     """For Prometheus: requests, jobs, runs, and how well the control loops kept their time."""

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import Field
@@ -16,11 +16,10 @@ from tauscope.server.history.gates import ModelPolicy
 from tauscope.server.history.model_history import ModelEntry
 from tauscope.server.history.model_judgement import compare_models
 from tauscope.server.history.trend import parameter_trends
-from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
-from tauscope.server.http.openapi import Examples, json_body
+from tauscope.server.http.answers import AnswerModel, Identifier, Limit, collection
+from tauscope.server.http.bodies import read_document
+from tauscope.server.http.openapi import json_request
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.routes import Identifier, Limit, collection
-from tauscope.server.models import AnswerModel
 from tauscope.server.problems import problem_responses
 from tauscope.strict_model import StrictModel
 
@@ -136,8 +135,7 @@ class EventAnswer(AnswerModel):
     kind: str = Field(description="drift", examples=["drift"])
     parameter: str = Field(description="that drifted")
     text: str = Field(
-        description="one line",
-        examples=["joint3: viscous friction +40 % in 6 weeks (0.5 → 0.7, 12 standard errors)"],
+        description="one line", examples=["joint3: viscous friction +40 % in 6 weeks (0.5 → 0.7, 12 standard errors)"]
     )
     raised: datetime = Field(description="when it was seen first, UTC")
     last_seen: datetime = Field(description="when it was seen last, UTC")
@@ -154,18 +152,8 @@ class EventListAnswer(AnswerModel):
 def make_model_answer(entry: ModelEntry, collection: str) -> ModelAnswer:
     """The answer that holds a model."""
     here = f"{collection}/{entry.identifier}"
-    return ModelAnswer(
-        id=entry.identifier,
-        site=entry.site,
-        robot=entry.robot,
-        created=entry.created,
-        considered=entry.considered,
-        source=entry.source,  # pyright: ignore[reportArgumentType] - checked by the model
-        state=entry.state,  # pyright: ignore[reportArgumentType]
-        is_reference=entry.is_reference,
-        gates=tuple(GateAnswer.model_validate(gate) for gate in entry.gates),
-        links=ModelLinksAnswer(self=here, document=f"{here}/document"),
-    )
+    links = ModelLinksAnswer(self=here, document=f"{here}/document")
+    return ModelAnswer.describe(entry, id=entry.identifier, links=links)
 
 
 def comparison_answer(
@@ -202,15 +190,8 @@ AnyRobot = Annotated[
 ]
 Number = Annotated[int, Path(ge=1, le=2**31 - 1, description="number of the event")]
 
-Body = TypeVar("Body", ReasonRequest, ModelPolicy)
-
 _REASON = {"why": ("Why", {"reason": "gear oil changed on 3 November"})}
 _BODY_PROBLEMS = ("bad-request", "limit-exceeded", "media-type", "not-found")
-
-
-def _body(kind: type[StrictModel] | type[ModelPolicy], examples: Examples) -> dict[str, Any]:
-    """A JSON body, for the OpenAPI document."""
-    return {"requestBody": {"required": True, "content": json_body(kind, examples)}}
 
 
 @router.get("/models", summary="List models")
@@ -262,7 +243,7 @@ def get_model_drift(
     "/models/{identifier}/activate",
     summary="Make a model the active one",
     responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra=_body(ReasonRequest, _REASON),
+    openapi_extra=json_request(ReasonRequest, _REASON),
 )
 async def activate_model(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
     """Also one that was refused; the one before is kept. The reason is kept with the choice."""
@@ -273,7 +254,7 @@ async def activate_model(request: Request, identifier: Identifier, services: Ser
     "/models/{identifier}/make-reference",
     summary="Count drift from a model",
     responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra=_body(ReasonRequest, _REASON),
+    openapi_extra=json_request(ReasonRequest, _REASON),
 )
 async def make_reference(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
     """After maintenance, say; drifts that are open are closed."""
@@ -297,11 +278,13 @@ def get_policy(services: ServicesDep, robot: RobotName) -> ModelPolicy:
     "/model-policy",
     summary="Set the bounds of a robot",
     responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra=_body(ModelPolicy, {"drift": ("Tell smaller changes", {"drift_share": 0.1, "drift_std": 5.0})}),
+    openapi_extra=json_request(
+        ModelPolicy, {"drift": ("Tell smaller changes", {"drift_share": 0.1, "drift_std": 5.0})}
+    ),
 )
 async def set_policy(request: Request, services: ServicesDep, robot: RobotName) -> ModelPolicy:
     """They hold for models that are judged from now on; what is left out takes its default."""
-    policy = await _read(request, ModelPolicy, services)
+    policy = await read_document(request, ModelPolicy, services.settings.max_document_bytes)
     await run_in_threadpool(services.models.history.set_policy, robot, policy)
     return policy
 
@@ -323,31 +306,22 @@ def list_events(
     "/events/{number}/acknowledge",
     summary="Take note of an event",
     responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra=_body(ReasonRequest, _REASON),
+    openapi_extra=json_request(ReasonRequest, _REASON),
 )
 async def acknowledge_event(request: Request, number: Number, services: ServicesDep) -> EventAnswer:
     """It is closed; another one is raised when the parameter is found beyond its bounds again."""
-    body = await _read(request, ReasonRequest, services)
+    body = await read_document(request, ReasonRequest, services.settings.max_document_bytes)
     history, now = services.models.history, datetime.now(UTC)
     return EventAnswer.model_validate(await run_in_threadpool(history.acknowledge, number, body.reason, now))
 
 
 async def _choose(request: Request, identifier: str, services: Services, role: str) -> ModelAnswer:
-    """Carry out a choice between models."""
-    body = await _read(request, ReasonRequest, services)
+    body = await read_document(request, ReasonRequest, services.settings.max_document_bytes)
     history, now = services.models.history, datetime.now(UTC)
     entry = await run_in_threadpool(history.activate, identifier, role, body.reason, now)
     return make_model_answer(entry, collection(request, 2))
 
 
-async def _read(request: Request, kind: type[Body], services: Services) -> Body:
-    """The JSON body of a request."""
-    if media_type(request) != JSON:
-        raise refuse_media_type(request, JSON)
-    return await read_document(request, kind, services.settings.max_document_bytes)
-
-
 def _bring_up_to_date(services: Services) -> None:
-    """What ended a moment ago counts already."""
     services.index.refresh()
     services.models.judge_new()

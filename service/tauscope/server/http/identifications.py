@@ -7,13 +7,12 @@ from pydantic import Field
 from tauscope.export.model_file import ModelFile
 from tauscope.identification import IdentificationDocument
 from tauscope.report.identification_plots import IdentificationPlots
+from tauscope.server.http.answers import JobAnswer, JobLinks
 from tauscope.server.http.openapi import binary_parts
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT
-from tauscope.server.http.tasks.answers import JobAnswer, JobLinks
+from tauscope.server.http.robot_files import EXAMPLE_ROBOT
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import JobDocument, plots_document, report_document, result_document
 from tauscope.server.http.tasks.submission import MODEL_FILE, RECORDINGS_EXAMPLE, Names, RecordingsRequest
-from tauscope.server.models import PageAnswer
 from tauscope.server.queue.analyses import IdentificationWorkspace
 from tauscope.server.queue.task_job import OrderedRecording
 from tauscope.tasks.identify import IdentificationOptions
@@ -68,18 +67,12 @@ class IdentificationAnswer(JobAnswer):
     links: LinksAnswer = Field(description="where to go on")
 
 
-class IdentificationListAnswer(PageAnswer):
-    """Identifications that are kept."""
-
-    identifications: list[IdentificationAnswer] = Field(description="the newest first")
-
-
 IDENTIFICATIONS = QueuedTask(
     noun="an identification",
     plural="identifications",
     kind=lambda services: services.identifications,
     workspace=IdentificationWorkspace,
-    models=(IdentificationRequest, IdentificationAnswer, IdentificationListAnswer),
+    models=(IdentificationRequest, IdentificationAnswer),
     examples=EXAMPLES,
     summary="Hand in an identification",
     words="The robot is checked at once, recordings are read by the job: follow `Location` until it has ended.",

@@ -1,17 +1,16 @@
 """The index over HTTP: items and robots, searched."""
 
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Query
 from pydantic import AwareDatetime, Field
 
-from tauscope.server.http.robots.models import RobotVersionAnswer
+from tauscope.server.http.answers import AnswerModel, Limit
+from tauscope.server.http.robot_files import RobotVersionAnswer
 from tauscope.server.http.services import ServicesDep
-from tauscope.server.http.tasks.routes import Limit
-from tauscope.server.models import AnswerModel
 from tauscope.server.problems import problem_responses
-from tauscope.server.store.data_folder import FOLDERS
+from tauscope.server.store.data_folder import FOLDERS, ItemKind
 from tauscope.server.store.database.index import ItemEntry, ItemQuery
 
 
@@ -58,10 +57,7 @@ class RobotListAnswer(AnswerModel):
 
 router = APIRouter(tags=["items"], responses=problem_responses("store"))
 
-Kind = Annotated[
-    Literal["excitation", "run", "identification", "diagnosis", "rollout", "campaign"] | None,
-    Query(description="kind of item"),
-]
+Kind = Annotated[ItemKind | None, Query(description="kind of item")]
 State = Annotated[str | None, Query(max_length=40, description="where it stands", examples=["succeeded", "damaged"])]
 RobotName = Annotated[str | None, Query(max_length=1000, description="name of the robot")]
 Digest = Annotated[
@@ -101,23 +97,10 @@ def list_robots(services: ServicesDep) -> RobotListAnswer:
 
 
 def _next(found: list[ItemAnswer], limit: int) -> datetime | None:
-    """Where the next page begins."""
     return found[-1].created if len(found) == limit else None
 
 
 def _answer(entry: ItemEntry, site: str) -> ItemAnswer:
-    """The answer that holds an item."""
     is_here = entry.site == site
-    return ItemAnswer(
-        kind=entry.kind,
-        id=entry.identifier,
-        site=entry.site,
-        is_here=is_here,
-        link=f"/api/v1/{FOLDERS[entry.kind]}/{entry.identifier}" if is_here else None,
-        state=entry.state,
-        robot=entry.robot,
-        created=entry.created,
-        ended=entry.ended,
-        problem=entry.problem_detail,
-        figures=dict(entry.figures),
-    )
+    link = f"/api/v1/{FOLDERS[entry.kind]}/{entry.identifier}" if is_here else None
+    return ItemAnswer.describe(entry, id=entry.identifier, is_here=is_here, link=link, problem=entry.problem_detail)

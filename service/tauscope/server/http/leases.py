@@ -11,12 +11,12 @@ from tauscope.errors import NotFoundError
 from tauscope.robot.messages import one_line, shown
 from tauscope.runtime.drivers import BackendName
 from tauscope.server.auth.gate import find_caller
-from tauscope.server.auth.scopes import Scope
+from tauscope.server.auth.keys import Scope
 from tauscope.server.control.leases import LONGEST_TTL_S, Lease, LeaseLostError, Permit
-from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
-from tauscope.server.http.openapi import json_body
+from tauscope.server.http.answers import AnswerModel
+from tauscope.server.http.bodies import read_document
+from tauscope.server.http.openapi import json_request
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.models import AnswerModel
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.run import BackendChoice
@@ -37,7 +37,7 @@ class LeaseRequest(StrictModel):
 
 
 EXAMPLES: dict[str, tuple[str, Any]] = {
-    "lease": ("An arm for ten seconds, and longer with heartbeats", {"robot": "two-joint-arm", "backend": "sim"}),
+    "lease": ("An arm for ten seconds, and longer with heartbeats", {"robot": "two-joint-arm", "backend": "sim"})
 }
 
 
@@ -118,7 +118,7 @@ _NO_BODY = {"requestBody": {"required": False, "content": {}}}
     summary="Take the lease of an arm",
     response_model=LeaseAnswer,
     responses=problem_responses("bad-request", "limit-exceeded", "media-type", "leased", "busy"),
-    openapi_extra={"requestBody": {"required": True, "content": json_body(LeaseRequest, EXAMPLES)}},
+    openapi_extra=json_request(LeaseRequest, EXAMPLES),
 )
 async def take_lease(request: Request, response: Response, services: ServicesDep) -> LeaseAnswer:
     """Exclusive: nobody else moves the arm while the lease holds. It ends by itself unless heartbeats renew it.
@@ -126,8 +126,6 @@ async def take_lease(request: Request, response: Response, services: ServicesDep
     Whatever moves by a lease stops when the lease ends. A service without API keys moves an arm without a lease too, as
     long as nobody has one; with keys, motion needs a lease that is armed.
     """
-    if media_type(request) != JSON:
-        raise refuse_media_type(request, JSON)
     wanted = await read_document(request, LeaseRequest, services.settings.max_document_bytes)
     caller = find_caller(request.scope)
     if wanted.take and not caller.scope.includes(Scope.ADMIN):
@@ -195,7 +193,6 @@ async def stop_everything(services: ServicesDep) -> StopAllAnswer:
 
 
 def _device(services: Services, identifier: str) -> str:
-    """The arm of a lease that holds."""
     lease = services.leases.find(identifier)
     if lease is None:
         raise LeaseLostError(one_line(f"{shown(identifier)}: this lease does not hold (any more); take a new one"))
@@ -203,17 +200,9 @@ def _device(services: Services, identifier: str) -> str:
 
 
 def _answer(services: Services, lease: Lease, root: str, token: str | None = None) -> LeaseAnswer:
-    """What is told of a lease."""
     here = f"{root}/{lease.id}"
     links = LeaseLinks(self=here, heartbeat=f"{here}/heartbeat", arm=f"{here}/arm", disarm=f"{here}/disarm")
-    return LeaseAnswer(
-        id=lease.id,
-        number=lease.number,
-        token=token,
-        arm=lease.device,
-        holder=lease.holder,
-        armed=lease.is_armed,
-        ttl_s=lease.ttl_s,
-        seconds_left=round(services.leases.seconds_left(lease), 3),
-        links=links,
+    left = round(services.leases.seconds_left(lease), 3)
+    return LeaseAnswer.describe(
+        lease, token=token, arm=lease.device, armed=lease.is_armed, seconds_left=left, links=links
     )

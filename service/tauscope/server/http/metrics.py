@@ -12,7 +12,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Histo
 from prometheus_client.registry import Collector
 
 from tauscope.runtime.record import RunRecord
-from tauscope.server.control.run_supervisor import Live
+from tauscope.server.control.run_manager import Live
 from tauscope.server.history.model_registry import DriftMonitor
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"

@@ -1,33 +1,283 @@
-"""The OpenAPI document: bodies that the framework does not see, and models that only they refer to."""
+"""The OpenAPI document: bodies that the framework does not see; parts that repeat are written once, and referred to."""
 
 import json
-from collections.abc import Mapping, Sequence
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
+from http import HTTPStatus
 from operator import getitem
 from typing import Any
 
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel
-from pydantic.json_schema import models_json_schema
+from pydantic.json_schema import JsonSchemaMode, models_json_schema
 
-from tauscope.server.auth.audited_requests import is_audited
-from tauscope.server.auth.scopes import find_needed_scope, is_stop
-from tauscope.server.http.openapi_sharing import SCHEMAS, merge_problems, share_parts
+from tauscope.server.auth.gate import is_audited
+from tauscope.server.auth.keys import find_needed_scope, is_stop
 from tauscope.server.http.repeated_requests import HEADER as ONCE
 from tauscope.server.http.repeated_requests import LONGEST_KEY, is_repeatable
-from tauscope.server.problems import problem_responses
+from tauscope.server.problems import MEDIA_TYPE, Problem, problem_responses
+
+_COMMON = (
+    "bad-request",
+    "host",
+    "origin",
+    "unauthorized",
+    "forbidden",
+    "invalid-request",
+    "limit-exceeded",
+    "media-type",
+    "rate-limited",
+    "queue-full",
+    "internal",
+    "worker-lost",
+    "store",
+    "storage-full",
+)
+"""Problems that any request to the interface may meet, before its route or in it."""
+
+_VALUES = ("examples", "default", "enum", "const")  # keywords of a schema that hold plain data
+_LEAST_SHARED = 150  # A shorter schema is not worth a name and two references [characters]
+
+SCHEMAS = "#/components/schemas/"
+
+
+def share_parts(document: dict[str, Any]) -> None:
+    """Refer to parts that repeat, and leave out keywords that say nothing more."""
+    _refer_to_formats(document)
+    _drop_unused(document)
+    _drop_descriptions_of_answers(document)
+    for node in _schema_nodes(document):
+        _shorten(node)
+    _share_problems(document)
+    for operation in _operations(document):
+        _shorten_answers(operation)
+    _share_parameters(document)
+    _share_answers(document)
+    _share_properties(document)
+
+
+def format_address(name: str) -> str:
+    """Where the schema of a file's format is read."""
+    return f"/docs/schemas/{name}"
+
+
+def _refer_to_formats(document: dict[str, Any]) -> None:
+    """Have answers that are files, which state their schema, name it instead of holding it."""
+    schemas = document["components"]["schemas"].items()
+    formats = [name for name, schema in schemas if "schema" in schema.get("properties", {})]
+    addresses = {SCHEMAS + name: format_address(name) for name in formats}
+    for operation in _operations(document):
+        for answer in operation["responses"].values():
+            for content in answer.get("content", {}).values():
+                address = addresses.get(content.get("schema", {}).get("$ref"))
+                if address is not None:
+                    file = {"type": "object", "additionalProperties": True}
+                    content["schema"] = {**file, "externalDocs": {"url": address}}
+
+
+def _drop_unused(document: dict[str, Any]) -> None:
+    """Remove schemas to which nothing leads."""
+    schemas = document["components"]["schemas"]
+    used = _find_schemas(schemas, document["paths"])
+    document["components"]["schemas"] = {name: schema for name, schema in schemas.items() if name in used}
+
+
+def _drop_descriptions_of_answers(document: dict[str, Any]) -> None:
+    """Leave the words on answers to `format_address`: requests are written by hand, answers are read by their types."""
+    schemas = document["components"]["schemas"]
+    sent = [operation.get("requestBody", {}) for operation in _operations(document)]
+    for name in schemas.keys() - _find_schemas(schemas, sent):
+        for node in _nodes(schemas[name]):
+            for keyword in ("description", "examples"):
+                node.pop(keyword, None)
+
+
+def _find_schemas(schemas: dict[str, Any], node: Any) -> set[str]:
+    open_, found = [json.dumps(node)], set[str]()
+    while open_:
+        new = set(re.findall(r'"#/components/schemas/([^"]+)"', open_.pop())) - found
+        found |= new
+        open_ += [json.dumps(schemas[name]) for name in new]
+    return found
+
+
+def _operations(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    for operations in document["paths"].values():
+        yield from operations.values()
+
+
+def _schema_nodes(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    yield from _nodes([*document["components"]["schemas"].values(), *_operations(document)])
+
+
+def _nodes(node: Any) -> Iterator[dict[str, Any]]:
+    """Objects of a part of the document that are no plain data and no lists of properties."""
+    if isinstance(node, list):
+        for each in node:
+            yield from _nodes(each)
+    elif isinstance(node, dict):
+        yield node
+        for keyword, value in node.items():
+            if keyword == "properties":
+                yield from _nodes(list(value.values()))
+            elif keyword not in _VALUES:
+                yield from _nodes(value)
+
+
+def _shorten(node: dict[str, Any]) -> None:
+    """Leave out titles, which repeat names, and defaults that are null or those of a model; null is one more type."""
+    if isinstance(node.get("title"), str):
+        del node["title"]
+    if "default" in node and (node["default"] is None or isinstance(node["default"], dict)):
+        del node["default"]
+    match node.get("anyOf"):
+        case [{"type": str(kind)} as only, {"type": "null"}] if not {"enum", "const"} & set(only):
+            del node["anyOf"]
+            node |= {**only, "type": [kind, "null"]}
+
+
+def _shorten_answers(operation: dict[str, Any]) -> None:
+    """A parameter is described once; an answer of which nothing is known is described by its status."""
+    for parameter in operation.get("parameters", []):
+        if "description" in parameter:
+            parameter["schema"].pop("description", None)
+    for status, answer in operation["responses"].items():
+        if answer.get("description") == "Successful Response":
+            answer["description"] = HTTPStatus(int(status)).phrase
+
+
+def _share_problems(document: dict[str, Any]) -> None:
+    """Put each problem's example, and each set of problems, into the document once.
+
+    The answer `default` of an operation with a scope holds the problems of any request; a status that has no others
+    is left out.
+    """
+    examples: dict[str, Any] = {}
+    shared: dict[str, dict[str, Any]] = {}
+    for operation in _operations(document):
+        answers = operation["responses"]
+        common = problem_responses(*_COMMON) if "x-tauscope-scope" in operation else {}
+        for status, answer in list(answers.items()):
+            if MEDIA_TYPE not in answer.get("content", {}):
+                continue
+            if set(answer["content"][MEDIA_TYPE]["examples"]) <= set(_COMMON) and common:
+                del answers[status]
+                continue
+            if int(status) in common:
+                merge_problems(answers, status, common[int(status)])
+            answers[status] = _refer(status, answer, examples, shared)
+        if common:
+            whole: dict[str, Any] = {}
+            for answer in common.values():
+                merge_problems(whole, "default", answer)
+            answers["default"] = _refer("any", whole["default"], examples, shared)
+    document["components"] |= {"examples": dict(sorted(examples.items())), "responses": dict(sorted(shared.items()))}
+
+
+def _refer(
+    name: str, answer: dict[str, Any], examples: dict[str, Any], shared: dict[str, dict[str, Any]]
+) -> dict[str, str]:
+    """Share an answer and its examples; the reference to it, by its only problem, or by its status and a number."""
+    content = answer["content"][MEDIA_TYPE]
+    codes = sorted(content["examples"])
+    examples |= {code: {"value": content["examples"][code]["value"]} for code in codes}
+    references = {code: {"$ref": f"#/components/examples/{code}"} for code in codes}
+    whole = {**answer, "description": ", ".join(codes), "content": {MEDIA_TYPE: {**content, "examples": references}}}
+    if len(codes) == 1:
+        name = codes[0]
+    elif name.isdecimal():
+        alike = [each for each in shared if each.startswith(f"{name}-")]
+        name = next((each for each in alike if shared[each] == whole), f"{name}-{len(alike) + 1}")
+    shared[name] = whole
+    return {"$ref": f"#/components/responses/{name}"}
+
+
+def merge_problems(answers: dict[str, Any], status: str, answer: dict[str, Any]) -> None:
+    """Add problems to those that a status has."""
+    present = answers.setdefault(status, answer)
+    if present is not answer:
+        examples = present["content"][MEDIA_TYPE]["examples"]
+        examples |= {
+            code: each for code, each in answer["content"][MEDIA_TYPE]["examples"].items() if code not in examples
+        }
+
+
+def _share_parameters(document: dict[str, Any]) -> None:
+    """Put each parameter that several operations have into the document once."""
+    lists = [operation["parameters"] for operation in _operations(document) if "parameters" in operation]
+    counts = Counter(json.dumps(each, sort_keys=True) for each in (each for found in lists for each in found))
+    shared: dict[str, Any] = {}
+    names: dict[str, str] = {}
+    for parameters in lists:
+        for place, parameter in enumerate(parameters):
+            text = json.dumps(parameter, sort_keys=True)
+            if counts[text] == 1:
+                continue
+            if text not in names:
+                alike = sum(each["name"] == parameter["name"] for each in shared.values())
+                names[text] = f"{parameter['name']}-{alike + 1}" if alike else parameter["name"]
+                shared[names[text]] = parameter
+            parameters[place] = {"$ref": f"#/components/parameters/{names[text]}"}
+    document["components"]["parameters"] = dict(sorted(shared.items()))
+
+
+def _share_answers(document: dict[str, Any]) -> None:
+    """Put each answer that several operations have, and that is no problem, into the document once."""
+    counts = Counter(
+        json.dumps(answer) for operation in _operations(document) for answer in operation["responses"].values()
+    )
+    names: dict[str, str] = {}
+    for operation in _operations(document):
+        for status, answer in operation["responses"].items():
+            text = json.dumps(answer)
+            if "$ref" not in answer and counts[text] > 1 and len(text) > _LEAST_SHARED:
+                found = re.search(r'schemas/(\w+)"', text)
+                name = names.setdefault(text, f"{found[1] if found else 'answer'}-{len(names) + 1}")
+                document["components"]["responses"][name] = answer
+                operation["responses"][status] = {"$ref": f"#/components/responses/{name}"}
+
+
+def _share_properties(document: dict[str, Any]) -> None:
+    """Put each long schema that several properties have into the document once, under the property's name."""
+    schemas = document["components"]["schemas"]
+    places = [
+        (node["properties"], name)
+        for node in [*_schema_nodes(document)]
+        if isinstance(node.get("properties"), dict)
+        for name in node["properties"]
+    ]
+    counts = Counter(json.dumps(properties[name], sort_keys=True) for properties, name in places)
+    names: dict[str, str] = {}
+    for properties, property_ in places:
+        text = json.dumps(properties[property_], sort_keys=True)
+        if counts[text] == 1 or len(text) < _LEAST_SHARED or "$ref" in properties[property_]:
+            continue
+        if text not in names:
+            name = "".join(part.capitalize() for part in property_.split("_"))
+            while name in schemas:
+                name += "Field"
+            names[text], schemas[name] = name, properties[property_]
+        properties[property_] = {"$ref": SCHEMAS + names[text]}
+    document["components"]["schemas"] = dict(sorted(schemas.items()))
+
 
 _REFERENCE = SCHEMAS + "{model}"
 
-Examples = Mapping[str, tuple[str, Any]]
-"""For each example its summary and its value."""
+Examples = Mapping[str, tuple[str, Any]]  # for each example its summary and its value
 
 
 def json_body(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
     """A JSON body of an operation. `examples`: mapping of str to (str, plain data), summary and value by name."""
     shown = {name: {"summary": summary, "value": value} for name, (summary, value) in examples.items()}
-    return {"application/json": {"schema": model_reference(model), "examples": shown}}
+    return {"application/json": {"schema": refer_to_model(model), "examples": shown}}
+
+
+def json_request(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
+    """The further entries of an operation that takes JSON alone."""
+    return {"requestBody": {"required": True, "content": json_body(model, examples)}}
 
 
 def form_body(parts: Mapping[str, Any], required: Sequence[str]) -> dict[str, Any]:
@@ -64,8 +314,17 @@ def file_contents(*media_types: str) -> dict[str, Any]:
     return {media_type: {"schema": schemas.get(media_type, {"type": "string"})} for media_type in ordered}
 
 
-def model_reference(model: type[BaseModel]) -> dict[str, str]:
-    """A reference to a model of the document."""
+def file_responses(media_types: Sequence[str], *problems: str, description: str = "the file") -> dict[int | str, Any]:
+    """The answers of a route that sends a file, and its problems by their codes."""
+    return {200: {"content": file_contents(*media_types), "description": description}, **problem_responses(*problems)}
+
+
+_referred: set[type[BaseModel]] = {Problem}  # models of bodies that the framework does not see
+
+
+def refer_to_model(model: type[BaseModel]) -> dict[str, str]:
+    """A reference to a model, which the document then holds."""
+    _referred.add(model)
     return {"$ref": _REFERENCE.format(model=model.__name__)}
 
 
@@ -77,38 +336,37 @@ def resolve_reference(document: Mapping[str, Any], node: dict[str, Any]) -> dict
     return node
 
 
-def install_openapi(app: FastAPI, models: Sequence[type[BaseModel]], formats: Sequence[type[BaseModel]]) -> None:
-    """Have the application's OpenAPI document hold further models, and refer to formats of files by their address.
+def install_openapi(app: FastAPI) -> None:
+    """Have the application's OpenAPI document hold all models, and refer to formats of files by their address.
 
     ``app.state.schemas`` then holds every model in full, as text by name: a reference is the other model's name.
     """
 
     def document() -> dict[str, Any]:
         if app.openapi_schema is None:
-            whole = _document(app, models)
-            schemas = whole["components"]["schemas"].items()
-            app.state.schemas = {name: json.dumps(each).replace(SCHEMAS, "") for name, each in schemas}
-            share_parts(whole, formats)
+            whole = get_openapi(
+                title=app.title,
+                version=app.version,
+                summary=app.summary,
+                description=app.description,
+                routes=app.routes,
+            )
+            kinds: list[tuple[type[BaseModel], JsonSchemaMode]] = [
+                (model, "validation") for model in sorted(_referred, key=lambda each: each.__name__)
+            ]
+            _, definitions = models_json_schema(kinds, ref_template=_REFERENCE)
+            schemas = whole.setdefault("components", {}).setdefault("schemas", {})
+            schemas.update(definitions.get("$defs", {}))
+            _add_common_answers(whole)
+            app.state.schemas = {name: json.dumps(each).replace(SCHEMAS, "") for name, each in schemas.items()}
+            share_parts(whole)
             app.openapi_schema = whole
         return app.openapi_schema
 
     app.openapi = document
 
 
-def _document(app: FastAPI, models: Sequence[type[BaseModel]]) -> dict[str, Any]:
-    """The document with all models, each part as often as it is used."""
-    document = get_openapi(
-        title=app.title, version=app.version, summary=app.summary, description=app.description, routes=app.routes
-    )
-    _, definitions = models_json_schema([(model, "validation") for model in models], ref_template=_REFERENCE)
-    components = document.setdefault("components", {}).setdefault("schemas", {})
-    components.update(definitions.get("$defs", {}))
-    _add_common_answers(document)
-    return document
-
-
-_REPEATED = ("not-repeatable", "key-reused")
-"""Further problems of a request that comes with the header `ONCE`."""
+_REPEATED = ("not-repeatable", "key-reused")  # further problems of a request that comes with the header `ONCE`
 
 _ONCE_PARAMETER = {
     "name": ONCE,

@@ -86,11 +86,7 @@ router = APIRouter(prefix="/docs", include_in_schema=False)
 _METHODS = ("get", "post", "put", "delete")
 _FOLDER = FilePath(__file__).parent / "templates"
 _templates = Environment(
-    loader=FileSystemLoader(_FOLDER),
-    autoescape=True,
-    undefined=StrictUndefined,
-    trim_blocks=True,
-    lstrip_blocks=True,
+    loader=FileSystemLoader(_FOLDER), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
 )
 
 
@@ -140,7 +136,6 @@ def get_schema(name: str, request: Request) -> Response:
 
 
 def _operations(document: dict[str, Any]) -> list[dict[str, Any]]:
-    """Operations of an OpenAPI document, as the page shows them."""
     return [
         {
             "method": method.upper(),
@@ -161,12 +156,10 @@ def _operations(document: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _name_status(status: str) -> str:
-    """A status in words."""
     return HTTPStatus(int(status)).phrase if status.isdecimal() else "of any request"
 
 
 def _bodies(document: dict[str, Any], content: dict[str, Any]) -> list[dict[str, Any]]:
-    """Media types of a body, each with its fields and examples."""
     bodies = []
     for media_type, body in content.items():
         schema = resolve_reference(document, body["schema"])

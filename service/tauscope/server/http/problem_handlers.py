@@ -1,20 +1,24 @@
-"""Which problem each exception becomes."""
+"""Which problem each exception becomes, and requests that no route foresees: methods and query parameters."""
 
 import logging
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from http import HTTPStatus
 
-from fastapi import FastAPI, Request, Response
+from fastapi import APIRouter, FastAPI, Request, Response
+from fastapi.dependencies.models import Dependant
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
+from starlette.routing import Route, compile_path
 
 from tauscope.errors import TauscopeError
 from tauscope.files import is_disk_full
-from tauscope.server.control.device_claims import BusyError
-from tauscope.server.control.leases import LeasedError, LeaseLostError, LeaseNeededError, NotArmedError
-from tauscope.server.http.methods import find_methods
+from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.server.auth.keys import is_stop
+from tauscope.server.control.leases import BusyError, LeasedError, LeaseLostError, LeaseNeededError, NotArmedError
 from tauscope.server.problems import (
+    FieldError,
     ProblemError,
     field_errors,
     make_code_answer,
@@ -24,6 +28,47 @@ from tauscope.server.problems import (
 )
 from tauscope.server.queue.queue import QueueFullError
 from tauscope.server.store.recordings import NameTakenError
+
+
+async def require_known_query(request: Request) -> None:
+    """Refuse a request with a query parameter that its route does not know; a stop is never refused.
+
+    Raises ProblemError naming the parameter.
+    """
+    if not request.query_params or is_stop(request.method, request.url.path):
+        return
+    known = set(_find_names(request.scope["route"].dependant))
+    unknown = sorted(set(request.query_params) - known)
+    if unknown:
+        hint = nearest(unknown[0], known) if known else "this address takes none"
+        text = one_line(f"query parameter {shown(unknown[0])} is not known here; {hint}")
+        errors = [FieldError(field=one_line(f"query.{name}")[:200], message="not known here") for name in unknown[:100]]
+        raise ProblemError("invalid-request", text, errors=errors)
+
+
+def _find_names(dependant: Dependant) -> Iterator[str]:
+    yield from (field.alias for field in dependant.query_params)
+    for other in dependant.dependencies:
+        yield from _find_names(other)
+
+
+Methods = Sequence[tuple[re.Pattern[str], frozenset[str]]]  # for each route the pattern of its path, and its methods
+
+
+def collect_methods(routers: Iterable[tuple[str, APIRouter]]) -> Methods:
+    """The methods of all routes. `routers`: iterable of (str, APIRouter), each with the prefix of its paths."""
+    return tuple(
+        (compile_path(prefix + route.path)[0], frozenset(route.methods or ()))
+        for prefix, router in routers
+        for route in router.routes
+        if isinstance(route, Route)
+    )
+
+
+def find_methods(methods: Methods, path: str) -> list[str]:
+    """The methods that an address knows, sorted."""
+    return sorted({method for pattern, known in methods if pattern.match(path) for method in known})
+
 
 _log = logging.getLogger("tauscope.api")
 
@@ -46,7 +91,6 @@ def install_problem_handlers(app: FastAPI) -> None:
 
 
 async def _tauscope_error(request: Request, error: Exception) -> Response:
-    """A failure that Tauscope foresees."""
     if isinstance(error, QueueFullError):
         return problem_answer(make_problem("queue-full", str(error), request.url.path), {"Retry-After": "10"})
     if isinstance(error, BusyError):
@@ -58,7 +102,6 @@ async def _tauscope_error(request: Request, error: Exception) -> Response:
 
 
 async def _validation_error(request: Request, error: Exception) -> Response:
-    """Path or query parameters that are not as documented."""
     assert isinstance(error, RequestValidationError)  # noqa: S101 - Starlette looks handlers up by type
     fields = field_errors(error.errors())
     return problem_answer(make_problem("invalid-request", summarise(fields), request.url.path, fields))
@@ -91,5 +134,4 @@ async def _system_error(request: Request, error: Exception) -> Response:
 
 
 async def _client_gone(_request: Request, _error: Exception) -> Response:
-    """Nobody reads the answer."""
     return Response(status_code=400)

@@ -11,9 +11,10 @@ from urllib.parse import urlsplit
 import anyio
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from typing_extensions import override
 
 from tauscope.errors import LimitExceededError
-from tauscope.server.auth.gate import find_caller
+from tauscope.server.auth.gate import HttpMiddleware, find_caller
 from tauscope.server.http.metrics import Metrics
 from tauscope.server.problems import make_problem, problem_answer
 
@@ -22,16 +23,11 @@ _request_log = logging.getLogger("tauscope.requests")
 REQUEST_ID = "X-Request-Id"
 
 
-class RequestLog:
+class RequestLog(HttpMiddleware):
     """Counts, times and logs requests."""
 
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request."""
-        if scope["type"] != "http":
-            return await self.app(scope, receive, send)
+    @override
+    async def answer(self, scope: Scope, receive: Receive, send: Send) -> None:
         number, began, status, answered = uuid.uuid4().hex, time.monotonic(), 500, None
 
         async def send_observed(message: Message) -> None:
@@ -82,16 +78,11 @@ HEADERS: Mapping[str, str] = {
 }
 
 
-class ResponseProtection:
+class ResponseProtection(HttpMiddleware):
     """Adds the headers of every answer, and turns an unforeseen exception into a problem without internals."""
 
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request."""
-        if scope["type"] != "http":
-            return await self.app(scope, receive, send)
+    @override
+    async def answer(self, scope: Scope, receive: Receive, send: Send) -> None:
         has_begun = False
 
         async def send_safely(message: Message) -> None:
@@ -114,22 +105,21 @@ class ResponseProtection:
             await answer(scope, receive, send_safely)
 
 
-class OriginCheck:
+class OriginCheck(HttpMiddleware):
     """Turns away requests for other host names (DNS rebinding) and those that a page of another origin makes."""
 
     def __init__(self, app: ASGIApp, answers_for: Callable[[str | None], bool]) -> None:
-        self.app = app
+        super().__init__(app)
         self.answers_for = answers_for
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request, or turn it away."""
-        if scope["type"] == "http" and (reason := self._reason(Headers(scope=scope))):
+    @override
+    async def answer(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if reason := self._reason(Headers(scope=scope)):
             answer = problem_answer(make_problem(*reason, scope["path"]))
             return await answer(scope, receive, send)
         return await self.app(scope, receive, send)
 
     def _reason(self, headers: Headers) -> tuple[str, str] | None:
-        """Code and detail of the problem with the caller, if there is one."""
         host, origin = headers.get("host", ""), headers.get("origin")
         if not self.answers_for(_host_name(f"//{host}")):
             return "host", f"this service does not answer for the host {host!r}; call it by the address it listens at"
@@ -149,11 +139,10 @@ def _host_name(address: str) -> str | None:
         return None
 
 
-LONGEST_WAIT_S = 30.0
-"""How long a client that has its answer may go on sending."""
+LONGEST_WAIT_S = 30.0  # how long a client that has its answer may go on sending
 
 
-class BodyLimit:
+class BodyLimit(HttpMiddleware):
     """Ends a request whose body is larger than allowed, by its own word or by count, with problem `limit-exceeded`.
 
     Whenever a request is answered before its body was read, the rest is read and dropped: else a client that is still
@@ -162,13 +151,11 @@ class BodyLimit:
 
     def __init__(self, app: ASGIApp, limit: int) -> None:
         """Limit bodies to `limit` [bytes]."""
-        self.app = app
+        super().__init__(app)
         self.limit = limit
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request, as far as its body is not too large."""
-        if scope["type"] != "http":
-            return await self.app(scope, receive, send)
+    @override
+    async def answer(self, scope: Scope, receive: Receive, send: Send) -> None:
         body = _CountedBody(Headers(scope=scope), receive, self.limit)
 
         async def send_unless_exceeded(message: Message) -> None:
@@ -225,25 +212,21 @@ class _CountedBody:
             await self._next()
 
     async def _next(self) -> Message:
-        """The next part, counted."""
         message = await self._receive()
         self._count += len(message.get("body", b""))
         self.is_pending = self.is_pending and bool(message.get("more_body", False))
         return message
 
 
-READERS = 2
-"""Reading requests at a time: more threads of one interpreter read no faster."""
-
-SLOT_TIMEOUT_S = 0.5
-"""A reader that a disk or a lock holds up loses its slot after this time [s]."""
+READERS = 2  # reading requests at a time: more threads of one interpreter read no faster
+SLOT_TIMEOUT_S = 0.5  # a reader that a disk or a lock holds up loses its slot after this time [s]
 
 _READING = ("GET", "HEAD")
 _PROBES = ("/healthz", "/readyz")
 """Probes have a slot of their own: a supervisor that gets no answer restarts the service, which stops its arms."""
 
 
-class ConcurrencyLimiter:
+class ConcurrencyLimiter(HttpMiddleware):
     """Admits a few reading requests at a time, first come first served; all other requests pass at once.
 
     A slot is free again when the answer begins: a stream of events keeps no other request waiting.
@@ -257,14 +240,14 @@ class ConcurrencyLimiter:
         is_closing: Callable[[], bool] = lambda: False,
     ) -> None:
         """Admit `readers` at a time; one that is stuck keeps its slot for `slot_timeout_s` [s]."""
-        self.app = app
+        super().__init__(app)
         self._is_closing = is_closing
         self._slots, self._probes = asyncio.Semaphore(readers), asyncio.Semaphore(1)
         self._slot_timeout_s = slot_timeout_s
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request when a slot is free."""
-        if scope["type"] != "http" or scope["method"] not in _READING:
+    @override
+    async def answer(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["method"] not in _READING:
             return await self.app(scope, receive, send)
         slots = self._probes if scope["path"] in _PROBES else self._slots
         await slots.acquire()
@@ -293,7 +276,6 @@ class _Slot:
         self._timer = asyncio.get_running_loop().call_later(longest_s, self.end)
 
     def end(self) -> None:
-        """Let the next one in."""
         if not self._has_ended:
             self._has_ended = True
             self._timer.cancel()

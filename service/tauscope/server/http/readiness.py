@@ -1,10 +1,13 @@
-"""Whether the service can work: its database, disk, workers and clock, each asked within a bounded time."""
+"""Whether the service lives and can work: the event loop's heartbeat; database, disk, workers and clock."""
 
+import asyncio
 import os
+import socket
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,17 +19,89 @@ from prometheus_client.registry import Collector
 
 from tauscope.errors import StoreError
 
-LEAST_FREE_BYTES = 64 * 2**20
-"""Room on the disk below which no run should begin [bytes]."""
+BEAT_S = 0.1  # how often the event loop shows that it turns [s]
+SILENCE_S = 2.0  # silence of the event loop after which it counts as stuck [s]
 
-TIMEOUT_S = 2.0
-"""How long each part may take to answer [s]."""
+
+class Heartbeat:
+    """The last sign of life of the event loop."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._last = clock()
+
+    def beat(self) -> None:
+        """Show a sign of life."""
+        self._last = self._clock()
+
+    def is_alive(self) -> bool:
+        """Whether the last sign of life is recent."""
+        return self._clock() - self._last < SILENCE_S
+
+    @asynccontextmanager
+    async def keep_beating(self) -> AsyncIterator[None]:
+        """Show signs of life as long as the event loop turns, within the context."""
+        async with _repeat(self.beat, BEAT_S):
+            yield
+
+
+@asynccontextmanager
+async def _repeat(call: Callable[[], object], interval_s: float | None) -> AsyncIterator[None]:
+    """Call a function again and again, within the context; never where there is no interval."""
+
+    async def repeat(pause_s: float) -> None:
+        while True:
+            call()
+            await asyncio.sleep(pause_s)
+
+    task = None if interval_s is None else asyncio.create_task(repeat(interval_s))
+    try:
+        yield
+    finally:
+        if task is not None:
+            task.cancel()
+            with suppress(asyncio.CancelledError):
+                await task
+
+
+def notify(state: str, environment: Mapping[str, str] = os.environ) -> bool:
+    """Tell systemd a state."""
+    address = environment.get("NOTIFY_SOCKET", "")
+    if not address.startswith(("/", "@")):
+        return False
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as channel:
+        try:
+            channel.sendto(state.encode(), address.replace("@", "\0", 1) if address[0] == "@" else address)
+        except OSError:
+            return False
+    return True
+
+
+def watchdog_interval_s(environment: Mapping[str, str] = os.environ) -> float | None:
+    """How often systemd wants a sign of life, halved; None where it wants none [s]."""
+    text = environment.get("WATCHDOG_USEC", "")
+    is_ours = environment.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
+    return int(text) * 0.5e-6 if text.isdecimal() and int(text) > 0 and is_ours else None
+
+
+@asynccontextmanager
+async def notify_systemd() -> AsyncIterator[None]:
+    """Say that the service is ready, give signs of life as long as the event loop turns, and say that it ends."""
+    notify("READY=1")
+    try:
+        async with _repeat(lambda: notify("WATCHDOG=1"), watchdog_interval_s()):
+            yield
+    finally:
+        notify("STOPPING=1")
+
+
+LEAST_FREE_BYTES = 64 * 2**20  # room on the disk below which no run should begin [bytes]
+TIMEOUT_S = 2.0  # how long each part may take to answer [s]
 
 EARLIEST = datetime(2026, 1, 1, tzinfo=UTC)
 """A clock before this moment was never set: identifiers, leases and schedules would be wrong."""
 
-MOST_SETBACK_S = 60.0
-"""How far the clock may be set back while the service runs: items are sorted by it [s]."""
+MOST_SETBACK_S = 60.0  # how far the clock may be set back while the service runs: items are sorted by it [s]
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,23 +15,12 @@ from tauscope.server.problems import ProblemError
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
-WIDTH = 2
-"""Files that are read at a time; a caller has one of them, so that another caller finds a process free."""
-
-MOST_WAITING = 32
-"""Requests that wait for a process."""
-
-MOST_WAITING_EACH = 8
-"""Requests of one caller that wait, a page's worth of plots."""
-
-READING = ("queue-full", "limit-exceeded", "worker-lost")
-"""Problems of a route that has a file read."""
-
-POLL_S = 0.1
-"""How often a client is asked whether it is still there [s]."""
-
-RETRY_S = 2
-"""When a request that found the queue full may come again [s]."""
+WIDTH = 2  # files that are read at a time; a caller has one of them, so that another caller finds a process free
+MOST_WAITING = 32  # requests that wait for a process
+MOST_WAITING_EACH = 8  # requests of one caller that wait, a page's worth of plots
+READING = ("queue-full", "limit-exceeded", "worker-lost")  # problems of a route that has a file read
+POLL_S = 0.1  # how often a client is asked whether it is still there [s]
+RETRY_S = 2  # when a request that found the queue full may come again [s]
 
 
 class ReadingQueue:
@@ -44,7 +33,6 @@ class ReadingQueue:
         self._waiting: Counter[str] = Counter()
 
     def __len__(self) -> int:
-        """How many requests wait or are read for."""
         return self._waiting.total()
 
     async def call(
@@ -72,7 +60,6 @@ class ReadingQueue:
                 del self._waiting[caller], self._turns[caller]
 
     async def _take_turn(self, turn: asyncio.Lock, function: Callable[[], Result]) -> Result:
-        """Call a function when it is the caller's turn."""
         async with turn, self._slots:
             try:
                 # Cancelling this cancels the future, which ends the process.

@@ -2,20 +2,104 @@
 
 import base64
 import hashlib
+import os
 import re
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
 from typing import cast
 
+from pydantic import Field, ValidationError
 from python_multipart.multipart import parse_options_header
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Send
 from starlette.types import Scope as AsgiScope
+from typing_extensions import override
 
-from tauscope.server.auth.gate import find_caller
-from tauscope.server.http.repeated_answers import KeptAnswer, StoredAnswers, request_name
-from tauscope.server.http.services import Services
+from tauscope.files import sync_folder, write_atomically
+from tauscope.server.auth.gate import HttpMiddleware, find_caller
 from tauscope.server.problems import make_problem, problem_answer
+from tauscope.strict_model import StrictModel
+
+LIFE_S = 24 * 3600.0  # how long an answer is kept [s]
+
+
+class KeptAnswer(StrictModel):
+    """What was answered."""
+
+    fingerprint: str = Field(description="of the request's body, in hexadecimal")
+    status: int = Field(description="of the answer")
+    headers: tuple[tuple[str, str], ...] = Field(description="of the answer")
+    body: str = Field(description="of the answer, in base64")
+
+    def content(self) -> bytes:
+        """The body as it was sent."""
+        return base64.b64decode(self.body)
+
+
+def request_name(caller: str, path: str, key: str) -> str:
+    """What a request is called: nobody meets another caller's answers."""
+    return hashlib.sha256("\n".join((caller, path, key)).encode()).hexdigest()
+
+
+_TIDY_EVERY = 500
+
+
+class StoredAnswers:
+    """Answers that outlast the service, each request durably claimed."""
+
+    def __init__(self, folder: Path, clock: Callable[[], float] = time.time) -> None:
+        """Open the store; its folder is made where it is missing, and answers that are too old go."""
+        self._folder, self._clock = folder, clock
+        self._lock = threading.Lock()
+        self._begun = 0
+        folder.mkdir(parents=True, exist_ok=True)
+        self._tidy()
+
+    def begin(self, name: str) -> bool:
+        """Claim a request before anything is done.
+
+        Raises OSError if that has to be written down and cannot be.
+
+        Raises OSError if that cannot be written down. Returns bool: False where the request was begun before.
+        """
+        with self._lock:
+            self._begun += 1
+            if self._begun % _TIDY_EVERY == 0:
+                self._tidy()
+        try:
+            descriptor = os.open(self._folder / name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        except FileExistsError:
+            return False
+        os.close(descriptor)
+        sync_folder(self._folder)
+        return True
+
+    def finish(self, name: str, answer: KeptAnswer | None) -> None:
+        """Keep the answer, or forget a request that did nothing."""
+        if answer is None:
+            (self._folder / name).unlink(missing_ok=True)
+        else:
+            write_atomically(self._folder / name, answer.model_dump_json().encode())
+
+    def find(self, name: str) -> KeptAnswer | None:
+        """The answer to a request; None where there is none (yet)."""
+        try:
+            return KeptAnswer.model_validate_json((self._folder / name).read_bytes())
+        except (OSError, ValidationError):
+            return None
+
+    def _tidy(self) -> None:
+        """Remove what is too old."""
+        for entry in self._folder.iterdir():
+            try:
+                if self._clock() - entry.stat().st_mtime > LIFE_S:
+                    entry.unlink(missing_ok=True)
+            except OSError:
+                continue
 
 
 class Fingerprint:
@@ -47,25 +131,24 @@ class Fingerprint:
 
 HEADER = "Idempotency-Key"
 
-LONGEST_KEY = 200
-"""Most characters of the header's value."""
+LONGEST_KEY = 200  # most characters of the header's value
 
 _REPEATABLE = re.compile(
-    r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|rollouts|recordings|schedules/[^/]+/run)"
+    r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|rollouts|recordings|robots(?:/check)?|schedules/[^/]+/run)"
 )
 _KEY = re.compile(rf"[\x21-\x7e]{{1,{LONGEST_KEY}}}")
 
 
-class IdempotentRequests:
+class IdempotentRequests(HttpMiddleware):
     """Answers a request that came before with the answer of then."""
 
     def __init__(self, app: ASGIApp) -> None:
-        self.app = app
+        super().__init__(app)
         self._underway: set[str] = set()
 
-    async def __call__(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
-        """Answer a request."""
-        key = Headers(scope=scope).get(HEADER) if scope["type"] == "http" else None
+    @override
+    async def answer(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
+        key = Headers(scope=scope).get(HEADER)
         if key is None or scope["method"] != "POST" or not is_repeatable(scope["path"]):
             return await self.app(scope, receive, send)
         if not _KEY.fullmatch(key):
@@ -88,7 +171,6 @@ class IdempotentRequests:
             self._underway.discard(name)
 
     async def _answer_first(self, scope: AsgiScope, receive: Receive, send: Send, name: str) -> None:
-        """Answer a request that is new, and keep the answer before it is sent."""
         store = _answers_of(scope)
         fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
         answer = _Captured()
@@ -111,8 +193,7 @@ def is_repeatable(path: str) -> bool:
 
 
 def _answers_of(scope: AsgiScope) -> StoredAnswers:
-    """Where answers are kept."""
-    return cast(Services, scope["app"].state.services).answers
+    return cast(StoredAnswers, scope["app"].state.services.answers)
 
 
 class _Captured:
@@ -125,7 +206,6 @@ class _Captured:
         self._headers: list[tuple[bytes, bytes]] = []
 
     async def take(self, message: Message) -> None:
-        """Take a part of it."""
         self.messages.append(message)
         if message["type"] == "http.response.start":
             self.status, self._headers = message["status"], list(message["headers"])
@@ -133,13 +213,10 @@ class _Captured:
             self.body += message.get("body", b"")
 
     def header_texts(self) -> tuple[tuple[str, str], ...]:
-        """Its headers as text."""
         return tuple((name.decode("latin-1"), value.decode("latin-1")) for name, value in self._headers)
 
 
 def _count_body(receive: Receive, fingerprint: Fingerprint) -> Receive:
-    """The body on its way to the application."""
-
     async def received() -> Message:
         message = await receive()
         fingerprint.add(message.get("body", b"") or b"")
@@ -149,7 +226,6 @@ def _count_body(receive: Receive, fingerprint: Fingerprint) -> Receive:
 
 
 async def _repeat(scope: AsgiScope, receive: Receive, store: StoredAnswers, name: str, is_underway: bool) -> Response:
-    """The answer to a request that came before."""
     fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
     more = True
     while more:

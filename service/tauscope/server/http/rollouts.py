@@ -7,16 +7,15 @@ from pydantic import Field
 from tauscope.closed_loop import RolloutDocument
 from tauscope.diagnosis.extended_model import LARGEST_FILE
 from tauscope.errors import NotFoundError
+from tauscope.server.http.answers import JobAnswer, JobLinks, require_document
 from tauscope.server.http.diagnoses import DIAGNOSES
 from tauscope.server.http.identifications import IDENTIFICATIONS
 from tauscope.server.http.openapi import binary_part, binary_parts
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.robot_files import EXAMPLE_ROBOT
 from tauscope.server.http.services import Services
-from tauscope.server.http.tasks.answers import JobAnswer, JobLinks, require_document
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import report_document, result_document
 from tauscope.server.http.tasks.submission import MODEL_FILE, Names, Received, RecordingsRequest, keep_model
-from tauscope.server.models import PageAnswer
 from tauscope.server.queue.analyses import RolloutWorkspace
 from tauscope.server.queue.task_job import SAVED_MODEL, OrderedRecording
 from tauscope.tasks.task import ReadingOptions
@@ -47,7 +46,7 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
     "identified": (
         "A recording on the server, and the model of an identification",
         {"robot": EXAMPLE_ROBOT, "recordings": ["wednesday.mcap"], "model": "20261103T101502Z-1f2e3d4c"},
-    ),
+    )
 }
 
 
@@ -64,12 +63,6 @@ class RolloutAnswer(JobAnswer):
     refine: tuple[OrderedRecording, ...] = Field(default=(), description="what the model is refined by")
     options: ReadingOptions | None = Field(default=None, description="how the recordings are read")
     links: RolloutLinksAnswer = Field(description="where to go on")
-
-
-class RolloutListAnswer(PageAnswer):
-    """Rollouts that are kept."""
-
-    rollouts: list[RolloutAnswer] = Field(description="the newest first")
 
 
 def place_model(received: Received[RolloutRequest], services: Services, workspace: Any) -> dict[str, str | None]:
@@ -94,7 +87,7 @@ ROLLOUTS = QueuedTask(
     plural="rollouts",
     kind=lambda services: services.rollouts,
     workspace=RolloutWorkspace,
-    models=(RolloutRequest, RolloutAnswer, RolloutListAnswer),
+    models=(RolloutRequest, RolloutAnswer),
     examples=EXAMPLES,
     summary="Hand in a rollout",
     words="The robot is checked at once, MuJoCo gets the commands of the recordings in the job: follow `Location` until"
@@ -107,10 +100,7 @@ ROLLOUTS = QueuedTask(
     further=place_model,
     further_parts={"model": (SAVED_MODEL, LARGEST_FILE)},
     work_problems=("robot-file", "recording", "recording-mismatch", "identification", "export", "invalid-request"),
-    documents=(
-        result_document("a rollout", "rollout", RolloutDocument),
-        report_document("rollout"),
-    ),
+    documents=(result_document("a rollout", "rollout", RolloutDocument), report_document("rollout")),
 )
 
 router = ROLLOUTS.router()

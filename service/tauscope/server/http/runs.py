@@ -20,25 +20,34 @@ from tauscope.runtime.record import RunRecord
 from tauscope.runtime.states import RunState
 from tauscope.runtime.timing import RealTime, Timing
 from tauscope.server.control.leases import Permit
-from tauscope.server.control.motions import DesignedMotion, Motion, ready_motion, take_trajectory
-from tauscope.server.control.run import RunRequestRecord, RunWorkspace
+from tauscope.server.control.run import (
+    DesignedMotion,
+    Motion,
+    RunRequestRecord,
+    RunWorkspace,
+    ready_motion,
+    take_trajectory,
+)
 from tauscope.server.control.run_manager import run_recording_name
-from tauscope.server.http.backends import BackendRequest, chosen_backend
-from tauscope.server.http.documents import file_answer, to_json_text
+from tauscope.server.http.answers import AnswerModel, Identifier, MotionLinks, convert_problem
+from tauscope.server.http.bodies import PartRule, file_answer, to_json_text
 from tauscope.server.http.excitations import EXCITATIONS
-from tauscope.server.http.form import PartRule
 from tauscope.server.http.leases import permit_of
-from tauscope.server.http.openapi import binary_part, file_contents
-from tauscope.server.http.robots.files import read_received_robot
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.openapi import binary_part, file_responses
+from tauscope.server.http.robot_files import EXAMPLE_ROBOT, read_received_robot
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.answers import MotionLinks, shown_problem
 from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
-from tauscope.server.http.tasks.routes import Identifier
-from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request, stage_request
-from tauscope.server.models import AnswerModel, PageAnswer
-from tauscope.server.problems import Problem, ProblemError, make_problem, problem_responses
-from tauscope.server.queue.excitation import ExcitationOrder, ExcitationWorkspace, check_trajectory
+from tauscope.server.http.tasks.submission import (
+    BackendRequest,
+    Received,
+    RobotRequest,
+    choose_backend,
+    keep_robot,
+    receive_request,
+    stage_request,
+)
+from tauscope.server.problems import Problem, ProblemError, make_problem
+from tauscope.server.queue.analyses import ExcitationOrder, ExcitationWorkspace, check_trajectory
 from tauscope.server.queue.task_job import submit_job
 from tauscope.server.store.event_log import EventLog
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
@@ -64,7 +73,6 @@ class RunRequest(RunOptions, RobotRequest, strict=True):
 
     @model_validator(mode="after")
     def _check_motion(self) -> Self:
-        """One motion at most."""
         if self.excitation is not None and self.trajectory is not None:
             raise PydanticCustomError("motions", "excitation and trajectory are both given; give one motion")
         return self
@@ -139,12 +147,6 @@ class RunAnswer(AnswerModel):
     links: RunLinks = Field(description="where to go on")
 
 
-class RunListAnswer(PageAnswer):
-    """Runs that are kept."""
-
-    runs: list[RunAnswer] = Field(description="the newest first")
-
-
 class StopAnswer(AnswerModel):
     """What became of the wish to stop a run."""
 
@@ -168,7 +170,7 @@ class FollowedRun:
     has_ended: Callable[[], bool]
 
 
-def followed_run(services: Services, identifier: str) -> FollowedRun:
+def follow_run(services: Services, identifier: str) -> FollowedRun:
     """A run whose events are followed. Raises NotFoundError if there is none."""
     workspace = find_run(services, identifier)
 
@@ -188,29 +190,18 @@ def describe(services: Services, identifier: str, root: str) -> RunAnswer:
         problem = make_problem("damaged", detail, here)
         return RunAnswer(id=identifier, state="damaged", problem=problem, links=_links(here, None, None, workspace))
     goes_on = live is not None and not record.state.is_end
-    return RunAnswer(
+    return RunAnswer.describe(
+        record,
         id=identifier,
-        state=record.state,
         step=workspace.read_step() if goes_on else None,
         percent=live.percent if live is not None and goes_on else 100.0 * record.played,
         figures=dict(live.figures) if live is not None and goes_on else {},
         created=record.history[0].at,
         ended=record.history[-1].at if record.state.is_end else None,
-        robot=record.robot,
         backend=request.backend,
         options=request.options,
         campaign=request.campaign,
-        stop_policy=record.stop_policy,
-        ramp_s=record.ramp_s,
-        motion_s=record.motion_s,
-        holds=record.holds,
-        drives=record.drives,
-        kept=record.kept,
-        timing=record.timing,
-        real_time=record.real_time,
-        worst_following=record.worst_following,
-        stop=record.stop,
-        problem=shown_problem(workspace.problem(), here),
+        problem=convert_problem(workspace.problem(), here),
         recording=_recording(services, identifier, record),
         links=_links(here, request.excitation and f"{root}/excitations/{request.excitation}", record, workspace),
     )
@@ -233,18 +224,10 @@ def require_recording(services: Services, identifier: str, format_: RecordingFor
 
 
 def _recording(services: Services, identifier: str, record: RunRecord) -> RunRecordingAnswer | None:
-    """What a run left behind."""
     left, name = record.recording, run_recording_name(identifier)
     if left is None:
         return None
-    is_kept = services.recordings.holds(name)
-    return RunRecordingAnswer(
-        name=name if is_kept else None,
-        samples=left.samples,
-        partial=left.partial,
-        lost_rows=left.lost_rows,
-        remarks=left.remarks,
-    )
+    return RunRecordingAnswer.describe(left, name=name if services.recordings.holds(name) else None)
 
 
 def _links(here: str, excitation: str | None, record: RunRecord | None, workspace: RunWorkspace) -> RunLinks:
@@ -258,8 +241,7 @@ def _links(here: str, excitation: str | None, record: RunRecord | None, workspac
     )
 
 
-LARGEST_TRAJECTORY = 64 * 2**20
-"""Bytes of the largest trajectory file that is accepted."""
+LARGEST_TRAJECTORY = 64 * 2**20  # bytes of the largest trajectory file that is accepted
 
 
 async def submit_run(request: Request, services: Services) -> str:
@@ -308,7 +290,6 @@ def _put_robot(received: Received[RunRequest], services: Services, workspace: Ru
 def _prepare(
     received: Received[RunRequest], services: Services, workspace: RunWorkspace, robot_file: str, robot: Robot
 ) -> _Wanted:
-    """Put the trajectory into its place."""
     document = received.document
     uploaded = received.form.file("trajectory") is not None
     if document.trajectory is not None:
@@ -321,12 +302,11 @@ def _prepare(
         uploaded = True
     if uploaded and document.excitation is not None:
         raise ProblemError("invalid-request", "excitation and trajectory were both given; give one motion")
-    backend = chosen_backend(services.settings, document.backend, robot)
+    backend = choose_backend(services.settings, document.backend, robot)
     return _Wanted(document, robot_file, robot, backend, uploaded)
 
 
 def _submit(wanted: _Wanted, services: Services, workspace: RunWorkspace, permit: Permit) -> str:
-    """Settle what is moved, and how, and begin."""
     document, backend = wanted.document, wanted.backend
     device = backend.device(wanted.robot.name)
     services.runs.claims.require_free(device)
@@ -369,11 +349,11 @@ Format = Annotated[RecordingFormat, Query(alias="format", description="mcap: the
 RUNS = Resource(
     noun="a run",
     plural="runs",
-    models=(RunRequest, RunAnswer, RunListAnswer),
+    models=(RunRequest, RunAnswer),
     examples=EXAMPLES,
     items=lambda services: services.runs.items,
     find=find_run,
-    followed=followed_run,
+    followed=follow_run,
     submit=submit_run,
     describe=describe,
     summary="Begin a run",
@@ -421,10 +401,7 @@ add_stopping(
     name="get_recording_of_run",
     summary="Fetch the recording of a run",
     response_class=FileResponse,
-    responses={
-        200: {"content": file_contents("application/octet-stream", "text/csv"), "description": "the file"},
-        **problem_responses("not-found", "not-finished"),
-    },
+    responses=file_responses(("application/octet-stream", "text/csv"), "not-found", "not-finished"),
 )
 def get_recording(identifier: Identifier, services: ServicesDep, format_: Format = "csv") -> FileResponse:
     """What was measured; also of a run that was stopped or interrupted, as far as it came."""

@@ -7,12 +7,11 @@ from fastapi import APIRouter, Path, Request
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
+from tauscope.server.http.answers import AnswerModel, Limit, collection
+from tauscope.server.http.bodies import read_document
 from tauscope.server.http.history import ReasonRequest
-from tauscope.server.http.openapi import json_body
+from tauscope.server.http.openapi import json_request
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.routes import Limit, collection
-from tauscope.server.models import AnswerModel
 from tauscope.server.problems import problem_responses
 from tauscope.server.schedules.definition import ScheduleDefinition
 from tauscope.server.schedules.repeater import make_schedule
@@ -117,7 +116,7 @@ def list_schedules(request: Request, services: ServicesDep) -> ScheduleListAnswe
     "/{name}",
     summary="Set a schedule up, or change it",
     responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra={"requestBody": {"required": True, "content": json_body(ScheduleRequest, EXAMPLES)}},
+    openapi_extra=json_request(ScheduleRequest, EXAMPLES),
 )
 async def put_schedule(request: Request, name: Name, services: ServicesDep) -> ScheduleAnswer:
     """It repeats something that was done once. What is due while no service runs is made up for once, or passed over.
@@ -125,7 +124,7 @@ async def put_schedule(request: Request, name: Name, services: ServicesDep) -> S
     Nothing is started outside of its window, while what it started last goes on, while somebody else has the arm, or
     where the interlock objects; such a firing is skipped, and never repeated by itself.
     """
-    body = await _read(request, services)
+    body = await read_document(request, ScheduleRequest, services.settings.max_document_bytes)
     return _answer(await run_in_threadpool(_put, name, body, services), collection(request, 1))
 
 
@@ -153,27 +152,15 @@ def list_firings(name: Name, services: ServicesDep, limit: Limit = 100) -> Firin
     status_code=202,
     summary="Do what a schedule does now",
     responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra={
-        "requestBody": {"required": True, "content": json_body(ReasonRequest, {"why": ("Why", {"reason": "a test"})})}
-    },
+    openapi_extra=json_request(ReasonRequest, {"why": ("Why", {"reason": "a test"})}),
 )
 async def run_schedule(request: Request, name: Name, services: ServicesDep) -> FiringAnswer:
     """As if it were due: window, interlock and whatever goes on are looked at. The service of its site does it."""
-    if media_type(request) != JSON:
-        raise refuse_media_type(request, JSON)
     await read_document(request, ReasonRequest, services.settings.max_document_bytes)
     return _firing(await run_in_threadpool(services.schedules.fire_now, name))
 
 
-async def _read(request: Request, services: Services) -> ScheduleRequest:
-    """The JSON body of a request."""
-    if media_type(request) != JSON:
-        raise refuse_media_type(request, JSON)
-    return await read_document(request, ScheduleRequest, services.settings.max_document_bytes)
-
-
 def _put(name: str, body: ScheduleRequest, services: Services) -> ScheduleEntry:
-    """Set it up, and look it up again."""
     scheduler = services.schedules
     site = None if body.anywhere else scheduler.repository.site
     scheduler.repository.put(
@@ -183,27 +170,15 @@ def _put(name: str, body: ScheduleRequest, services: Services) -> ScheduleEntry:
 
 
 def _answer(entry: ScheduleEntry, path: str) -> ScheduleAnswer:
-    """The answer that holds a schedule."""
     robot = entry.order.get("robot_name")
-    return ScheduleAnswer(
-        name=entry.name,
-        site=entry.site,
+    return ScheduleAnswer.describe(
+        entry,
         robot=robot if isinstance(robot, str) else None,
         definition=read_definition(entry),
-        created=entry.created,
-        next_due=entry.next_due,
         firings=f"{path}/{entry.name}/firings",
     )
 
 
 def _firing(entry: FiringEntry) -> FiringAnswer:
-    """The answer that holds a firing."""
-    return FiringAnswer(
-        number=entry.number,
-        due=entry.due,
-        is_asked=entry.is_asked,
-        state=entry.state,
-        reason=entry.reason,
-        item=None if entry.item is None else f"/api/v1/{FOLDERS[entry.item[0]]}/{entry.item[1]}",
-        item_state=entry.item_state,
-    )
+    item = None if entry.item is None else f"/api/v1/{FOLDERS[entry.item[0]]}/{entry.item[1]}"
+    return FiringAnswer.describe(entry, item=item)

@@ -61,8 +61,7 @@ def hide_secrets(_logger: Any, _method: str, event: MutableMapping[str, Any]) ->
     return event
 
 
-GRACE_S = 5
-"""How long open requests may take when the service is asked to stop."""
+GRACE_S = 5  # how long open requests may take when the service is asked to stop
 
 
 SWITCH_S = 0.0005
@@ -131,7 +130,6 @@ class _Server(uvicorn.Server):
             await self._open.aclose()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Stop the arms, then everything else."""
         services: Services | None = getattr(self._app.state, "services", None)
         if services is not None:
             services.begin_to_close()
@@ -140,7 +138,6 @@ class _Server(uvicorn.Server):
 
 
 def _check_certificate(settings: Settings) -> None:
-    """Refuse a certificate without key, or files that are neither."""
     if (settings.tls_certificate is None) != (settings.tls_key is None):
         raise TauscopeError("TLS: certificate and key belong together; give --tls-certificate and --tls-key")
     if settings.tls_certificate is None:
@@ -153,7 +150,6 @@ def _check_certificate(settings: Settings) -> None:
 
 
 def _listen(settings: Settings) -> socket.socket:
-    """A socket that listens at the address."""
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     # With the protocol named, answers are sent at once (TCP_NODELAY); asyncio would let them wait for each other else.
     listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)

@@ -18,38 +18,31 @@ from tauscope.errors import TauscopeError
 from tauscope.server.auth.audit_log import AuditLog, AuditTrail
 from tauscope.server.auth.gate import Access, RateLimit
 from tauscope.server.auth.keys import KeyFile, KeyRing
-from tauscope.server.control.campaign_manager import CampaignManager
-from tauscope.server.control.campaign_runner import CampaignDependencies
-from tauscope.server.control.device_claims import DeviceClaims
-from tauscope.server.control.leases import Lease, Leases
+from tauscope.server.control.campaign_runner import CampaignDependencies, CampaignManager
+from tauscope.server.control.leases import DeviceClaims, Lease, Leases
 from tauscope.server.control.run import start_control
-from tauscope.server.control.run_manager import RunManager
-from tauscope.server.control.run_supervisor import StartControl
+from tauscope.server.control.run_manager import RunManager, StartControl
 from tauscope.server.history.indexer import Indexer, open_index
 from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.history.model_registry import DriftMonitor, ModelRegistry
 from tauscope.server.history.retention import RetentionRule, RetentionSweeper
-from tauscope.server.http.heartbeat import Heartbeat
 from tauscope.server.http.metrics import Metrics, TimedExecutor
-from tauscope.server.http.readiness import Clock, Readiness, ReadyMetrics, check_database, check_disk
+from tauscope.server.http.readiness import Clock, Heartbeat, Readiness, ReadyMetrics, check_database, check_disk
 from tauscope.server.http.reading import WIDTH, ReadingQueue
-from tauscope.server.http.repeated_answers import StoredAnswers
+from tauscope.server.http.repeated_requests import StoredAnswers
 from tauscope.server.http.settings import Settings
 from tauscope.server.http.tasks.event_feeds import EventFeeds
-from tauscope.server.queue.analyses import run_diagnosis, run_identification, run_rollout
-from tauscope.server.queue.cluster_executor import ClusterExecutor
-from tauscope.server.queue.excitation import run_excitation
-from tauscope.server.queue.executors import open_executor
+from tauscope.server.queue.analyses import run_diagnosis, run_excitation, run_identification, run_rollout
+from tauscope.server.queue.cluster_executor import ClusterExecutor, open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.server.schedules.repeater import Repeater
 from tauscope.server.schedules.repository import ScheduleRepository
 from tauscope.server.schedules.scheduler import Scheduler, new_boot
-from tauscope.server.store.data_folder import FOLDERS, FolderLock, item_stores, site_identifier
+from tauscope.server.store.data_folder import FOLDERS, FolderLock, ItemStore, item_stores, site_identifier
 from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index
-from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.server.store.robots import RobotStore
 
@@ -97,17 +90,14 @@ async def _services_of(request: Request) -> Services:
     return cast(Services, request.app.state.services)
 
 
-ServicesDep = Annotated[Services, Depends(_services_of)]
-"""The services, as an argument of a route."""
+ServicesDep = Annotated[Services, Depends(_services_of)]  # the services, as an argument of a route
 
 
-PRUNING_S = 3600.0
-"""How often what is old is removed, where the operator asked for it [s]."""
+PRUNING_S = 3600.0  # how often what is old is removed, where the operator asked for it [s]
 
 DAY_S = 86400.0
 
-REQUESTS_PER_S = 200.0
-"""How often a key may call in the long run, where the operator says nothing [1/s]."""
+REQUESTS_PER_S = 200.0  # how often a key may call in the long run, where the operator says nothing [1/s]
 
 
 @contextmanager
@@ -245,8 +235,6 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
 def _collect_checks(
     ground: _Ground, jobs: JobQueue, readers: Executor, audit: AuditTrail, closing: threading.Event
 ) -> dict[str, Callable[[], str | None]]:
-    """What `/readyz` asks."""
-
     def check_workers() -> str | None:
         if not jobs.can_work():
             return "the Dask cluster does not answer, and jobs wait for it"
@@ -269,7 +257,6 @@ def open_readers(settings: Settings) -> Executor:
 
 
 def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind, JobKind, JobKind, JobKind]:
-    """Identifications, diagnoses, designed motions and rollouts."""
     where = {"server_recordings": settings.recordings_folder}
     return (
         JobKind(items["identification"], partial(run_identification, **where)),
@@ -311,7 +298,6 @@ def _retention(services: Services) -> list[Callable[[], object]]:
 
 
 def _watch(services: Services, drift: DriftMonitor) -> None:
-    """Numbers that are asked for when somebody looks at the metrics."""
     metrics, folder = services.metrics, services.settings.data_folder
     metrics.loops.live = services.runs.list_live
     metrics.watch_drift(drift)
@@ -323,7 +309,6 @@ def _watch(services: Services, drift: DriftMonitor) -> None:
 
 
 def _note_end(audit: AuditTrail, lease: Lease, why: str) -> None:
-    """A lease has ended."""
     audit.note("service", "lease ended", subject=lease.id, device=lease.device, holder=lease.holder, reason=why)
 
 

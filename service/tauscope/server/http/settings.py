@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field, SecretStr
 
 from tauscope.runtime.drivers import DEFAULT_BACKEND, BackendName
-from tauscope.server.store.data_folder import FOLDERS, RECORDINGS
+from tauscope.server.store.data_folder import RECORDINGS, ItemKind
 from tauscope.server.store.database.database import FILE_NAME
 
 MEBIBYTE = 2**20
@@ -56,13 +56,12 @@ class Settings(BaseModel):
     )
 
     require_lease: bool = Field(
-        default=False,
-        description="whether an arm moves by a lease only; where keys are asked for, it always does",
+        default=False, description="whether an arm moves by a lease only; where keys are asked for, it always does"
     )
     prune_older_than_days: float | None = Field(
         default=None, ge=0, description="what ended longer ago is removed, hour after hour [days]; null: nothing is"
     )
-    prune_kinds: tuple[Literal["excitation", "run", "identification", "diagnosis", "rollout", "campaign"], ...] = Field(
+    prune_kinds: tuple[ItemKind, ...] = Field(
         default=(), description="kinds of items that it is said of; empty: every kind"
     )
     prune_recordings: bool = Field(
@@ -94,31 +93,6 @@ class Settings(BaseModel):
         return self.data_folder / RECORDINGS
 
     @property
-    def identifications_folder(self) -> Path:
-        """Identifications, each a folder."""
-        return self.data_folder / FOLDERS["identification"]
-
-    @property
-    def diagnoses_folder(self) -> Path:
-        """Diagnoses, each a folder."""
-        return self.data_folder / FOLDERS["diagnosis"]
-
-    @property
-    def excitations_folder(self) -> Path:
-        """Designed motions, each a folder."""
-        return self.data_folder / FOLDERS["excitation"]
-
-    @property
-    def runs_folder(self) -> Path:
-        """Runs, each a folder."""
-        return self.data_folder / FOLDERS["run"]
-
-    @property
-    def campaigns_folder(self) -> Path:
-        """Campaigns, each a folder."""
-        return self.data_folder / FOLDERS["campaign"]
-
-    @property
     def is_local(self) -> bool:
         """Whether only this machine can reach the service."""
         return is_loopback(self.host)
@@ -141,7 +115,6 @@ def is_loopback(host: str) -> bool:
 
 
 def _is_address(name: str) -> bool:
-    """Whether a host is given as a number."""
     try:
         ipaddress.ip_address(name.strip("[]"))
     except ValueError:

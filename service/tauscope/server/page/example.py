@@ -56,7 +56,6 @@ def example_files() -> dict[str, bytes]:
 
 
 def _robot() -> Robot:
-    """The arm with the model that its file states."""
     with TemporaryDirectory(prefix="tauscope-example-") as folder:
         path = Path(folder) / "example-arm.yaml"
         path.write_text(ROBOT, encoding="utf-8")

@@ -58,7 +58,6 @@ def show_asset(request: Request, name: str) -> Response:
 
 
 def _answer(request: Request, name: str) -> Response:
-    """A file, or that the browser has it already."""
     asset = assets().get(name)
     if asset is None:
         raise NotFoundError(one_line(f"the page has no file {shown(name)}; open / instead"))
@@ -96,5 +95,4 @@ def _drivers_script() -> bytes:
 
 
 def _asset(name: str, content: bytes) -> Asset:
-    """A file with its tag."""
     return Asset(content, MEDIA_TYPES[Path(name).suffix], f'"{hashlib.sha256(content).hexdigest()[:24]}"')

@@ -1,13 +1,15 @@
-"""A Dask cluster as an executor; it reconnects by itself after the scheduler was away."""
+"""Where analysis is done: worker processes of this service, or a Dask cluster that reconnects by itself."""
 
 import asyncio
 import logging
+import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from tauscope.errors import StoreError
+from tauscope.server.queue.worker_pool import WorkerPool
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -60,11 +62,8 @@ _log = logging.getLogger("tauscope.jobs")
 SCHEDULER = "DASK_SCHEDULER_ADDRESS"
 """Environment variable that names the scheduler of a Dask cluster, as in ``tcp://scheduler:8786``."""
 
-TIMEOUT_S = 10
-"""How long a scheduler may take to answer [s]."""
-
-CHECK_S = 1.0
-"""How often the scheduler is looked at: whether it is there, and how many workers it has [s]."""
+TIMEOUT_S = 10  # how long a scheduler may take to answer [s]
+CHECK_S = 1.0  # how often the scheduler is looked at: whether it is there, and how many workers it has [s]
 
 
 class ClusterUnavailableError(BrokenExecutor):
@@ -175,7 +174,6 @@ class ClusterExecutor(Executor):
             self._there.clear()
 
     def _hand_on(self, inner: "Future[Any]", outer: "Future[Any]") -> None:
-        """Give the end of a task to who waits for it."""
         from distributed import KilledWorker
 
         if outer.cancelled():
@@ -205,3 +203,16 @@ def _not_reached(address: str, error: Exception) -> StoreError:
 def _executor_of(client: "Client") -> Executor:
     """Dask's own executor. The same function of the same folder is no known result: its files may be others by now."""
     return client.get_executor(pure=False)
+
+
+def open_executor(workers: int, wait_s: float = 0.0, deadline_s: float | None = None) -> Executor:
+    """Where analysis is done: on the cluster that the environment names, else in processes of our own.
+
+    The workers of a cluster have to see the data folder under the same path. Raises StoreError if the cluster does not
+    answer, or Dask is not installed.
+
+    `wait_s`: how long a task waits for a cluster that is away before it ends [s]; `deadline_s`: how long a task may
+    take in a process of our own [s].
+    """
+    address = os.environ.get(SCHEDULER, "")
+    return ClusterExecutor(address, wait_s) if address else WorkerPool(workers, deadline_s=deadline_s)

@@ -110,7 +110,6 @@ def diagnose_robot(entry: FleetEntry, folder: Path) -> FleetResult:
 
 
 def _time(task: ModuleType, entry: FleetEntry, folder: Path) -> FleetResult:
-    """A result with how long it took."""
     begin = time.monotonic()
     return replace(_perform(task, entry, folder), seconds=time.monotonic() - begin)
 
@@ -133,7 +132,6 @@ def _perform(task: ModuleType, entry: FleetEntry, folder: Path) -> FleetResult:
 
 
 def _figures(found: Any) -> dict[str, str]:
-    """The columns of a row."""
     if hasattr(found, "verdict"):
         findings = (f"{each.effect}@{each.joint}" if each.joint else each.effect for each in found.findings)
         return {"verdict": found.verdict, "findings": "; ".join(findings)}
@@ -157,7 +155,6 @@ def _submit(executor: Executor, work: FleetWork, entry: FleetEntry, folder: Path
 
 
 def _result(future: "Future[FleetResult]", entry: FleetEntry) -> FleetResult:
-    """What came of a robot, whatever it was."""
     try:
         return future.result()
     except ClusterUnavailableError:
@@ -169,7 +166,6 @@ def _result(future: "Future[FleetResult]", entry: FleetEntry) -> FleetResult:
 
 
 def _entry(path: Path, line: int, row: dict[str, str], names: dict[str, int]) -> FleetEntry:
-    """A line of a manifest."""
     place = f"{path}: line {line}"
     if None in row or None in row.values():
         raise RecordingError(f"{place}: has not {len(COLUMNS)} columns; separate recordings by {SEPARATOR}")
@@ -186,6 +182,5 @@ def _entry(path: Path, line: int, row: dict[str, str], names: dict[str, int]) ->
 
 
 def _paths(folder: Path, text: str) -> tuple[Path, ...]:
-    """Files that a cell names."""
     words: Sequence[str] = [word.strip() for word in text.split(SEPARATOR)]
     return tuple(folder / word for word in words if word)

@@ -8,8 +8,7 @@ from tauscope.errors import TauscopeError
 
 _log = logging.getLogger("tauscope.jobs")
 
-PERIOD_S = 1.0
-"""How often the tasks are done [s]."""
+PERIOD_S = 1.0  # how often the tasks are done [s]
 
 
 class Housekeeping:
@@ -54,6 +53,5 @@ class Housekeeping:
                 self._failing.discard(task)
 
     def _run(self) -> None:
-        """Round after round."""
         while not self._closing.wait(self._period_s):
             self.round()

@@ -9,18 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.errors import RecordingError
-from tauscope.recording import (
-    ColumnMapping,
-    Reading,
-    RecordingReport,
-    check_recording,
-    find_mapping,
-    read_recording,
-)
+from tauscope.recording import ColumnMapping, Reading, RecordingReport, check_recording, find_mapping, read_recording
 from tauscope.recording.recording import Array
 from tauscope.report.series import envelope_indices
 from tauscope.robot import Robot
-from tauscope.server.queue.record import without_folders
+from tauscope.server.queue.job_folder import hide_folders, without_folders
 
 
 def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport:
@@ -30,11 +23,8 @@ def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport
 
     `joint_count`: joints that it must have; None where any number is welcome.
     """
-    try:
-        report = check_recording(path, joint_count)
-    except RecordingError as error:
-        raise type(error)(without_folders(str(error), path.parent)) from None
-    return replace(report, name=path.name)
+    with hide_folders(path.parent):
+        return replace(check_recording(path, joint_count), name=path.name)
 
 
 @dataclass(frozen=True)
@@ -79,10 +69,8 @@ def read_kept_samples(path: Path, most: int) -> bytes:
         four), then each column that the header names as 32-bit floats, little-endian; time counts from the first sample
         [s].
     """
-    try:
+    with hide_folders(path.parent):
         recording = read_recording(path)
-    except RecordingError as error:
-        raise type(error)(without_folders(str(error), path.parent)) from None
     samples = recording.samples()
     effort = recording.effort_kind.value
     values = np.hstack([samples.position, samples.effort])

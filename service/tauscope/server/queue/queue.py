@@ -10,9 +10,8 @@ from pathlib import Path
 
 from tauscope.errors import LimitExceededError, NotFoundError, TauscopeError
 from tauscope.server.queue.cluster_executor import ClusterUnavailableError
-from tauscope.server.queue.job_folder import Workspace
-from tauscope.server.queue.record import JobProblem, JobRecord, JobState
-from tauscope.server.store.items import ItemStore
+from tauscope.server.queue.job_folder import JobProblem, JobRecord, JobState, Workspace
+from tauscope.server.store.data_folder import ItemStore
 
 Work = Callable[[Path], JobProblem | None]
 """Does the job of a folder; returns why it failed. It may run in another process."""
@@ -182,7 +181,6 @@ class JobQueue:
             return job.identifier
 
     def _require_quota(self, caller: str) -> None:
-        """Refuse one more job of a caller who has enough of them."""
         self._callers = {job: who for job, who in self._callers.items() if job in self._running or job in self._waiting}
         open_jobs = sum(who == caller for who in self._callers.values())
         if caller and self._most_each is not None and open_jobs >= self._most_each:
@@ -251,7 +249,6 @@ class JobQueue:
         self._executor.shutdown(wait=True, cancel_futures=True)
 
     def _pass_over(self, job: QueuedJob) -> None:
-        """A job does not wait any more."""
         if job in self._waiting:
             self._waiting.remove(job)
 
@@ -266,7 +263,6 @@ class JobQueue:
             self._is_hindered = True
 
     def _fill_slots(self) -> None:
-        """Hand waiting jobs to the executor while it has room."""
         while (job := self._find_next()) is not None and not self._is_closed and self._is_there():
             is_wanted = job.move(JobState.RUNNING)
             self._waiting.remove(job)
@@ -282,7 +278,6 @@ class JobQueue:
         return next((job for job in self._waiting if has_room or not job.kind.is_heavy), None)
 
     def _hand_over(self, job: QueuedJob) -> None:
-        """Have the executor do a job."""
         try:
             future = self._executor.submit(job.kind.work, job.folder)
         except NotFoundError:
@@ -300,7 +295,6 @@ class JobQueue:
         future.add_done_callback(lambda done: self._end(job, done))
 
     def _end(self, job: QueuedJob, future: "Future[JobProblem | None]") -> None:
-        """Take note that the work of a job has ended, and begin the next."""
         end = self._end_of(job, future)
         with self._lock:
             self._running.pop(job, None)
@@ -316,7 +310,6 @@ class JobQueue:
                 self._waiting.appendleft(job)
 
     def _end_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> _End:
-        """How a job ended by what came of its work."""
         try:
             problem = self._problem_of(job, future)
         except (ClusterUnavailableError, BrokenExecutor) as error:

@@ -13,6 +13,7 @@ from tauscope.errors import ExportError, NotFoundError, RecordingError, Tauscope
 from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.files import write_atomically
 from tauscope.server.queue.job_folder import (
+    JobProblem,
     Workspace,
     begin_step,
     do_work,
@@ -20,12 +21,12 @@ from tauscope.server.queue.job_folder import (
     read_document,
     read_stored,
     require_wanted,
+    without_folders,
     write_stored,
 )
 from tauscope.server.queue.queue import JobKind, JobQueue
-from tauscope.server.queue.record import JobProblem, without_folders
+from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.files import hash_file
-from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.task import ROLES
@@ -211,14 +212,13 @@ class Preparable(Protocol):
 
     def prepare(self) -> None:
         """Make the folders that hold the input."""
-        ...
 
 
 Staged = TypeVar("Staged", bound=Preparable)
 
 
 @contextmanager
-def staged_workspace(items: ItemStore, kind: Callable[[Path], Staged]) -> Iterator[Staged]:
+def stage_workspace(items: ItemStore, kind: Callable[[Path], Staged]) -> Iterator[Staged]:
     """A new folder that is removed in the end, unless it was handed in meanwhile."""
     staged = items.stage()
     try:
@@ -238,12 +238,12 @@ def submit_job(
 
     `put_robot`: writes the robot's files into a folder.
     """
-    with staged_workspace(kind.items, workspace) as staged:
+    with stage_workspace(kind.items, workspace) as staged:
         put_robot(staged.robot)
         staged.write_order(order)
         return jobs.submit(kind, staged.folder)
 
 
-def ordered_on_server(recordings: RecordingStore, names: Sequence[str]) -> tuple[OrderedRecording, ...]:
+def order_kept(recordings: RecordingStore, names: Sequence[str]) -> tuple[OrderedRecording, ...]:
     """Recordings that lie on the server, as an order holds them. Raises NotFoundError if one does not lie there."""
     return tuple(OrderedRecording(name=name, origin="server", sha256=recordings.digest(name)) for name in names)

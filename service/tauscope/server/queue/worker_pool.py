@@ -18,8 +18,7 @@ from typing import Any, ParamSpec, TypeVar
 
 from tauscope.errors import LimitExceededError
 
-NICENESS = 10
-"""Of a worker, so that the service answers a stop on a machine whose processors are all at work."""
+NICENESS = 10  # of a worker, so that the service answers a stop on a machine whose processors are all at work
 
 
 def serve_connection(connection: Connection, memory_bytes: int | None) -> None:
@@ -60,7 +59,6 @@ def _describe_failure(error: BaseException) -> tuple[bool, BaseException]:
 
 
 def _end_with_service() -> None:
-    """End this process when the service is gone."""
     parent = parent_process()
     if parent is not None:
         wait([parent.sentinel])
@@ -70,8 +68,7 @@ def _end_with_service() -> None:
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
-START_S = 120.0
-"""How long a process may take to start on a busy machine [s]."""
+START_S = 120.0  # how long a process may take to start on a busy machine [s]
 
 _THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _environment = threading.Lock()
@@ -141,7 +138,6 @@ class WorkerPool(Executor):
             atexit.unregister(self._kill_all)
 
     def _kill_all(self) -> None:
-        """End every process."""
         with self._condition:
             for worker in (*self._busy, *self._idle):
                 worker.kill()
@@ -162,7 +158,6 @@ class WorkerPool(Executor):
             worker.close()
 
     def _do(self, task: _Task) -> None:
-        """Do a task in the process that was used last, or a new one."""
         try:
             worker = self._take_worker()
         except OSError as error:
@@ -190,7 +185,6 @@ class WorkerPool(Executor):
         return worker
 
     def _call(self, worker: "_Worker", task: _Task) -> "_Outcome":
-        """What comes of a call."""
         try:
             worker.begin(task.call)
         except (OSError, EOFError):
@@ -265,7 +259,6 @@ class _Worker:
             self._process.kill()
 
     def close(self) -> None:
-        """End it, and give back what it held."""
         self.kill()
         self._process.join()
         self._process.close()

@@ -18,7 +18,6 @@ ClockTime = Annotated[str, Field(pattern=r"^([01]\d|2[0-3]):[0-5]\d$", examples=
 
 
 def _time_zone(value: str) -> str:
-    """A name of the time zone database."""
     try:
         ZoneInfo(value)
     except (ZoneInfoNotFoundError, ValueError, OSError):
@@ -105,7 +104,6 @@ class ScheduleDefinition(StrictModel):
         return self.window is None or self.window.holds(now.astimezone(ZoneInfo(self.timezone)))
 
     def _trigger(self, created: datetime) -> BaseTrigger:
-        """The trigger of APScheduler."""
         zone = ZoneInfo(self.timezone)
         if self.cron is not None:
             return CronTrigger.from_crontab(self.cron, timezone=zone)

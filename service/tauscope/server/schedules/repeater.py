@@ -11,20 +11,15 @@ from typing import TypeVar
 
 from tauscope.errors import NotFoundError, TauscopeError
 from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
-from tauscope.server.control.campaign_manager import CampaignManager
-from tauscope.server.control.campaign_runner import CampaignDependencies
+from tauscope.server.control.campaign_runner import CampaignDependencies, CampaignManager
 from tauscope.server.control.leases import FREE, Permit
-from tauscope.server.queue.analyses import (
-    DiagnosisOrder,
-    DiagnosisWorkspace,
-    IdentificationOrder,
-    IdentificationWorkspace,
-)
+from tauscope.server.history.indexer import WORKSPACES
+from tauscope.server.queue.analyses import DiagnosisOrder, IdentificationOrder
 from tauscope.server.queue.job_folder import Workspace
-from tauscope.server.queue.task_job import OrderedRecording, ordered_on_server, staged_workspace, submit_job
+from tauscope.server.queue.task_job import OrderedRecording, order_kept, stage_workspace, submit_job
 from tauscope.server.schedules.definition import RecordingChoice, ScheduleDefinition
 from tauscope.server.schedules.repository import ScheduleEntry
-from tauscope.server.store.items import ItemStore
+from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.strict_model import StrictModel
 
@@ -71,23 +66,17 @@ class Repeater:
         return (self.dependencies.identifications if kind == "identification" else self.dependencies.diagnoses).items
 
     def _campaign(self, entry: ScheduleEntry) -> str:
-        """A campaign like the one that the schedule was made from."""
         order = _order(entry, CampaignOrder)
-        with staged_workspace(self.campaigns.items, CampaignWorkspace) as workspace:
+        with stage_workspace(self.campaigns.items, CampaignWorkspace) as workspace:
             write_robot(workspace.robot, entry)
             workspace.write_order(order)
             return self.campaigns.submit(workspace.folder, self.permit_for(order.backend.device(order.robot_name)))
 
     def _analyse(self, kind: str, entry: ScheduleEntry, recordings: Mapping[str, tuple[OrderedRecording, ...]]) -> str:
-        """Submit an identification or a diagnosis of other recordings."""
-        dependencies, put_robot = self.dependencies, partial(write_robot, entry=entry)
-        if kind == "identification":
-            order = _order(entry, IdentificationOrder).model_copy(update=recordings)
-            return submit_job(
-                dependencies.jobs, dependencies.identifications, IdentificationWorkspace, order, put_robot
-            )
-        order = _order(entry, DiagnosisOrder).model_copy(update=recordings)
-        return submit_job(dependencies.jobs, dependencies.diagnoses, DiagnosisWorkspace, order, put_robot)
+        is_diagnosis = kind == "diagnosis"
+        order = _order(entry, DiagnosisOrder if is_diagnosis else IdentificationOrder).model_copy(update=recordings)
+        job = self.dependencies.diagnoses if is_diagnosis else self.dependencies.identifications
+        return submit_job(self.dependencies.jobs, job, WORKSPACES[kind], order, partial(write_robot, entry=entry))
 
 
 def newest_recordings(
@@ -105,7 +94,7 @@ def newest_recordings(
     if since is not None and wanted[-1].modified <= since:
         raise NothingToDoError(f"no recording that matches {choice.pattern} is newer than the last time; record more")
     names = [entry.name for entry in wanted]
-    return ordered_on_server(store, names[: choice.train]), ordered_on_server(store, names[choice.train :])
+    return order_kept(store, names[: choice.train]), order_kept(store, names[choice.train :])
 
 
 def write_robot(folder: Path, entry: ScheduleEntry) -> None:
@@ -115,15 +104,7 @@ def write_robot(folder: Path, entry: ScheduleEntry) -> None:
 
 
 def _order(entry: ScheduleEntry, kind: type[Order]) -> Order:
-    """The order that is repeated."""
     return kind.model_validate(dict(entry.order), strict=False)
-
-
-_WORKSPACES = {
-    "campaign": CampaignWorkspace,
-    "identification": IdentificationWorkspace,
-    "diagnosis": DiagnosisWorkspace,
-}
 
 
 def make_schedule(
@@ -135,7 +116,7 @@ def make_schedule(
 
     `site`: of the data folder whose service does it; None for whichever comes first.
     """
-    workspace = _WORKSPACES[definition.kind](repeater.items(definition.kind).folder(like))
+    workspace = WORKSPACES[definition.kind](repeater.items(definition.kind).folder(like))
     order = workspace.read_order()
     if order is None:
         raise NotFoundError(f"{definition.kind} {like}: its order is missing or damaged; name another one")

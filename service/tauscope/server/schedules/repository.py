@@ -10,11 +10,10 @@ from sqlalchemy.orm import Session
 
 from tauscope.errors import NotFoundError
 from tauscope.robot.messages import nearest, one_line, shown
-from tauscope.server.store.database.database import Database
+from tauscope.server.store.database.database import Database, read_row
 from tauscope.server.store.database.tables import Firing, Item, Schedule
 
-UNDECIDED = ("asked", "claimed")
-"""States of a firing that will become another one."""
+UNDECIDED = ("asked", "claimed")  # states of a firing that will become another one
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ class FiringEntry:
 
 def schedule_entry(row: Schedule) -> ScheduleEntry:
     """What is given out of a schedule."""
-    return ScheduleEntry(row.name, row.site, row.definition, row.order, row.files, row.created, row.next_due)
+    return read_row(ScheduleEntry, row)
 
 
 def firing_entry(session: Session, row: Firing) -> FiringEntry:
@@ -70,9 +69,8 @@ def firing_entry(session: Session, row: Firing) -> FiringEntry:
         found = session.execute(query).one_or_none()
         # What is not in the index yet goes on; what is not in it any more was removed, which is told by the folder.
         state, is_final = (None, False) if found is None else (found[0], found[1])
-    return FiringEntry(
-        row.id, row.schedule.name, row.due, row.is_asked, row.state, row.reason, row.site, item, state, is_final
-    )
+    told = {"item": item, "item_state": state, "is_final": is_final}
+    return read_row(FiringEntry, row, number=row.id, schedule=row.schedule.name, **told)
 
 
 class ScheduleRepository:
@@ -190,7 +188,6 @@ class ScheduleRepository:
             return [firing_entry(session, row) for row in rows]
 
     def _is_mine(self) -> ColumnElement[bool]:
-        """Of schedules that this site may do."""
         return or_(Schedule.site == self.site, Schedule.site.is_(None))
 
     def _move(self, where: ColumnElement[bool], before: str, **values: Any) -> int:
@@ -201,7 +198,6 @@ class ScheduleRepository:
 
 
 def _schedule(session: Session, name: str) -> Schedule:
-    """The row of a schedule."""
     row = session.scalar(select(Schedule).where(Schedule.name == name))
     if row is None:
         known = session.scalars(select(Schedule.name).order_by(Schedule.name).limit(1000)).all()

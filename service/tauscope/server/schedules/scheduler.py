@@ -1,26 +1,72 @@
 """The scheduler: each firing happens once, has a definite end, and is never repeated by itself."""
 
 import logging
+import stat
+import subprocess
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from tauscope.errors import TauscopeError
-from tauscope.server.control.device_claims import BusyError
-from tauscope.server.control.interlock import find_objection
-from tauscope.server.control.leases import LeasedError
+from tauscope.robot.messages import one_line
+from tauscope.server.control.leases import BusyError, LeasedError
+from tauscope.server.queue.job_folder import without_folders
 from tauscope.server.queue.queue import QueueFullError
-from tauscope.server.queue.record import without_folders
 from tauscope.server.schedules.definition import ScheduleDefinition
 from tauscope.server.schedules.repeater import NothingToDoError, Repeater
 from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry, ScheduleRepository
-from tauscope.server.store.items import utc_now
+from tauscope.server.store.data_folder import utc_now
 from tauscope.tasks.run import BackendChoice
+
+FOLDER = "interlocks"
+TIMEOUT_S = 10.0  # how long the program may take [s]
+
+
+def find_objection(data_folder: Path, name: str, robot: str, device: str) -> str | None:
+    """Ask whether an arm is free. Whatever goes wrong with asking counts as no.
+
+    Only programs in the folder are called, never a command that came over the network.
+
+    Returns str or None: one line: why it is not free; None where it is.
+    """
+    path = data_folder / FOLDER / name
+    fault = _fault(path)
+    if fault is not None:
+        return f"interlock {name}: {fault}"
+    try:
+        done = subprocess.run(  # noqa: S603 - the operator's own program, without a shell
+            [str(path), robot, device],
+            capture_output=True,
+            timeout=TIMEOUT_S,
+            check=False,
+            stdin=subprocess.DEVNULL,
+            cwd=data_folder,
+        )
+    except subprocess.TimeoutExpired:
+        return f"interlock {name}: did not answer within {TIMEOUT_S:g} s"
+    except OSError as error:
+        return f"interlock {name}: cannot be called ({error.strerror or error})"
+    if done.returncode == 0:
+        return None
+    said = (done.stdout.strip() or done.stderr.strip()).decode("utf-8", "replace").splitlines()
+    return one_line(f"interlock {name}: {said[0] if said else f'exit status {done.returncode}'}")
+
+
+def _fault(path: Path) -> str | None:
+    try:
+        status = path.lstat()
+    except OSError:
+        return f"there is no program {path.name} in the folder {FOLDER} of the data folder"
+    if not stat.S_ISREG(status.st_mode) or not status.st_mode & stat.S_IXUSR:
+        return "is no program: an executable file, no link, is needed"
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return "others may write to it; take that right away (chmod go-w)"
+    return None
+
 
 _log = logging.getLogger("tauscope.jobs")
 
-_Outcome = tuple[str, str | None, tuple[str, str] | None]
-"""State of a firing, its reason, and what was started."""
+_Outcome = tuple[str, str | None, tuple[str, str] | None]  # state of a firing, its reason, and what was started
 
 
 class Scheduler:
@@ -62,7 +108,6 @@ class Scheduler:
         return self.repository.firing(number)
 
     def _fire(self, number: int, entry: ScheduleEntry, lateness: timedelta | None) -> None:
-        """Start what a schedule repeats, or write down why not."""
         try:
             outcome = self._outcome(entry, read_definition(entry), lateness)
         except Exception as error:
@@ -80,7 +125,6 @@ class Scheduler:
             self._unwritten.pop(number, None)
 
     def _outcome(self, entry: ScheduleEntry, definition: ScheduleDefinition, lateness: timedelta | None) -> _Outcome:
-        """What came of a firing."""
         if lateness is not None and self._is_too_late(entry, definition, lateness):
             minutes = lateness.total_seconds() / 60
             return "missed", f"no service looked at it until {minutes:.0f} minutes later; it is due again", None
@@ -124,7 +168,6 @@ class Scheduler:
         return firing.item_state is not None and not firing.is_final
 
     def _last_start(self, entry: ScheduleEntry) -> datetime | None:
-        """When it was started last."""
         return next((each.due for each in self.repository.firings(entry.name, 100) if each.state == "started"), None)
 
 

@@ -9,17 +9,104 @@ import secrets
 import shutil
 import tarfile
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any
 
+from sqlalchemy import Column, Connection, DateTime, Engine, MetaData, Table, insert, select, text
 from sqlalchemy.exc import SQLAlchemyError
 
 from tauscope.errors import StoreError
 from tauscope.files import sync_folder
-from tauscope.server.store.database.database import FILE_NAME, Database, open_engine
-from tauscope.server.store.database.dump import dump_lines, load_lines
+from tauscope.server.store.database.database import (
+    FILE_NAME,
+    WRITES,
+    Database,
+    open_engine,
+    present_revision,
+    revisions,
+    show_address,
+    upgrade,
+)
+
+_FORM = "alembic_version"
+
+
+def dump_lines(engine: Engine) -> Iterator[bytes]:
+    """Every row, as one moment shows them; the first line holds the form of the tables."""
+    # SQLite shows one moment by itself, PostgreSQL when it is told to.
+    options = {"isolation_level": "REPEATABLE READ"} if engine.dialect.name == "postgresql" else {}
+    with engine.connect().execution_options(**options) as connection:
+        tables = _tables(connection)
+        yield _line({"revision": present_revision(connection)})
+        for table in tables:
+            for row in connection.execute(select(table)).mappings():
+                yield _line({"table": table.name, "row": {key: _plain(value) for key, value in row.items()}})
+
+
+def load_lines(engine: Engine, lines: Iterable[bytes]) -> None:
+    """Fill an empty database, and bring it to this program's form; all of it, or nothing.
+
+    Raises StoreError if there is something in the database, or the lines are of a newer program.
+    """
+    rows = (json.loads(line) for line in lines)
+    revision = next(rows)["revision"]
+    if revision not in revisions():
+        raise StoreError(f"the backup was made by a newer Tauscope (form {revision}); restore it with that one")
+    with engine.connect() as connection:
+        if present_revision(connection) is not None:
+            address = show_address(engine)
+            raise StoreError(f"{address}: there is something in this database; give the backup an empty one")
+    upgrade(engine, revision)
+    with engine.execution_options(**{WRITES: True}).begin() as connection:
+        tables = {table.name: table for table in _tables(connection)}
+        for entry in rows:
+            table = tables[entry["table"]]
+            values = {key: _convert_type(table.columns[key], value, connection) for key, value in entry["row"].items()}
+            connection.execute(insert(table).values(**values))
+        _advance_counters(connection, tables.values())
+    upgrade(engine)
+
+
+def _tables(connection: Connection) -> list[Table]:
+    """The tables as they are, each behind those that it refers to."""
+    metadata = MetaData()
+    metadata.reflect(connection)
+    return [table for table in metadata.sorted_tables if table.name != _FORM]
+
+
+def _line(content: dict[str, Any]) -> bytes:
+    return json.dumps(content, ensure_ascii=False).encode() + b"\n"
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON holds it; moments in UTC."""
+    if isinstance(value, datetime):
+        return (value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)).isoformat()
+    return value
+
+
+def _convert_type(column: Column[Any], value: Any, connection: Connection) -> Any:
+    if value is None or not isinstance(column.type, DateTime):
+        return value
+    moment = datetime.fromisoformat(value)
+    return moment.replace(tzinfo=None) if connection.dialect.name == "sqlite" else moment
+
+
+def _advance_counters(connection: Connection, tables: Iterable[Table]) -> None:
+    """PostgreSQL's counters begin behind the rows that were written with their numbers."""
+    if connection.dialect.name != "postgresql":
+        return
+    for table in tables:
+        if "id" in table.columns:
+            highest = connection.execute(text(f"SELECT max(id) FROM {table.name}")).scalar()  # noqa: S608 - our own names
+            if highest is not None:
+                connection.execute(
+                    text("SELECT setval(pg_get_serial_sequence(:name, 'id'), :highest)"),
+                    {"name": table.name, "highest": highest},
+                )
+
 
 FORM = "tauscope.backup/1"
 _DATABASE, _MANIFEST, _DATA = "database.jsonl", "manifest.json", "data"
@@ -129,7 +216,6 @@ class _Hashing:
         return piece
 
     def digest(self) -> str:
-        """The sha256 of what was read, in hexadecimal."""
         return self._hash.hexdigest()
 
 
@@ -161,7 +247,6 @@ def _unpack(source: Path, staged: Path) -> dict[str, Any]:
 
 
 def _content(archive: tarfile.TarFile, entry: tarfile.TarInfo) -> IO[bytes]:
-    """The bytes of a regular file in an archive."""
     file = archive.extractfile(entry)
     assert file is not None  # noqa: S101 - it is a regular file
     return file
@@ -183,7 +268,6 @@ def _write(file: IO[bytes], path: Path) -> tuple[int, str]:
 
 
 def _is_confined(name: str) -> bool:
-    """Whether a name leads to where backups put things."""
     parts = name.split("/")
     return name in (_DATABASE, _MANIFEST) or (
         parts[0] == _DATA and len(parts) > 1 and all(part not in ("", ".", "..") and "\0" not in part for part in parts)
@@ -191,7 +275,6 @@ def _is_confined(name: str) -> bool:
 
 
 def _fill_database(lines: Path, address: Path | str) -> None:
-    """Fill an empty database."""
     engine = open_engine(address)
     try:
         with lines.open("rb") as file:
@@ -205,5 +288,4 @@ def _fill_database(lines: Path, address: Path | str) -> None:
 
 
 def _refuse(source: Path, reason: str) -> StoreError:
-    """A backup that is not used."""
     return StoreError(f"{source}: is damaged or no backup of Tauscope's ({reason}); use another one")

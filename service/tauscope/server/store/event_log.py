@@ -1,13 +1,14 @@
 """What happened, line by line: appended by several processes, read by any number of followers, kept over restarts."""
 
 import errno
-import fcntl
 import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from tauscope.server.store.files import lock_file
 
 _TAIL = 2**16
 
@@ -39,17 +40,12 @@ class EventLog:
         Raises OSError if it cannot be written, or only in part; what is there of it is passed over by readers.
         """
         line = json.dumps(content, ensure_ascii=False, allow_nan=False).encode() + b"\n"
-        descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o640)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        with lock_file(self.path, os.O_APPEND, 0o640) as descriptor:
             size = os.fstat(descriptor).st_size
             is_torn = size > 0 and os.pread(descriptor, 1, size - 1) != b"\n"
             line = b"\n" + line if is_torn else line
             if os.write(descriptor, line) < len(line):
                 raise OSError(errno.ENOSPC, "the disk took a part of a line only", str(self.path))
-        finally:
-            fcntl.flock(descriptor, fcntl.LOCK_UN)  # closing does not where a process forked meanwhile holds it, too
-            os.close(descriptor)
 
     def last(self) -> dict[str, Any] | None:
         """The content of the last whole line; None where there is none or it is damaged."""

@@ -1,10 +1,13 @@
 """Files that arrive: names that may become paths, and bytes that are written and hashed piece by piece."""
 
+import fcntl
 import hashlib
 import os
 import re
 import secrets
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -91,6 +94,18 @@ class IncomingFile:
         """Close and remove the file; may be called twice."""
         self._file.close()
         self.path.unlink(missing_ok=True)
+
+
+@contextmanager
+def lock_file(path: Path, flags: int = 0, mode: int = 0o600) -> Iterator[int]:
+    """Open a file that is made where it is missing, and hold its lock meanwhile; gives out the descriptor."""
+    descriptor = os.open(path, flags | os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, mode)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield descriptor
+    finally:
+        fcntl.flock(descriptor, fcntl.LOCK_UN)  # closing does not where a process forked meanwhile holds it, too
+        os.close(descriptor)
 
 
 def hash_file(path: Path) -> str:

@@ -95,7 +95,6 @@ class RecordingHashes:
             write_atomically(self._path(name), json.dumps(content).encode())
 
     def _path(self, name: str) -> Path:
-        """The file of a recording's hash."""
         return self._root / f"{name}.json"
 
     def _read(self, name: str) -> dict[str, Any] | None:
@@ -280,5 +279,4 @@ class RecordingStore:
 
 
 def _read_modified(status: os.stat_result) -> datetime:
-    """When a file was last written."""
     return datetime.fromtimestamp(status.st_mtime, UTC)

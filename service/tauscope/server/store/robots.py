@@ -14,7 +14,7 @@ from pathlib import Path
 from tauscope.errors import NotFoundError
 from tauscope.files import sync_folder, write_atomically
 from tauscope.robot.messages import one_line, shown
-from tauscope.server.store.items import utc_now
+from tauscope.server.store.data_folder import utc_now
 
 VERSION_PATTERN = "^[0-9a-f]{32}$"
 _STAGED = ".staged-"

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from server.http.contract.documented import load_document
+from tauscope.server.http.openapi import resolve_reference
 
 BYTES = "application/octet-stream"
 
@@ -52,3 +53,13 @@ def test_files_are_sent_as_files() -> None:
     parts = [node for node in walk(forms) if node.get("contentMediaType") == BYTES]
     assert parts
     assert all(part["format"] == "binary" for part in parts)
+
+
+def test_an_operation_of_several_bodies_has_an_optional_parameter() -> None:
+    """The generated function calls its body optional: it imports `Unset` for that where a parameter is optional too."""
+    document = load_document()
+    several = [each for each in operations() if len(each.get("requestBody", {}).get("content", ())) > 1]
+    assert {"check_robot_file", "keep_robot_version"} <= {each["operationId"] for each in several}
+    for operation in several:
+        parameters = [resolve_reference(document, each) for each in operation.get("parameters", [])]
+        assert any(not each.get("required", False) for each in parameters), operation["operationId"]

@@ -18,7 +18,7 @@ from server.http.problem_check import assert_problem
 from server.http.write_openapi import COMMITTED
 from server.queue.controls import finish_at_once
 from server.queue.executors import InlineExecutor
-from tauscope.server.auth.scopes import Scope, find_needed_scope
+from tauscope.server.auth.keys import Scope, find_needed_scope
 from tauscope.server.http import Settings, create_app
 
 READ, ANALYSE, MOVE, ADMIN = Scope.READ, Scope.ANALYSE, Scope.MOVE, Scope.ADMIN

@@ -11,11 +11,8 @@ from anyio import to_thread
 
 from tauscope.server.store.event_log import EventLog, LoggedEvent
 
-POLL_S = 0.1
-"""How often logs are looked at [s]."""
-
-LAST_WAIT_S = 3.0
-"""How long the end event of a job that has ended is waited for [s]."""
+POLL_S = 0.1  # how often logs are looked at [s]
+LAST_WAIT_S = 3.0  # how long the end event of a job that has ended is waited for [s]
 
 
 class EventSource(Protocol):

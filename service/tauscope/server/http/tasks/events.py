@@ -7,26 +7,22 @@ from typing import Annotated, Any
 from anyio import to_thread
 from fastapi import APIRouter, Depends, Header, Request, Response
 from fastapi.sse import KEEPALIVE_COMMENT, EventSourceResponse, format_sse_event
-from pydantic.json_schema import models_json_schema
 
+from tauscope.server.http.answers import Identifier
+from tauscope.server.http.openapi import refer_to_model
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.event_feeds import EventFeeds, EventSource
-from tauscope.server.http.tasks.routes import Identifier
 from tauscope.server.problems import problem_responses
-from tauscope.server.queue.record import EndedEvent, ProgressEvent, StateEvent, StepEvent
+from tauscope.server.queue.job_folder import EndedEvent, ProgressEvent, StateEvent, StepEvent
 from tauscope.server.store.event_log import LoggedEvent
 
 EVENT_MODELS = (StateEvent, StepEvent, ProgressEvent, EndedEvent)
 
-HEARTBEAT_S = 10.0
-"""Silence after which a comment says that the connection lives [s]."""
-
-RETRY_MS = 1000
-"""How long a client waits before it connects again [ms]."""
+HEARTBEAT_S = 10.0  # silence after which a comment says that the connection lives [s]
+RETRY_MS = 1000  # how long a client waits before it connects again [ms]
 
 
-PRESENCE_S = 1.0
-"""How often a client without news is looked for [s]."""
+PRESENCE_S = 1.0  # how often a client without news is looked for [s]
 
 
 LastEvent = Annotated[
@@ -57,10 +53,7 @@ def add_events_route(router: APIRouter, noun: str, find: Callable[[Services, str
         summary=f"Follow the events of {noun}",
         response_class=Response,
         responses={
-            200: {
-                "content": {"text/event-stream": {"schema": _stream_schema()}},
-                "description": _STREAM,
-            },
+            200: {"content": {"text/event-stream": {"schema": _stream_schema()}}, "description": _STREAM},
             204: {"description": "the job had ended before `Last-Event-ID`: do not connect again"},
             **problem_responses("not-found"),
         },
@@ -108,7 +101,6 @@ def _find_end(source: EventSource) -> int | None:
 
 
 def _format_event(event: LoggedEvent) -> bytes:
-    """An event as it is sent."""
     kind = event.content.get("kind")
     return format_sse_event(
         data_str=json.dumps(event.content, ensure_ascii=False),
@@ -118,18 +110,17 @@ def _format_event(event: LoggedEvent) -> bytes:
 
 
 def _stream_schema() -> dict[str, Any]:
-    """What the data of an event may be."""
-    references, _ = models_json_schema(
-        [(model, "serialization") for model in EVENT_MODELS], ref_template="#/components/schemas/{model}"
-    )
-    data = [references[(model, "serialization")] for model in EVENT_MODELS]
     return {
         "type": "object",
         "additionalProperties": False,
         "properties": {
             "event": {"type": "string", "enum": ["state", "step", "progress", "ended"]},
             "id": {"type": "string", "description": "number of the event, from 1"},
-            "data": {"type": "string", "contentMediaType": "application/json", "contentSchema": {"anyOf": data}},
+            "data": {
+                "type": "string",
+                "contentMediaType": "application/json",
+                "contentSchema": {"anyOf": [refer_to_model(model) for model in EVENT_MODELS]},
+            },
             "retry": {"type": "integer", "description": "how long to wait before connecting again [ms]"},
         },
     }

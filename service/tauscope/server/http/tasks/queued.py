@@ -10,11 +10,11 @@ from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import LimitExceededError
 from tauscope.server.auth.gate import find_caller
-from tauscope.server.http.form import PartRule
+from tauscope.server.http.answers import describe_damaged, describe_job, require_success
+from tauscope.server.http.bodies import PartRule
 from tauscope.server.http.openapi import Examples
-from tauscope.server.http.robots.files import read_received_robot
+from tauscope.server.http.robot_files import read_received_robot
 from tauscope.server.http.services import Services
-from tauscope.server.http.tasks.answers import damaged_fields, job_fields, require_success
 from tauscope.server.http.tasks.router import (
     JobDocument,
     Resource,
@@ -25,8 +25,8 @@ from tauscope.server.http.tasks.router import (
 )
 from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request, stage_request
 from tauscope.server.problems import ProblemError
+from tauscope.server.queue.job_folder import JobState
 from tauscope.server.queue.queue import JobKind
-from tauscope.server.queue.record import JobState
 from tauscope.server.queue.task_job import OrderedRecording, TaskWorkspace
 from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import RecordingStore
@@ -54,7 +54,7 @@ class QueuedTask:
     plural: str
     kind: Callable[[Services], JobKind]
     workspace: type[TaskWorkspace[Any]]
-    models: tuple[type[RobotRequest], type[BaseModel], type[BaseModel]]
+    models: tuple[type[RobotRequest], type[BaseModel]]
     examples: Examples
     summary: str
     words: str
@@ -112,8 +112,8 @@ class QueuedTask:
         here, order = f"{root}/{self.plural}/{identifier}", workspace.read_order()
         links: dict[str, Any] = {"self": here, "events": f"{here}/events"}
         if order is None:
-            return answer(**damaged_fields(identifier, here), links=links)
-        fields, refused = job_fields(workspace, here), workspace.refused_exports()
+            return answer(**describe_damaged(identifier, here), links=links)
+        fields, refused = describe_job(workspace, here), workspace.refused_exports()
         if fields["state"] is JobState.SUCCEEDED:
             there = [e for e in self.documents if e.missing is None or (workspace.folder / e.output).is_file()]
             names = [*(document.name for document in there), *self.links]
@@ -152,8 +152,7 @@ class QueuedTask:
         wanted: Mapping[str, Any],
         caller: str,
     ) -> str:
-        """Check what was received beside the robot, and queue it."""
-        recordings = {role: ordered_recordings(role, received, services.recordings) for role in workspace.roles}
+        recordings = {role: order_recordings(role, received, services.recordings) for role in workspace.roles}
         if recordings:
             check_recordings(recordings, services.settings.max_recordings)
         given: dict[str, Any] = {**wanted, **recordings}
@@ -162,7 +161,7 @@ class QueuedTask:
         return services.jobs.submit(self.kind(services), workspace.folder, caller)
 
 
-def ordered_recordings(role: str, received: Received[Any], store: RecordingStore) -> tuple[OrderedRecording, ...]:
+def order_recordings(role: str, received: Received[Any], store: RecordingStore) -> tuple[OrderedRecording, ...]:
     """The recordings of a role: each a file of the form, or else a recording on the server.
 
     Raises ProblemError if a file was sent but is not listed. Raises NotFoundError if a recording is neither sent nor on

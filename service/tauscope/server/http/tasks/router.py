@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 from typing import Annotated, Any, Protocol
 
 from fastapi import APIRouter, Depends, Path, Request, Response
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, create_model
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import ExportError, NotFoundError
@@ -15,22 +15,30 @@ from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
+from tauscope.server.http.answers import (
+    ENDINGS,
+    MOTION,
+    SUBMISSION,
+    After,
+    AnswerModel,
+    Identifier,
+    Limit,
+    PageAnswer,
+    collection,
+    require_document,
+)
 from tauscope.server.http.evidence import require_no_model
 from tauscope.server.http.leases import LeaseToken
 from tauscope.server.http.openapi import Examples, file_contents
 from tauscope.server.http.reading import READING
-from tauscope.server.http.robots.files import check_received_robot
-from tauscope.server.http.robots.models import RobotReportAnswer
+from tauscope.server.http.robot_files import RobotReportAnswer, check_received_robot
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.answers import require_document
 from tauscope.server.http.tasks.event_feeds import EventSource
 from tauscope.server.http.tasks.events import add_events_route
-from tauscope.server.http.tasks.routes import ENDINGS, MOTION, SUBMISSION, After, Identifier, Limit, collection
 from tauscope.server.http.tasks.submission import RobotRequest, request_body
-from tauscope.server.models import AnswerModel
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.queue import JobKind
-from tauscope.server.store.items import ItemStore
+from tauscope.server.store.data_folder import ItemStore
 
 HTML = "text/html"
 
@@ -105,7 +113,6 @@ class Folder(Protocol):
 
     def read_order(self) -> Any:
         """What was asked for; None where that is damaged."""
-        ...
 
     def has_ended(self) -> bool:
         """Whether nothing more will happen."""
@@ -125,7 +132,7 @@ class Resource:
 
     noun: str
     plural: str
-    models: tuple[type[RobotRequest], type[BaseModel], type[BaseModel]]
+    models: tuple[type[RobotRequest], type[BaseModel]]
     examples: Examples
     items: Callable[[Services], ItemStore]
     find: Callable[[Services, str], Folder]
@@ -148,7 +155,14 @@ def make_router(resource: Resource) -> APIRouter:
     """The routes that every resource has; those that end something are added by its kind."""
     plural, noun, singular = resource.plural, resource.noun, resource.singular
     router = APIRouter(prefix=f"/{plural}", tags=[plural])
-    request_model, answer_model, list_model = resource.models
+    request_model, answer_model = resource.models
+    entries: Any = {plural: (list[answer_model], Field(description="the newest first"))}
+    list_model = create_model(
+        f"{singular.capitalize()}ListAnswer",
+        __base__=PageAnswer,
+        __doc__=f"{plural.capitalize()} that are kept.",
+        **entries,
+    )
 
     @router.post(
         "",
@@ -298,10 +312,7 @@ def add_document_route(
 
 
 def add_export_route(
-    router: APIRouter,
-    finished: Callable[[Services, str], Any],
-    formats: Mapping[ExportFormat, ExportFile],
-    words: str,
+    router: APIRouter, finished: Callable[[Services, str], Any], formats: Mapping[ExportFormat, ExportFile], words: str
 ) -> None:
     """Give a resource the route ``/{identifier}/exports/{format}``."""
     content = file_contents(*{file.media_type for file in formats.values()})
@@ -350,7 +361,6 @@ def _lease_header(_lease: LeaseToken = None) -> None:
 
 
 def _read_files(folder: FilePath) -> list[RobotFileAnswer]:
-    """Text files of a folder, as far as such a file may be long."""
     answers = []
     for path in sorted(folder.iterdir()):
         if path.is_file() and not path.is_symlink():

@@ -1,37 +1,43 @@
 """A request that hands a job in: JSON, or a form with the JSON as part `request` and files beside it."""
 
 import shutil
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Generic, Self, TypeVar
+from typing import Annotated, Any, Generic, Literal, Self, TypeVar
 
 from fastapi import Request
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, FiniteFloat, model_validator
 from pydantic_core import PydanticCustomError
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.errors import IdentificationError
-from tauscope.server.http.documents import (
+from tauscope.errors import IdentificationError, RobotFileError, ScenarioError
+from tauscope.robot import Robot
+from tauscope.robot.messages import one_line
+from tauscope.runtime.drivers import BackendName, find_driver
+from tauscope.server.http.bodies import (
+    FORM,
     JSON,
+    PartRule,
+    ReceivedForm,
     media_type,
     parse_document,
     read_document,
+    receive_form,
     refuse_media_type,
     to_json_text,
 )
-from tauscope.server.http.form import FORM, PartRule, ReceivedForm, receive_form
-from tauscope.server.http.openapi import Examples, binary_part, form_body, json_body, model_reference
-from tauscope.server.http.robots.files import keep_inline_robot, robot_part_rules
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.openapi import Examples, binary_part, form_body, json_body, refer_to_model
+from tauscope.server.http.robot_files import EXAMPLE_ROBOT, keep_inline_robot, robot_part_rules
 from tauscope.server.http.settings import Settings
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.task_job import SAVED_MODEL, Staged, TaskWorkspace
+from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.files import FILE_NAME_PATTERN, FILE_NAME_RULE, KeptFile, is_file_name
-from tauscope.server.store.items import ItemStore
 from tauscope.server.store.robots import RobotStore
 from tauscope.strict_model import StrictModel
+from tauscope.tasks.run import BackendChoice
 from tauscope.tasks.task import ROLES
 
 MODEL_FILE = "model.json"
@@ -76,7 +82,6 @@ class RobotRequest(StrictModel):
 
 
 def _check_file_name(value: str) -> str:
-    """Refuse what cannot be a recording's name."""
     if not is_file_name(value):
         raise PydanticCustomError("file_name", "is no name of a recording; {rule}", {"rule": FILE_NAME_RULE})
     return value
@@ -91,7 +96,6 @@ class RecordingsRequest(RobotRequest):
 
     @model_validator(mode="after")
     def _check_once(self) -> Self:
-        """A recording counts once."""
         for names in (getattr(self, role, None) or [] for role in ROLES if role != "model"):
             twice = next((name for index, name in enumerate(names) if name in names[:index]), None)
             if twice is not None:
@@ -179,10 +183,65 @@ def request_body(
     `examples`: mapping of str to (str, plain data), summary and value by name.
     """
     parts = {
-        "request": model_reference(kind),
+        "request": refer_to_model(kind),
         "robot": binary_part("the robot file (YAML)"),
         "urdf": binary_part("the URDF that the robot file names, by its bare name"),
         **(further_parts or {}),
     }
     form = form_body(parts, required=[])
     return {"requestBody": {"required": True, "content": {**json_body(kind, examples), **form}}}
+
+
+class BackendRequest(StrictModel):
+    """Which arm is moved; what is left out, the operator of the service has decided."""
+
+    name: BackendName | None = Field(default=None, description="backend; null: the service's own")
+    time: Literal["virtual", "real"] | None = Field(
+        default=None,
+        description="of the simulated arm: as fast as it computes, or by the clock; null: the service's own",
+    )
+    scenario: dict[str, Any] | None = Field(
+        default=None, description="what the simulated arm conceals: content of a scenario file; null: nothing"
+    )
+    keep_settings: bool = Field(
+        default=False, description="whether servos keep in EEPROM what a run changed; false: it is put back"
+    )
+    start: tuple[FiniteFloat, ...] | None = Field(
+        default=None,
+        max_length=100,
+        description="where the simulated arm stands at first, one number a joint [rad or m]; null: at zero",
+    )
+
+
+def choose_backend(settings: Settings, request: BackendRequest, robot: Robot) -> BackendChoice:
+    """The backend of a request.
+
+    Raises ScenarioError if the scenario is no plain data. Raises RobotFileError if a drive block names a file that the
+    driver would open: no path of the server is opened for a client; or if an arm without a model is to be simulated.
+    """
+    if request.scenario is not None and to_json_text(request.scenario) is None:
+        raise ScenarioError("scenario: holds NaN, infinity or text that is not Unicode; write plain numbers and text")
+    name = request.name or settings.backend
+    driver = find_driver(name)
+    _refuse_files(robot, driver.file_keys)
+    if driver.is_simulated and len(robot.model.links or ()) != robot.link_count:
+        raise RobotFileError(
+            f"{robot.name}: the {name} backend needs a model: mass, first_moment and inertia of all {robot.link_count}"
+            " links; state model.links, give a URDF with inertials, or take the improved robot of a diagnosis"
+        )
+    return BackendChoice(
+        name=name,
+        time=request.time or settings.sim_time,
+        scenario=request.scenario,
+        start=request.start,
+        keep_settings=request.keep_settings,
+    )
+
+
+def _refuse_files(robot: Robot, keys: Sequence[str]) -> None:
+    """Refuse drives' own files: nothing in a request would bring them."""
+    for joint in robot.joints:
+        for key in keys:
+            if (joint.drive or {}).get(key) is not None:
+                hint = "leave it out, or run this arm with tauscope run"
+                raise RobotFileError(one_line(f"{joint.name}: drive.{key} names a file, which cannot be sent; {hint}"))

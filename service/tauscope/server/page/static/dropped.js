@@ -1,4 +1,6 @@
-// Files that were dropped or chosen: which is the robot, which are recordings.
+// Files that were dropped or chosen, or those of the example: which is the robot, which are recordings.
+
+import { fetchRaw } from "./api.js";
 
 const RECORDING = /\.(csv|tsv|txt|parquet|mcap|db3|bag|npz)$/i;
 const DESCRIPTION = /\.(urdf|xml|mjcf|xacro)$/i;
@@ -36,3 +38,8 @@ export async function sortFiles(files) {
   const robot = first ? [first.file, descriptions.find((file) => first.text.includes(file.name))].filter(Boolean) : descriptions.slice(0, 1);
   return { robot, recordings, unused: shown.filter((file) => !robot.includes(file) && !recordings.includes(file)) };
 }
+
+const EXAMPLE = ["example-arm.yaml", "example-train.csv", "example-held-out.csv"];
+
+/** The example's files, as if they had been dropped. */
+export const exampleFiles = () => Promise.all(EXAMPLE.map(async (name) => new File([await (await fetchRaw(`/example/${name}`)).blob()], name)));

@@ -3,9 +3,10 @@
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from alembic import command
 from alembic.config import Config
@@ -20,8 +21,7 @@ from sqlalchemy.pool import NullPool
 from tauscope.errors import StoreError
 from tauscope.robot.messages import one_line
 
-TIMEOUT_S = 5
-"""How long a write waits for another one, and a connection for its server [s]."""
+TIMEOUT_S = 5  # how long a write waits for another one, and a connection for its server [s]
 
 WRITES = "tauscope_writes"
 """Execution option of a connection that will write: SQLite then takes its lock at the beginning.
@@ -46,7 +46,7 @@ def open_engine(address: Path | str) -> Engine:
     )
 
 
-def shown_address(engine: Engine) -> str:
+def show_address(engine: Engine) -> str:
     """What messages call a database: its file, or its URL without the password."""
     url = engine.url
     return str(url.database) if url.get_backend_name() == "sqlite" else url.render_as_string(hide_password=True)
@@ -73,7 +73,6 @@ def _prepare_sqlite(connection: sqlite3.Connection, _record: Any) -> None:
 
 
 def _begin_sqlite(connection: Connection) -> None:
-    """Begin a transaction."""
     writes = connection.get_execution_options().get(WRITES, False)
     connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
 
@@ -93,7 +92,7 @@ def upgrade(engine: Engine, target: str = "head") -> None:
         present = present_revision(connection)
         if present is not None and present not in revisions():
             hint = "use the Tauscope that wrote it, or restore a backup of before"
-            raise StoreError(f"{shown_address(engine)}: was written by a newer Tauscope (form {present}); {hint}")
+            raise StoreError(f"{show_address(engine)}: was written by a newer Tauscope (form {present}); {hint}")
         if present != (revisions()[-1] if target == "head" else target):
             command.upgrade(_configuration(connection), target)
 
@@ -118,12 +117,20 @@ def _configuration(connection: Connection | None) -> Config:
     return configuration
 
 
-FILE_NAME = "tauscope.db"
-"""Of the SQLite database in a data folder."""
+FILE_NAME = "tauscope.db"  # of the SQLite database in a data folder
 
+
+Entry = TypeVar("Entry")
 
 _SQLITE_MAGIC = b"SQLite format 3\0"
 _DAMAGE_HINT = "restore a backup, or move it away: the index is made anew, schedules and the choice of models are not"
+
+
+def read_row(kind: type[Entry], row: object, **more: Any) -> Entry:
+    """What is given out of a row: a dataclass of the same attributes. `more`: those that the row has not so."""
+    known: Any = kind
+    names = (field.name for field in fields(known) if field.name not in more)
+    return kind(**{name: getattr(row, name) for name in names}, **more)
 
 
 class Database:
@@ -181,7 +188,7 @@ class Database:
                 present = present_revision(connection)
         if present != revisions()[-1]:
             hint = "restore it from a backup, and start the service again"
-            raise StoreError(f"{shown_address(self._engine)}: its tables are gone or were changed; {hint}")
+            raise StoreError(f"{show_address(self._engine)}: its tables are gone or were changed; {hint}")
 
     def close(self) -> None:
         """Close every connection."""
@@ -195,7 +202,7 @@ class Database:
         except IntegrityError:
             raise
         except (DBAPIError, PoolTimeoutError) as error:
-            raise StoreError(_describe_fault(shown_address(self._engine), error)) from error
+            raise StoreError(_describe_fault(show_address(self._engine), error)) from error
 
 
 def _check_file(url: URL) -> None:
@@ -215,7 +222,6 @@ def _check_file(url: URL) -> None:
 
 
 def _describe_fault(address: str, error: Exception) -> str:
-    """What is wrong with a database, and what to do."""
     reason = one_line(str(getattr(error, "orig", None) or error)).strip()
     lower = reason.lower()
     if "not a database" in lower or "malformed" in lower:

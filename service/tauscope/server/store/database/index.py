@@ -4,10 +4,10 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 
-from sqlalchemy import delete, insert, select, update
+from sqlalchemy import ColumnElement, delete, insert, select, update
 from sqlalchemy.orm import Session
 
-from tauscope.server.store.database.database import Database
+from tauscope.server.store.database.database import Database, read_row
 from tauscope.server.store.database.tables import ITEM_CLASSES, Artefact, Item, Recording, RecordingUse, Robot, Site
 from tauscope.server.store.recordings import StoredRecording
 
@@ -155,9 +155,7 @@ class Index:
         """Take items out of the index whose folders are gone."""
         with self._database.writing() as session:
             for identifier in identifiers:
-                session.execute(
-                    delete(Item).where(Item.site == self.site, Item.kind == kind, Item.identifier == identifier)
-                )
+                session.execute(delete(Item).where(*self._match(kind, identifier)))
 
     def damaged(self, kind: str) -> frozenset[str]:
         """Identifiers of the damaged items of this site."""
@@ -167,19 +165,19 @@ class Index:
 
     def mark_damaged(self, kind: str, identifier: str, detail: str) -> None:
         """Say of an item that a file of it is not what it was."""
-        where = (Item.site == self.site, Item.kind == kind, Item.identifier == identifier)
         values = {"state": "damaged", "problem_code": "damaged", "problem_detail": detail}
         with self._database.writing() as session:
-            session.execute(update(Item).where(*where).values(**values))
+            session.execute(update(Item).where(*self._match(kind, identifier)).values(**values))
 
     def artefacts(self, kind: str, identifier: str) -> tuple[FileMetadata, ...]:
         """The files of an item as they were when it ended."""
-        query = (
-            select(Artefact).join(Item).where(Item.site == self.site, Item.kind == kind, Item.identifier == identifier)
-        )
+        query = select(Artefact).join(Item).where(*self._match(kind, identifier))
         with self._database.reading() as session:
             rows = session.scalars(query.order_by(Artefact.path))
-            return tuple(FileMetadata(row.path, row.size, row.sha256) for row in rows)
+            return tuple(read_row(FileMetadata, row) for row in rows)
+
+    def _match(self, kind: str, identifier: str) -> tuple[ColumnElement[bool], ...]:
+        return Item.site == self.site, Item.kind == kind, Item.identifier == identifier
 
     def put_recordings(self, entries: Iterable[StoredRecording]) -> None:
         """Index the recordings of this site; those that are not among them any more are forgotten."""
@@ -236,15 +234,10 @@ class Index:
         """Every robot that an item is or was about, by name."""
         with self._database.reading() as session:
             rows = session.scalars(select(Robot).order_by(Robot.name))
-            return [RobotEntry(row.name, row.first_seen, row.last_seen) for row in rows]
-
-    def _row(self, kind: str, identifier: str):
-        """The query of an item's row."""
-        return select(Item).where(Item.site == self.site, Item.kind == kind, Item.identifier == identifier)
+            return [read_row(RobotEntry, row) for row in rows]
 
 
 def _fill(row: Item, facts: ItemMetadata) -> None:
-    """Write what is known of an item into its row."""
     row.state, row.is_final, row.stamp = facts.state, facts.is_final, facts.stamp
     row.created, row.ended = facts.created, facts.ended
     row.problem_code, row.problem_detail = facts.problem or (None, None)
@@ -270,16 +263,5 @@ def _find_robots(session: Session, facts: Sequence[ItemMetadata]) -> dict[str, i
 
 
 def _entry(row: Item) -> ItemEntry:
-    """What a search gives out."""
-    return ItemEntry(
-        kind=row.kind,
-        identifier=row.identifier,
-        site=row.site,
-        state=row.state,
-        created=row.created,
-        ended=row.ended,
-        robot=None if row.robot is None else row.robot.name,
-        problem_code=row.problem_code,
-        problem_detail=row.problem_detail,
-        figures={column: getattr(row, column) for column in FIGURES.get(row.kind, ())},
-    )
+    figures = {column: getattr(row, column) for column in FIGURES.get(row.kind, ())}
+    return read_row(ItemEntry, row, robot=row.robot and row.robot.name, figures=figures)

@@ -11,8 +11,7 @@ from sqlalchemy.dialects.postgresql import JSONB
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 from sqlalchemy.types import TypeDecorator
 
-PLAIN = JSON().with_variant(JSONB(), "postgresql")
-"""Plain data: what JSON can hold."""
+PLAIN = JSON().with_variant(JSONB(), "postgresql")  # plain data: what JSON can hold
 
 
 class Moment(TypeDecorator[datetime]):

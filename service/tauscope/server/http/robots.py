@@ -1,4 +1,4 @@
-"""Routes about robots."""
+"""Robots over HTTP: checked, kept, listed."""
 
 import shutil
 import tempfile
@@ -8,18 +8,20 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
+from tauscope.server.http.bodies import FORM, JSON, media_type, read_document, receive_form, refuse_media_type
 from tauscope.server.http.evidence import require_no_identification
-from tauscope.server.http.form import FORM, receive_form
 from tauscope.server.http.openapi import binary_part, form_body, json_body
 from tauscope.server.http.reading import READING
-from tauscope.server.http.robots.files import (
+from tauscope.server.http.robot_files import (
+    EXAMPLE_ROBOT,
+    RobotCheckRequest,
+    RobotReportAnswer,
+    RobotVersionAnswer,
     check_received_robot,
     keep_inline_robot,
     read_received_robot,
     robot_part_rules,
 )
-from tauscope.server.http.robots.models import EXAMPLE_ROBOT, RobotCheckRequest, RobotReportAnswer, RobotVersionAnswer
 from tauscope.server.http.services import ServicesDep
 from tauscope.server.http.tasks.router import JobRobotAnswer, describe_robot
 from tauscope.server.problems import ProblemError, problem_responses

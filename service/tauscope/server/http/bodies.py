@@ -1,12 +1,15 @@
-"""A multipart form, streamed: files go to the disk and are hashed as they arrive; none is held in memory."""
+"""Bodies of requests: JSON of one media type, bounded and strict; forms whose files go to the disk as they arrive."""
 
+import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from fastapi import Request
+from fastapi.responses import FileResponse
+from pydantic import BaseModel, ValidationError
 from python_multipart.exceptions import FormParserError
 from python_multipart.multipart import MultipartParser, parse_options_header
 from starlette.concurrency import run_in_threadpool
@@ -14,11 +17,73 @@ from starlette.concurrency import run_in_threadpool
 from tauscope.errors import LimitExceededError
 from tauscope.robot.messages import one_line, shown
 from tauscope.server.auth.gate import require_upload_quota
-from tauscope.server.problems import ProblemError
+from tauscope.server.problems import ProblemError, invalid_request
 from tauscope.server.store.files import FILE_NAME_RULE, IncomingFile, KeptFile, is_file_name
 
 if TYPE_CHECKING:
     from python_multipart.multipart import MultipartCallbacks
+
+
+JSON = "application/json"
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def media_type(request: Request) -> str:
+    """The media type of a request's body, without parameters."""
+    return request.headers.get("content-type", "").partition(";")[0].strip().lower()
+
+
+def refuse_media_type(request: Request, *accepted: str) -> ProblemError:
+    """The problem of a body of another media type."""
+    found = media_type(request) or "of no stated media type"
+    headers = {"Accept-Post": ", ".join(accepted)}
+    return ProblemError("media-type", f"the body is {found}; send {' or '.join(accepted)}", headers=headers)
+
+
+async def read_document(request: Request, kind: type[Model], limit: int) -> Model:
+    """The JSON body of a request.
+
+    Raises ProblemError if the body is not as the model wants it. Raises LimitExceededError if it is too large.
+
+    `limit`: largest body [bytes].
+    """
+    if media_type(request) != JSON:
+        raise refuse_media_type(request, JSON)
+    content = bytearray()
+    async for piece in request.stream():
+        content += piece
+        if len(content) > limit:
+            raise LimitExceededError(f"the JSON is larger than the {limit} bytes accepted here; send files as a form")
+    return parse_document(bytes(content), kind, within="body")
+
+
+def parse_document(content: bytes, kind: type[Model], *, within: str) -> Model:
+    """A model from JSON text. Raises ProblemError if it is not as the model wants it."""
+    try:
+        return kind.model_validate_json(content)
+    except ValidationError as error:
+        raise invalid_request(error, within=within) from None
+
+
+def to_json_text(value: Any) -> str | None:
+    """Plain data as JSON; None where it holds NaN or infinity, or text that is not Unicode."""
+    try:
+        text = json.dumps(value, ensure_ascii=False, allow_nan=False)
+        text.encode()
+    except (ValueError, RecursionError):
+        return None
+    return text
+
+
+_MEDIA_TYPES: Mapping[str, str] = {".csv": "text/csv", ".json": "application/json"}
+
+
+def file_answer(path: Path, name: str) -> FileResponse:
+    """The answer that sends a file, to be saved under a name and never shown as a page."""
+    media_type = _MEDIA_TYPES.get(Path(name).suffix.lower(), "application/octet-stream")
+    return FileResponse(path, media_type=media_type, filename=name)
+
 
 FORM = "multipart/form-data"
 
@@ -57,6 +122,8 @@ async def receive_form(request: Request, rules: Mapping[str, PartRule]) -> Recei
     Raises ProblemError if the body is no form, or has a part that is not foreseen, or a file of a name that is not
     allowed; or the caller has sent enough for now. Raises LimitExceededError if a part is too large.
     """
+    if media_type(request) != FORM:
+        raise refuse_media_type(request, FORM)
     charge = require_upload_quota(request.scope)
     receiver = _Receiver(rules)
     with _form_errors():
@@ -85,7 +152,6 @@ def _feed(parser: MultipartParser, piece: bytes) -> None:
 
 @contextmanager
 def _form_errors() -> Iterator[None]:
-    """The parser's complaints as problems."""
     try:
         yield
     except FormParserError as error:
@@ -107,7 +173,6 @@ class _Receiver:
         self._file: IncomingFile | None = None
 
     def callbacks(self) -> "MultipartCallbacks":
-        """What the parser calls."""
         return {
             "on_part_begin": self._part_begin,
             "on_header_field": self._header_field,
@@ -120,7 +185,6 @@ class _Receiver:
         }
 
     def discard(self) -> None:
-        """Remove everything that was written."""
         if self._file is not None:
             self._file.discard()
         for file in (file for files in self.form.files.values() for file in files):
@@ -159,7 +223,6 @@ class _Receiver:
         self._file = IncomingFile(rule.folder, self._accept_name(name), rule.limit)
 
     def _accept_name(self, name: str | None) -> str:
-        """The name of a file, if the form may have such a file."""
         files = self.form.files.setdefault(self._part, [])
         if name is None:
             raise ProblemError("invalid-request", f"part {self._part}: is not a file; send it with a file name")

@@ -1,14 +1,62 @@
-"""What is said of a job, whatever kind it is."""
+"""What answers, and the routes of items, have in common."""
 
+import math
 from datetime import datetime
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field
+from fastapi import Path, Query, Request
+from pydantic import BeforeValidator, ConfigDict, Field
 
-from tauscope.server.models import AnswerModel
 from tauscope.server.problems import Problem, ProblemError, make_problem
-from tauscope.server.queue.job_folder import Workspace
-from tauscope.server.queue.record import JobProblem, JobState
+from tauscope.server.queue.job_folder import JobProblem, JobState, Workspace
+from tauscope.strict_model import StrictModel
+
+
+class AnswerModel(StrictModel):
+    """An answer; it may be made from an object with attributes of the same names."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    @classmethod
+    def describe(cls, entry: object, **more: Any) -> Self:
+        """The answer that holds an entry's attributes. `more`: those that it has not, or has by another name."""
+        names = (name for name in cls.model_fields if name not in more and hasattr(entry, name))
+        return cls.model_validate({name: getattr(entry, name) for name in names} | more)
+
+
+class PageAnswer(AnswerModel):
+    """A page of a list."""
+
+    next: str | None = Field(default=None, description="to be given as `after` for the next page; null: it is the last")
+
+
+def _no_nan(value: Any) -> Any:
+    """JSON knows no NaN: what was not measured is null."""
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+Measured = Annotated[float | None, BeforeValidator(_no_nan)]  # A number, or null where there was nothing to measure
+
+
+Identifier = Annotated[str, Path(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])]
+Limit = Annotated[int, Query(ge=1, le=1000, description="most entries of the list")]
+After = Annotated[str | None, Query(max_length=255, description="`next` of the page before; null: the first page")]
+
+ENDINGS = ("not-finished", "cancelled", "interrupted", "damaged", "storage-full")
+"""Problems of a job without result, beside those of its work."""
+
+
+SUBMISSION = ("bad-request", "limit-exceeded", "media-type", "robot-file", "invalid-request", "storage-full")
+"""Problems of handing anything in that comes with a robot file."""
+
+
+MOTION = ("busy", "leased", "lease-needed", "lease-lost", "not-armed")
+"""Problems of moving an arm that somebody else has, or that the lease does not let move."""
+
+
+def collection(request: Request, steps_below: int) -> str:
+    """Path of the collection, seen from a request below it."""
+    return request.url.path.rsplit("/", steps_below)[0]
 
 
 class Links(AnswerModel):
@@ -45,11 +93,11 @@ class JobAnswer(AnswerModel):
     robot: str | None = Field(default=None, description="name of the robot")
 
 
-def job_fields(workspace: Workspace, here: str) -> dict[str, Any]:
+def describe_job(workspace: Workspace, here: str) -> dict[str, Any]:
     """The fields of `JobAnswer`; a job whose state cannot be read is said to be damaged."""
     identifier, record = workspace.folder.name, workspace.read_record()
     if record is None:
-        return damaged_fields(identifier, here)
+        return describe_damaged(identifier, here)
     return {
         "id": identifier,
         "state": record.state,
@@ -57,17 +105,17 @@ def job_fields(workspace: Workspace, here: str) -> dict[str, Any]:
         "created": record.created,
         "started": record.started,
         "ended": record.ended,
-        "problem": shown_problem(record.problem, here),
+        "problem": convert_problem(record.problem, here),
     }
 
 
-def damaged_fields(identifier: str, here: str) -> dict[str, Any]:
+def describe_damaged(identifier: str, here: str) -> dict[str, Any]:
     """The fields of `JobAnswer` of a job whose files are missing or damaged."""
     detail = f"files of {identifier} are missing or damaged; remove it and hand it in again"
     return {"id": identifier, "state": "damaged", "problem": make_problem("damaged", detail, here)}
 
 
-def shown_problem(problem: JobProblem | None, here: str) -> Problem | None:
+def convert_problem(problem: JobProblem | None, here: str) -> Problem | None:
     """The problem that a job ended in, as answers hold it."""
     return None if problem is None else make_problem(problem.code, problem.detail, here)
 

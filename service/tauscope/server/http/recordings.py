@@ -1,0 +1,276 @@
+"""Recordings over HTTP: sent, listed, checked, and how one is read before it is sent for good."""
+
+from datetime import datetime
+from typing import Annotated
+from urllib.parse import quote
+
+from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi.responses import FileResponse
+from pydantic import Field
+from starlette.concurrency import run_in_threadpool
+
+from tauscope.recording import EffortKind
+from tauscope.server.http.answers import After, AnswerModel, Measured, PageAnswer
+from tauscope.server.http.bodies import PartRule, file_answer, parse_document, receive_form
+from tauscope.server.http.evidence import require_no_evidence
+from tauscope.server.http.openapi import binary_part, file_responses, form_body, refer_to_model
+from tauscope.server.http.reading import READING
+from tauscope.server.http.robot_files import FindingAnswer, read_received_robot, robot_part_rules
+from tauscope.server.http.services import ServicesDep
+from tauscope.server.problems import ProblemError, problem_responses
+from tauscope.server.queue.kept_recordings import check_kept_recording, read_kept_samples, understand_recording
+from tauscope.server.store.recordings import StoredRecording
+from tauscope.tasks.task import ReadingOptions
+
+
+class RecordingAnswer(AnswerModel):
+    """A recording that lies on the server."""
+
+    name: str = Field(description="by which requests refer to it", examples=["log-2026-11-03.csv"])
+    size: int = Field(description="number of bytes", examples=[1830221])
+    modified: datetime = Field(description="when it was last written, UTC")
+    sha256: str | None = Field(description="of its bytes, in hexadecimal; null in a list where it was not computed yet")
+    is_damaged: bool = Field(description="whether it was sent or recorded, and its bytes are not those any more")
+
+
+class RecordingListAnswer(PageAnswer):
+    """Recordings on the server."""
+
+    recordings: list[RecordingAnswer] = Field(description="by name")
+
+
+class StepsAnswer(AnswerModel):
+    """Steps of the clock [s]."""
+
+    minimum: float = Field(description="shortest")
+    percentile_1: float = Field(description="1 % are shorter")
+    median: float = Field(description="half are shorter")
+    percentile_99: float = Field(description="99 % are shorter")
+    maximum: float = Field(description="longest")
+
+
+class GapsAnswer(AnswerModel):
+    """Steps of the clock beyond 1.9 medians."""
+
+    count: int = Field(description="how many")
+    longest: float = Field(description="the longest [s]; 0 without gaps")
+    longest_at: float | None = Field(description="time at which it begins [s]")
+
+
+class PeriodsAnswer(AnswerModel):
+    """Repeats of the excitation."""
+
+    count: int = Field(description="how many are marked")
+    shortest: int = Field(description="samples of the shortest")
+    longest: int = Field(description="samples of the longest")
+
+
+class ChannelsAnswer(AnswerModel):
+    """One joint's channels."""
+
+    position: tuple[Measured, Measured] = Field(description="least and greatest value [rad or m]; null without samples")
+    effort: tuple[Measured, Measured] = Field(description="least and greatest value [Nm, N or drive units]")
+    position_step: float | None = Field(description="step in multiples of which the position moves [rad or m]")
+    wraps: int = Field(description="jumps of the position by about 2π")
+    first_wrap: Measured = Field(description="time of the first of them [s]")
+    clipped: tuple[tuple[float, int], ...] = Field(
+        description="levels at which the effort stays, and number of samples"
+    )
+
+
+class RecordingReportAnswer(AnswerModel):
+    """What a recording holds, and what to look at before trusting it."""
+
+    name: str = Field(description="of the recording")
+    samples: int = Field(description="number of samples")
+    duration_s: float = Field(description="from the first to the last sample [s]")
+    rate_hz: float = Field(description="1 / median step [Hz]")
+    effort_kind: EffortKind = Field(description="torque (tau), or drive units (i)")
+    columns: tuple[str, ...] = Field(description="columns that are read")
+    ignored_columns: tuple[str, ...] = Field(description="columns that nobody reads")
+    missed: dict[str, int] = Field(description="number of NaN in each column that has any")
+    steps: StepsAnswer = Field(description="of the clock")
+    gaps: GapsAnswer = Field(description="where the clock skips")
+    periods: PeriodsAnswer | None = Field(description="repeats of the excitation, where they are marked")
+    joints: tuple[ChannelsAnswer, ...] = Field(description="one a joint")
+    findings: tuple[FindingAnswer, ...] = Field(description="warnings first")
+
+
+class ReadingRequest(ReadingOptions):
+    """How a recording is to be read."""
+
+
+class MappingAnswer(AnswerModel):
+    """Which columns of a file are read as which."""
+
+    header: tuple[str, ...] = Field(description="names of the file's columns; numbers from 1 where it has no names")
+    columns: dict[str, str] = Field(description="the file's column for t, q1, tau1, …; only those that were found")
+    units: dict[str, str] = Field(description="of t, q, qd and tau")
+    is_guessed: bool = Field(description="whether only the words of the column names suggest it")
+
+
+class UnderstandingAnswer(AnswerModel):
+    """How a recording is understood; nothing of it is kept."""
+
+    mapping: MappingAnswer | None = Field(description="its columns and units; null for a log, which names its joints")
+    report: RecordingReportAnswer | None = Field(description="what it holds, read so; null where it is refused")
+    problem: str | None = Field(description="why it is refused, and what to do")
+
+
+router = APIRouter(prefix="/recordings", tags=["recordings"])
+
+Name = Annotated[str, Path(description="name of the recording", examples=["log-2026-11-03.csv"])]
+JointCount = Annotated[int | None, Query(gt=0, le=1000, description="joints that the recording must have")]
+MostSamples = Annotated[int, Query(ge=2, le=1_000_000, description="samples to return, about")]
+
+RecordingLimit = Annotated[int, Query(ge=1, le=10_000, description="most entries of the list")]
+
+_BODY = form_body({"file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database")}, required=["file"])
+
+
+@router.post(
+    "",
+    status_code=201,
+    summary="Keep a recording on the server",
+    response_model=RecordingAnswer,
+    responses={
+        200: {"model": RecordingAnswer, "description": "the very same bytes were already kept under that name"},
+        **problem_responses("bad-request", "limit-exceeded", "media-type", "name-taken", "storage-full"),
+    },
+    openapi_extra={"requestBody": {"required": True, "content": _BODY}},
+)
+async def keep_recording(request: Request, response: Response, services: ServicesDep) -> RecordingAnswer:
+    """The file is kept under its own name; nothing is ever overwritten."""
+    folder = await run_in_threadpool(services.recordings.stage)
+    try:
+        rules = {"file": PartRule(services.settings.max_upload_bytes, folder)}
+        file = (await receive_form(request, rules)).file("file")
+        if file is None:
+            raise ProblemError("invalid-request", "the form has no part file; send the recording as part file")
+        kept, is_new = await run_in_threadpool(services.recordings.keep, file)
+    finally:
+        await run_in_threadpool(services.recordings.discard, folder)
+    response.status_code = 201 if is_new else 200
+    response.headers["Location"] = f"{request.url.path}/{quote(kept.name)}"
+    return _answer(kept)
+
+
+@router.get("", summary="List the recordings on the server")
+def list_recordings(services: ServicesDep, limit: RecordingLimit = 1000, after: After = None) -> RecordingListAnswer:
+    """Sent ones, and those that the operator put into the folder."""
+    entries = [entry for entry in services.recordings.entries() if after is None or entry.name > after]
+    page = [_answer(entry) for entry in entries[:limit]]
+    return RecordingListAnswer(recordings=page, next=page[-1].name if len(entries) > limit else None)
+
+
+@router.get("/{name}", summary="Look a recording up", responses=problem_responses("not-found"))
+def get_recording(name: Name, services: ServicesDep) -> RecordingAnswer:
+    """Size, time and sha256."""
+    return _answer(services.recordings.find(name))
+
+
+@router.get(
+    "/{name}/report",
+    summary="Check a recording",
+    responses=problem_responses("not-found", "recording", "recording-mismatch", *READING),
+)
+async def report_on_recording(
+    request: Request, name: Name, services: ServicesDep, joint_count: JointCount = None
+) -> RecordingReportAnswer:
+    """What it holds, and what to look at before trusting it."""
+    path = await run_in_threadpool(services.recordings.path, name)
+    report = await services.reading.call(request, check_kept_recording, path, joint_count)
+    return RecordingReportAnswer.model_validate(report)
+
+
+@router.get(
+    "/{name}/samples",
+    summary="Fetch samples of a recording for a plot",
+    response_class=Response,
+    responses=file_responses(
+        ("application/octet-stream",),
+        "not-found",
+        "recording",
+        *READING,
+        description="columns of 32-bit floats behind a header",
+    ),
+)
+async def get_samples(request: Request, name: Name, services: ServicesDep, most: MostSamples = 100_000) -> Response:
+    """Time, positions and torques; of more samples than asked for, those that keep every column's look.
+
+    Length of the header (4 bytes, little-endian), the header (JSON: `columns`, `joint_count`, `effort`, `samples`,
+    `shown`), then each column as little-endian 32-bit floats; time counts from the first sample.
+    """
+    path = await run_in_threadpool(services.recordings.path, name)
+    content = await services.reading.call(request, read_kept_samples, path, most)
+    return Response(content, media_type="application/octet-stream")
+
+
+@router.get(
+    "/{name}/content",
+    summary="Fetch a recording",
+    response_class=FileResponse,
+    responses=file_responses(("application/octet-stream", "text/csv"), "not-found"),
+)
+def get_content(name: Name, services: ServicesDep) -> FileResponse:
+    """The very bytes that are kept."""
+    return file_answer(services.recordings.path(name), name)
+
+
+@router.delete(
+    "/{name}",
+    status_code=204,
+    summary="Remove a recording",
+    responses=problem_responses("not-found", "in-use", "store"),
+)
+def remove_recording(name: Name, services: ServicesDep) -> None:
+    """Identifications that wait for it will fail; one that a model in use rests on stays."""
+    services.recordings.path(name)
+    require_no_evidence(services, name)
+    services.recordings.remove(name)
+
+
+def _answer(recording: StoredRecording) -> RecordingAnswer:
+    return RecordingAnswer.model_validate(recording)
+
+
+mapping_router = APIRouter(prefix="/mappings", tags=["recordings"], responses=problem_responses("invalid-request"))
+
+_MAPPING_BODY = form_body(
+    {
+        "file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database"),
+        "robot": binary_part("the robot file, whose joints, limits and layout it is read by"),
+        "urdf": binary_part("the URDF that the robot file names, by its bare name"),
+        "request": refer_to_model(ReadingRequest),
+    },
+    required=["file"],
+)
+
+
+@mapping_router.post(
+    "/check",
+    summary="Check how a recording is read",
+    responses=problem_responses("bad-request", "limit-exceeded", "media-type", "robot-file", *READING),
+    openapi_extra={"requestBody": {"required": True, "content": _MAPPING_BODY}},
+)
+async def check_sent_recording(request: Request, services: ServicesDep) -> UnderstandingAnswer:
+    """Its columns and units as they are understood, and what it holds when it is read so; nothing is kept."""
+    folder = await run_in_threadpool(services.recordings.stage)
+    try:
+        settings, robots = services.settings, folder / "robot"
+        await run_in_threadpool(robots.mkdir)
+        rules = {
+            "request": PartRule(settings.max_document_bytes),
+            "file": PartRule(settings.max_upload_bytes, folder),
+            **robot_part_rules(robots),
+        }
+        form = await receive_form(request, rules)
+        file, robot_file = form.file("file"), form.file("robot")
+        if file is None:
+            raise ProblemError("invalid-request", "the form has no part file; send the recording as part file")
+        options = parse_document(form.texts.get("request", b"{}"), ReadingRequest, within="part request")
+        robot = robot_file and await run_in_threadpool(read_received_robot, robots, robot_file.name)
+        found = await services.reading.call(request, understand_recording, file.path, robot, options.reading)
+        return UnderstandingAnswer.model_validate(found)
+    finally:
+        await run_in_threadpool(services.recordings.discard, folder)

@@ -1,1 +1,0 @@
-"""Recordings on the server: sent, listed, checked."""

@@ -1,1 +1,0 @@
-"""Robot files: received, checked."""
