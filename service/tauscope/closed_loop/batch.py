@@ -11,9 +11,7 @@ from tauscope.dynamics import torque_regressor
 from tauscope.recording.recording import Array
 from tauscope.robot import Actuator, Robot
 
-SWEEPS = 4
-"""Gauss-Seidel sweeps over the dry friction of coupled joints."""
-
+SWEEPS = 4  # Gauss-Seidel sweeps over the dry friction of coupled joints
 _TWO_OVER_PI = 2.0 / np.pi
 
 

@@ -13,11 +13,10 @@ from tauscope.recording.conditioning.filters import smooth
 from tauscope.recording.recording import Array
 from tauscope.robot import Actuator, Robot
 
+# Bandwidth of the stabiliser [rad/s]: 1 Hz holds a drift of minutes and leaves the motion itself to the model.
 STABILISER_RAD_S = 2.0 * np.pi
-"""Bandwidth of the stabiliser [rad/s]: 1 Hz holds a drift of minutes and leaves the motion itself to the model."""
-
+# Band of the velocity that restarts begin with, where none was recorded [Hz]: above it are steps of the encoder.
 STATE_BAND_HZ = 15.0
-"""Band of the velocity that restarts begin with, where none was recorded [Hz]: above it are steps of the encoder."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,7 @@ from tauscope.recording.recording import Array
 
 _TWO_OVER_PI = 2.0 / np.pi
 
-RESTING = 1e-4
-"""Speed below which a joint's direction is that of the torque on it [rad/s or m/s]."""
+RESTING = 1e-4  # speed below which a joint's direction is that of the torque on it [rad/s or m/s]
 
 
 class JointLaws:

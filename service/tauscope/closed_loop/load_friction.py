@@ -11,9 +11,9 @@ import numpy as np
 
 from tauscope.recording.recording import Array
 
+# Weight of the last step's load in the load that friction follows: friction acts back on it through the acceleration,
+# and a friction that takes more than half of any further load would make the two alternate from step to step.
 RELAXED = 0.5
-"""Weight of the last step's load in the load that friction follows: friction acts back on it through the acceleration,
-and a friction that takes more than half of any further load would make the two alternate from step to step."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,9 +25,7 @@ from tauscope.report.tables import input_table
 
 HEIGHT_INCHES = 3.4
 
-MOST_POINTS = 1400
-"""Points a curve; two a pixel."""
-
+MOST_POINTS = 1400  # points a curve; two a pixel
 COLOURS = {"stated": HELD_OUT, "identified": PREDICTED, "findings": RESIDUAL, "refined": INK}
 
 

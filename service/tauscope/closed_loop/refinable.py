@@ -14,18 +14,12 @@ from tauscope.recording.recording import Array
 from tauscope.robot import Actuator, LinkInertia
 from tauscope.robot.actuator import ROOM_C
 
+# Standard error of masses relative to themselves, and of centres of mass relative to the arm of their inertia.
 BODY_STD = 0.1
-"""Standard error of masses relative to themselves, and of centres of mass relative to the arm of their inertia."""
-
-GYRATION_STD = 0.3
-"""Relative standard error of radii of gyration about centres of mass: torque tells them last of all."""
-
+GYRATION_STD = 0.3  # relative standard error of radii of gyration about centres of mass: torque tells them last of all
+# Loss of torque per volt with temperature, prior [1/K]: copper 0.4 %/K, magnets 0.2 %/K; the sensor is not at both.
 WARM_LOSS, WARM_LOSS_STD = 0.006, 0.01
-"""Loss of torque per volt with temperature, prior [1/K]: copper 0.4 %/K, magnets 0.2 %/K; the sensor is not at both."""
-
-STEP = 0.3
-"""Size of a step of friction relative to its level."""
-
+STEP = 0.3  # size of a step of friction relative to its level
 PER_BODY, PER_JOINT = 5, 5
 
 

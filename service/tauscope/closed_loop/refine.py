@@ -18,20 +18,11 @@ from tauscope.recording import Recording
 from tauscope.recording.recording import Array
 from tauscope.robot import Actuator
 
-INDEPENDENT_S = 0.1
-"""Time between independent position errors [s]: loops of servos pass about 10 Hz."""
-
-SIGNIFICANT = 0.05
-"""p above which a term of friction by load is left out."""
-
-MOST_STEPS = 30
-"""Gauss-Newton steps at most."""
-
-IMPROVES = 1e-4
-"""Relative fall of the cost below which the search ends."""
-
-DIFFERENCE = 0.02
-"""Step of numerical derivatives, relative to the scale of a parameter."""
+INDEPENDENT_S = 0.1  # time between independent position errors [s]: loops of servos pass about 10 Hz
+SIGNIFICANT = 0.05  # p above which a term of friction by load is left out
+MOST_STEPS = 30  # Gauss-Newton steps at most
+IMPROVES = 1e-4  # relative fall of the cost below which the search ends
+DIFFERENCE = 0.02  # step of numerical derivatives, relative to the scale of a parameter
 
 
 @dataclass(frozen=True)

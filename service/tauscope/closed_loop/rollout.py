@@ -30,9 +30,7 @@ from tauscope.recording.table import MemoryTable
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import Actuator, Robot
 
-HORIZONS_S = (0.1, 1.0, 10.0)
-"""Times between restarts at the real state [s]: one command, one move, one task."""
-
+HORIZONS_S = (0.1, 1.0, 10.0)  # times between restarts at the real state [s]: one command, one move, one task
 Progress = Callable[[str], None]
 
 

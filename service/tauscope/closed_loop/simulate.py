@@ -9,8 +9,7 @@ from tauscope.closed_loop.plant import STEP_S, Plant
 from tauscope.errors import TauscopeError
 from tauscope.recording.recording import Array
 
-LOST = 1e3
-"""Position error beyond which the simulated arm is lost and held there [rad or m]."""
+LOST = 1e3  # position error beyond which the simulated arm is lost and held there [rad or m]
 
 
 def simulate_motion(

@@ -6,13 +6,11 @@ from tauscope.closed_loop.result import RefinementEntry, RolloutDocument
 from tauscope.number_text import ABSENT, significant
 from tauscope.report.table import Table
 
+# Models in words: the identified one is without findings of a diagnosis.
 MODEL_WORDS = {"stated": "robot file", "identified": "identified", "findings": "with findings", "refined": "refined"}
-"""Models in words: the identified one is without findings of a diagnosis."""
-
 MILLI = 1e3
 
-LEAST_P = 1e-3
-"""p below which its size says nothing."""
+LEAST_P = 1e-3  # p below which its size says nothing
 
 
 def summary_table(document: RolloutDocument) -> Table:

@@ -11,9 +11,8 @@ from tauscope.number_text import significant
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Angles at which a cable begins to pull, relative to the range of motion: one that always pulls is a spring.
 ONSETS = np.linspace(0.2, 0.9, 8)
-"""Angles at which a cable begins to pull, relative to the range of motion: one that always pulls is a spring."""
-
 EXPONENTS = np.array([1.0, 1.5, 2.0])
 
 

@@ -12,11 +12,9 @@ from tauscope.robot import Robot
 
 T = TypeVar("T")
 
+# Rms of a joint's rigid-body torque relative to its largest torque below which nothing presses its transmission.
 LEAST_LOAD = 0.02
-"""Rms of a joint's rigid-body torque relative to its largest torque below which nothing presses its transmission."""
-
-ONE_WAY = 0.1
-"""Speed the other way, relative to the rms, below which a joint does not reverse."""
+ONE_WAY = 0.1  # speed the other way, relative to the rms, below which a joint does not reverse
 
 
 @dataclass(frozen=True, eq=False)

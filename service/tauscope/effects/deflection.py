@@ -17,31 +17,24 @@ from tauscope.effects.context import ArmContext, Signals
 from tauscope.effects.effect import Effect, Quantity, Shape
 from tauscope.recording.recording import Array
 
+# Step of the difference quotient by position [rad or m]: far above rounding, far below the curvature of any sine.
 SMALL = 1e-4
-"""Step of the difference quotient by position [rad or m]: far above rounding, far below the curvature of any sine."""
-
+# Rates at which derivatives by position, velocity and acceleration are taken. They change with the pose, by far slower
+# than a recording, that by position with the acceleration too: at the 16 joints of three simulated arms they err by
+# 0.4, 0.8 and 0.02 % at most, rms.
 SLOPES_HZ = (100.0, 25.0, 25.0)
-"""Rates at which derivatives by position, velocity and acceleration are taken. They change with the pose, by far slower
-than a recording, that by position with the acceleration too: at the 16 joints of three simulated arms they err by 0.4,
-0.8 and 0.02 % at most, rms."""
-
+# Joints whose columns' slopes are kept a piece: fits are about one or two joints at a time, and each motion needs some
+# 0.1 MB a second and joint.
 KEPT = 2 * THREADS
-"""Joints whose columns' slopes are kept a piece: fits are about one or two joints at a time, and each motion needs
-some 0.1 MB a second and joint."""
-
-LEAST_INERTIA = 0.05
-"""Share of a joint's largest inertia below which a fitted one is an error of the fit."""
-
+LEAST_INERTIA = 0.05  # share of a joint's largest inertia below which a fitted one is an error of the fit
+# What the first order in δ, with the load of the motor's own motion, errs by, relative to the size that is found: on
+# simulated arms 0.02 to 0.25 beyond the standard error.
 FIRST_ORDER = 0.12
-"""What the first order in δ, with the load of the motor's own motion, errs by, relative to the size that is found: on
-simulated arms 0.02 to 0.25 beyond the standard error."""
-
-BAND = Shape("band", "Hz", fixed=True, reported=False)
-"""Of the load that deflects the transmission."""
+BAND = Shape("band", "Hz", fixed=True, reported=False)  # of the load that deflects the transmission
 
 
+# Samples (K,) at which slopes are taken, and those of some columns of Φ there, (n, C, K): 1e-7 is more than enough.
 _Slopes = tuple[NDArray[np.intp], NDArray[np.float32]]
-"""Samples (K,) at which slopes are taken, and those of some columns of Φ there, (n, C, K): 1e-7 is more than enough."""
 
 
 class Deflection(Effect):

@@ -17,21 +17,15 @@ from tauscope.number_text import significant
 from tauscope.recording.recording import Array
 from tauscope.robot import JointType, Robot
 
+# An entry of a scenario file without its joint; without its effect too where that is the effect's own id.
 Entry = dict[str, Any]
-"""An entry of a scenario file without its joint; without its effect too where that is the effect's own id."""
-
-_STEP = "atan({k_v} * v) * 0.6366197723675814"
-"""A(K_v v), the smooth sign, in C and Python."""
-
+_STEP = "atan({k_v} * v) * 0.6366197723675814"  # A(K_v v), the smooth sign, in C and Python
 _POSITION = {JointType.REVOLUTE: "rad", JointType.PRISMATIC: "m"}
 _TORQUE = {JointType.REVOLUTE: "Nm", JointType.PRISMATIC: "N"}
 
 
-SHORT_S = 0.5
-"""Times below this are told in milliseconds [s]."""
-
-NO_SHAPE = np.zeros((1, 0))
-"""The grid of an effect without shape parameters."""
+SHORT_S = 0.5  # times below this are told in milliseconds [s]
+NO_SHAPE = np.zeros((1, 0))  # the grid of an effect without shape parameters
 
 
 @dataclass(frozen=True)
@@ -81,8 +75,7 @@ class Quantity:
         return replace(self, value=1e3 * self.value, std=1e3 * self.std, unit="ms", period=1e3 * self.period)
 
 
-Sizes = Mapping[str, Quantity]
-"""Parameters of a finding by name."""
+Sizes = Mapping[str, Quantity]  # parameters of a finding by name
 
 
 def size_text(quantity: Quantity) -> str:

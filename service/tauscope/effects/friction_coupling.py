@@ -11,8 +11,8 @@ from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, si
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Steepness of the coupled motor's Coulomb step, times the rms of the joint's own speed.
 STEEPNESSES = np.array([30.0, 120.0, 500.0, 2000.0])
-"""Steepness of the coupled motor's Coulomb step, times the rms of the joint's own speed."""
 
 
 @dataclass(frozen=True, eq=False)

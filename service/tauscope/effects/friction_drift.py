@@ -10,21 +10,14 @@ from tauscope.effects.context import ArmContext, Signals
 from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, Sizes, size_text
 from tauscope.recording.recording import Array
 
-TIMES = np.array([0.08, 0.2, 0.5, 1.2, 3.0])
-"""Time constants looked at, relative to the longest recording."""
+TIMES = np.array([0.08, 0.2, 0.5, 1.2, 3.0])  # time constants looked at, relative to the longest recording
 
 
+# Range of a recorded temperature from which friction may follow it [K]: motors report whole degrees.
 LEAST_WARMING = 2.0
-"""Range of a recorded temperature from which friction may follow it [K]: motors report whole degrees."""
-
-RATES = np.array([0.0, 0.03])
-"""Relative changes of viscosity looked at [1/K]: greases and oils lose 2 to 5 % a kelvin."""
-
-FASTEST = 0.06
-"""…and the largest [1/K]."""
-
-NO_RATE = 1e-9
-"""Rate below which friction is a straight line in temperature [1/K]."""
+RATES = np.array([0.0, 0.03])  # relative changes of viscosity looked at [1/K]: greases and oils lose 2 to 5 % a kelvin
+FASTEST = 0.06  # …and the largest [1/K]
+NO_RATE = 1e-9  # rate below which friction is a straight line in temperature [1/K]
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,11 +14,9 @@ from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, si
 from tauscope.recording.recording import Array
 from tauscope.robot import Placement, Robot
 
+# Displacement of a frame for the difference quotient [m]; torque is quadratic in it, on the scale of the arm.
 STEP_M = 1e-5
-"""Displacement of a frame for the difference quotient [m]; torque is quadratic in it, on the scale of the arm."""
-
-LARGEST_M = 0.2
-"""A frame farther off is no error of measurement [m]."""
+LARGEST_M = 0.2  # a frame farther off is no error of measurement [m]
 
 
 class KinematicError(Effect):

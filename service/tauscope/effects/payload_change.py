@@ -11,11 +11,8 @@ from tauscope.effects.time_local import EVERY, OUTSIDE, TimeLocalEffect, since
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
-NEAR_EDGE = 0.03
-"""Part of a recording within which an edge of a window is the recording's own."""
-
-INSTANTS = 12
-"""Instants of every recording at which the payload may change."""
+NEAR_EDGE = 0.03  # part of a recording within which an edge of a window is the recording's own
+INSTANTS = 12  # instants of every recording at which the payload may change
 
 
 class PayloadChange(TimeLocalEffect):

@@ -27,31 +27,21 @@ from tauscope.effects.effect import (
 from tauscope.recording.recording import Array
 from tauscope.robot import JointType, Robot
 
+# Cycles over the range of motion below which a periodic torque is a spring or a bump by another name.
 FEWEST_CYCLES = 1.5
-"""Cycles over the range of motion below which a periodic torque is a spring or a bump by another name."""
-
-CYCLES_A_STEP = 0.35
-"""Step of the scan in cycles over the range of motion: a peak is two wide."""
-
-BAND_SHARE = 0.8
-"""Share of the band up to which the frequency at typical speed may reach."""
-
+CYCLES_A_STEP = 0.35  # step of the scan in cycles over the range of motion: a peak is two wide
+BAND_SHARE = 0.8  # share of the band up to which the frequency at typical speed may reach
 MOST_ORDERS = 220
 
+# Spread of steps, relative to one, up to which they are even: over a thousand orders no phase is off by as much.
 EVEN = 1e-9
-"""Spread of steps, relative to one, up to which they are even: over a thousand orders no phase is off by as much."""
-
+# Factor up to which orders are looked at where something is left: they reach the band near reversals only, in a
+# twentieth of the time of a sine.
 FARTHER = 8.0
-"""Factor up to which orders are looked at where something is left: they reach the band near reversals only, in a
-twentieth of the time of a sine."""
-
 MOST_FARTHER_ORDERS = 800
 
-FEW = 2
-"""Orders at once up to which sines are kept: one of a fit, and the two of its difference quotient."""
-
-KEPT = 24 * THREADS
-"""Sets of them that are kept a piece: those of a model with all orders that it may have."""
+FEW = 2  # orders at once up to which sines are kept: one of a fit, and the two of its difference quotient
+KEPT = 24 * THREADS  # sets of them that are kept a piece: those of a model with all orders that it may have
 
 
 def possible_orders(context: ArmContext, joint: int) -> Array:

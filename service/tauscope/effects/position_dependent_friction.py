@@ -11,11 +11,9 @@ from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, pe
 from tauscope.recording.recording import Array
 from tauscope.robot import JointType, Robot
 
-TIMES_A_TURN = np.array([1.0, 2.0, 3.0])
-"""An eccentric bearing, an oval one, and one that three jaws hold."""
-
+TIMES_A_TURN = np.array([1.0, 2.0, 3.0])  # an eccentric bearing, an oval one, and one that three jaws hold
+# k times the stroke of a linear axis: from what is bent a little up to three waves.
 RADIANS_A_STROKE = np.array([1.0, 2.0, 4.0, 6.0, 9.0, 12.0, 15.0, 18.0])
-"""k times the stroke of a linear axis: from what is bent a little up to three waves."""
 
 
 @dataclass(frozen=True, eq=False)

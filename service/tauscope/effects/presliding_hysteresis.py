@@ -14,11 +14,10 @@ from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, pe
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Bristle lengths looked at, relative to the joint's range of motion.
 DISTANCES = np.array([5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3.2e-2])
-"""Bristle lengths looked at, relative to the joint's range of motion."""
-
+# Bristle length, in standard deviations of the position's noise, below which it is a step like any other.
 RESOLVED = 4.0
-"""Bristle length, in standard deviations of the position's noise, below which it is a step like any other."""
 
 
 def bristle_deflection(position: Array, lengths: Array, start: Array) -> Array:

@@ -9,14 +9,12 @@ from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, me
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
-SPEEDS = np.array([0.04, 0.08, 0.15, 0.25, 0.4, 0.65, 1.0])
-"""Decay speeds looked at, relative to the joint's top speed."""
-
+SPEEDS = np.array([0.04, 0.08, 0.15, 0.25, 0.4, 0.65, 1.0])  # decay speeds looked at, relative to the joint's top speed
 EXPONENTS = np.array([1.0, 2.0])
 
+# Least K_v v_s: where friction has not risen to half its size before it decays, step and decay together are any small
+# bump, and s is of any size.
 SHORTEST_DECAY = 1.0
-"""Least K_v v_s: where friction has not risen to half its size before it decays, step and decay together are any small
-bump, and s is of any size."""
 
 
 class StribeckFriction(Effect):

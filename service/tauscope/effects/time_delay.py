@@ -11,15 +11,12 @@ from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape,
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Share of the torque that a constant near the right one makes late: the right one makes all of it late at most.
 LARGEST_SHARE = 2.0
-"""Share of the torque that a constant near the right one makes late: the right one makes all of it late at most."""
-
+# A channel is late as a whole: where less than half of its torque seems to be, noise or something else does.
 SMALLEST_SHARE = 0.5
-"""A channel is late as a whole: where less than half of its torque seems to be, noise or something else does."""
-
+# Time constants looked at, relative to that of the band: one that is much shorter is a delay.
 LAGS = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
-"""Time constants looked at, relative to that of the band: one that is much shorter is a delay."""
-
 ORDERS = (1, 2)
 
 

@@ -9,14 +9,10 @@ from tauscope.effects.context import Signals
 from tauscope.effects.effect import Effect
 from tauscope.recording.recording import Array
 
-EVERY = -1.0
-"""Scope of a window that lies at the same instants of every recording, held-out ones included."""
-
-HALF_SINE = 1.0
-"""Profile of a window that rises and falls as half a sine."""
-
+EVERY = -1.0  # scope of a window that lies at the same instants of every recording, held-out ones included
+HALF_SINE = 1.0  # profile of a window that rises and falls as half a sine
+# …of one that is open wherever the rectangular one is shut, in the training recordings; any other is rectangular.
 OUTSIDE = -1.0
-"""…of one that is open wherever the rectangular one is shut, in the training recordings; any other is rectangular."""
 
 
 def since(recording: int) -> float:

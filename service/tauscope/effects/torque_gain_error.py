@@ -8,8 +8,7 @@ from tauscope.number_text import significant
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
-ALIKE = 0.05
-"""Part of a torque constant by which motors of one kind differ: so much is no scale."""
+ALIKE = 0.05  # part of a torque constant by which motors of one kind differ: so much is no scale
 
 
 class TorqueGainError(Effect):

@@ -11,14 +11,11 @@ from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape,
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Levels of a soft curve looked at, relative to the largest torque.
 COMPRESSIONS = np.array([0.3, 0.5, 0.8, 1.3, 2.2, 4.0])
-"""Levels of a soft curve looked at, relative to the largest torque."""
-
-CLIPS = np.array([0.3, 0.45, 0.6, 0.7, 0.8, 0.9])
-"""Levels of a hard one."""
-
+CLIPS = np.array([0.3, 0.45, 0.6, 0.7, 0.8, 0.9])  # levels of a hard one
+# Part of what lies beyond the level that a hard curve takes off: one that takes off little is a soft curve.
 CLIPPED_AT_LEAST = 0.5
-"""Part of what lies beyond the level that a hard curve takes off: one that takes off little is a soft curve."""
 
 
 class Saturation(Effect):

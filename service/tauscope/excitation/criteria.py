@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# Share of the largest eigenvalue below which an eigenvalue is rounding: some parameter is not excited at all.
 SINGULAR = 1e-13
-"""Share of the largest eigenvalue below which an eigenvalue is rounding: some parameter is not excited at all."""
 
 
 class Criterion(StrEnum):

@@ -16,11 +16,9 @@ from tauscope.trajectory.fourier_series import FourierSeries
 from tauscope.trajectory.segments import FourierSegment, Segment
 from tauscope.trajectory.trajectory import DesignRecord, Trajectory
 
+# Part of a limit: a limit that leaves no more than this above what is spared by wish is one that limits the design.
 ACTIVE = 0.01
-"""Part of a limit: a limit that leaves no more than this above what is spared by wish is one that limits the design."""
-
-ACTIVE_CLEARANCE_M = 0.005
-"""Clearance from floor or boxes at which they limit the design [m]."""
+ACTIVE_CLEARANCE_M = 0.005  # clearance from floor or boxes at which they limit the design [m]
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,11 +21,9 @@ from tauscope.trajectory.fourier_series import MotionSamples
 Array = NDArray[np.float64]
 Columns = NDArray[np.intp]
 
+# K_v where the robot file states none [s/rad or s/m]: its sign function turns within a hundredth of usual speeds.
 ORDINARY_STEEPNESS = 500.0
-"""K_v where the robot file states none [s/rad or s/m]: its sign function turns within a hundredth of usual speeds."""
-
-APART = 4.0
-"""K_v is never taken for less than this many δ: the two columns would be one."""
+APART = 4.0  # k_v is never taken for less than this many δ: the two columns would be one
 
 
 class ColumnScaling(StrEnum):

@@ -23,24 +23,15 @@ from tauscope.trajectory.limits import MotionLimits, motion_limits
 
 Array = NDArray[np.float64]
 
+# Instants a period of the highest harmonic at which the optimiser looks, first and last: friction's sign asks for more
+# than the ten that the rest of the regressor needs.
 SAMPLES_PER_HARMONIC = (24, 48)
-"""Instants a period of the highest harmonic at which the optimiser looks, first and last: friction's sign asks for more
-than the ten that the rest of the regressor needs."""
-
-FINE_SAMPLES_PER_HARMONIC = 80
-"""Instants a period of the highest harmonic at which torque and workspace are held."""
-
-REPORT_SAMPLES = 2000
-"""Instants a period from which the reported criterion and condition number are computed."""
-
-EXACT_SAMPLES = 1000
-"""Instants a period from which candidates are compared."""
-
+FINE_SAMPLES_PER_HARMONIC = 80  # instants a period of the highest harmonic at which torque and workspace are held
+REPORT_SAMPLES = 2000  # instants a period from which the reported criterion and condition number are computed
+EXACT_SAMPLES = 1000  # instants a period from which candidates are compared
+# The sign function may turn within this part of the change of speed from instant to instant, as 1/K_v.
 RESOLVED_STEPS = 5.0
-"""The sign function may turn within this part of the change of speed from instant to instant, as 1/K_v."""
-
-SCALING_STATES = 512
-"""Random states from which `ColumnScaling.TYPICAL` takes the size of a column."""
+SCALING_STATES = 512  # random states from which `ColumnScaling.TYPICAL` takes the size of a column
 
 
 @dataclass(frozen=True, eq=False)

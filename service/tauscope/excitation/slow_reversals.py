@@ -24,43 +24,21 @@ from tauscope.trajectory.trajectory import ramp, whole_steps
 
 Array = NDArray[np.float64]
 
-SPEED_SHARE = 0.05
-"""Peak speed as part of the speed limit."""
-
+SPEED_SHARE = 0.05  # peak speed as part of the speed limit
+# Peak speed however fast the joint may move [rad/s or m/s].
 LARGEST_SPEED = {JointType.REVOLUTE: 0.1, JointType.PRISMATIC: 0.02}
-"""Peak speed however fast the joint may move [rad/s or m/s]."""
-
-LEVELS = (1.0, 0.5, 0.25)
-"""Peak speeds of successive postures, relative to the first."""
-
-DURATION_S = 8.0
-"""Time at one posture [s]."""
-
-LOWEST_ORDERS = (2, 3, 4)
-"""l of successive joints: five, seven and nine reversals."""
-
-PLACES = 60
-"""Instants of the excitation's period that are considered as postures."""
-
-ROOMY = 0.5
-"""Part of its peak speed that every joint has to reach at a posture: near a position limit there is no room."""
-
-SAME_POSTURE = 1e-12
-"""Postures closer than this need no move [rad or m]."""
-
-MOVE_FRACTION = 0.6
-"""Part of the limits that moves between postures use."""
-
-PATH_PACE = 1.0
-"""Largest pace along the excitation's path, in its own time."""
-
-LONGER = 1.25
-"""Factor by which a move is slowed down until it keeps all limits."""
-
+LEVELS = (1.0, 0.5, 0.25)  # peak speeds of successive postures, relative to the first
+DURATION_S = 8.0  # time at one posture [s]
+LOWEST_ORDERS = (2, 3, 4)  # l of successive joints: five, seven and nine reversals
+PLACES = 60  # instants of the excitation's period that are considered as postures
+ROOMY = 0.5  # part of its peak speed that every joint has to reach at a posture: near a position limit there is no room
+SAME_POSTURE = 1e-12  # postures closer than this need no move [rad or m]
+MOVE_FRACTION = 0.6  # part of the limits that moves between postures use
+PATH_PACE = 1.0  # largest pace along the excitation's path, in its own time
+LONGER = 1.25  # factor by which a move is slowed down until it keeps all limits
 MOST_SLOWDOWNS = 12
 
-STEP_S = 0.02
-"""Instants at which moves are checked are this far apart [s]."""
+STEP_S = 0.02  # instants at which moves are checked are this far apart [s]
 
 
 @dataclass(frozen=True, eq=False)

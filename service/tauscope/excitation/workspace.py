@@ -13,11 +13,8 @@ from tauscope.trajectory.fourier_series import MotionSamples
 
 Array = NDArray[np.float64]
 
-REFERENCE_M = 0.1
-"""Clearance from which nothing is said to be used of it; at zero clearance all of it is [m]."""
-
-STILL_M = 1e-9
-"""A point that moves less than this is fixed to the base: where it stands is nobody's choice [m]."""
+REFERENCE_M = 0.1  # clearance from which nothing is said to be used of it; at zero clearance all of it is [m]
+STILL_M = 1e-9  # a point that moves less than this is fixed to the base: where it stands is nobody's choice [m]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from tauscope.errors import ExportError
 from tauscope.export.mjcf_findings import numbers
 from tauscope.robot import Joint, LinkInertia, Robot
 
+# Bandwidth of gains that nothing states [rad/s]: 5 Hz, the reach of a small servo's position loop.
 BANDWIDTH_RAD_S = 2.0 * np.pi * 5.0
-"""Bandwidth of gains that nothing states [rad/s]: 5 Hz, the reach of a small servo's position loop."""
 
 
 class ActuatorKind(StrEnum):

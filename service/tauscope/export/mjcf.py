@@ -19,8 +19,7 @@ from tauscope.export.model import ExportModel
 from tauscope.robot import JointLimits, JointType, Robot, Segment
 from tauscope.robot.messages import one_line, shown
 
-MOTORS = ActuatorChoice()
-"""Torque motors, which need no gains."""
+MOTORS = ActuatorChoice()  # torque motors, which need no gains
 
 
 @dataclass(frozen=True)

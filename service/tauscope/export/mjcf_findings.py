@@ -18,12 +18,10 @@ from tauscope.export.compensation.model import JointFriction
 from tauscope.export.model import ExportModel, FoundEffect
 from tauscope.robot import LinkInertia, Robot
 
+# Effects that the joints' own friction and armature hold.
 IN_THE_MODEL = frozenset({"coulomb_friction", "viscous_friction", "torque_offset", "rotor_inertia"})
-"""Effects that the joints' own friction and armature hold."""
-
+# Attributes with which frictionloss holds a joint at rest: MuJoCo's own let it creep, by 25 mrad/s under 2/3 of it.
 REST = {"solreffriction": "0.002 1", "solimpfriction": "0.9999 0.9999 0.001 0.5 2"}
-"""Attributes with which frictionloss holds a joint at rest: MuJoCo's own let it creep, by 25 mrad/s under 2/3 of it."""
-
 NEWER = "needs MuJoCo 3.8 or later"
 
 
@@ -173,6 +171,7 @@ def _coupling(added: Additions, found: FoundEffect) -> str | None:
     return None
 
 
+# Functions that write an effect into a file, or return the reason against it.
 WRITERS: Mapping[str, Callable[[Additions, FoundEffect], str | None]] = {
     "joint_spring": _spring,
     "nonlinear_viscous": _add_power_of_speed,
@@ -183,7 +182,6 @@ WRITERS: Mapping[str, Callable[[Additions, FoundEffect], str | None]] = {
     "kinematic_error": _displacement,
     "friction_coupling": _coupling,
 }
-"""Functions that write an effect into a file, or return the reason against it."""
 
 
 def effects_in(model: ExportModel, included: Sequence[str], why: str) -> list[str]:

@@ -20,22 +20,15 @@ from tauscope.recording.recording import Array
 
 LARGEST_ORDER = 30
 
-FILTER_ORDER = 24
-"""Orders that stand for the band's filter: the density in the pass band is that of all orders to 1 %."""
-
+FILTER_ORDER = 24  # orders that stand for the band's filter: the density in the pass band is that of all orders to 1 %
+# White noise that is added to a filtered residual, as a share of its variance: the stop band is empty, and an
+# autoregression that is to follow it that far down needs hundreds of orders.
 FILTER_FLOOR = 1e-2
-"""White noise that is added to a filtered residual, as a share of its variance: the stop band is empty, and an
-autoregression that is to follow it that far down needs hundreds of orders."""
-
-FILTERED_LAGS = LARGEST_ORDER + FILTER_ORDER
-"""Lags that a model of a filtered residual needs."""
-
+FILTERED_LAGS = LARGEST_ORDER + FILTER_ORDER  # lags that a model of a filtered residual needs
+# Where samples are missing, orders end where fewer than this share of so many consecutive samples are all there: what
+# pairs at longer lags say no longer fits together.
 UNBROKEN_SHARE = 0.3
-"""Where samples are missing, orders end where fewer than this share of so many consecutive samples are all there: what
-pairs at longer lags say no longer fits together."""
-
-SMALLEST_SHARE = 1e-3
-"""…and at least so many are: a share of none has no logarithm."""
+SMALLEST_SHARE = 1e-3  # …and at least so many are: a share of none has no logarithm
 
 
 @dataclass(frozen=True, eq=False)

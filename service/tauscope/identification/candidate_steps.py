@@ -19,8 +19,7 @@ from tauscope.identification.least_squares import Solution
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
-COLLINEAR = 1e-9
-"""A second column with less than this share of its energy left beside the first adds nothing."""
+COLLINEAR = 1e-9  # a second column with less than this share of its energy left beside the first adds nothing
 
 
 @dataclass(frozen=True, eq=False)

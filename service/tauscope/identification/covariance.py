@@ -21,8 +21,8 @@ from tauscope.identification.shape_sensitivity import ShapeParameter, columns_wi
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
+# The covariance is enlarged by no more than the inverse of this for the degrees of freedom that parameters took.
 MOST_FREEDOM_LOST = 0.25
-"""The covariance is enlarged by no more than the inverse of this for the degrees of freedom that parameters took."""
 
 
 def parameter_covariance(

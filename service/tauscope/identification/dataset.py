@@ -14,21 +14,14 @@ from tauscope.recording.conditioning.common_band import HarmonicBand
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Bytes of columns that are kept between passes; beyond, every pass conditions the recording again.
 MEMORY_LIMIT = 256 * 1024 * 1024
-"""Bytes of columns that are kept between passes; beyond, every pass conditions the recording again."""
 
 
-REST_S = 0.1
-"""A joint that moves by no more than its encoder resolves for so long stands still [s]."""
-
-STOP_S = 0.5
-"""A joint that stands so long is held by its friction; a shorter rest is a turning point [s]."""
-
-MOSTLY = 0.1
-"""Share of a row's samples at rest from which on it says little of the noise in motion."""
-
-FEWEST_AT_REST = 3
-"""Samples that tell rest from a turning point."""
+REST_S = 0.1  # a joint that moves by no more than its encoder resolves for so long stands still [s]
+STOP_S = 0.5  # a joint that stands so long is held by its friction; a shorter rest is a turning point [s]
+MOSTLY = 0.1  # share of a row's samples at rest from which on it says little of the noise in motion
+FEWEST_AT_REST = 3  # samples that tell rest from a turning point
 
 
 @dataclass(frozen=True, eq=False)

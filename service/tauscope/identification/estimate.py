@@ -7,14 +7,11 @@ import numpy as np
 from tauscope.identification.least_squares import JointFactor, Solution, solve
 from tauscope.recording.recording import Array
 
+# Rounds of estimating σ_j from the common solution's residual, after a first one from each joint alone.
 REWEIGHTINGS = 1
-"""Rounds of estimating σ_j from the common solution's residual, after a first one from each joint alone."""
-
-SMALLEST_TORQUE = 1e-9
-"""Torque below which a recording has none [Nm or N]."""
-
+SMALLEST_TORQUE = 1e-9  # torque below which a recording has none [Nm or N]
+# Share of a joint's torque that counts as its noise at least: no sensor resolves more, and weights stay finite.
 FINEST_TORQUE = 1e-6
-"""Share of a joint's torque that counts as its noise at least: no sensor resolves more, and weights stay finite."""
 
 
 class Estimator(StrEnum):

@@ -8,15 +8,11 @@ import numpy as np
 from tauscope.identification.dataset import PreparedMotion
 from tauscope.recording.recording import Array
 
-TURNING = 0.05
-"""Share of a joint's top speed that it passes on both sides of a reversal: less is noise at rest."""
-
-TOP = 0.99
-"""Share of the samples that are slower than the top speed."""
+TURNING = 0.05  # share of a joint's top speed that it passes on both sides of a reversal: less is noise at rest
+TOP = 0.99  # share of the samples that are slower than the top speed
 
 
-MOST_SAMPLES = 2048
-"""Samples of one piece of motion, which has up to 32,768, by which it is described."""
+MOST_SAMPLES = 2048  # samples of one piece of motion, which has up to 32,768, by which it is described
 
 
 @dataclass(frozen=True, eq=False)

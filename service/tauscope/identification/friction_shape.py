@@ -20,36 +20,20 @@ from tauscope.recording.recording import Array
 from tauscope.robot import FrictionShape
 
 GRID_POINTS = 42
+# Candidates times the joint's rms velocity run over these powers of ten: from a gentle Stribeck slope to a step.
 GRID_DECADES = (0.2, 4.3)
-"""Candidates times the joint's rms velocity run over these powers of ten: from a gentle Stribeck slope to a step."""
-
-LEAST_STEP = 10**0.8
-"""K_v times the rms velocity is at least this: what is gentler is viscous friction by another name."""
-
+LEAST_STEP = 10**0.8  # k_v times the rms velocity is at least this: what is gentler is viscous friction by another name
+# K times the rms velocity of a constant that the data leave open, as near as they allow: the step of a textbook.
 ORDINARY = 1000.0
-"""K times the rms velocity of a constant that the data leave open, as near as they allow: the step of a textbook."""
-
-STRAIGHT = 0.17
-"""δ times the rms velocity v below which A(δ v) is a straight line but for a hundredth: (δ v)²/3."""
-
-AT_LIMIT = 0.95
-"""Share of the steepest δ from which on it is at its limit."""
-
-SEPARATION = 4.0
-"""K_v is at least this many times δ: closer, their columns are one."""
-
+STRAIGHT = 0.17  # δ times the rms velocity v below which A(δ v) is a straight line but for a hundredth: (δ v)²/3
+AT_LIMIT = 0.95  # share of the steepest δ from which on it is at its limit
+SEPARATION = 4.0  # k_v is at least this many times δ: closer, their columns are one
+# What a Stribeck term must take off the criterion to be proposed, in residual variances: five standard errors.
 IMPROVEMENT = 25.0
-"""What a Stribeck term must take off the criterion to be proposed, in residual variances: five standard errors."""
-
+# …and the share of the joint's residual energy that it must explain, so that it is not a proxy of something else.
 IMPROVEMENT_SHARE = 0.005
-"""…and the share of the joint's residual energy that it must explain, so that it is not a proxy of something else."""
-
-KNOWN_BAND = 25.0
-"""Constants whose criterion is within this much of the best are not told apart: five standard errors."""
-
-AS_GOOD = 0.02
-"""Share of the residual's energy that is no practical difference between two constants."""
-
+KNOWN_BAND = 25.0  # constants whose criterion is within this much of the best are not told apart: five standard errors
+AS_GOOD = 0.02  # share of the residual's energy that is no practical difference between two constants
 SWEEPS = 4
 
 

@@ -8,11 +8,8 @@ from tauscope.identification.excitation import thin
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
-POSTURES = 200
-"""Of the training motion, by which both are compared."""
-
-FELT = 1e-3
-"""Gravity below this share of the masses' weight at one metre, per kilogram, does not show [Nm/Nm]."""
+POSTURES = 200  # of the training motion, by which both are compared
+FELT = 1e-3  # gravity below this share of the masses' weight at one metre, per kilogram, does not show [Nm/Nm]
 
 
 def gravity_scale(motions: Dataset, structure: ModelStructure, parameters: Array) -> float | None:

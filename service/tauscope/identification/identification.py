@@ -33,10 +33,8 @@ from tauscope.recording.recording import Array, Recording
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import Robot
 
+# A coefficient whose standard error moves the joint's torque by more than this share of its rms is not identifiable.
 KNOWN_SHARE = 0.1
-"""A coefficient whose standard error moves the joint's torque by more than this share of its rms is not
-identifiable."""
-
 Progress = Callable[[str], None]
 
 

@@ -18,18 +18,13 @@ from tauscope.identification.dataset import PreparedMotion
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
+# Singular values of the column-scaled factor below this share of the largest are directions without information.
 RANK_TOLERANCE = 1e-9
-"""Singular values of the column-scaled factor below this share of the largest are directions without information."""
-
+# Reciprocal condition (1-norm) of a factor above which no direction can lack information: the ratio of the singular
+# values is at least that over the number of columns.
 WELL_CONDITIONED = 1e-6
-"""Reciprocal condition (1-norm) of a factor above which no direction can lack information: the ratio of the singular
-values is at least that over the number of columns."""
-
-ROWS_AT_ONCE = 1 << 10
-"""Rows factorised at once: such a block stays in the processor's cache."""
-
-PANEL = 8
-"""Columns that are eliminated before the rest is updated by one matrix product."""
+ROWS_AT_ONCE = 1 << 10  # rows factorised at once: such a block stays in the processor's cache
+PANEL = 8  # columns that are eliminated before the rest is updated by one matrix product
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,13 +22,12 @@ from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Standard error of a constant's logarithm that leaves no doubt about it. K_v has its profile as well; δ is known where
+# five standard errors are within a factor of e.
 TIGHT = {"k_v": 0.1, "delta": 0.2}
-"""Standard error of a constant's logarithm that leaves no doubt about it. K_v has its profile as well; δ is known where
-five standard errors are within a factor of e."""
-
+# Noise variances that a Stribeck term must take off the criterion to stay in the model: what chance does as rarely as
+# five standard errors, with the term's two unknowns τ_sc and δ.
 SIGNIFICANT = float(stats.chi2.isf(2.0 * stats.norm.sf(5.0), df=2))
-"""Noise variances that a Stribeck term must take off the criterion to stay in the model: what chance does as rarely as
-five standard errors, with the term's two unknowns τ_sc and δ."""
 
 
 def choose_model(

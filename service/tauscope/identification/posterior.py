@@ -22,21 +22,13 @@ from tauscope.identification.least_squares import JointFactor, stacked_factor
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
-WIDTHS = np.geomspace(1 / 16, 32.0, 19)
-"""Candidates of w: at 2 a link's mass is believed to as much as all of itself."""
-
+WIDTHS = np.geomspace(1 / 16, 32.0, 19)  # candidates of w: at 2 a link's mass is believed to as much as all of itself
+# The estimate believes no body more than this, however well the stated ones agree with the data so far: w is at least
+# as large in it, while its uncertainty is that of the w which the data show.
 WIDE = 2.0
-"""The estimate believes no body more than this, however well the stated ones agree with the data so far: w is at least
-as large in it, while its uncertainty is that of the w which the data show."""
-
-ROUNDS = 20
-"""Most rounds of noise, width and parameters…"""
-
-SETTLED = 1e-3
-"""…which end where no joint's noise changes by more than this share."""
-
-DETERMINED = 0.9
-"""Share of the prior's variance that data take from a parameter which they determine."""
+ROUNDS = 20  # most rounds of noise, width and parameters…
+SETTLED = 1e-3  # …which end where no joint's noise changes by more than this share
+DETERMINED = 0.9  # share of the prior's variance that data take from a parameter which they determine
 
 
 @dataclass(frozen=True, eq=False)

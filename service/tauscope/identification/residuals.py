@@ -19,14 +19,9 @@ from tauscope.identification.structure import ModelStructure
 from tauscope.recording.conditioning import AllPass, Stretch, split_periods
 from tauscope.recording.recording import Array
 
-FEWEST_PERIOD_SAMPLES = 50
-"""Differences between periods that are needed before their variance is trusted."""
-
-LEAST_TORQUE = 1e-12
-"""Share of the residual below which a recording has no torque to be compared with."""
-
-CLEARLY_MORE = 1.3
-"""Ratio of two estimated powers that is no chance."""
+FEWEST_PERIOD_SAMPLES = 50  # differences between periods that are needed before their variance is trusted
+LEAST_TORQUE = 1e-12  # share of the residual below which a recording has no torque to be compared with
+CLEARLY_MORE = 1.3  # ratio of two estimated powers that is no chance
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,19 +14,13 @@ from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
-SEPARATION = 1e-6
-"""Share of a rotor's column that must lie outside the base parameters' columns."""
-
-STANDARD_ERRORS = 5.0
-"""A rotor must be this many standard errors away from zero, and positive."""
-
+SEPARATION = 1e-6  # share of a rotor's column that must lie outside the base parameters' columns
+STANDARD_ERRORS = 5.0  # a rotor must be this many standard errors away from zero, and positive
+# …or this many where the robot file states a gear ratio: a geared motor has a rotor, the question is only whether it
+# shows.
 GEARED_STANDARD_ERRORS = 2.0
-"""…or this many where the robot file states a gear ratio: a geared motor has a rotor, the question is only whether it
-shows."""
-
+# …and explain this share of its joint's residual energy: less is more likely a stand-in for something else.
 SMALLEST_SHARE = 0.02
-"""…and explain this share of its joint's residual energy: less is more likely a stand-in for something else."""
-
 PROBE_STATES = 30
 
 

@@ -17,16 +17,12 @@ from tauscope.identification.friction_shape import gentle_range
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
+# Joint index and ``k_v`` or ``delta``: a shape constant that was estimated, as its logarithm.
 ShapeParameter = tuple[int, str]
-"""Joint index and ``k_v`` or ``delta``: a shape constant that was estimated, as its logarithm."""
-
-LARGEST_STEP = 0.3
-"""Change of a constant's logarithm in one step, about half the way to the next grid point and a bit."""
-
+LARGEST_STEP = 0.3  # change of a constant's logarithm in one step, about half the way to the next grid point and a bit
+# A K_v whose logarithm wants to move further than this from where its profile peaked is left there. A δ may go wherever
+# it stands for a term of its own: its profile was taken beside a K_v of the grid, which displaces its peak.
 LARGEST_CHANGE = 0.7
-"""A K_v whose logarithm wants to move further than this from where its profile peaked is left there. A δ may go
-wherever it stands for a term of its own: its profile was taken beside a K_v of the grid, which displaces its peak."""
-
 SETTLED = 1e-3
 STEPS = 10
 

@@ -21,14 +21,11 @@ from tauscope.identification.residuals import evaluate
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
+# Log likelihood by which another sign has to explain the torque better: odds of 150 for one joint in a hundred.
 CLEARLY = 5.0
-"""Log likelihood by which another sign has to explain the torque better: odds of 150 for one joint in a hundred."""
-
-UNEXPLAINED = 0.2
-"""Share of a joint's torque that a wrong sign leaves unexplained at least…"""
-
+UNEXPLAINED = 0.2  # share of a joint's torque that a wrong sign leaves unexplained at least…
+# …and by how much the long-run variance of that exceeds white noise's; without both no other sign is tried.
 COLOURED = 1.2
-"""…and by how much the long-run variance of that exceeds white noise's; without both no other sign is tried."""
 
 
 def reversed_joints(

@@ -11,17 +11,11 @@ from tauscope.result_warning import ResultWarning
 from tauscope.robot import JointType, Robot
 from tauscope.robot.messages import listed
 
-FEWEST_REVERSALS = 2
-"""A joint turns round at least so often where friction is to be told from a constant torque."""
-
-UNSEEN = 0.1
-"""Share of a joint's held-out torque above which it matters that training leaves it uncertain."""
-
+FEWEST_REVERSALS = 2  # a joint turns round at least so often where friction is to be told from a constant torque
+UNSEEN = 0.1  # share of a joint's held-out torque above which it matters that training leaves it uncertain
+# Times the top speed, the range or the uncertain torque of training at which held-out motion is another motion.
 BEYOND = 1.25
-"""Times the top speed, the range or the uncertain torque of training at which held-out motion is another motion."""
-
-FAR_OFF = 3.0
-"""Factor between recorded and stated weight beyond which a unit is wrong rather than a mass."""
+FAR_OFF = 3.0  # factor between recorded and stated weight beyond which a unit is wrong rather than a mass
 
 _FRICTION = {
     "stiction": "Coulomb friction; turn the joint round more often",

@@ -5,8 +5,7 @@ import numpy as np
 from tauscope.recording.samples import Array
 from tauscope.result_warning import ResultWarning
 
-PAUSE_S = 60.0
-"""Between two episodes [s]: no filter and no fit bridges a gap of this length."""
+PAUSE_S = 60.0  # between two episodes [s]: no filter and no fit bridges a gap of this length
 
 
 class SplitClock:

@@ -14,8 +14,7 @@ from tauscope.recording.units import SECONDS, SI, Reading
 ROWS_AT_ONCE = 2**16
 _EPISODE = "episode_index"
 
-Batch = Callable[[str], Array]
-"""Values of a column of the file, (rows,) float64."""
+Batch = Callable[[str], Array]  # values of a column of the file, (rows,) float64
 
 
 def read_batches(

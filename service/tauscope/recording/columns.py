@@ -16,9 +16,8 @@ from tauscope.result_warning import ResultWarning
 from tauscope.robot.messages import listed, printable
 from tauscope.robot.recording_layout import RecordingLayout
 
+# Columns of which a joint may have one, in the order in which a table keeps them.
 OPTIONAL_GROUPS = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt", "kp")
-"""Columns of which a joint may have one, in the order in which a table keeps them."""
-
 _JOINT_COLUMN = re.compile(r"(q|tau|i|qd|qdd|qref|taucmd|temp|qlink|volt|kp)([1-9][0-9]{0,3})")
 
 

@@ -69,8 +69,7 @@ def _stamps(time: Array, previous: int, name: str) -> list[int]:
     return stamps.tolist()
 
 
-FORMATS = (".csv", ".parquet", ".mcap")
-"""Formats that can be written, by suffix."""
+FORMATS = (".csv", ".parquet", ".mcap")  # formats that can be written, by suffix
 
 
 @dataclass(frozen=True)

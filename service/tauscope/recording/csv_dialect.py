@@ -15,8 +15,7 @@ _KNOWN: Mapping[str, Mapping[str, str]] = {
     "tau": {"Nm": "Nm", "N*m": "Nm", "N·m": "Nm", "N m": "Nm", "N": "N", "A": "A", "mA": "mA"},
 }
 _LIKE: Mapping[str, str] = {"i": "tau", "qref": "q", "qlink": "q", "taucmd": "tau"}
-_FREE = ("temp", "period")
-"""Groups whose units are not looked at."""
+_FREE = ("temp", "period")  # groups whose units are not looked at
 
 
 def read_units_row(names: Sequence[str], cells: Sequence[str]) -> dict[str, str] | None:

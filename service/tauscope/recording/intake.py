@@ -13,12 +13,11 @@ from tauscope.recording.table import SPOOL_ABOVE_BYTES, TableBuilder
 from tauscope.recording.units import SI, Conversion, Reading
 from tauscope.result_warning import ResultWarning
 
+# Rows by which one may come too late and still be put in its place: threads and networks swap neighbours. A clock that
+# is set back, or two files in one, come later by far more.
 LATE_ROWS = 8
-"""Rows by which one may come too late and still be put in its place: threads and networks swap neighbours. A clock
-that is set back, or two files in one, come later by far more."""
-
+# Share of rows with a stamp of another row above which the stamps are too coarse: leaving them out leaves holes.
 REPEATED_SHARE = 0.05
-"""Share of rows with a stamp of another row above which the stamps are too coarse: leaving them out leaves holes."""
 
 
 class RowIntake:

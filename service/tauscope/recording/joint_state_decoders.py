@@ -10,13 +10,11 @@ from tauscope.recording.joint_state import CdrCursor, JointState, decode_cdr, de
 from tauscope.recording.protobuf import decode_foxglove_protobuf
 from tauscope.recording.samples import Array
 
-Decoder = Callable[[bytes], JointState]
-"""One message to a joint state; raises ValueError where it is none."""
-
+Decoder = Callable[[bytes], JointState]  # one message to a joint state; raises ValueError where it is none
 JOINT_STATE_TYPES = ("sensor_msgs/msg/JointState", "sensor_msgs/JointState")
 
+# Interfaces of ros2_control that serve as effort, the first that a joint has.
 _EFFORTS = ("effort", "torque", "current")
-"""Interfaces of ros2_control that serve as effort, the first that a joint has."""
 
 
 def find_decoder(type_name: str, encoding: str, schema: bytes) -> Decoder | None:

@@ -10,8 +10,7 @@ from tauscope.robot.messages import listed
 
 _PREFERRED_TOPICS = ("/joint_states", "joint_states")
 
-MessageHandler = Callable[[int, bytes], None]
-"""Takes the log time [ns] and the bytes of a message."""
+MessageHandler = Callable[[int, bytes], None]  # takes the log time [ns] and the bytes of a message
 
 
 class JointStateLog:

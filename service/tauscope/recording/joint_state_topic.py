@@ -82,13 +82,11 @@ def _messages(count: int) -> str:
 _MESSAGES_AT_ONCE = 4096
 _BYTES_AT_ONCE = 2**24
 
-LONGEST_FROM_ZERO_NS = 10**12
-"""A stamp of zero beside stamps above this is none [ns]; simulated time may begin at zero."""
-
+LONGEST_FROM_ZERO_NS = 10**12  # a stamp of zero beside stamps above this is none [ns]; simulated time may begin at zero
 Decoded = TypeVar("Decoded")
 Rows: TypeAlias = NDArray[np.intp]
+# Messages of one layout, and their places among those that were taken at once.
 Batch: TypeAlias = tuple[Rows, JointStates]
-"""Messages of one layout, and their places among those that were taken at once."""
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,7 @@ import numpy as np
 from tauscope.recording.journal import JournalWriter
 from tauscope.recording.journal_rows import JournalHeader, journal_row_type
 
-HEADER, ROW, EVENT = b"h", b"r", b"e"
-"""Kinds of frame."""
-
+HEADER, ROW, EVENT = b"h", b"r", b"e"  # kinds of frame
 FRAME = struct.Struct("<Ic")
 EVENT_TIME = struct.Struct("<q")
 

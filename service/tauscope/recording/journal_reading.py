@@ -17,8 +17,7 @@ from tauscope.recording.mcap_format import scan_mcap
 from tauscope.recording.recording import Array, EffortKind, Recording
 from tauscope.robot.messages import reason
 
-LONGEST_HOLD = 1.5
-"""Cycles between two samples of which none was missed between them."""
+LONGEST_HOLD = 1.5  # cycles between two samples of which none was missed between them
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,12 +19,10 @@ from tauscope.recording.inflation import HELD_BYTES, LARGEST_RATIO, require_plau
 from tauscope.recording.joint_state_log import MessageHandler
 from tauscope.robot.messages import reason
 
-RECORD = struct.Struct("<BQ")
-"""Opcode and length of a record."""
+RECORD = struct.Struct("<BQ")  # opcode and length of a record
+MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time and publish time, in front of a message's bytes
 
-MESSAGE = struct.Struct("<HIQQ")
-"""Channel, sequence, log time and publish time, in front of a message's bytes."""
-
+# Errors that damaged records raise.
 UNREADABLE = (
     McapError,
     ValueError,
@@ -35,7 +33,6 @@ UNREADABLE = (
     OverflowError,
     zstandard.ZstdError,
 )
-"""Errors that damaged records raise."""
 
 _LARGEST_CHUNK_BYTES = 2**28
 
@@ -77,12 +74,9 @@ def unpack_chunk(body: bytes) -> bytes:
     return stream.read(size)
 
 
+# Distance of wanted messages above which each is read by itself [bytes]: reading so far takes longer than a seek.
 SEEK_BYTES = 2**15
-"""Distance of wanted messages above which each is read by itself [bytes]: reading so far takes longer than a seek."""
-
-MOST_SHARE = 0.5
-"""Share of the file above which it is read as a whole, which compares every checksum."""
-
+MOST_SHARE = 0.5  # share of the file above which it is read as a whole, which compares every checksum
 _MAGIC_BYTES = 8
 _FOOTER = struct.Struct("<BQQQI")
 _CHUNK_HEAD = struct.Struct("<QQQII")

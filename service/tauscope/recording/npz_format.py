@@ -20,6 +20,7 @@ from tauscope.robot.messages import listed, reason
 ZIP_MAGIC = b"PK\x03\x04"
 
 _MOST_COLUMNS = 10_000
+# Errors that damaged archives raise; NumPy reads the header of an array as Python.
 _UNREADABLE = (
     zipfile.BadZipFile,
     zlib.error,
@@ -32,7 +33,6 @@ _UNREADABLE = (
     RecursionError,
     tokenize.TokenError,
 )
-"""Errors that damaged archives raise; NumPy reads the header of an array as Python."""
 
 
 def read_npz(path: Path, name: str, joint_count: int | None = None, reading: Reading = SI) -> Recording:

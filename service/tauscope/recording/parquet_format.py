@@ -22,8 +22,7 @@ from tauscope.robot.messages import printable, reason
 
 _LARGEST_INFO_BYTES = 2**22
 _MOST_ELEMENTS = 1000
-_FOLDERS_UP = 3
-"""A LeRobot data set keeps ``data/chunk-000/FILE.parquet`` beside ``meta/info.json``."""
+_FOLDERS_UP = 3  # a LeRobot data set keeps ``data/chunk-000/FILE.parquet`` beside ``meta/info.json``
 
 
 @dataclass(frozen=True)

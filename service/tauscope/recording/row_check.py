@@ -7,8 +7,7 @@ import numpy as np
 from tauscope.errors import RecordingError
 from tauscope.recording.samples import Array
 
-MINIMUM_ROWS = 10
-"""Fewer samples than this are a mistake and not a motion."""
+MINIMUM_ROWS = 10  # fewer samples than this are a mistake and not a motion
 
 
 class RowCheck:

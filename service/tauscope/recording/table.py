@@ -9,9 +9,8 @@ import numpy as np
 from tauscope.errors import RecordingError
 from tauscope.recording.samples import Array, Table
 
+# Tables larger than this go to a temporary file: 1.3 million samples of a six-joint arm still fit into memory.
 SPOOL_ABOVE_BYTES = 128 * 2**20
-"""Tables larger than this go to a temporary file: 1.3 million samples of a six-joint arm still fit into memory."""
-
 _FIRST_ROWS = 4096
 
 

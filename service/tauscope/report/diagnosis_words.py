@@ -28,9 +28,7 @@ AGAINST = {
 
 CONFIRMED = {True: "confirmed", False: "not confirmed", None: "not tested: no recording was held out"}
 
-MOST_FINDINGS = 5
-"""Findings shown before a fold."""
-
+MOST_FINDINGS = 5  # findings shown before a fold
 NOTHING_ELSE = "No competing explanation"
 
 

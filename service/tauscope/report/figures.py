@@ -21,9 +21,8 @@ from tauscope.report.table import Table
 from tauscope.report.words import base_parameter_unit, noise_ratio
 from tauscope.trajectory import Trajectory
 
+# Multiples of the noise between the shades: the lightest is nothing but noise.
 LEVELS = (1.1, 1.3, 1.6, 2.0, 3.0, 5.0, 10.0)
-"""Multiples of the noise between the shades: the lightest is nothing but noise."""
-
 VARIABLES = ("velocity", "position", "load", "acceleration", "time")
 
 _WIDTH, _LABELS, _GAP = 920.0, 104.0, 14.0
@@ -98,9 +97,7 @@ def _legend(top: float) -> Iterator[str]:
 
 
 PARAMETER_ROW_INCHES = 0.19
-DEVIATIONS = 1.96
-"""Standard errors to either side: 95 % of a normal distribution."""
-
+DEVIATIONS = 1.96  # standard errors to either side: 95 % of a normal distribution
 LONGEST_LABEL = 62
 
 
@@ -182,8 +179,8 @@ def residual_figure(name: str, document: IdentificationDocument) -> str:
 MOST = 14
 SHIFT_ROW_INCHES = 0.22
 LONGEST_SHIFT_LABEL = 58
+# Standard errors at the ticks: linear up to the first, logarithmic from there.
 TICKS = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 10000.0)
-"""Standard errors at the ticks: linear up to the first, logarithmic from there."""
 
 
 def shift_figure(name: str, document: DiagnosisDocument) -> str:

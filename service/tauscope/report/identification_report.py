@@ -35,9 +35,7 @@ from tauscope.report.words import (
     velocity_unit,
 )
 
-MOST_SERIES = 6
-"""Recordings that the friction curves are compared with."""
-
+MOST_SERIES = 6  # recordings that the friction curves are compared with
 _FRICTION_EQUATION = "τ_f(q̇) = τ_s A(K_v q̇) + τ_sc A(δ q̇) + τ_v q̇ + offset,  A(x) = (2/π) arctan x"
 
 

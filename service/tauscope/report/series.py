@@ -35,8 +35,7 @@ def envelope_indices(values: Array, most: int) -> NDArray[np.intp]:
     return np.array(kept, dtype=np.intp)
 
 
-MOST_PIECES = 8
-"""Pieces of a recording that are conditioned in search of the longest."""
+MOST_PIECES = 8  # pieces of a recording that are conditioned in search of the longest
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,7 @@ from tauscope.report.table import Table
 from tauscope.report.words import base_parameter_unit, noise_ratio, torque_unit
 from tauscope.robot import Robot
 
-MOST_SHIFTS = 12
-"""Rows of the parameters that findings have moved most."""
+MOST_SHIFTS = 12  # rows of the parameters that findings have moved most
 
 
 def located_table(document: DiagnosisDocument) -> Table:

@@ -65,12 +65,9 @@ def _draw_spectrum(axis: Axes, spectrum: ResidualSpectrum | None, unit: str) -> 
 
 
 HEIGHT_INCHES = 3.5
-MOST_POINTS = 1400
-"""Points a curve over the whole width; two a pixel."""
-
+MOST_POINTS = 1400  # points a curve over the whole width; two a pixel
 MOST_POINTS_ENLARGED = 700
-ENLARGED_SHARE = 0.1
-"""Part of the time that is enlarged: where the residual's mean square is greatest."""
+ENLARGED_SHARE = 0.1  # part of the time that is enlarged: where the residual's mean square is greatest
 
 
 def torque_figure(name: str, series: TorqueSeries, joint: int, noise_std: float, unit: str) -> str:

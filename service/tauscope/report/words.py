@@ -33,26 +33,21 @@ def base_parameter_unit(terms: Iterable[str]) -> str:
     return "kg m" if first.startswith("ms") else "kg"
 
 
-AT_NOISE = 1.1
-"""A residual of at most this many times the noise holds nothing but noise."""
-
-ABOVE_NOISE = 2.0
-"""A residual of more than this many times the noise is mostly not noise."""
-
-CARRIES_OVER = 1.3
-"""A held-out residual of more than this many times that of the model's own recordings is not chance."""
+AT_NOISE = 1.1  # a residual of at most this many times the noise holds nothing but noise
+ABOVE_NOISE = 2.0  # a residual of more than this many times the noise is mostly not noise
+CARRIES_OVER = 1.3  # a held-out residual of more than this many times that of the model's own recordings is not chance
 
 _PERIOD_LEVELS = {
     "noise": "the residual is at the level of the sensor noise: little else is left",
     "above": "the residual is above the sensor noise: something small is missing from the model",
     "well above": "the residual is well above the sensor noise: the model lacks an effect there",
 }
+# Without repeated periods, what is correlated over time and what the sensor does cannot be told apart for certain.
 _RESIDUAL_LEVELS = {
     "noise": "the residual is hardly correlated over time: little else than noise is left",
     "above": "part of the residual is correlated over time: something small is missing, or the noise is coloured",
     "well above": "most of the residual is correlated over time: an effect is missing, or the noise is coloured",
 }
-"""Without repeated periods, what is correlated over time and what the sensor does cannot be told apart for certain."""
 
 
 def fit_sentences(document: IdentificationDocument) -> list[str]:

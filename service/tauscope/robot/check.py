@@ -11,8 +11,7 @@ from tauscope.robot.messages import Finding, Severity
 from tauscope.robot.robot import Joint, JointLimits, JointType, Robot, Segment
 from tauscope.robot.robot_file import read_robot
 
-EARTH = (9.7, 9.9)
-"""Acceleration of gravity on the ground, with room for altitude and latitude [m/s²]."""
+EARTH = (9.7, 9.9)  # acceleration of gravity on the ground, with room for altitude and latitude [m/s²]
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from tauscope.robot.yaml_text import Place
 
 DocumentType = TypeVar("DocumentType", bound=Document)
 
+# Our words for pydantic's kinds of error.
 WORDING: Mapping[str, Callable[[ErrorDetails], str]] = {
     "refused": lambda e: e.get("ctx", {})["text"],
     "missing": lambda e: f"the key {shown(e['loc'][-1])} is missing; add it",
@@ -22,7 +23,6 @@ WORDING: Mapping[str, Callable[[ErrorDetails], str]] = {
     "too_short": lambda e: "must not be an empty list; leave the key out instead",
     "too_long": lambda e: f"holds more than {e.get('ctx', {})['max_length']} entries",
 }
-"""Our words for pydantic's kinds of error."""
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ from tauscope.robot.recording_layout import PRESETS, RecordingLayout
 from tauscope.robot.yaml_text import Place, read_yaml
 
 LARGEST_LAYOUT_FILE = 64 * 1024
-INLINE = "{"
-"""First sign of a mapping that stands in place of a file's name."""
+INLINE = "{"  # first sign of a mapping that stands in place of a file's name
 
 
 def read_layout(text: str) -> RecordingLayout:

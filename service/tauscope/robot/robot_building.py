@@ -90,9 +90,7 @@ def read_mjcf_chain(
     raise RobotFileError(f"{label}: no reader of MJCF is registered; install tauscope again")
 
 
-EARTH = np.array([0.0, 0.0, -9.81])
-"""Gravity in the base frame where nothing is stated [m/s²]."""
-
+EARTH = np.array([0.0, 0.0, -9.81])  # gravity in the base frame where nothing is stated [m/s²]
 REPAIR_REMEDY = "correct the link (inertia is about the link frame's origin, not about the centre of mass)"
 
 
@@ -105,8 +103,8 @@ class SourceFile:
     path: Path | None = None
 
 
+# Looks up a file by the kind of kinematics and the name that a document gives.
 FileSource = Callable[[str, str], SourceFile]
-"""Looks up a file by the kind of kinematics and the name that a document gives."""
 
 
 @dataclass(frozen=True)

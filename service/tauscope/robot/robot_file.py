@@ -18,8 +18,7 @@ from tauscope.robot.yaml_text import read_yaml
 
 LARGEST_ROBOT_FILE = 1024 * 1024
 
-KINEMATICS_OF_ROOT = {"robot": "urdf", "mujoco": "mjcf"}
-"""Kinds of kinematics by the root element of a file."""
+KINEMATICS_OF_ROOT = {"robot": "urdf", "mujoco": "mjcf"}  # kinds of kinematics by the root element of a file
 
 
 def read_robot(path: Path | str) -> Robot:

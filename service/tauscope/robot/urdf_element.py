@@ -15,11 +15,9 @@ from tauscope.robot.robot import Placement
 
 NUMBER = re.compile(r"[-+]?([0-9]+(?:\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
+# What to do with a file that xacro has not processed.
 EXPAND = "expand the file first: pip install xacro; xacro FILE > arm.urdf"
-"""What to do with a file that xacro has not processed."""
-
-Element = Any
-"""lxml's `_Element`, which carries no types."""
+Element = Any  # lxml's `_Element`, which carries no types
 
 
 def local_name(element: Element) -> str:

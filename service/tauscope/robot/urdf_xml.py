@@ -9,8 +9,7 @@ from tauscope.robot.urdf_element import EXPAND, Element, children, local_name, u
 from tauscope.robot.xml_text import parse_xml
 
 JOINT_TYPES = frozenset({"revolute", "continuous", "prismatic", "fixed", "floating", "planar"})
-XACRO_DEFINITIONS = frozenset({"arg", "macro", "property"})
-"""Elements of xacro that stand for no link or joint."""
+XACRO_DEFINITIONS = frozenset({"arg", "macro", "property"})  # elements of xacro that stand for no link or joint
 
 
 @dataclass(frozen=True)

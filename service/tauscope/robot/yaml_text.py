@@ -20,8 +20,7 @@ TAG = "tag:yaml.org,2002:"
 TRUE = frozenset({"true", "yes", "on", "y"})
 FALSE = frozenset({"false", "no", "off", "n"})
 
-Place = tuple[str | int, ...]
-"""Keys and indices that lead from the document's root to an entry."""
+Place = tuple[str | int, ...]  # keys and indices that lead from the document's root to an entry
 
 
 @dataclass(frozen=True)

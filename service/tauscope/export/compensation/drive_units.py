@@ -24,8 +24,7 @@ class DriveUnits:
     remarks: tuple[str, ...] = ()
 
 
-UNKNOWN_UNITS = DriveUnits()
-"""Nothing is known of the drive."""
+UNKNOWN_UNITS = DriveUnits()  # nothing is known of the drive
 
 
 def drive_units(joint: Joint, effort_kind: EffortKind) -> DriveUnits:

@@ -12,8 +12,8 @@ from tauscope.export.compensation.drive_units import UNKNOWN_UNITS, DriveUnits
 from tauscope.robot import JointType
 from tauscope.robot.messages import one_line, shown
 
+# Equations (7) and (8) of the seed paper, with the constant offset that real drives have.
 EQUATION = "tau = stiction*(2/pi)*atan(k_v*v) + stribeck*(2/pi)*atan(delta*v) + viscous*v + offset"
-"""Equations (7) and (8) of the seed paper, with the constant offset that real drives have."""
 
 
 @dataclass(frozen=True)

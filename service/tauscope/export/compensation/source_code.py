@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from tauscope.export.compensation.model import EQUATION, CompensationModel, JointCompensation
 from tauscope.robot import JointType
 
+# Characters that end no comment and no string, and start no trigraph, in C, C++ or Python.
 _PLAIN = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789 ._,:;()+=@#%/-")
-"""Characters that end no comment and no string, and start no trigraph, in C, C++ or Python."""
 
 
 def identifier(name: str) -> str:
@@ -92,8 +92,7 @@ def _joint_line(number: int, joint: JointCompensation) -> str:
     return f"Joint {number}: {joint.name} ({kind}). " + " ".join(f"{remark}." for remark in joint.units.remarks)
 
 
-_TWO_OVER_PI = "0.6366197723675814"
-"""The shortest decimal that reads back as 2/π rounded to float64."""
+_TWO_OVER_PI = "0.6366197723675814"  # the shortest decimal that reads back as 2/π rounded to float64
 
 
 def to_c_header(model: CompensationModel) -> str:

@@ -11,8 +11,8 @@ from tauscope.robot import STANDARD_PARAMETERS
 Array = NDArray[np.float64]
 
 
+# Share of the stiction that Coulomb friction is at least: dry friction falls by half with speed, hardly by more.
 LEAST_COULOMB = 1 / 3
-"""Share of the stiction that Coulomb friction is at least: dry friction falls by half with speed, hardly by more."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,11 +21,8 @@ from tauscope.robot import LinkInertia
 
 Array = NDArray[np.float64]
 
-MARGIN = 1e-8
-"""ε: smallest eigenvalue of a scaled pseudo-inertia. A link of 0.3 m keeps 0.03 mm of thickness."""
-
-_ACTIVE = 100.0
-"""A constraint counts as active where less than this many margins are left."""
+MARGIN = 1e-8  # ε: smallest eigenvalue of a scaled pseudo-inertia. A link of 0.3 m keeps 0.03 mm of thickness.
+_ACTIVE = 100.0  # a constraint counts as active where less than this many margins are left
 
 
 @dataclass(frozen=True, eq=False)

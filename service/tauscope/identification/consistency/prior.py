@@ -13,24 +13,18 @@ from tauscope.robot import JointType, LinkInertia, Robot
 
 Array = NDArray[np.float64]
 
+# Radius of gyration of a default link over its length: between a slender rod (0.29) and a compact housing.
 _GYRATION = 0.25
-"""Radius of gyration of a default link over its length: between a slender rod (0.29) and a compact housing."""
-
+# Radius of gyration, over the link's length, of the body that deviations are measured by, at least: a link's mass may
+# lie anywhere along it and as far beside it.
 _REACH = 1.0
-"""Radius of gyration, over the link's length, of the body that deviations are measured by, at least: a link's mass may
-lie anywhere along it and as far beside it."""
-
+# Speed that a joint is made for where its file does not say [rad/s or m/s].
 _ORDINARY_SPEED = {JointType.REVOLUTE: 1.0, JointType.PRISMATIC: 0.3}
-"""Speed that a joint is made for where its file does not say [rad/s or m/s]."""
-
+# Lengths of the whole arm beyond which no mass of it lies: a reflected rotor seems to reach a few, g mm² thousands.
 _FAR = 100.0
-"""Lengths of the whole arm beyond which no mass of it lies: a reflected rotor seems to reach a few, g mm² thousands."""
-
-_LIGHTEST = 0.1
-"""A link is believed to weigh at least this share of the heaviest."""
-
+_LIGHTEST = 0.1  # a link is believed to weigh at least this share of the heaviest
+# Size of a link whose frames coincide in a chain that has no length at all, such as one joint by itself [m].
 _SMALLEST_LENGTH = 0.05
-"""Size of a link whose frames coincide in a chain that has no length at all, such as one joint by itself [m]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,9 +22,7 @@ from tauscope.robot import LinkInertia, pseudo_inertia
 
 Array = NDArray[np.float64]
 
-_TOLERANCE = 1e-10
-"""Feasibility and duality gap asked of the solver."""
-
+_TOLERANCE = 1e-10  # feasibility and duality gap asked of the solver
 _ATTEMPTS = ((1.0, True), (1.0, False), (1e2, True), (1e4, True), (1e6, True), (1e2, False), (1e4, False), (1e6, False))
 """Unit of y in standard deviations, and whether the solver equilibrates, in the order tried.
 
@@ -33,14 +31,10 @@ consistent optimum may lie thousands of standard deviations from the free one, a
 most programs take fewer iterations.
 """
 
-_GAP = 1e-6
-"""Largest duality gap, relative to the criterion or to 1, with which an inexact solution is accepted."""
-
+_GAP = 1e-6  # largest duality gap, relative to the criterion or to 1, with which an inexact solution is accepted
+# Largest violation of a scaled inequality that rounding in the solver may leave; it is removed afterwards.
 _SLACK = 1e-7
-"""Largest violation of a scaled inequality that rounding in the solver may leave; it is removed afterwards."""
-
-_EXACT = 1e-9
-"""Largest violation of a scaled constraint in a result."""
+_EXACT = 1e-9  # largest violation of a scaled constraint in a result
 
 
 @dataclass(frozen=True, eq=False)

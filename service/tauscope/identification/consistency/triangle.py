@@ -12,9 +12,8 @@ from tauscope.robot import LinkInertia, pseudo_inertia
 
 Array = NDArray[np.float64]
 
+# Entries of a symmetric 4x4 matrix, upper triangle column by column: the order of clarabel's PSDTriangleConeT.
 UPPER_TRIANGLE = tuple((row, column) for column in range(4) for row in range(column + 1))
-"""Entries of a symmetric 4x4 matrix, upper triangle column by column: the order of clarabel's PSDTriangleConeT."""
-
 _ROWS, _COLUMNS = np.array(UPPER_TRIANGLE).T
 
 

@@ -46,30 +46,19 @@ class ConditioningSummary:
     velocity_source: tuple[str, ...]
 
 
-WINDOW_ROWS = 1 << 15
-"""Rows conditioned at once: bounds memory whatever the recording's length."""
-
+WINDOW_ROWS = 1 << 15  # rows conditioned at once: bounds memory whatever the recording's length
+# Windows, spread over the recording, from which noise is estimated: it may begin with the arm at rest.
 SURVEYED_WINDOWS = 4
-"""Windows, spread over the recording, from which noise is estimated: it may begin with the arm at rest."""
-
+# Samples of a period up to which periods are averaged: the regressor of one period is held in memory.
 LONGEST_PERIOD = 2 * WINDOW_ROWS
-"""Samples of a period up to which periods are averaged: the regressor of one period is held in memory."""
-
-AVERAGED_ROWS = 8 * WINDOW_ROWS
-"""Rows that are averaged into one period at most, for the same reason."""
-
+AVERAGED_ROWS = 8 * WINDOW_ROWS  # rows that are averaged into one period at most, for the same reason
+# A joint moves where its range exceeds `STANDING_STILL` standard deviations of its noise, and this [rad or m].
 SMALLEST_MOTION = 1e-5
-"""A joint moves where its range exceeds `STANDING_STILL` standard deviations of its noise, and this [rad or m]."""
-
-PERIOD_SPARE = 4
-"""Rows read beyond the periods on either side, so that interpolation has neighbours."""
+PERIOD_SPARE = 4  # rows read beyond the periods on either side, so that interpolation has neighbours
 
 
-RESOLVED_STEPS = 2.0
-"""Steps of an encoder that are motion."""
-
-RESOLVED_STD = 4.0
-"""Standard deviations of a position's noise that are motion."""
+RESOLVED_STEPS = 2.0  # steps of an encoder that are motion
+RESOLVED_STD = 4.0  # standard deviations of a position's noise that are motion
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,20 +13,12 @@ from numpy.typing import NDArray
 
 from tauscope.recording.recording import Array
 
+# Distance of a step from the line through all of them, in sample intervals, that rounding to a sample explains.
 STEP_TOLERANCE = 1.5
-"""Distance of a step from the line through all of them, in sample intervals, that rounding to a sample explains."""
-
-LATE_STEPS = 0.4
-"""Share of the steps that may lie off the line because the first sample of their period was missed."""
-
-MOST_STEPS = 100
-"""Steps to which the line is fitted."""
-
-SHORTEST_PERIOD = 32
-"""Samples below which a period is none."""
-
-WHOLE_PERIOD = 1e-6
-"""Part of a period that rounding may take from the last one."""
+LATE_STEPS = 0.4  # share of the steps that may lie off the line because the first sample of their period was missed
+MOST_STEPS = 100  # steps to which the line is fitted
+SHORTEST_PERIOD = 32  # samples below which a period is none
+WHOLE_PERIOD = 1e-6  # part of a period that rounding may take from the last one
 
 
 @dataclass(frozen=True)

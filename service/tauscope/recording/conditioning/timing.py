@@ -13,31 +13,23 @@ from tauscope.errors import RecordingError
 from tauscope.recording.conditioning.period_runs import PeriodLabels, PeriodRun
 from tauscope.recording.recording import Array, Recording
 
-SCAN_ROWS = 1 << 17
-"""Rows read at once while looking for gaps."""
-
+SCAN_ROWS = 1 << 17  # rows read at once while looking for gaps
 BRIDGED_SAMPLES = 5.5
 BRIDGED_SECONDS = 0.0125
 LONGEST_BRIDGE_S = 0.05
 MOST_BRIDGED_SAMPLES = 32.0
+# A gap is bridged up to `BRIDGED_SAMPLES` intervals or `BRIDGED_SECONDS`, whichever is longer: an arm moves along a
+# cubic that long. A single missing sample always is; beyond it `LONGEST_BRIDGE_S` and `MOST_BRIDGED_SAMPLES` are the
+# end.
 FEWEST_BRIDGED_SAMPLES = 2.5
-"""A gap is bridged up to `BRIDGED_SAMPLES` intervals or `BRIDGED_SECONDS`, whichever is longer: an arm moves along a
-cubic that long. A single missing sample always is; beyond it `LONGEST_BRIDGE_S` and `MOST_BRIDGED_SAMPLES` are the
-end."""
-
-ONE_INTERVAL = 1.75
-"""Multiple of the typical interval above which a sample is missing."""
-
+ONE_INTERVAL = 1.75  # multiple of the typical interval above which a sample is missing
+# Share of single intervals below which stamps rounded to the interval itself are taken to be coarse, not missing.
 COARSE_SINGLES = 0.85
-"""Share of single intervals below which stamps rounded to the interval itself are taken to be coarse, not missing."""
-
-BURST_TIME = 0.1
-"""Share of the time below which the usual interval cannot be the sampling interval."""
-
+BURST_TIME = 0.1  # share of the time below which the usual interval cannot be the sampling interval
 MEDIAN_SAMPLES = 1 << 20
 
+# Samples below which a stretch between two long gaps cannot be filtered and is left out (and counted).
 SHORTEST_STRETCH = 32
-"""Samples below which a stretch between two long gaps cannot be filtered and is left out (and counted)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,20 +11,11 @@ from tauscope.recording.examination.sketch import BLOCK_ROWS
 from tauscope.recording.recording import Recording, Samples
 from tauscope.recording.samples import Array
 
-DROP = 10.0
-"""Multiple of the usual change from row to row by which one joint's effort falls to zero, and comes back."""
-
-COMMON_DROP = 2.0
-"""The same of at least one joint, where the efforts of all joints are exactly zero at once."""
-
-COMMON_ROWS = 3
-"""Rows, at least, in which noisy efforts of all joints are exactly zero by no accident."""
-
-OPEN_ROWS = 10
-"""Rows of a dropout, at least, that reaches to the beginning or the end of the recording."""
-
-MOST_RUNS = 100_000
-"""Runs of zero of one joint beyond which zero is a value like any other."""
+DROP = 10.0  # multiple of the usual change from row to row by which one joint's effort falls to zero, and comes back
+COMMON_DROP = 2.0  # the same of at least one joint, where the efforts of all joints are exactly zero at once
+COMMON_ROWS = 3  # rows, at least, in which noisy efforts of all joints are exactly zero by no accident
+OPEN_ROWS = 10  # rows of a dropout, at least, that reaches to the beginning or the end of the recording
+MOST_RUNS = 100_000  # runs of zero of one joint beyond which zero is a value like any other
 
 
 class ZeroRuns:

@@ -10,26 +10,14 @@ from tauscope.recording.examination.edits import NO_NUMBERS, Numbers, find_runs,
 from tauscope.recording.examination.scales import NEIGHBOURS, EffortScale, distance_beyond, is_new, neighbour_windows
 from tauscope.recording.samples import Array
 
-SURPRISE = 20.0
-"""Multiple of the usual distance beyond the neighbours' range above which a sample is a spike."""
-
-SPAN = 0.15
-"""Share of the effort's usual range that this distance exceeds, too."""
-
-STUCK_ROWS = 10
-"""Rows for which a stuck value is repeated, at least."""
-
-STUCK_RUNS = 5
-"""Multiple of the rows for which values usually are."""
-
+SURPRISE = 20.0  # multiple of the usual distance beyond the neighbours' range above which a sample is a spike
+SPAN = 0.15  # share of the effort's usual range that this distance exceeds, too
+STUCK_ROWS = 10  # rows for which a stuck value is repeated, at least
+STUCK_RUNS = 5  # multiple of the rows for which values usually are
+# Rows for which noise lets no value be repeated: where it does, the effort comes in coarse steps and may rest.
 USUAL_RUN = 3
-"""Rows for which noise lets no value be repeated: where it does, the effort comes in coarse steps and may rest."""
-
-ONE_STEP = 1.5
-"""Smallest steps of the effort below which a change is one of them."""
-
-LEAST_MOVE = 0.01
-"""Distance above which a joint moves within some rows [rad or m]."""
+ONE_STEP = 1.5  # smallest steps of the effort below which a change is one of them
+LEAST_MOVE = 0.01  # distance above which a joint moves within some rows [rad or m]
 
 
 def find_stuck(rows: Numbers, effort: Array, position: Array, scale: EffortScale) -> Numbers:

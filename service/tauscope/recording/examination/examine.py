@@ -21,9 +21,7 @@ from tauscope.recording.units import SI, Reading
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.robot import Robot
 
-FILLED_ROWS = 4
-"""Rows without an effort that are filled in where positions and efforts come in rows of their own."""
-
+FILLED_ROWS = 4  # rows without an effort that are filled in where positions and efforts come in rows of their own
 BUS = "check the bus for lost reads and damaged frames"
 
 

@@ -13,55 +13,28 @@ from tauscope.recording.recording import Recording
 from tauscope.recording.units import METRES, RADIANS, SECONDS
 from tauscope.robot.robot import JointType, Robot
 
-SLOWEST_RATE_HZ = 2.0
-"""No arm's dynamics are sampled this slowly [Hz]; 1 kHz counted in ms seems to be 1 Hz."""
-
-FASTEST_RATE_HZ = 2e5
-"""No drive is sampled this fast [Hz]."""
-
+SLOWEST_RATE_HZ = 2.0  # no arm's dynamics are sampled this slowly [Hz]; 1 kHz counted in ms seems to be 1 Hz
+FASTEST_RATE_HZ = 2e5  # no drive is sampled this fast [Hz]
+# Time from row to row times the time to cross a joint's range at its own top speed [s²]: a slow friction sweep of 300 s
+# is sampled at 10 Hz or more. A clock in ms makes this product a million times larger.
 SLOWEST = 30.0
-"""Time from row to row times the time to cross a joint's range at its own top speed [s²]: a slow friction sweep of
-300 s is sampled at 10 Hz or more. A clock in ms makes this product a million times larger."""
-
-LEAST_SWEEP = 0.05
-"""A range below this is rest, whatever its speed [rad or m]."""
-
-FASTEST = 1e4
-"""A median speed above this is no joint's [rad/s or m/s]."""
-
-SAME_RATIO = 0.1
-"""Largest deviation of a ratio of velocities from a ratio of units."""
-
-AGREEMENT = 0.25
-"""Largest deviation of that ratio from 1 in which the units are taken to agree."""
-
-STEADY_RATIO = 0.3
-"""Largest quartile distance, relative to the median, of a ratio that is one."""
-
-FAST_PART = 0.3
-"""Share of the top velocity above which a row tells a ratio."""
-
+LEAST_SWEEP = 0.05  # a range below this is rest, whatever its speed [rad or m]
+FASTEST = 1e4  # a median speed above this is no joint's [rad/s or m/s]
+SAME_RATIO = 0.1  # largest deviation of a ratio of velocities from a ratio of units
+AGREEMENT = 0.25  # largest deviation of that ratio from 1 in which the units are taken to agree
+STEADY_RATIO = 0.3  # largest quartile distance, relative to the median, of a ratio that is one
+FAST_PART = 0.3  # share of the top velocity above which a row tells a ratio
 FEWEST_ROWS = 20
 
 SI_LENGTHS = ("rad", "m")
 
-MANY_TURNS = 4.0 * np.pi
-"""Most joints of an arm of three joints or more keep below two turns [rad]."""
-
-LARGEST_DEGREES = 720.0
-"""Whole numbers above this are no angles, in degrees neither: an encoder counts to 1024 or more."""
-
-FASTEST_ARM = 60.0
-"""No arm of three joints or more has most joints faster than this [rad/s]: the fastest reach 20."""
-
-QUARTER_TURN = 90.0
-"""Span in degrees from which gravity's torque shows that it swings in degrees."""
-
-LONGEST_SLIDE = 100.0
-"""No prismatic joint is longer [m]."""
-
+MANY_TURNS = 4.0 * np.pi  # most joints of an arm of three joints or more keep below two turns [rad]
+LARGEST_DEGREES = 720.0  # whole numbers above this are no angles, in degrees neither: an encoder counts to 1024 or more
+FASTEST_ARM = 60.0  # no arm of three joints or more has most joints faster than this [rad/s]: the fastest reach 20
+QUARTER_TURN = 90.0  # span in degrees from which gravity's torque shows that it swings in degrees
+LONGEST_SLIDE = 100.0  # no prismatic joint is longer [m]
+# Share of the range by which a joint may be beyond its limits: offsets, and limits of another model.
 BEYOND_LIMITS = 0.1
-"""Share of the range by which a joint may be beyond its limits: offsets, and limits of another model."""
 
 
 def find_implausible(recording: Recording, robot: Robot | None = None) -> str | None:

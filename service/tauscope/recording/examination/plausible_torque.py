@@ -8,43 +8,24 @@ from tauscope.recording.samples import Array
 from tauscope.robot.kinematics import link_placements
 from tauscope.robot.robot import JointType, Robot
 
+# Multiple of a joint's torque limit that a peak stays below: limits are of the drive, or of continuous duty.
 ABOVE_LIMITS = 5.0
-"""Multiple of a joint's torque limit that a peak stays below: limits are of the drive, or of continuous duty."""
-
+# Multiple of the stated masses' gravity that no torque is: masses that are guessed are off by a few times.
 ABOVE_GRAVITY = 20.0
-"""Multiple of the stated masses' gravity that no torque is: masses that are guessed are off by a few times."""
-
-LIVELY = 5.0
-"""Acceleration of the hand, relative to gravity's, from which a motion says nothing about gravity."""
-
-AS_GRAVITY = 0.8
-"""Least cosine between torque and gravity's torque for which one is the other times a constant."""
-
+LIVELY = 5.0  # acceleration of the hand, relative to gravity's, from which a motion says nothing about gravity
+AS_GRAVITY = 0.8  # least cosine between torque and gravity's torque for which one is the other times a constant
 POSTURES = 400
 
-SMALL_STEP = 1e-5
-"""Of a difference quotient: its error of 1e-10 of the slope is as large as round-off [rad or m]."""
-
-LARGEST_TORQUE = 1e6
-"""No joint's torque is larger [Nm or N]."""
-
+SMALL_STEP = 1e-5  # of a difference quotient: its error of 1e-10 of the slope is as large as round-off [rad or m]
+LARGEST_TORQUE = 1e6  # no joint's torque is larger [Nm or N]
+# A negative number that is read without its sign is at least this: signs are in bit 10 of old servos, or in bit 15.
 REGISTER_RANGE = 1 << 10
-"""A negative number that is read without its sign is at least this: signs are in bit 10 of old servos, or in bit 15."""
-
+# Torque in whole Nm belongs to an arm whose wrist, too, has this much; a register has it at every joint [Nm].
 REGISTER_LEVEL = 30.0
-"""Torque in whole Nm belongs to an arm whose wrist, too, has this much; a register has it at every joint [Nm]."""
-
-MASS_DENSITY = 150.0
-"""Mass of the heaviest arms by the cube of their reach [kg/m³]: 4,700 kg at 3.2 m."""
-
-WRIST_SHARE = 0.03
-"""Torque at the wrist of such an arm, relative to gravity's at its base."""
-
-NEAR_ZERO = 0.05
-"""Share of its 99th percentile below which a torque is near zero."""
-
-FEWEST_TOUCHES = 3
-"""Times that a magnitude comes down to zero while the joint is fast, and goes up again."""
+MASS_DENSITY = 150.0  # mass of the heaviest arms by the cube of their reach [kg/m³]: 4,700 kg at 3.2 m
+WRIST_SHARE = 0.03  # torque at the wrist of such an arm, relative to gravity's at its base
+NEAR_ZERO = 0.05  # share of its 99th percentile below which a torque is near zero
+FEWEST_TOUCHES = 3  # times that a magnitude comes down to zero while the joint is fast, and goes up again
 
 
 def find_implausible_torque(recording: Recording, sketch: Sketch, robot: Robot | None) -> str | None:

@@ -11,29 +11,15 @@ from tauscope.robot.robot import JointType
 
 ONE_TURN = 2.0 * np.pi
 
-TURN_SPARE = 0.01
-"""Beyond one turn by this, an angle is not wrapped [rad]."""
-
-LARGEST_STEP = np.pi / 2.0
-"""Turn between two samples up to which it can be told which way [rad]."""
-
+TURN_SPARE = 0.01  # beyond one turn by this, an angle is not wrapped [rad]
+LARGEST_STEP = np.pi / 2.0  # turn between two samples up to which it can be told which way [rad]
+# A value that moves by so many of its own steps in one row is sampled too coarsely to rest in the next.
 STEPS_OF_A_MOVE = 4.0
-"""A value that moves by so many of its own steps in one row is sampled too coarsely to rest in the next."""
-
-HELD_SHARE = 0.5
-"""Share of such moves followed by a rest above which the source holds its values."""
-
-FEWEST_MOVES = 30
-"""Least number of such moves: noise makes some now and then."""
-
-LONGEST_HOLD = 64
-"""Rows of the longest hold: a source of 30 Hz on a topic of 2 kHz."""
-
-JUDGED_ROWS = 2048
-"""Rows whose neighbours are looked at for a typical size."""
-
-NEIGHBOURS = 3
-"""Rows on either side that a row is judged by."""
+HELD_SHARE = 0.5  # share of such moves followed by a rest above which the source holds its values
+FEWEST_MOVES = 30  # least number of such moves: noise makes some now and then
+LONGEST_HOLD = 64  # rows of the longest hold: a source of 30 Hz on a topic of 2 kHz
+JUDGED_ROWS = 2048  # rows whose neighbours are looked at for a typical size
+NEIGHBOURS = 3  # rows on either side that a row is judged by
 
 
 @dataclass(frozen=True)

@@ -23,17 +23,11 @@ from tauscope.recording.recording import Recording, Samples
 from tauscope.recording.samples import Array
 from tauscope.robot.robot import JointType
 
-SPARE_ROWS = 512
-"""Rows read beyond a block on either side: a run of one value that is longer is taken to end there."""
-
-BUNCHED = 0.1
-"""Share of the usual interval below which two stamps belong to one instant: a buffer was emptied."""
-
+SPARE_ROWS = 512  # rows read beyond a block on either side: a run of one value that is longer is taken to end there
+BUNCHED = 0.1  # share of the usual interval below which two stamps belong to one instant: a buffer was emptied
+# Share of bunched stamps above which the source always sends in bursts: the conditioning counts its rows.
 MOST_BUNCHED = 0.1
-"""Share of bunched stamps above which the source always sends in bursts: the conditioning counts its rows."""
-
-REST_HOLDS = 4
-"""Holds of one value after which it is a rest, and no update that was lost."""
+REST_HOLDS = 4  # holds of one value after which it is a rest, and no update that was lost
 
 
 @dataclass(eq=False)

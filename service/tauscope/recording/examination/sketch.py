@@ -9,21 +9,12 @@ from tauscope.recording.recording import Recording
 from tauscope.recording.samples import Array, Samples
 from tauscope.robot.robot import JointType, Robot
 
-BLOCK_ROWS = 1 << 15
-"""Rows that are read at once."""
-
+BLOCK_ROWS = 1 << 15  # rows that are read at once
 WINDOWS = 8
-WINDOW_ROWS = 1 << 13
-"""Rows of one window; a recording of at most `WINDOWS` of them is looked at whole."""
-
-RANKED_ROWS = 4096
-"""Rows of which a percentile is taken."""
-
-BURST = 0.1
-"""Share of the mean step below which the usual step is one within a burst, as buffers are emptied."""
-
-BREAK = 2.5
-"""Steps of the clock above this many medians are gaps, across which nothing is differenced."""
+WINDOW_ROWS = 1 << 13  # rows of one window; a recording of at most `WINDOWS` of them is looked at whole
+RANKED_ROWS = 4096  # rows of which a percentile is taken
+BURST = 0.1  # share of the mean step below which the usual step is one within a burst, as buffers are emptied
+BREAK = 2.5  # steps of the clock above this many medians are gaps, across which nothing is differenced
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 from tauscope.recording.layout.roles import is_joint_name
 
+# Placeholders of a template: the joint's number from 0, its number from 1, its name.
 FROM_ZERO, FROM_ONE, BY_NAME = "{0}", "{1}", "{name}"
-"""Placeholders of a template: the joint's number from 0, its number from 1, its name."""
-
 PLACEHOLDERS = (FROM_ZERO, FROM_ONE, BY_NAME)
 
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+")
@@ -16,8 +15,8 @@ _JOINT = re.compile(r"\[[^\[\]]*\{(?:0|1|name)\}[^\[\]]*\]|\{(?:0|1|name)\}")
 _SEGMENT = re.compile(r"[^/.\[\]:]+")
 _NUMBER = re.compile(r"[0-9]+")
 
+# Characters of a column's name beyond which it belongs to no family: topic, field and joint are shorter together.
 LONGEST_NAME = 200
-"""Characters of a column's name beyond which it belongs to no family: topic, field and joint are shorter together."""
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ _COMMON_JOINT_COUNTS = (6, 7)
 _PLAIN = re.compile(r"(?!(?:y|n|yes|no|on|off|true|false|null)$)[A-Za-z_][A-Za-z0-9_./-]*", re.IGNORECASE)
 _OPTIONAL = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt")
 
+# The group that words of a column mean, and how far they are from the first choice.
 Ranking = Callable[[Sequence[str]], tuple[str, int] | None]
-"""The group that words of a column mean, and how far they are from the first choice."""
 
 
 def guess_layout(

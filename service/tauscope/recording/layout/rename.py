@@ -14,9 +14,7 @@ from tauscope.robot.messages import listed, printable
 from tauscope.robot.recording_layout import RecordingLayout, Source
 
 _TARGET = re.compile(r"([a-z]+)([0-9]*)")
-NANOSECONDS = "t nanoseconds"
-"""Name of the column with the nanoseconds of each second."""
-
+NANOSECONDS = "t nanoseconds"  # name of the column with the nanoseconds of each second
 _EFFORTS = ("tau", "i")
 
 

@@ -18,17 +18,16 @@ _CORES: Mapping[str, str] = {
 _COMMANDED = frozenset(
     ("target", "desired", "des", "d", "cmd", "command", "commanded", "ref", "reference", "goal", "setpoint", "ipo")
 )
+# Words of quantities that belong to no joint, or are not its measurement.
 _FOREIGN = frozenset(
     ("tcp", "ee", "eef", "cartesian", "base", "tool", "ext", "external", "wrench", "object", "pose", "contact")
 ) | frozenset(("qfrc", "gravity", "error", "bias", "limit", "limits", "max", "min", "accelerometer", "imu"))
-"""Words of quantities that belong to no joint, or are not its measurement."""
 
 _QUALIFIERS = frozenset(
     ("present", "actual", "measured", "meas", "act", "raw", "filtered", "msr", "computed", "applied")
 )
+# Words that make a family second choice.
 _LEVELS: Mapping[str, int] = {"computed": 1, "force": 2, "theta": 2, "load": 2, "state": 3}
-"""Words that make a family second choice."""
-
 _TIMES = ("t", "time", "timestamp", "stamp", "sim_time", "time_s", "seconds", "sec", "clock", "elapsed", "duration")
 _UNIT = re.compile(r"(?<![A-Za-z])(deg(?:rees?)?|mA)(?![A-Za-z])|(°)")
 
