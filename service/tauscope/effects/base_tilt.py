@@ -15,10 +15,7 @@ from tauscope.robot import Robot
 def tilt_directions(gravity: Array) -> tuple[Array, Array]:
     """Two unit vectors across gravity, the frame's own axes where gravity lies along one.
 
-    Parameters
-    ----------
-    gravity : (3,) float64
-        in the base frame [m/s²]
+    `gravity`: (3,), in the base frame [m/s²].
     """
     axes = np.eye(3)
     main = int(np.argmax(np.abs(gravity)))

@@ -65,25 +65,16 @@ class Deflection(Effect):
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
         """δ per unit of the coefficient along a motion, (N,).
 
-        Parameters
-        ----------
-        load : (N,) float64
-            τ_rb, smoothed [Nm or N]
-        inertia : (N,) float64
-            of the link and all that it carries, zero where it is not known [kg m² or kg]
-        shape : (k,) float64
-            values of the shape parameters
-        rate_hz : float
-            sampling rate [Hz]
+        `load`: (N,), τ_rb, smoothed [Nm or N].
+        `inertia`: (N,), of the link and all that it carries, zero where it is not known [kg m² or kg].
+        `shape`: (k,), values of the shape parameters.
+        `rate_hz`: sampling rate [Hz].
         """
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """Torque of the deflection; where the motion repeats, as in a repetition that follows another.
 
-        Parameters
-        ----------
-        shapes : (g, k) float64
-            values of the shape parameters, `BAND` among them
+        `shapes`: (g, k), values of the shape parameters, `BAND` among them.
         """
         joint, band = self.joint or 0, self.shapes.index(BAND)
         times, count = 2 if signals.periodic else 1, signals.position.shape[-1]
@@ -100,17 +91,8 @@ class Deflection(Effect):
 def torque_of_deflection(signals: Signals, joint: int, deflection: Array) -> Array:
     """Torque that a small deflection of one joint's transmission makes at all joints.
 
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    deflection : (N,) float64
-        δ, by how much the link lags the motor [rad or m]
-
-    Returns
-    -------
-    (n, N) float64
-        τ(q - δ) - τ(q), to first order [Nm or N]
+    `deflection`: (N,), δ, by how much the link lags the motor [rad or m].
+    Returns (n, N), τ(q - δ) - τ(q), to first order [Nm or N].
     """
     by_position, by_velocity, by_acceleration = _slopes(signals, joint)
     rate = signals.derivative(deflection)
@@ -121,13 +103,7 @@ def torque_of_deflection(signals: Signals, joint: int, deflection: Array) -> Arr
 
 
 def inertia_of_link(signals: Signals, joint: int) -> Array:
-    """Inertia that a joint's transmission moves, (N,) [kg m² or kg]; zero where the fit knows of none.
-
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    """
+    """Inertia that a joint's transmission moves, (N,) [kg m² or kg]; zero where the fit knows of none."""
     inertia = _slopes(signals, joint)[2][joint]
     return np.asarray(np.maximum(inertia, LEAST_INERTIA * max(float(inertia.max()), 0.0)))
 

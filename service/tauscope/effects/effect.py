@@ -32,10 +32,8 @@ NO_SHAPE = np.zeros((1, 0))  # the grid of an effect without shape parameters
 class Coefficient:
     """A linear coefficient of an effect.
 
-    largest, smallest : float
-        magnitudes beyond which there is no such effect
-    whole : float
-        value of what is complete, where an estimate stops
+    `largest`, `smallest`: magnitudes beyond which there is no such effect.
+    `whole`: value of what is complete, where an estimate stops.
     """
 
     name: str
@@ -93,12 +91,9 @@ def percent_text(value: float) -> str:
 class Effect(ABC):
     """One form of an effect at one place.
 
-    joint : int or None
-        joint index, from 0; None for the whole arm
-    grid : (g, k) float64
-        values of the shape parameters at which the effect is looked for
-    lower, upper : (k,) float64
-        bounds of the shape parameters
+    `joint`: None for the whole arm.
+    `grid`: (g, k), values of the shape parameters at which the effect is looked for.
+    `lower`, `upper`: (k,), bounds of the shape parameters.
 
     Columns of an effect `of_motion_alone` are the same beside every model, and are made once; those of one that
     `has_step` change with K_v of its joint; one `of_motion_and_step` changes with nothing else of the model.

@@ -106,10 +106,7 @@ def transposed_jacobian(signals: Signals) -> Array:
 def contact_windows(durations: Sequence[float]) -> tuple[Array, tuple[Array, Array]]:
     """Windows of one recording each, and windows at the same instants of all, with the bounds of their shapes.
 
-    Parameters
-    ----------
-    durations : sequence of float
-        of the recordings [s]
+    `durations`: of the recordings [s].
     """
     scopes = [(float(place), length) for place, length in enumerate(durations)]
     if len(durations) > 1:

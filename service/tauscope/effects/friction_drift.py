@@ -28,8 +28,7 @@ class FrictionDrift(Effect):
     would else leave them open. By the clock p is 1. By heat it is the power that the model's friction dissipates, in
     watts: a joint that rests or creeps cools.
 
-    duration_s : float
-        D, of the longest recording [s]
+    `duration_s`: D, of the longest recording [s].
     """
 
     has_step = True
@@ -99,8 +98,7 @@ class ThermalDrift(FrictionDrift):
 
     f and w are what friction changes by a kelvin at ϑ_0. Where no temperature is known h is zero.
 
-    reference_c : float
-        ϑ_0, middle of the temperatures of training [°C]
+    `reference_c`: ϑ_0, middle of the temperatures of training [°C].
     """
 
     is_variant = True
@@ -116,13 +114,7 @@ class ThermalDrift(FrictionDrift):
 
     @classmethod
     def of(cls, context: ArmContext, joint: int) -> "ThermalDrift":
-        """The form of a joint whose temperature was recorded.
-
-        Parameters
-        ----------
-        joint : int
-            index, from 0
-        """
+        """The form of a joint whose temperature was recorded. `joint`: index, from 0."""
         bounds = np.zeros(1), np.array([FASTEST])
         reference = 0.5 * float(context.coldest[joint] + context.hottest[joint])
         return cls(joint, RATES[:, None], *bounds, max(context.durations), reference_c=reference)

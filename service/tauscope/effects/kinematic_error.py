@@ -76,12 +76,7 @@ def _torques(signals: Signals, displacements: Sequence[tuple[Array, float]]) -> 
 def displaced(robot: Robot, link: int, by: Array) -> Robot:
     """The arm with the frame of one link, and all that follows, displaced.
 
-    Parameters
-    ----------
-    link : int
-        index of the link, from 0
-    by : (3,) float64
-        displacement in the moved joint's frame [m]
+    `link`: index of the link, from 0; `by`: (3,), displacement in the moved joint's frame [m].
     """
     segment = robot.segments[link]
     after = Placement(segment.after.rotation, segment.after.translation + by)

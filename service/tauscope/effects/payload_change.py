@@ -96,14 +96,7 @@ def carried(mass: float, shape: Array, durations: Sequence[float]) -> tuple[floa
 
     Beside a nominal model that has it or not, a mass that is missing in one part is a mass that is carried in the rest.
 
-    Parameters
-    ----------
-    mass : float
-        m [kg]
-    shape : (7,) float64
-        the window
-    durations : sequence of float
-        of the recordings [s]
+    `mass`: m [kg]; `shape`: (7,), the window; `durations`: of the recordings [s].
     """
     scope, start, end = shape[:3]
     if shape[3] == OUTSIDE:
@@ -124,10 +117,7 @@ def payload_windows(durations: Sequence[float]) -> Array:
 
     Within one recording, at the same instants of all, or from one recording on.
 
-    Parameters
-    ----------
-    durations : sequence of float
-        of the recordings [s]
+    `durations`: of the recordings [s].
     """
     rows = []
     scopes = [(float(place), length) for place, length in enumerate(durations)]

@@ -45,24 +45,12 @@ KEPT = 24 * THREADS  # sets of them that are kept a piece: those of a model with
 
 
 def possible_orders(context: ArmContext, joint: int) -> Array:
-    """Orders of a periodic torque that this motion can show, (g,), ascending; empty where there are none.
-
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    """
+    """Orders of a periodic torque that this motion can show, (g,), ascending; empty where there are none."""
     return _orders(context, joint, 1.0)[:MOST_ORDERS]
 
 
 def farther_orders(context: ArmContext, joint: int) -> Array:
-    """Orders beyond those, that show in a part of the motion only, (g,), ascending.
-
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    """
+    """Orders beyond those, that show in a part of the motion only, (g,), ascending."""
     near = possible_orders(context, joint)
     return _orders(context, joint, FARTHER)[len(near) :][:MOST_FARTHER_ORDERS]
 
@@ -97,17 +85,7 @@ def _is_geared(context: ArmContext, joint: int) -> bool:
 def waves(position: Array, orders: Array) -> Array:
     """Sines and cosines of orders of a position; of even steps by sin(a + b) and cos(a + b), ten times as quick.
 
-    Parameters
-    ----------
-    position : (N,) float64
-        q [rad or m]
-    orders : (g,) float64
-        k [1/rad or 1/m]
-
-    Returns
-    -------
-    (g, 2, N) float64
-        sin kq, cos kq
+    `position`: (N,), q [rad or m]; `orders`: (g,), k [1/rad or 1/m]. Returns (g, 2, N), sin kq, cos kq.
     """
     steps = np.diff(orders)
     if len(steps) < 2 or np.ptp(steps) > EVEN * abs(steps[0]):

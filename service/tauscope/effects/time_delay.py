@@ -98,15 +98,7 @@ class Shift(LateTorque):
         return [cls(place, *_constants(context)) for place in cls.places(context)]
 
     def late(self, torque: Array, constant: float, signals: Signals) -> Array:
-        """Torque (m, N) as it is recorded with a = 1.
-
-        Parameters
-        ----------
-        torque : (m, N) float64
-            as it is [Nm or N]
-        constant : float
-            T [s]
-        """
+        """Torque (m, N) as it is recorded with a = 1. `torque`: (m, N), as it is [Nm or N]; `constant`: T [s]."""
         return shifted(torque, constant, signals)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -183,15 +175,7 @@ def _constants(context: ArmContext) -> tuple[Array, Array, Array]:
 
 
 def shifted(torque: Array, delay: float, signals: Signals) -> Array:
-    """Torque that is late, linear from sample to sample, (m, N).
-
-    Parameters
-    ----------
-    torque : (m, N) float64
-        as it is [Nm or N]
-    delay : float
-        [s]
-    """
+    """Torque that is late, linear from sample to sample, (m, N). `torque`: (m, N), as it is [Nm or N]; `delay`: [s]."""
     instants = np.arange(torque.shape[1]) / signals.rate_hz
     period = torque.shape[1] / signals.rate_hz if signals.periodic else None
     return np.stack([np.interp(instants - delay, instants, row, period=period) for row in torque])
@@ -200,12 +184,7 @@ def shifted(torque: Array, delay: float, signals: Signals) -> Array:
 def low_passed(torque: Array, constant: float, order: int, signals: Signals) -> Array:
     """Torque behind a filter, exact for torque that is linear from sample to sample, (m, N).
 
-    Parameters
-    ----------
-    torque : (m, N) float64
-        before it [Nm or N]
-    constant : float
-        each time constant T of the filter [s]
+    `torque`: (m, N), before it [Nm or N]; `constant`: each time constant T of the filter [s].
     """
     samples = constant * signals.rate_hz
     kept = float(np.exp(-1.0 / samples))

@@ -32,13 +32,7 @@ class Saturation(Effect):
 
     @classmethod
     def of_levels(cls, context: ArmContext, parts: Array) -> list[Effect]:
-        """One a joint.
-
-        Parameters
-        ----------
-        parts : (g,) float64
-            levels looked at, relative to the joint's largest torque
-        """
+        """One a joint. `parts`: (g,), levels looked at, relative to the joint's largest torque."""
         made: list[Effect] = []
         for joint in context.joints:
             levels = parts * float(context.top_torque[joint])
@@ -49,12 +43,7 @@ class Saturation(Effect):
     def recorded(self, torque: Array, levels: Array) -> Array:
         """Torque r(τ) as it is recorded with a = 1, (g, N).
 
-        Parameters
-        ----------
-        torque : (N,) float64
-            as it is [Nm or N]
-        levels : (g, 1) float64
-            c [Nm or N]
+        `torque`: (N,), as it is [Nm or N]; `levels`: (g, 1), c [Nm or N].
         """
 
     def claim(self, found: Sizes, context: ArmContext) -> str:

@@ -33,11 +33,7 @@ SMALLEST_SHARE = 1e-3  # …and at least so many are: a share of none has no log
 
 @dataclass(frozen=True, eq=False)
 class Autoregression:
-    """e_t = Σ a_k e_{t-k} + ε_t.
-
-    coefficients : (p,) float64
-        a_1 … a_p; empty for white noise
-    """
+    """e_t = Σ a_k e_{t-k} + ε_t. `coefficients`: (p,), a_1 … a_p; empty for white noise."""
 
     coefficients: Array
     innovation_variance: float
@@ -62,10 +58,7 @@ class Autoregression:
     def colour(self, columns: Array) -> Array:
         """Columns run through σ_ε / a(z): their Gram matrix is LᵀΩL, Ω the residual's covariance.
 
-        Parameters
-        ----------
-        columns : (k, M) float64
-            signals, time last
+        `columns`: (k, M), signals, time last.
         """
         scale = np.sqrt(self.innovation_variance)
         if self.order == 0:
@@ -77,10 +70,8 @@ class Autoregression:
 class LaggedProducts:
     """Σ e_t e_{t+k} of one stretch of a residual, and how many products that are.
 
-    products, counts : (K + 1,) float64
-        for the lags k = 0 … K; pairs of which one was not measured are left out of both
-    spans : (K + 1,) float64
-        pairs that there would be if all had been measured
+    `products`, `counts`: (K + 1,), for the lags k = 0 … K; pairs of which one was not measured are left out of both.
+    `spans`: (K + 1,), pairs that there would be if all had been measured.
     """
 
     products: Array
@@ -91,12 +82,7 @@ class LaggedProducts:
     def of(residual: Array, used: NDArray[np.bool_], lags: int = LARGEST_ORDER) -> "LaggedProducts":
         """The products of consecutive samples, those left out that do not count.
 
-        Parameters
-        ----------
-        residual : (M,) float64
-            consecutive samples
-        used : (M,) bool
-            which of them count
+        `residual`: (M,), consecutive samples; `used`: (M,), which of them count.
         """
         sums = LaggedProducts(np.zeros(lags + 1), np.zeros(lags + 1), np.zeros(lags + 1))
         whole = bool(used.all())
@@ -120,10 +106,8 @@ class AutocovarianceSum:
     def add(self, piece: LaggedProducts, filtered_white: Array | None = None) -> None:
         """Add one piece.
 
-        Parameters
-        ----------
-        filtered_white : (K + 1,) float64 or None
-            autocovariance of white noise that passed the filter which the residual passed; None where it passed none
+        `filtered_white`: (K + 1,) or None, autocovariance of white noise that passed the filter which the residual
+        passed; None where it passed none.
         """
         both = slice(min(len(piece.products), len(self._sums.products)))
         self._sums.products[both] += piece.products[both]

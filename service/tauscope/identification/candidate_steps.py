@@ -26,14 +26,10 @@ COLLINEAR = 1e-9  # a second column with less than this share of its energy left
 class JointGrid:
     """One joint's candidate columns after projection: a step of every slope, and v|v| as the last.
 
-    slopes : (g,) float64
-        candidate constants
-    gram : (g + 1, g + 1) float64
-        GᵀG of its columns, before projection
-    inner : (z, g + 1) float64
-        Q_jᵀ G: what the projection takes away
-    target : (g + 1,) float64
-        Gᵀ y after projection
+    `slopes`: (g,), candidate constants.
+    `gram`: (g + 1, g + 1), GᵀG of its columns, before projection.
+    `inner`: (z, g + 1), Q_jᵀ G: what the projection takes away.
+    `target`: (g + 1,), Gᵀ y after projection.
     """
 
     slopes: Array
@@ -62,14 +58,9 @@ def projected_grids(
 ) -> list[JointGrid]:
     """Candidate columns of every joint, projected off the shared ones; one pass over the data.
 
-    Parameters
-    ----------
-    shared : (z,) int
-        its global columns that do not depend on any shape constant, ascending
-    noise_std : (n,) float64
-        residual standard deviation of every joint, for the weights [Nm or N]
-    slopes : list of (g,) float64, length n
-        every joint's candidates [s/rad or s/m]
+    `shared`: (z,) int, its global columns that do not depend on any shape constant, ascending.
+    `noise_std`: (n,), residual standard deviation of every joint, for the weights [Nm or N].
+    `slopes`: list of (g,), length n, every joint's candidates [s/rad or s/m].
     """
     joints = range(structure.robot.joint_count)
     gram = [np.zeros((len(values) + 1, len(values) + 1)) for values in slopes]
@@ -106,10 +97,7 @@ def total_gain(grids: list[JointGrid], chosen: list[list[int]]) -> float:
 class Conditional:
     """One joint's candidates after the chosen columns of all other joints are projected off as well.
 
-    gram : (g + 1, g + 1) float64
-        Gram matrix of the candidates
-    target : (g + 1,) float64
-        their products with the torque
+    `gram`: (g + 1, g + 1), Gram matrix of the candidates; `target`: (g + 1,), their products with the torque.
     """
 
     gram: Array
@@ -117,13 +105,7 @@ class Conditional:
 
     @staticmethod
     def of(grids: list[JointGrid], chosen: list[list[int]], joint: int) -> "Conditional":
-        """The candidates of one joint with the other joints as chosen.
-
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        """
+        """The candidates of one joint with the other joints as chosen."""
         grid, every = grids[joint], list(range(len(grids[joint].target)))
         gram, target = grid.block(grid, every, every), grid.target
         others = [(grids[k], chosen[k]) for k in range(len(grids)) if k != joint]

@@ -39,19 +39,10 @@ def parameter_covariance(
 ) -> Array:
     """Covariance of all parameters, with the estimated shape constants appended.
 
-    Parameters
-    ----------
-    parameters : (p,) float64
-        the estimate
-    weight : (n,) float64
-        w_j, the weights that the estimate was made with
-    scale_std : sequence of float
-        s_j, one a joint; empty where torque was measured
-
-    Returns
-    -------
-    (p + s, p + s) float64
-        covariance of Θ and of the logarithms of the shape constants
+    `parameters`: (p,), the estimate.
+    `weight`: (n,), w_j, the weights that the estimate was made with.
+    `scale_std`: s_j, one a joint; empty where torque was measured.
+    Returns (p + s, p + s), covariance of Θ and of the logarithms of the shape constants.
     """
     size = structure.size + len(shapes)
     bread, meat = np.zeros((size, size)), np.zeros((size, size))

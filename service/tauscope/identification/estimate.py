@@ -24,10 +24,7 @@ class Estimator(StrEnum):
 def estimate(factors: tuple[JointFactor, ...], size: int, estimator: Estimator) -> tuple[Array, Solution]:
     """LS, or WLS with σ_j estimated from the residual and the equations solved again.
 
-    Returns
-    -------
-    tuple of (n,) float64 and Solution
-        weights 1/σ_j (ones for LS), and the solution
+    Returns tuple of (n,) and Solution, weights 1/σ_j (ones for LS), and the solution.
     """
     if estimator is Estimator.LS:
         return np.ones(len(factors)), solve(factors, size, np.ones(len(factors)))

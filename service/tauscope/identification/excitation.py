@@ -19,12 +19,9 @@ MOST_SAMPLES = 2048  # samples of one piece of motion, which has up to 32,768, b
 class Excitation:
     """How the joints move.
 
-    lowest, highest : (n,) float64
-        positions [rad or m]
-    speed : (n,) float64
-        top speed, which one sample in a hundred exceeds [rad/s or m/s]
-    reversals : (n,) int
-        how often the joints turn round
+    `lowest`, `highest`: (n,), positions [rad or m].
+    `speed`: (n,), top speed, which one sample in a hundred exceeds [rad/s or m/s].
+    `reversals`: (n,) int, how often the joints turn round.
     """
 
     lowest: Array
@@ -48,10 +45,7 @@ def measure_excitation(motions: Iterable[PreparedMotion]) -> Excitation:
 def thin(signals: Array, most: int = MOST_SAMPLES) -> Array:
     """Every so many rows of a piece, so that a long recording is not held in memory.
 
-    Parameters
-    ----------
-    signals : (N, n) float64
-        one row a sample
+    `signals`: (N, n), one row a sample.
     """
     return signals[:: -(-len(signals) // most)].copy()
 

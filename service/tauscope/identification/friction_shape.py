@@ -41,14 +41,10 @@ SWEEPS = 4
 class EstimatedShape:
     """Shape constants of one joint.
 
-    k_v : float
-        slope of the step at zero velocity [s/rad or s/m]
-    delta : float or None
-        slope of the Stribeck term [s/rad or s/m]; None where the data show no such term
-    k_v_identifiable, delta_identifiable : bool
-        False where the data cannot tell the constant
-    k_v_given, delta_given : bool
-        True where the robot file states it
+    `k_v`: slope of the step at zero velocity [s/rad or s/m].
+    `delta`: slope of the Stribeck term [s/rad or s/m]; None where the data show no such term.
+    `k_v_identifiable`, `delta_identifiable`: False where the data cannot tell the constant.
+    `k_v_given`, `delta_given`: True where the robot file states it.
     """
 
     k_v: float
@@ -80,15 +76,10 @@ def estimate_shapes(
 ) -> tuple[EstimatedShape, ...]:
     """Shape constants of all joints; those that the robot file states are kept.
 
-    Parameters
-    ----------
-    noise_std : (n,) float64
-        residual standard deviation in the common band, for the weights
-    unit : (n,) float64
-        one noise variance, inflated by autocorrelation, relative to `noise_std`²: the measure of what the data can
-        tell; zeros for the best candidates whatever they are worth
-    speed : (n,) float64
-        rms velocity of every joint, which the candidates are relative to [rad/s or m/s]
+    `noise_std`: (n,), residual standard deviation in the common band, for the weights.
+    `unit`: (n,), one noise variance, inflated by autocorrelation, relative to `noise_std`²: the measure of what the
+    data can tell; zeros for the best candidates whatever they are worth.
+    `speed`: (n,), rms velocity of every joint, which the candidates are relative to [rad/s or m/s].
     """
     given = [joint.friction_shape for joint in structure.robot.joints]
     shared = _shared_columns(structure)
@@ -260,17 +251,9 @@ def _with_stribeck(
 def gentle_range(k_v: float, speed: float) -> tuple[float, float]:
     """Between which slopes a δ stands for a term of its own: gentler ones are viscous friction, steeper ones K_v's.
 
-    Parameters
-    ----------
-    k_v : float
-        slope of the step at zero velocity [s/rad or s/m]
-    speed : float
-        the joint's rms velocity [rad/s or m/s]
-
-    Returns
-    -------
-    tuple of float
-        gentlest and steepest δ [s/rad or s/m]
+    `k_v`: slope of the step at zero velocity [s/rad or s/m].
+    `speed`: the joint's rms velocity [rad/s or m/s].
+    Returns gentlest and steepest δ [s/rad or s/m].
     """
     return STRAIGHT / speed, k_v / SEPARATION
 

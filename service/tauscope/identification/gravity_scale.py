@@ -15,15 +15,8 @@ FELT = 1e-3  # gravity below this share of the masses' weight at one metre, per 
 def gravity_scale(motions: Dataset, structure: ModelStructure, parameters: Array) -> float | None:
     """Least-squares factor between the estimated torque of gravity and that of the stated links.
 
-    Parameters
-    ----------
-    parameters : (p,) float64
-        the estimate
-
-    Returns
-    -------
-    float or None
-        1 where both agree; None where the file states no links, or gravity does not show
+    `parameters`: (p,), the estimate.
+    Returns 1 where both agree; None where the file states no links, or gravity does not show.
     """
     links = structure.robot.model.links
     if links is None:

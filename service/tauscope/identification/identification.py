@@ -42,10 +42,8 @@ Progress = Callable[[str], None]
 class Options:
     """What a user may ask of an identification.
 
-    cutoff_hz : float, None or "auto"
-        band that torque and regressor share [Hz]; None for no filter; chosen from the data by default
-    prior : bool
-        whether the most probable bodies are delivered, or the free least-squares estimate
+    `cutoff_hz`: band that torque and regressor share [Hz]; None for no filter; chosen from the data by default.
+    `prior`: whether the most probable bodies are delivered, or the free least-squares estimate.
     """
 
     estimator: Estimator = Estimator.WLS
@@ -58,30 +56,19 @@ class Options:
 class Identification:
     """A model of the arm with what is known about its uncertainty.
 
-    parameters : (p,) float64
-        the model that is delivered
-    free_parameters : (p,) float64
-        the LS or WLS estimate, without prior and without bodies
-    consistent_parameters : (p,) float64
-        the most probable bodies and friction, in the same columns
-    constrained : bool
-        whether no body can have the free estimate
-    price_of_bodies : (n,) float64
-        training residual over that of the free estimate
-    gravity_scale : float or None
-        torque of gravity over that of the stated links; None where it cannot be told
-    reversed_joints : tuple of int
-        joints whose torque fits much better with the other sign, which is not used
-    covariance : (p + s, p + s) float64
-        of the parameters, and of the logarithms of the estimated shape constants
-    undetermined : (p,) bool
-        parameters about which the recordings say nothing
-    predicted_train, predicted_held_out : (n,) float64
-        residual at the recorded rate that noise and covariance lead to expect [Nm or N]
-    extrapolation : (n,) float64 or None
-        share of the held-out torque's rms that training leaves uncertain
-    uncertainty_growth : (n,) float64 or None
-        uncertain torque of held-out motion over that of training
+    `parameters`: (p,), the model that is delivered.
+    `free_parameters`: (p,), the LS or WLS estimate, without prior and without bodies.
+    `consistent_parameters`: (p,), the most probable bodies and friction, in the same columns.
+    `constrained`: whether no body can have the free estimate.
+    `price_of_bodies`: (n,), training residual over that of the free estimate.
+    `gravity_scale`: torque of gravity over that of the stated links; None where it cannot be told.
+    `reversed_joints`: joints whose torque fits much better with the other sign, which is not used.
+    `covariance`: (p + s, p + s), of the parameters, and of the logarithms of the estimated shape constants.
+    `undetermined`: (p,), parameters about which the recordings say nothing.
+    `predicted_train`, `predicted_held_out`: (n,), residual at the recorded rate that noise and covariance lead to
+    expect [Nm or N].
+    `extrapolation`: (n,) or None, share of the held-out torque's rms that training leaves uncertain.
+    `uncertainty_growth`: (n,) or None, uncertain torque of held-out motion over that of training.
     """
 
     robot: Robot
@@ -118,11 +105,7 @@ class Identification:
 
 @dataclass(frozen=True, eq=False)
 class _Estimates:
-    """The free and the most probable model of the training recordings.
-
-    weights : (n,) float64
-        1/σ_j of the free estimate
-    """
+    """The free and the most probable model of the training recordings. `weights`: (n,), 1/σ_j of the free estimate."""
 
     structure: ModelStructure
     shapes: tuple[EstimatedShape, ...]

@@ -31,10 +31,7 @@ PANEL = 8  # columns that are eliminated before the rest is updated by one matri
 class JointFactor:
     """Triangular factor of one joint's equations.
 
-    columns : (p_j,) int
-        global columns of the model
-    triangle : (p_j + 1, p_j + 1) float64
-        R_j of [A_j | y_j]
+    `columns`: (p_j,) int, global columns of the model; `triangle`: (p_j + 1, p_j + 1), R_j of [A_j | y_j].
     """
 
     columns: NDArray[np.intp]
@@ -54,13 +51,7 @@ class JointFactor:
         return float(np.sum((columns @ solution - target) ** 2))
 
     def squared_residual(self, parameters: Array) -> float:
-        """‖A_j Θ - y_j‖².
-
-        Parameters
-        ----------
-        parameters : (p,) float64
-            all parameters of the model
-        """
+        """‖A_j Θ - y_j‖². `parameters`: (p,), all parameters of the model."""
         own = np.append(parameters[self.columns], -1.0)
         return float(np.sum((self.triangle @ own) ** 2))
 
@@ -69,16 +60,11 @@ class JointFactor:
 class Solution:
     """A least-squares estimate.
 
-    parameters : (p,) float64
-        Θ; where a direction has no information, its smallest value
-    factor : (p, p) float64
-        R of the weighted equations
-    target : (p,) float64
-        z, so that the criterion is ‖R Θ - z‖² and a constant
-    spread : (p, r) float64
-        S with S Sᵀ = (Lᵀ W L)⁺, r the rank
-    undetermined : (p,) bool
-        parameters that take part in a direction without information
+    `parameters`: (p,), Θ; where a direction has no information, its smallest value.
+    `factor`: (p, p), R of the weighted equations.
+    `target`: (p,), z, so that the criterion is ‖R Θ - z‖² and a constant.
+    `spread`: (p, r), S with S Sᵀ = (Lᵀ W L)⁺, r the rank.
+    `undetermined`: (p,), parameters that take part in a direction without information.
     """
 
     parameters: Array
@@ -120,10 +106,7 @@ def solve(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Solu
 
     Θ = argmin Σ_j ‖A_j Θ - y_j‖² / σ_j².
 
-    Parameters
-    ----------
-    noise_std : (n,) float64
-        σ_j; all ones for LS
+    `noise_std`: (n,), σ_j; all ones for LS.
     """
     triangle = stacked_factor(factors, size, noise_std)
     return _solved(triangle[:size, :size], triangle[:size, size])
@@ -132,10 +115,7 @@ def solve(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Solu
 def stacked_factor(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Array:
     """Triangular factor of all joints' equations together, (p + 1, p + 1).
 
-    Parameters
-    ----------
-    noise_std : (n,) float64
-        σ_j, by which the equations are divided
+    `noise_std`: (n,), σ_j, by which the equations are divided.
     """
     stacked = np.zeros((sum(len(factor.triangle) for factor in factors), size + 1))
     row = 0
@@ -150,10 +130,7 @@ def stacked_factor(factors: tuple[JointFactor, ...], size: int, noise_std: Array
 def restricted(factors: tuple[JointFactor, ...], keep: NDArray[np.intp]) -> tuple[JointFactor, ...]:
     """The factors of a smaller model: columns left out without another pass over the data.
 
-    Parameters
-    ----------
-    keep : (k,) int
-        its global columns that stay, ascending; they are numbered anew from 0
+    `keep`: (k,) int, its global columns that stay, ascending; they are numbered anew from 0.
     """
     position = np.full(max(int(factor.columns.max()) for factor in factors) + 1, -1)
     position[keep] = np.arange(len(keep))

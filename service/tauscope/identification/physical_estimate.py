@@ -29,10 +29,7 @@ def consistent_estimate(structure: ModelStructure, factor: Array, target: Array,
     then solved for a noise ten times as large, and so on: the prior weighs more. Raises IdentificationError where no
     noise makes the program solvable.
 
-    Parameters
-    ----------
-    factor, target : (r, p), (r,) float64
-        R and z of the whitened equations of the model's columns
+    `factor`, `target`: (r, p), (r,), R and z of the whitened equations of the model's columns.
     """
     full = FullParameters.of(structure)
     columns = factor @ full.map

@@ -35,18 +35,12 @@ DETERMINED = 0.9  # share of the prior's variance that data take from a paramete
 class Posterior:
     """What prior and data together say of the parameters, before bodies and friction restrict them.
 
-    doubt : (p,) float64
-        deviation from the prior that the data show, in its standard deviations
-    noise_std : (n,) float64
-        σ_j of a row in the common band
-    weights : (n,) float64
-        1/(σ_j √ρ_j), by which the joints' equations are multiplied
-    factor, target : (p, p), (p,) float64
-        R and z of the data's weighted equations
-    mean : (p,) float64
-        of the posterior, before bodies and friction restrict it
-    covariance, precision : (p, p) float64
-        S of the posterior, and P⁻¹ of the prior
+    `doubt`: (p,), deviation from the prior that the data show, in its standard deviations.
+    `noise_std`: (n,), σ_j of a row in the common band.
+    `weights`: (n,), 1/(σ_j √ρ_j), by which the joints' equations are multiplied.
+    `factor`, `target`: (p, p), (p,), R and z of the data's weighted equations.
+    `mean`: (p,), of the posterior, before bodies and friction restrict it.
+    `covariance`, `precision`: (p, p), S of the posterior, and P⁻¹ of the prior.
     """
 
     prior: Prior
@@ -78,10 +72,7 @@ def infer(
 ) -> Posterior:
     """The posterior of all parameters.
 
-    Parameters
-    ----------
-    ratios : (n,) float64 or None
-        ρ_j, long-run over white variance of each joint's residual; ones where it is not known
+    `ratios`: (n,) or None, ρ_j, long-run over white variance of each joint's residual; ones where it is not known.
     """
     full = FullParameters.of(structure)
     colour = np.ones(len(factors)) if ratios is None else np.sqrt(ratios)
@@ -108,12 +99,8 @@ def infer(
 def _friction_doubt(structure: ModelStructure, deviation: Array, learnt: Array) -> Array:
     """Deviation from the prior that coefficients of a kind show at the joints whose data determine them, (p,).
 
-    Parameters
-    ----------
-    deviation : (p,) float64
-        of the mean from the prior's, in its standard deviations
-    learnt : (p,) float64
-        share of the prior's variance that the data took away
+    `deviation`: (p,), of the mean from the prior's, in its standard deviations.
+    `learnt`: (p,), share of the prior's variance that the data took away.
     """
     doubt = np.ones(structure.size)
     joints = range(structure.robot.joint_count)

@@ -22,19 +22,10 @@ def uncertain_torque(
 
     a are the rows of a joint, v is what `PreparedMotion` says of friction at rest.
 
-    Parameters
-    ----------
-    parameters : (p,) float64
-        the coefficients, for the amplitudes of the shape constants
-    covariance : (p + s, p + s) float64
-        S, of the parameters and of the logarithms of the estimated shape constants
-    noise_std : (n,) float64
-        σ of a row [Nm or N]
-
-    Returns
-    -------
-    (n,) float64
-        in the common band [Nm or N]
+    `parameters`: (p,), the coefficients, for the amplitudes of the shape constants.
+    `covariance`: (p + s, p + s), S, of the parameters and of the logarithms of the estimated shape constants.
+    `noise_std`: (n,), σ of a row [Nm or N].
+    Returns (n,), in the common band [Nm or N].
     """
     squares, resting, count = np.zeros((3, structure.robot.joint_count))
     for prepared in motions:

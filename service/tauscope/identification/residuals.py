@@ -28,14 +28,10 @@ CLEARLY_MORE = 1.3  # ratio of two estimated powers that is no chance
 class Fit:
     """How well a parameter set explains the torque.
 
-    rms : (n,) float64
-        root mean square of the torque residual at the recorded rate, no filter [Nm or N]
-    band_rms : (n,) float64
-        the same in the common band
-    moving_rms : (n,) float64
-        the same in the common band, of rows in which the joint moves
-    torque_rms : (n,) float64
-        root mean square of the measured torque in the common band [Nm or N]
+    `rms`: (n,), root mean square of the torque residual at the recorded rate, no filter [Nm or N].
+    `band_rms`: (n,), the same in the common band.
+    `moving_rms`: (n,), the same in the common band, of rows in which the joint moves.
+    `torque_rms`: (n,), root mean square of the measured torque in the common band [Nm or N].
     """
 
     rms: Array
@@ -49,8 +45,8 @@ class Fit:
 class ResidualStatistics:
     """What the residuals of one parameter set tell.
 
-    period_noise_std : (n,) float64 or None
-        standard deviation of the torque noise from what differs between periods; None without enough periods
+    `period_noise_std`: (n,) or None, standard deviation of the torque noise from what differs between periods; None
+    without enough periods.
     """
 
     fit: Fit
@@ -96,13 +92,7 @@ def _low_power(model: Autoregression) -> float:
 def evaluate(
     motions: Iterable[PreparedMotion], structure: ModelStructure, candidates: Sequence[Array]
 ) -> tuple[ResidualStatistics, ...]:
-    """Residual statistics of several parameter sets in one pass.
-
-    Parameters
-    ----------
-    candidates : sequence of (p,) float64
-        parameter sets
-    """
+    """Residual statistics of several parameter sets in one pass. `candidates`: sequence of (p,), parameter sets."""
     sums = [_Sums(structure.robot.joint_count) for _ in candidates]
     for prepared in motions:
         predicted = prepared.predict_torque(structure, np.stack(candidates))

@@ -27,10 +27,7 @@ PROBE_STATES = 30
 def separable_rotors(robot: Robot, base: BaseParameters, seed: int = 0) -> tuple[bool, ...]:
     """Joints whose rotor inertia no combination of link parameters, offsets and viscous friction can imitate.
 
-    Returns
-    -------
-    tuple of bool, length n
-        True where I_a can be told from the links
+    Returns True where I_a can be told from the links.
     """
     rng = np.random.default_rng(seed)
     count = robot.joint_count
@@ -58,17 +55,9 @@ def needed_rotors(
 ) -> tuple[bool, ...]:
     """Of the rotors in a model, those that the data ask for: the least needed one is dropped until all that stay count.
 
-    Parameters
-    ----------
-    noise_std : (n,) float64
-        residual standard deviation of each joint in the common band
-    inflation : (n,) float64
-        variance inflation by autocorrelation, at least 1
-
-    Returns
-    -------
-    tuple of bool, length n
-        True where the rotor stays
+    `noise_std`: (n,), residual standard deviation of each joint in the common band.
+    `inflation`: (n,), variance inflation by autocorrelation, at least 1.
+    Returns True where the rotor stays.
     """
     joints = {joint for joint, terms in enumerate(structure.terms) if terms.rotor}
     if _gain_of_all(factors, structure, noise_std) < min(
@@ -114,13 +103,7 @@ def _needed_gain(structure: ModelStructure, joint: int, inflation: float, rows: 
 
 
 def kept_columns(structure: ModelStructure, rotors: set[int]) -> np.ndarray:
-    """Global columns of a model when only some of its rotors stay.
-
-    Returns
-    -------
-    (k,) int
-        ascending
-    """
+    """Global columns of a model when only some of its rotors stay. Returns (k,) int, ascending."""
     dropped = [_column(structure, j) for j, terms in enumerate(structure.terms) if terms.rotor and j not in rotors]
     return np.setdiff1d(np.arange(structure.size), np.array(dropped, dtype=int))
 

@@ -36,17 +36,8 @@ def columns_with_shapes(
 ) -> tuple[Array, NDArray[np.intp]]:
     """A joint's columns followed by those of its estimated shape constants.
 
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    parameters : (p,) float64
-        the coefficients, for the amplitudes c
-
-    Returns
-    -------
-    tuple of (k, M) float64 and (k,) int
-        columns in the common band, and their global places
+    `parameters`: (p,), the coefficients, for the amplitudes c.
+    Returns tuple of (k, M) and (k,) int, columns in the common band, and their global places.
     """
     columns = prepared.joint_columns(structure, joint)
     index = structure.joint_columns(joint)
@@ -75,14 +66,9 @@ def refined_structure(
 ) -> ModelStructure:
     """The structure with its estimated shape constants moved to the joint optimum, by Gauss–Newton steps.
 
-    Parameters
-    ----------
-    parameters : (p,) float64
-        its coefficients
-    weight : (n,) float64
-        1/σ_j of every joint
-    speed : (n,) float64
-        rms velocity of every joint [rad/s or m/s]
+    `parameters`: (p,), its coefficients.
+    `weight`: (n,), 1/σ_j of every joint.
+    `speed`: (n,), rms velocity of every joint [rad/s or m/s].
     """
     start = structure
     for _ in range(STEPS):
@@ -105,10 +91,7 @@ def refined_structure(
 def pseudo_inverse(matrix: Array) -> Array:
     """Inverse (p, p) of a normal matrix in scaled columns; directions without information are left out.
 
-    Parameters
-    ----------
-    matrix : (p, p) float64
-        symmetric, positive semidefinite
+    `matrix`: (p, p), symmetric, positive semidefinite.
     """
     scale = np.sqrt(np.diag(matrix))
     scale[scale == 0.0] = 1.0

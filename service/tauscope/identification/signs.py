@@ -38,10 +38,7 @@ def reversed_joints(
 ) -> tuple[int, ...]:
     """Indices of the joints whose torque explains itself much better with the other sign.
 
-    Parameters
-    ----------
-    ratios : (n,) float64
-        ρ_j, long-run over white variance of each joint's residual
+    `ratios`: (n,), ρ_j, long-run over white variance of each joint's residual.
     """
     unexplained = (posterior.noise_std > UNEXPLAINED * torque_rms(factors)) & (ratios > COLOURED)
     if not (is_rejected(consistent) or unexplained.any()):

@@ -54,13 +54,7 @@ def robot_warnings(robot: Robot) -> list[ResultWarning]:
 
 
 def weak_points(result: Identification, joint: int) -> list[str]:
-    """What the recordings do not tell of a joint and of its link, each with the motion that would.
-
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    """
+    """What the recordings do not tell of a joint and of its link, each with the motion that would."""
     if result.excitation.speed[joint] == 0.0:
         return ["motion: it stands still; move it through its range"]
     known = result.identifiable[joint]

@@ -17,13 +17,7 @@ LEAST_COULOMB = 1 / 3
 
 @dataclass(frozen=True, eq=False)
 class LinearInequalities:
-    """Rows of G x ≤ h.
-
-    matrix : (k, p) float64
-        G
-    bound : (k,) float64
-        h
-    """
+    """Rows of G x ≤ h. `matrix`: (k, p), G; `bound`: (k,), h."""
 
     matrix: Array
     bound: Array
@@ -79,13 +73,7 @@ def friction_inequalities(columns: FrictionColumns, size: int, joints: Sequence[
 
 
 def mass_inequalities(least: Array, size: int) -> LinearInequalities:
-    """No link weighs less than this.
-
-    Parameters
-    ----------
-    least : (n,) float64
-        smallest mass of every link [kg]
-    """
+    """No link weighs less than this. `least`: (n,), smallest mass of every link [kg]."""
     matrix = np.zeros((len(least), size))
     matrix[np.arange(len(least)), 10 * np.arange(len(least)) + STANDARD_PARAMETERS.index("m")] = -1.0
     names = tuple(f"mass of link {link + 1} ≥ {mass:.3g} kg" for link, mass in enumerate(least))

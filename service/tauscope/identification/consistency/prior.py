@@ -31,14 +31,10 @@ _SMALLEST_LENGTH = 0.05
 class Prior:
     """A normal distribution of all parameters: ‖W (x - μ)‖² is χ² of as many degrees of freedom.
 
-    mean : (p,) float64
-        μ: standard parameters of all links, then friction coefficients
-    root : (p, p) float64
-        W
-    scale : (p,) float64
-        expected magnitudes, positive; the conic program is scaled by them
-    masses : (n,) float64
-        mass that each link may be expected to have [kg]
+    `mean`: (p,), μ: standard parameters of all links, then friction coefficients.
+    `root`: (p, p), W.
+    `scale`: (p,), expected magnitudes, positive; the conic program is scaled by them.
+    `masses`: (n,), mass that each link may be expected to have [kg].
     """
 
     mean: Array
@@ -52,24 +48,12 @@ class Prior:
         return len(self.masses)
 
     def widen(self, width: float) -> "Prior":
-        """The same bodies, believed so many times less.
-
-        Parameters
-        ----------
-        width : float
-            factor of the links' standard deviations
-        """
+        """The same bodies, believed so many times less. `width`: factor of the links' standard deviations."""
         links = np.arange(len(self.mean)) < 10 * self.link_count
         return replace(self, root=np.where(links[:, None], self.root / width, self.root))
 
     def squared_distance(self, parameters: Array) -> float:
-        """‖W (x - μ)‖².
-
-        Parameters
-        ----------
-        parameters : (p,) float64
-            x
-        """
+        """‖W (x - μ)‖². `parameters`: (p,), x."""
         return float(np.sum((self.root @ (parameters - self.mean)) ** 2))
 
 
@@ -87,12 +71,7 @@ def plausible_prior(robot: Robot, factor: Array, target: Array, friction: Fricti
     that a motion that cannot tell τ_sc from τ_s (never slow enough) credits τ_s, and what cannot be told from the
     link's own inertia is credited to the link.
 
-    Parameters
-    ----------
-    factor : (r, p) float64
-        R of the whitened least-squares problem ‖R x - z‖²
-    target : (r,) float64
-        z
+    `factor`: (r, p), R of the whitened least-squares problem ‖R x - z‖²; `target`: (r,), z.
     """
     count = robot.link_count
     lengths = link_lengths(robot)
@@ -152,12 +131,7 @@ def _measure_repair(robot: Robot, index: int) -> Array:
 def _deviation(link: LinkInertia, mass: float, length: float) -> Array:
     """W of one link: svec(A⁻¹ J A⁻ᵀ) as a linear map of its parameters, (10, 10).
 
-    Parameters
-    ----------
-    mass : float
-        mass of the body that measures it, at least the link's own [kg]
-    length : float
-        size of the link [m]
+    `mass`: mass of the body that measures it, at least the link's own [kg]; `length`: size of the link [m].
     """
     centre = link.first_moment / link.mass if link.mass > 0.0 else np.zeros(3)
     second_moment = np.zeros((3, 3))
@@ -176,10 +150,7 @@ def link_lengths(robot: Robot) -> Array:
 
     Housings are as large where axes meet.
 
-    Returns
-    -------
-    (n,) float64
-        lengths [m], positive
+    Returns (n,), lengths [m], positive.
     """
     spans = np.array([np.linalg.norm(np.subtract(*_joint_positions(robot, j))) for j in range(robot.link_count)])
     apart = spans[spans > 0.0]
