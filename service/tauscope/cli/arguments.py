@@ -121,7 +121,7 @@ class LayoutArguments:
         """
         from tauscope.errors import RobotFileError
         from tauscope.robot.recording_layout import RecordingLayout
-        from tauscope.robot.recording_layout_file import read_layout
+        from tauscope.robot.robot_file import read_layout
 
         unit_of = _parse_units(self.units)
         try:

@@ -9,7 +9,7 @@ from tauscope.cli.terminal import output, plain, shown_progress, table
 from tauscope.number_text import ABSENT, counted, given, significant
 from tauscope.recording import EffortKind, Reading, RecordingReport, check_recording, convert_recording
 from tauscope.recording.convert import FORMATS
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 from tauscope.robot import JointSummary, RobotReport, check_robot, read_robot
 
 

@@ -8,8 +8,7 @@ from tauscope.closed_loop.tables import recording_table, refinement_table, rollo
 from tauscope.excitation import ExcitationDesign
 from tauscope.identification import IdentificationDocument
 from tauscope.number_text import ABSENT, counted, percent, significant
-from tauscope.report.table import Table
-from tauscope.report.tables import base_parameter_table, fit_table, friction_table, rotor_table
+from tauscope.report.tables import Table, base_parameter_table, fit_table, friction_table, rotor_table
 from tauscope.report.words import band_words, cautions, fit_sentences, masked_samples, noise_words
 from tauscope.robot import Robot
 

@@ -13,7 +13,7 @@ from tauscope.cli.output_files import keep_file, require_new
 from tauscope.cli.terminal import output, plain, shown_progress, table
 from tauscope.errors import AcquisitionError
 from tauscope.number_text import ABSENT, counted, significant
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 from tauscope.robot import JointType, Robot
 from tauscope.robot.messages import one_line
 from tauscope.runtime.drivers import find_driver

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tauscope.closed_loop.load_friction import RELAXED, LoadFriction
+from tauscope.closed_loop.laws import RELAXED, LoadFriction
 from tauscope.closed_loop.segments import STEP_S, Segments
 from tauscope.dynamics import torque_regressor
 from tauscope.recording.recording import Array

@@ -5,8 +5,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from tauscope.closed_loop.laws import JointLaws
-from tauscope.closed_loop.load_friction import LoadFriction
+from tauscope.closed_loop.laws import JointLaws, LoadFriction
 from tauscope.export.compensation import JointFriction
 from tauscope.export.mjcf import to_mjcf
 from tauscope.export.mjcf_findings import IN_THE_MODEL, add_findings

@@ -20,8 +20,7 @@ from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Sectio
 from tauscope.report.provenance import Provenance
 from tauscope.report.series import envelope_indices
 from tauscope.report.svg import HELD_OUT, INK, MEASURED, PREDICTED, RESIDUAL, draw_svg
-from tauscope.report.table import csv_text
-from tauscope.report.tables import input_table
+from tauscope.report.tables import csv_text, input_table
 
 HEIGHT_INCHES = 3.4
 

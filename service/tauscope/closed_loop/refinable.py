@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauscope.closed_loop.batch import Variants, simulate_segments
-from tauscope.closed_loop.load_friction import LoadFriction
+from tauscope.closed_loop.drive import LOST
+from tauscope.closed_loop.laws import LoadFriction
 from tauscope.closed_loop.segments import Segments
-from tauscope.closed_loop.simulate import LOST
 from tauscope.dynamics import mass_matrix
 from tauscope.export.model import ExportModel
 from tauscope.recording.recording import Array

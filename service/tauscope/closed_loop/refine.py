@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from tauscope.closed_loop.load_friction import LoadFriction
+from tauscope.closed_loop.laws import LoadFriction
 from tauscope.closed_loop.refinable import RefinableModel, Term
 from tauscope.closed_loop.segments import STEP_S, Segments
 from tauscope.export.model import ExportModel

@@ -6,7 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauscope.actuation import estimate_delays, is_open, require_loops
-from tauscope.closed_loop.drive import Drive, LoopDrive, RecordedMotion, TorqueDrive, loop_damping, record_motion
+from tauscope.closed_loop.drive import (
+    Drive,
+    LoopDrive,
+    RecordedMotion,
+    TorqueDrive,
+    loop_damping,
+    record_motion,
+    simulate_motion,
+)
 from tauscope.closed_loop.measure import lag, reversal_error, rms_error, worst_error
 from tauscope.closed_loop.model import RolloutModel, rollout_model, stated_model
 from tauscope.closed_loop.plant import STEP_S, make_plant
@@ -20,7 +28,6 @@ from tauscope.closed_loop.result import (
     RolloutDocument,
     SummaryEntry,
 )
-from tauscope.closed_loop.simulate import simulate_motion
 from tauscope.errors import RecordingMismatchError
 from tauscope.export.model import ExportModel
 from tauscope.recording import EffortKind, Recording

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from tauscope.closed_loop.result import RefinementEntry, RolloutDocument
 from tauscope.number_text import ABSENT, significant
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 
 # Models in words: the identified one is without findings of a diagnosis.
 MODEL_WORDS = {"stated": "robot file", "identified": "identified", "findings": "with findings", "refined": "refined"}

@@ -1,17 +1,19 @@
-"""Designing an excitation: from a robot and a few wishes to a trajectory that a run can play."""
+"""Designing an excitation: from a robot and a few wishes to a trajectory that a run can play, and its document."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tauscope.excitation.criteria import Criterion, reported_value
+from tauscope.excitation.information import Criterion, reported_value
 from tauscope.excitation.margins import Margins, trajectory_margins
 from tauscope.excitation.optimiser import OptimiserProgress, optimise
 from tauscope.excitation.options import ExcitationOptions
 from tauscope.excitation.setting import Setting
 from tauscope.excitation.slow_reversals import SlowPart, slow_part
 from tauscope.robot import Robot
+from tauscope.trajectory.document import trajectory_document
+from tauscope.trajectory.excitation_document import ExcitationDocument, HistoryPart
 from tauscope.trajectory.fourier_series import FourierSeries
 from tauscope.trajectory.segments import FourierSegment, Segment
 from tauscope.trajectory.trajectory import DesignRecord, Trajectory
@@ -126,3 +128,32 @@ def _notes(robot: Robot, setting: Setting, slow: SlowPart) -> tuple[str, ...]:
     if slow.postures < wanted:
         notes.append(f"slow reversals at {slow.postures} of {wanted} postures: no more have room within the limits")
     return tuple(notes)
+
+
+def excitation_document(design: ExcitationDesign) -> ExcitationDocument:
+    """The document of a designed excitation."""
+    trajectory = trajectory_document(design.trajectory)
+    return ExcitationDocument(
+        robot=trajectory.robot,
+        joints=trajectory.joints,
+        criterion=design.criterion.value,
+        value=design.value,
+        condition_number=design.condition_number,
+        random_value=design.random_value,
+        period_s=design.series.period_s,
+        harmonics=design.series.harmonics,
+        periods=design.periods,
+        duration_s=design.trajectory.duration_s,
+        margins={kind: list(values) for kind, values in design.margins.as_table().items()},
+        clearance_m=design.margins.workspace_m,
+        active=list(design.active),
+        notes=list(design.notes),
+        evaluations=design.evaluations,
+        seconds=design.seconds,
+        history=[
+            HistoryPart(start=start, iteration=iteration, value=value, violation=violation)
+            for start, iteration, value, violation in design.history
+            if np.isfinite(value)
+        ],
+        trajectory=trajectory,
+    )

@@ -10,8 +10,8 @@ from scipy.optimize import minimize
 from threadpoolctl import threadpool_limits
 
 from tauscope.errors import ExcitationError
-from tauscope.excitation.criteria import CriterionValue, reported_value
 from tauscope.excitation.feasibility import Feasibility
+from tauscope.excitation.information import CriterionValue, reported_value
 from tauscope.excitation.problem import ExcitationProblem
 
 Array = NDArray[np.float64]

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.errors import ExcitationError
-from tauscope.excitation.criteria import Criterion
-from tauscope.excitation.information import ColumnScaling
+from tauscope.excitation.information import ColumnScaling, Criterion
 from tauscope.excitation.optimiser import STARTS
 from tauscope.excitation.workspace import Workspace
 

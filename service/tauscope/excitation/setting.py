@@ -8,9 +8,15 @@ from numpy.typing import NDArray
 from tauscope.dynamics import BaseParameters, base_parameters
 from tauscope.errors import ExcitationError
 from tauscope.excitation.constraints import KinematicUsage, StateUsage
-from tauscope.excitation.criteria import Criterion, CriterionValue, criterion_value, reported_value
 from tauscope.excitation.feasibility import Feasibility, require_room
-from tauscope.excitation.information import ColumnScaling, ExcitationRegressor
+from tauscope.excitation.information import (
+    ColumnScaling,
+    Criterion,
+    CriterionValue,
+    ExcitationRegressor,
+    criterion_value,
+    reported_value,
+)
 from tauscope.excitation.optimiser import Stages
 from tauscope.excitation.options import ExcitationOptions
 from tauscope.excitation.problem import ExcitationProblem, Objective

@@ -12,26 +12,35 @@ from tauscope.dynamics.base_parameters import base_parameters
 from tauscope.errors import IdentificationError, RecordingMismatchError
 from tauscope.identification.band import choose_cutoff
 from tauscope.identification.consistency import ConsistentParameters
-from tauscope.identification.covariance import parameter_covariance
+from tauscope.identification.covariance import parameter_covariance, uncertain_torque
 from tauscope.identification.dataset import Dataset
-from tauscope.identification.estimate import Estimator, estimate
 from tauscope.identification.excitation import Excitation, measure_excitation
 from tauscope.identification.friction_shape import EstimatedShape, shape_parameters
 from tauscope.identification.full_parameters import FullParameters
-from tauscope.identification.gravity_scale import gravity_scale
-from tauscope.identification.least_squares import JointFactor, Solution, condition_number
+from tauscope.identification.least_squares import Estimator, JointFactor, Solution, condition_number, estimate
 from tauscope.identification.model_terms import choose_model
 from tauscope.identification.physical_estimate import consistent_estimate, is_rejected
 from tauscope.identification.posterior import Posterior, infer
-from tauscope.identification.preconditions import require_motion
-from tauscope.identification.prediction import uncertain_torque
 from tauscope.identification.residuals import Fit, ResidualStatistics, evaluate
-from tauscope.identification.signs import reversed_joints
+from tauscope.identification.signs import gravity_scale, reversed_joints
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.conditioning import Conditioner, ConditioningSummary
 from tauscope.recording.recording import Array, Recording
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import Robot
+
+
+def require_motion(conditioners: Sequence[Conditioner]) -> None:
+    """Refuse recordings in which no joint leaves the noise of its own encoder.
+
+    Raises IdentificationError, which names the recordings.
+    """
+    if not any(conditioner.moving.any() for conditioner in conditioners):
+        names = ", ".join(conditioner.recording.name for conditioner in conditioners)
+        raise IdentificationError(
+            f"{names}: no joint moves by more than the noise of its position: record a motion that excites every joint"
+        )
+
 
 # A coefficient whose standard error moves the joint's torque by more than this share of its rms is not identifiable.
 KNOWN_SHARE = 0.1

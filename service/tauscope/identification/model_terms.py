@@ -11,9 +11,8 @@ from tauscope.identification.band import preliminary_terms
 from tauscope.identification.consistency import LEAST_COULOMB
 from tauscope.identification.covariance import parameter_covariance
 from tauscope.identification.dataset import Dataset, rms_speed
-from tauscope.identification.estimate import FINEST_TORQUE, single_joint_std
 from tauscope.identification.friction_shape import EstimatedShape, estimate_shapes, shape_parameters
-from tauscope.identification.least_squares import JointFactor, factorise, restricted
+from tauscope.identification.least_squares import FINEST_TORQUE, JointFactor, factorise, restricted, single_joint_std
 from tauscope.identification.posterior import infer
 from tauscope.identification.residuals import evaluate
 from tauscope.identification.rotor import kept_columns, needed_rotors, separable_rotors

@@ -16,9 +16,8 @@ from scipy.linalg import qr, solve_triangular, svd
 
 from tauscope.dynamics.friction import FRICTION_COLUMNS
 from tauscope.identification.consistency import Prior, plausible_prior
-from tauscope.identification.estimate import FINEST_TORQUE, Estimator, torque_rms
 from tauscope.identification.full_parameters import FullParameters
-from tauscope.identification.least_squares import JointFactor, stacked_factor
+from tauscope.identification.least_squares import FINEST_TORQUE, Estimator, JointFactor, stacked_factor, torque_rms
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 

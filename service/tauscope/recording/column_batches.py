@@ -4,9 +4,8 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from tauscope.recording.clocks import EpisodeClock, SplitClock
 from tauscope.recording.columns import ColumnLayout, find_layout, require_joint_count
-from tauscope.recording.intake import RowIntake
+from tauscope.recording.intake import EpisodeClock, RowIntake, SplitClock
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
 from tauscope.recording.units import SECONDS, SI, Reading

@@ -5,11 +5,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from tauscope.errors import RecordingError, RecordingMismatchError
-from tauscope.recording.layout.families import BY_NAME, words_of
+from tauscope.recording.layout.families import BY_NAME, role_of, words_of
 from tauscope.recording.layout.guess import guess_layout, is_numbered, layout_text
 from tauscope.recording.layout.presets import PRESET_OF
 from tauscope.recording.layout.rename import NANOSECONDS, rename_columns
-from tauscope.recording.layout.roles import role_of
 from tauscope.recording.samples import EffortKind
 from tauscope.recording.units import Reading
 from tauscope.result_warning import ResultWarning

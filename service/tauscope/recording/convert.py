@@ -12,8 +12,8 @@ from mcap_ros2.writer import Writer
 
 from tauscope.errors import RecordingError
 from tauscope.recording.csv_format import write_csv
+from tauscope.recording.joint_state import JOINT_STATE_DEFINITION
 from tauscope.recording.joint_state_decoders import JOINT_STATE_TYPES
-from tauscope.recording.joint_state_encoding import JOINT_STATE_DEFINITION
 from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.mcap_format import MCAP_MAGIC, recover_mcap
 from tauscope.recording.parquet_format import write_parquet

@@ -9,11 +9,10 @@ from typing import BinaryIO
 import numpy as np
 
 from tauscope.errors import RecordingError
-from tauscope.recording.clocks import SplitClock
 from tauscope.recording.columns import ColumnLayout, find_layout, require_joint_count
 from tauscope.recording.csv_dialect import BLANK, Dialect, find_delimiter, find_first_row, read_units_row
 from tauscope.recording.csv_numbers import Clock, is_number, parse_number, parse_quickly, shown
-from tauscope.recording.intake import RowIntake
+from tauscope.recording.intake import RowIntake, SplitClock
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
 from tauscope.recording.units import SI, Reading

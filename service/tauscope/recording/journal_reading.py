@@ -10,7 +10,7 @@ from pydantic_core import from_json
 
 from tauscope.errors import RecordingError
 from tauscope.recording.joint_state import JointStateLayout, JointStates
-from tauscope.recording.joint_state_log import MessageHandler
+from tauscope.recording.joint_state_topic import MessageHandler
 from tauscope.recording.journal import CYCLE_TOPIC, EVENT_TOPIC, JOINT_STATE_TOPIC, REFERENCE_TOPIC
 from tauscope.recording.journal_rows import JournalHeader, Phase, journal_row_type
 from tauscope.recording.mcap_format import scan_mcap

@@ -7,8 +7,7 @@ import numpy as np
 
 from tauscope.errors import RecordingError, RecordingMismatchError
 from tauscope.recording.columns import OPTIONAL_GROUPS, table_columns
-from tauscope.recording.row_check import RowCheck, require_rising, require_rows
-from tauscope.recording.samples import Array, EffortKind, Samples, Table
+from tauscope.recording.samples import Array, EffortKind, RowCheck, Samples, Table, require_rising, require_rows
 from tauscope.recording.table import MemoryTable
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.robot import Robot

@@ -10,23 +10,11 @@ from tauscope.diagnosis.documents.plots import DiagnosisPlots, diagnosis_plots
 from tauscope.diagnosis.documents.result import FindingEntry
 from tauscope.diagnosis.next_experiment import PlannedExperiment
 from tauscope.number_text import chance, counted, significant
-from tauscope.report.diagnosis_words import (
-    MOST_FINDINGS,
-    cautions,
-    constancy_sentence,
-    effect_title,
-    file_title,
-    finding_facts,
-    location_sentence,
-    noise_ratios,
-    place_title,
-    summary_sentences,
-)
 from tauscope.report.figures import difference_figure, heat_map, heat_table, motion_figure, shift_figure
 from tauscope.report.page import Card, Drawing, Fold, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.provenance import Provenance
-from tauscope.report.table import csv_text
 from tauscope.report.tables import (
+    csv_text,
     detectable_table,
     difference_table,
     headroom_table,
@@ -36,7 +24,20 @@ from tauscope.report.tables import (
     shift_table,
 )
 from tauscope.report.torque_figure import proof_figure
-from tauscope.report.words import noise_words, torque_unit
+from tauscope.report.words import (
+    MOST_FINDINGS,
+    cautions,
+    constancy_sentence,
+    effect_title,
+    file_title,
+    finding_facts,
+    location_sentence,
+    noise_ratios,
+    noise_words,
+    place_title,
+    summary_sentences,
+    torque_unit,
+)
 from tauscope.robot import JointType
 
 

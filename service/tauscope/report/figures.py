@@ -17,7 +17,7 @@ from tauscope.identification.result import BaseParameterEntry
 from tauscope.number_text import power_of_ten, significant
 from tauscope.report.friction_curve import FrictionCurve
 from tauscope.report.svg import BAND, HELD_OUT, MEASURED, MUTED, PREDICTED, draw_svg
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 from tauscope.report.words import base_parameter_unit, noise_ratio
 from tauscope.trajectory import Trajectory
 

@@ -13,10 +13,10 @@ from tauscope.report.friction_curve import friction_curve
 from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.provenance import Provenance
 from tauscope.report.series import TorqueSeries, torque_series
-from tauscope.report.table import csv_text
 from tauscope.report.tables import (
     base_parameter_table,
     conditioning_table,
+    csv_text,
     fit_table,
     friction_table,
     input_table,

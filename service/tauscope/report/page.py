@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from tauscope.robot.actuator import Actuator
 from tauscope.robot.chain import Chain
 from tauscope.robot.document import (
     ActuatorDocument,
+    DocumentOrigin,
     JointDocument,
     LinkDocument,
     ModelDocument,
@@ -23,10 +24,9 @@ from tauscope.robot.document import (
     Rows,
     SegmentDocument,
 )
-from tauscope.robot.document_origin import DocumentOrigin
+from tauscope.robot.kinematics import DenavitHartenbergRow, modified_segments, standard_segments
 from tauscope.robot.messages import Finding, Severity, shown
 from tauscope.robot.physical import nearest_body, repair_text
-from tauscope.robot.placement import DenavitHartenbergRow, modified_segments, standard_segments
 from tauscope.robot.recording_layout import RecordingLayout
 from tauscope.robot.robot import (
     Coupling,

@@ -7,8 +7,7 @@ from typing import Any
 
 from tauscope.errors import RobotFileError
 from tauscope.robot.actuator import Actuator
-from tauscope.robot.document import PlainRobotDocument
-from tauscope.robot.document_origin import DocumentOrigin
+from tauscope.robot.document import DocumentOrigin, PlainRobotDocument
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot import Joint, LinkInertia, Model, Placement, Robot, Segment
 from tauscope.robot.robot_building import FileSource, SourceFile, build_robot

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from tauscope.errors import RobotFileError
 from tauscope.robot.document_fields import LARGEST_NUMBER
+from tauscope.robot.kinematics import rotation_of_roll_pitch_yaw
 from tauscope.robot.messages import Finding, Severity, one_line, shown
-from tauscope.robot.placement import rotation_of_roll_pitch_yaw
 from tauscope.robot.robot import Placement
 
 NUMBER = re.compile(r"[-+]?([0-9]+(?:\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")

@@ -4,9 +4,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from tauscope.robot.kinematics import compose
 from tauscope.robot.messages import Finding, Severity, one_line, shown
 from tauscope.robot.physical import nearest_body, repair_text
-from tauscope.robot.placement import compose
 from tauscope.robot.robot import LinkInertia, Placement, Repair
 from tauscope.robot.urdf_element import Element, bounded_number, number, only_child, origin, where
 from tauscope.robot.urdf_xml import UrdfTree

@@ -10,7 +10,6 @@ import numpy as np
 from tauscope.errors import RecordingError
 from tauscope.recording.conditioning.motion import Motion, Trim, average_motion, transient_motion
 from tauscope.recording.conditioning.motion_source import MotionSource, choose_sources
-from tauscope.recording.conditioning.period_runs import PeriodRun
 from tauscope.recording.conditioning.periods import Periods, repeats, split_periods, with_turns_removed
 from tauscope.recording.conditioning.position_noise import (
     STANDING_STILL,
@@ -19,7 +18,7 @@ from tauscope.recording.conditioning.position_noise import (
     lowest_limit,
     position_noise,
 )
-from tauscope.recording.conditioning.timing import Timing, find_stretches, row_at
+from tauscope.recording.conditioning.timing import PeriodRun, Timing, find_stretches, row_at
 from tauscope.recording.conditioning.uniform import Mask, Stretch, read_stretch, uniform_grid
 from tauscope.recording.recording import Array, Recording, Samples
 from tauscope.robot.robot import Robot

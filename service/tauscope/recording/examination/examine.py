@@ -11,8 +11,8 @@ from tauscope.errors import RecordingError
 from tauscope.recording.columns import table_columns
 from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, EditedTable, Numbers
 from tauscope.recording.examination.plausibility import find_implausible
+from tauscope.recording.examination.scales import BLOCK_ROWS, joint_types
 from tauscope.recording.examination.scan import Defects, JointDefects, find_defects
-from tauscope.recording.examination.sketch import BLOCK_ROWS, joint_types
 from tauscope.recording.link_encoders import link_warnings
 from tauscope.recording.reading import read_recording
 from tauscope.recording.recording import EffortKind, Recording

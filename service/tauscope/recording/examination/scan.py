@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.recording.examination.dropouts import ZeroRuns
 from tauscope.recording.examination.edits import (
     NO_NUMBERS,
     ColumnEdit,
@@ -15,10 +14,17 @@ from tauscope.recording.examination.edits import (
     join_ranges,
     row_numbers,
 )
-from tauscope.recording.examination.effort_defects import find_all_stuck, find_spikes, find_stuck
+from tauscope.recording.examination.effort_defects import ZeroRuns, find_all_stuck, find_spikes, find_stuck
 from tauscope.recording.examination.position_defects import scan_position
-from tauscope.recording.examination.scales import EffortScale, PositionScale, is_new, measure_efforts, measure_positions
-from tauscope.recording.examination.sketch import BLOCK_ROWS, Sketch
+from tauscope.recording.examination.scales import (
+    BLOCK_ROWS,
+    EffortScale,
+    PositionScale,
+    Sketch,
+    is_new,
+    measure_efforts,
+    measure_positions,
+)
 from tauscope.recording.recording import Recording, Samples
 from tauscope.recording.samples import Array
 from tauscope.robot.robot import JointType

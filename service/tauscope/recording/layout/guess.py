@@ -4,9 +4,8 @@ import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 
-from tauscope.recording.layout.families import Family, find_families, words_of
+from tauscope.recording.layout.families import Family, find_families, role_of, time_rank, time_unit, unit_of, words_of
 from tauscope.recording.layout.presets import PRESET_OF, Preset
-from tauscope.recording.layout.roles import role_of, time_rank, time_unit, unit_of
 from tauscope.robot.recording_layout import RecordingLayout, Source
 
 _COMMON_JOINT_COUNTS = (6, 7)
