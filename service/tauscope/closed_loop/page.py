@@ -66,7 +66,6 @@ def rollout_page(rollout: Rollout, provenance: Provenance) -> str:
 
 
 def _key_figures(document: RolloutDocument) -> list[KeyFigure]:
-    """Error of each model at its worst joint."""
     figures = []
     for entry in document.summary:
         place = max(range(len(entry.rms)), key=entry.rms.__getitem__)
@@ -76,7 +75,6 @@ def _key_figures(document: RolloutDocument) -> list[KeyFigure]:
 
 
 def _motion(trace: Trace, joint: int, name: str) -> Part:
-    """Real and simulated position of one joint, and their difference."""
     time, real = trace.motion.rows, trace.motion.measured[:, joint]
     curves = {model: positions[:, joint] for model, positions in trace.simulated.items()}
 

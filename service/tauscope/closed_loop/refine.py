@@ -100,7 +100,6 @@ def refine_model(
 
 
 def _rms(errors: Array) -> float:
-    """Root mean square of all errors."""
     return float(np.sqrt(np.mean(errors**2)))
 
 

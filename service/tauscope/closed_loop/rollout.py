@@ -103,7 +103,6 @@ class Rollout:
         )
 
     def _summary(self, place: int) -> SummaryEntry:
-        """One model over all recordings."""
         entries = [trace.entry.models[place] for trace in self.traces]
         rms, worst = np.array([entry.rms for entry in entries]), np.array([entry.worst for entry in entries])
         return SummaryEntry(model=entries[0].model, rms=rms.mean(axis=0).tolist(), worst=worst.max(axis=0).tolist())
@@ -244,7 +243,6 @@ def _drive(
 
 
 def _plain_model(robot: Robot, exports: Sequence[ExportModel]) -> ExportModel | None:
-    """The model without findings."""
     if not exports:
         return stated_model(robot)
     return exports[0] if len(exports) > 1 else replace(exports[-1], effects=())
@@ -267,7 +265,6 @@ def _refine(
 def _entry(
     name: str, motion: RecordedMotion, runs: dict[float | None, Array], stabiliser: list[float] | None
 ) -> ModelEntry:
-    """Errors of one model on one recording."""
     real, free = motion.measured, runs[None]
     turned = reversal_error(motion.rows, real, free, motion.time, motion.velocity)
     return ModelEntry(
@@ -282,7 +279,6 @@ def _entry(
 
 
 def _warn_drive(*, is_closed: bool) -> tuple[ResultWarning, ...]:
-    """That a stabiliser holds the arm."""
     if is_closed:
         return ()
     text = "no loop is stated, or commands are missing: recorded torque drives the arm, and a stabiliser holds it"

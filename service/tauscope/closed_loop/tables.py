@@ -96,7 +96,6 @@ def rollout_sentences(document: RolloutDocument) -> Iterator[str]:
 
 
 def _refinement_sentences(entry: RefinementEntry) -> Iterator[str]:
-    """How the refinement went, and whether to use it."""
     before, after = (significant(MILLI * value, 3) for value in (entry.rms_before, entry.rms_after))
     yield f"The refinement lowers the error of {entry.segments} segments of 0.3 s from {before} to {after} mrad."
     if entry.left_out:

@@ -172,7 +172,6 @@ def _run(search: _Search, rng: np.random.Generator, starts: int) -> tuple[Array,
 
 
 def _candidates(search: _Search, rng: np.random.Generator) -> list[Array]:
-    """Random feasible series, the best first."""
     search.tell("random motions", 0.0)
     postures = search.feasibility.standing_postures(rng)
     found: list[tuple[float, int, Array]] = []

@@ -156,6 +156,5 @@ def _available_torque(robot: Robot, stated: MotionLimits, options: ExcitationOpt
 
 
 def _require_noise(noise_std: Array, robot: Robot) -> None:
-    """Refuse noise that weights cannot be made of."""
     if noise_std.shape != (robot.joint_count,) or not (np.isfinite(noise_std) & (noise_std > 0.0)).all():
         raise ExcitationError(f"noise_std needs {robot.joint_count} positive numbers, one a joint")

@@ -88,7 +88,6 @@ def _swing(robot: Robot, posture: Array, limits: MotionLimits, level: float) -> 
 
 
 def _size(swing: FourierSegment) -> Array:
-    """Peak speed of every joint."""
     return np.abs(swing.series.cosine).max(axis=1)
 
 
@@ -134,7 +133,6 @@ def _transfer(
 
 
 def _is_free(segment: FourierSegment | MoveSegment | PathSegment, limits: MotionLimits, states: StateUsage) -> bool:
-    """Whether a segment keeps all limits."""
     count = max(int(np.ceil(segment.duration_s / STEP_S)), 2)
     motion = segment.evaluate(np.linspace(0.0, segment.duration_s, count + 1))
     return _kinematic(motion, limits) <= 1.0 + 1e-9 and states.largest(motion) <= 1.0

@@ -76,7 +76,6 @@ class TorquePrediction:
         )
 
     def _rigid(self, base: Array) -> Array:
-        """Rigid-body torque, (N, n)."""
         first = self._regressor.first_columns
         return np.stack([self._base[at:] @ base[joint, at:] for joint, at in enumerate(first)], axis=1)
 

@@ -171,6 +171,5 @@ def to_isaac_lab(model: ExportModel, choice: ActuatorChoice) -> str:
 
 
 def _entry(field: str, values: Mapping[str, float]) -> str:
-    """A field with its values by joint."""
     rows = "".join(f"            {name!r}: {value!r},\n" for name, value in values.items())
     return f"        {field}={{\n{rows}        }},\n"

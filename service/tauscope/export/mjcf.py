@@ -122,7 +122,6 @@ def tendon_elements(added: Additions, names: list[str]) -> list[str]:
 def _body(
     robot: Robot, index: int, label: str, model: JointModel, extras: JointExtras, limits: JointLimits
 ) -> list[str]:
-    """Start tag, inertial and joint of one body."""
     from scipy.spatial.transform import Rotation
 
     if model.link is None:

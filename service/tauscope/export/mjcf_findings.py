@@ -137,14 +137,12 @@ def _bristles(added: Additions, found: FoundEffect) -> str | None:
 
 
 def _payload(added: Additions, found: FoundEffect) -> str | None:
-    """A point mass in the last link."""
     body = float(found.coefficients[0]) * unit_body(found.shape)
     added.links[-1] = LinkInertia.from_vector(added.links[-1].to_vector() + body)
     return None
 
 
 def _tilt(added: Additions, found: FoundEffect) -> str | None:
-    """Gravity in the direction that was found."""
     gravity = added.robot.gravity
     strength, across = float(np.linalg.norm(gravity)), tilt_directions(gravity)
     turned = gravity + strength * sum(float(a) * e for a, e in zip(found.coefficients, across, strict=True))
@@ -153,14 +151,12 @@ def _tilt(added: Additions, found: FoundEffect) -> str | None:
 
 
 def _displacement(added: Additions, found: FoundEffect) -> str | None:
-    """A link's frame where it was found."""
     link, axis = (int(each) - 1 for each in found.shape)
     added.robot = displaced(added.robot, link, float(found.coefficients[0]) * np.eye(3)[axis])
     return None
 
 
 def _coupling(added: Additions, found: FoundEffect) -> str | None:
-    """A fixed tendon over both joints."""
     effect = found.effect
     if not isinstance(effect, FrictionCoupling):
         return "its form is not known"

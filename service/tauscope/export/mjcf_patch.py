@@ -88,7 +88,6 @@ def _weighs(model: JointModel) -> bool:
 
 
 def _write_inertial(text: XmlText, body: Element, inertia: CentredInertia) -> None:
-    """Set a body's inertial."""
     full = [inertia.inertia[row, column] for row, column in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
     line = f'<inertial pos="{numbers(*inertia.centre)}" mass="{numbers(inertia.mass)}" fullinertia="{numbers(*full)}"/>'
     stated = next(body.named("inertial"), None)

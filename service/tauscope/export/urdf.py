@@ -108,7 +108,6 @@ class _Tree:
 
 
 def _read(source: bytes | Path) -> tuple[bytes, str]:
-    """The file's bytes and its name for messages."""
     if isinstance(source, bytes):
         return source, "URDF"
     try:
@@ -118,7 +117,6 @@ def _read(source: bytes | Path) -> tuple[bytes, str]:
 
 
 def _joint(element: Element) -> _Joint:
-    """Type and ends of a joint element."""
     ends = [next((e.attributes.get("link", "") for e in element.named(end)), "") for end in ("parent", "child")]
     return _Joint(element, element.attributes.get("type", ""), ends[0], ends[1])
 
@@ -198,7 +196,6 @@ def _write_dynamics(text: XmlText, element: Element, name: str, friction: JointF
 
 
 def _tag(name: str, attributes: Mapping[str, str]) -> str:
-    """An empty element."""
     return f"<{name} " + " ".join(f'{key}="{value}"' for key, value in attributes.items()) + "/>"
 
 

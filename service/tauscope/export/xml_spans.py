@@ -139,7 +139,6 @@ def _require_utf8(data: bytes, label: str) -> None:
 
 
 def _parse(data: bytes, label: str) -> Element:
-    """The root element with all spans."""
     _require_utf8(data, label)
     parser = expat.ParserCreate("utf-8")
     parser.buffer_text = True

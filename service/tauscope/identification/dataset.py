@@ -157,7 +157,6 @@ class Dataset:
         return prepared if self.rest_variance is None else replace(prepared, rest_variance=self.rest_variance)
 
     def _prepare(self) -> Iterator[PreparedMotion]:
-        """Condition, evaluate the regressor, and reduce."""
         for index, conditioner in enumerate(self.conditioners):
             for measured in conditioner.motions(self.cutoff_hz):
                 motion = _without_jitter(measured, conditioner.moving)

@@ -167,7 +167,6 @@ def _stribeck_gain(structure: ModelStructure, parameters: Array, covariance: Arr
 
 
 def _with_shapes(structure: ModelStructure, shapes: Sequence[EstimatedShape]) -> ModelStructure:
-    """The structure with these shape constants."""
     terms = zip(structure.terms, shapes, strict=True)
     return structure.with_terms(tuple(replace(joint, k_v=s.k_v, delta=s.delta) for joint, s in terms))
 
@@ -183,7 +182,6 @@ def _needed_rotors(motions: Dataset, complete: ModelStructure, factors: tuple[Jo
 
 
 def _with_rotors(structure: ModelStructure, rotors: Sequence[bool]) -> ModelStructure:
-    """The structure with rotor inertia at some joints."""
     terms = zip(structure.terms, rotors, strict=True)
     return structure.with_terms(tuple(replace(joint, rotor=rotor) for joint, rotor in terms))
 

@@ -122,13 +122,11 @@ def _normal_equations(
 
 
 def _constant(structure: ModelStructure, joint: int, name: str) -> float:
-    """Present value of a shape constant."""
     terms = structure.terms[joint]
     return terms.k_v if name == "k_v" else terms.delta or 0.0
 
 
 def _with_constant(structure: ModelStructure, joint: int, name: str, value: float) -> ModelStructure:
-    """The structure with one shape constant exchanged."""
     terms = list(structure.terms)
     terms[joint] = replace(terms[joint], k_v=value) if name == "k_v" else replace(terms[joint], delta=value)
     return structure.with_terms(tuple(terms))

@@ -76,7 +76,6 @@ def _own_bodies(result: Identification, joint: int) -> Iterator[tuple[str, float
 
 
 def _signs(result: Identification) -> Iterator[ResultWarning]:
-    """Torques with the wrong sign."""
     joints = result.robot.joints
     for joint in result.reversed_joints:
         sign = "-1" if joints[joint].sign > 0 else "1"
@@ -155,7 +154,6 @@ def undetermined(result: Identification) -> frozenset[int]:
 
 
 def _range(motion: Excitation, joint: int) -> str:
-    """Lowest and highest position of a joint in words."""
     return f"{motion.lowest[joint]:.2g} to {motion.highest[joint]:.2g}"
 
 
@@ -172,7 +170,6 @@ def extrapolation_warnings(result: Identification) -> Iterator[ResultWarning]:
 
 
 def _samples(summaries: tuple[ConditioningSummary, ...]) -> Iterator[ResultWarning]:
-    """Samples that were missing, and gaps of the clock."""
     for each in summaries:
         counts = {
             "without a position": each.missed_positions,

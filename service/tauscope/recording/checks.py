@@ -159,7 +159,6 @@ def _measure_ranges(running: _Running, block: Array) -> None:
 
 
 def _measure_steps(running: _Running, samples: Samples, stride: int) -> None:
-    """Steps of the clock, and steps of q by one turn."""
     steps = np.diff(samples.time)
     if not len(steps):
         return
@@ -341,7 +340,6 @@ def _locate(severity: Severity, text: str) -> Finding:
 
 
 def _about_columns(recording: Recording) -> Iterator[Finding]:
-    """Columns that are there for nothing."""
     currents = [f"i{joint}" for joint in range(1, recording.joint_count + 1)]
     passed_over = [name for name in recording.ignored_columns if name in currents]
     others = [name for name in recording.ignored_columns if name not in currents]
@@ -352,7 +350,6 @@ def _about_columns(recording: Recording) -> Iterator[Finding]:
 
 
 def _about_clock(gaps: Gaps) -> Iterator[Finding]:
-    """Samples that the logger lost."""
     if gaps.count:
         places = "1 gap" if gaps.count == 1 else f"{gaps.count} gaps"
         longest = f"the longest, {gaps.longest:.4g} s, begins at t = {gaps.longest_at:.6g} s"
@@ -360,7 +357,6 @@ def _about_clock(gaps: Gaps) -> Iterator[Finding]:
 
 
 def _about_missed(missed: dict[str, int]) -> Iterator[Finding]:
-    """Samples marked as missed."""
     for name, count in missed.items():
         if name != "period":
             yield Finding(

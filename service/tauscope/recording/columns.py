@@ -243,5 +243,4 @@ def _order_names(
 
 
 def _joints(count: int) -> str:
-    """A count of joints in words."""
     return f"{count} joint" if count == 1 else f"{count} joints"

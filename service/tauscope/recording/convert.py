@@ -146,7 +146,6 @@ def _read(
 
 
 def _require_other(source: Path, target: Path) -> None:
-    """Refuse to write to what is read."""
     if target.exists() and source.exists() and target.samefile(source):
         raise RecordingError(f"{target}: is the source itself; a recording given as input is never written to")
     if source.is_dir() and target.absolute().parent.resolve() == source.resolve():
@@ -154,7 +153,6 @@ def _require_other(source: Path, target: Path) -> None:
 
 
 def _require_writable(path: Path, *, overwrite: bool) -> None:
-    """Refuse unknown formats, and files that are there already."""
     if path.suffix.lower() not in FORMATS:
         raise RecordingError(f"{path}: the suffix names no format that can be written; use {', '.join(FORMATS)}")
     if path.is_dir() or (path.exists() and not overwrite):

@@ -98,7 +98,6 @@ class Dialect:
         return commas and not any(is_number(field) and b"." in field for field in fields)
 
     def _open_cells(self, line: bytes) -> bytes:
-        """A line of plain fields."""
         if line.lstrip().startswith(b"#"):
             return line
         fields = [field for cell in self._cells(line.rstrip(b"\r")) for field in _elements(cell)]

@@ -105,7 +105,6 @@ class _Chunk:
 
 
 def _read_header(file: BinaryIO, name: str, reading: Reading) -> _Header:
-    """Read the names of the columns and find those that are wanted."""
     found = _read_names(file, name, reading)
     reading, layout = find_layout(found.names, reading, name)
     at, number, line = file.tell(), found.line, b"\n"
@@ -194,7 +193,6 @@ def _name_numbers(comment: bytes, row: Sequence[bytes], dialect: Dialect) -> lis
 
 
 def _decode(field: bytes) -> str:
-    """A column's name, of a file in UTF-8 or in the code page of Windows."""
     try:
         return field.decode("utf-8")
     except UnicodeDecodeError:
@@ -261,7 +259,6 @@ def _join_time(block: Array, header: _Header) -> Array:
 
 
 def _split_line(line: bytes, number: int, header: _Header, name: str, *, is_truncated: bool) -> list[bytes]:
-    """The fields of a line, as many as the header has."""
     _require_text(line, number, name)
     fields = line.split(header.dialect.separator)
     width = header.layout.width
@@ -290,12 +287,10 @@ def _refuse_units(fields: Sequence[bytes], number: int, header: _Header, name: s
 
 
 def _require_text(line: bytes, number: int, name: str) -> None:
-    """Refuse bytes that no text file has."""
     if b"\0" in line:
         raise RecordingError(f"{name}: line {number} holds a NUL byte; the file is binary, damaged or not UTF-8 text")
 
 
 def _is_empty(line: bytes) -> bool:
-    """Whether a line is blank or a comment."""
     text = line.strip()
     return not text or text.startswith(b"#")

@@ -146,7 +146,6 @@ class RowIntake:
         return Recording(self._file, joint_count, kind, table, ignored, (*notes, *self._warnings()))
 
     def _convert(self, block: Array) -> Array:
-        """Rows in SI."""
         if not self._conversion.is_needed or not len(block):
             return block
         converted = block * self._conversion.factor
@@ -179,7 +178,6 @@ class RowIntake:
         return block[is_new], rows[order][is_new]
 
     def _warnings(self) -> Sequence[ResultWarning]:
-        """Warnings about stamps that were put in order."""
         found = []
         if self._late:
             rows = "1 row came" if self._late == 1 else f"{self._late} rows came"

@@ -57,7 +57,6 @@ def _field_numbers(schema: bytes) -> Mapping[str, Mapping[str, int]]:
 
 
 def _all(message: bytes, number: int) -> Sequence[bytes]:
-    """All values of a field."""
     return [_require_bytes(value) for found, value in _fields(message) if found == number]
 
 
@@ -103,7 +102,6 @@ def _double(value: Value | None) -> float:
 
 
 def _require_bytes(value: Value) -> bytes:
-    """A field of bytes."""
     if isinstance(value, int):
         raise ValueError("a field has another wire type")
     return value
@@ -191,7 +189,6 @@ def decode_foxglove_json(message: bytes) -> JointState:
 
 
 def _is_number(value: object) -> bool:
-    """Whether a field of JSON holds a number."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

@@ -204,7 +204,6 @@ class JointStateTopic:
         return batches
 
     def _decode_each(self, messages: Sequence[bytes], rows: Rows, first: int) -> list[Batch]:
-        """Batches of equal layout, decoded message by message."""
         groups: dict[object, list[tuple[int, JointState]]] = {}
         for row, message in zip(rows.tolist(), messages, strict=True):
             state = self._decode_one(self._decoder, message, first + row)
@@ -247,7 +246,6 @@ class JointStateTopic:
         return JointStates(states.stamp, self._wanted, states.position[:, order], velocity, states.effort[:, order])
 
     def _take(self, states: JointStates, log_time: NDArray[np.int64], number: Rows) -> None:
-        """Add messages to the rows."""
         if self._rows is None:
             count, has_velocity = states.position.shape[1], states.velocity.shape[1] > 0
             self._rows = _Rows(self._choice, self.topic, count, has_velocity=has_velocity)
@@ -316,7 +314,6 @@ def _layout_of(state: JointState) -> tuple[tuple[str, ...], int, int, int]:
 
 
 def _stack(states: Sequence[JointState]) -> JointStates:
-    """Messages of one layout as one batch."""
     stamp = np.array([state.stamp for state in states], dtype=np.int64)
     fields = ("position", "velocity", "effort")
     return JointStates(stamp, states[0].names, *(np.array([getattr(s, field) for s in states]) for field in fields))

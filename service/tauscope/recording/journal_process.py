@@ -119,7 +119,6 @@ def wait_for_writer(path: Path, patience_s: float) -> bool:
 
 
 def _say(line: dict[str, Any]) -> None:
-    """One JSON line to whoever started this process; nobody may be there any more."""
     try:
         os.write(sys.stdout.fileno(), json.dumps(line).encode() + b"\n")
     except OSError:

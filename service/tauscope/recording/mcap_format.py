@@ -184,12 +184,10 @@ def _read_summary(file: BinaryIO, size: int) -> _Summary | None:
 
 
 def _sort_chunks(chunks: Sequence[ChunkIndex]) -> Sequence[ChunkIndex]:
-    """Chunks in the order of the file."""
     return sorted(chunks, key=lambda chunk: chunk.chunk_start_offset)
 
 
 def _find_messages(file: BinaryIO, size: int, chunk: ChunkIndex, wanted: set[int]) -> _Part:
-    """Places of the wanted messages of a chunk."""
     offsets: list[int] = []
     if chunk.chunk_start_offset + chunk.chunk_length > size:
         raise ValueError("a chunk leaves the file")
@@ -210,7 +208,6 @@ def _find_messages(file: BinaryIO, size: int, chunk: ChunkIndex, wanted: set[int
 
 
 def _read_part(file: BinaryIO, part: _Part, handlers: Mapping[int, MessageHandler | None]) -> None:
-    """Hand the wanted messages of one chunk over."""
     start, chunk = part.chunk.chunk_start_offset, part.chunk
     try:
         opcode, length = RECORD.unpack(_read(file, start, RECORD.size))
@@ -236,7 +233,6 @@ def _read_part(file: BinaryIO, part: _Part, handlers: Mapping[int, MessageHandle
 
 
 def _hand_over(opcode: int, record: bytes, handlers: Mapping[int, MessageHandler | None]) -> None:
-    """Hand one message over."""
     channel, _, log_time, _ = MESSAGE.unpack_from(record)
     handler = handlers.get(channel)
     if opcode != Opcode.MESSAGE or handler is None:
@@ -374,7 +370,6 @@ class _Scan:
             raise DamageError(f"the file is damaged: it states {stated} messages and holds {self._messages}")
 
     def _walk_chunk(self, body: bytes) -> None:
-        """Walk the records within a chunk."""
         data = unpack_chunk(body)
         self._unpacked_bytes += len(data)
         require_plausible_inflation(self._file.tell(), self._unpacked_bytes, "what was read so far")
@@ -391,7 +386,6 @@ class _Scan:
             at += length
 
     def _take(self, opcode: int, data: bytes, start: int, stop: int) -> None:
-        """Take one record of the data section."""
         if opcode == Opcode.MESSAGE:
             channel, _, log_time, _ = MESSAGE.unpack_from(data, start)
             if stop - start < MESSAGE.size or channel not in self._handlers:

@@ -60,7 +60,6 @@ def take_column(arrow: Any, batch: Any, wanted: FileColumn) -> Any:
 
 
 def _is_list(arrow: Any, kind: Any) -> bool:
-    """Whether a column holds lists of numbers."""
     types = arrow.types
     is_list = types.is_list(kind) or types.is_fixed_size_list(kind) or types.is_large_list(kind)
     return is_list and (types.is_floating(kind.value_type) or types.is_integer(kind.value_type))
@@ -208,7 +207,6 @@ def _arrow_errors(arrow: Any, name: str) -> Iterator[None]:
 
 
 def _require_numbers(schema: Any, wanted: Sequence[FileColumn], layout: ColumnLayout, name: str) -> None:
-    """Refuse columns of text, dates and the like."""
     for target, column in zip(layout.names, wanted, strict=True):
         kind = schema.field(column.column).type
         is_number = column.element is not None or _NUMBER_TYPE.fullmatch(str(kind))
@@ -218,10 +216,8 @@ def _require_numbers(schema: Any, wanted: Sequence[FileColumn], layout: ColumnLa
 
 
 def _is_stamp(kind: Any) -> bool:
-    """Whether a column's type is a date with time."""
     return str(kind).startswith("timestamp[")
 
 
 def _numbers(column: Any) -> Array:
-    """A column as float64, null as NaN."""
     return column.cast("float64", safe=False).to_numpy(zero_copy_only=False)

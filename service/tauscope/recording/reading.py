@@ -103,7 +103,6 @@ def _count_bytes(path: Path) -> int:
 
 
 def _read(path: Path, name: str, joint_count: int | None, choice: Choice) -> Recording:
-    """Hand the file to the reader of its format."""
     if path.is_dir():
         return read_rosbag2(path, choice)
     magic = first_bytes(path, name)
@@ -122,7 +121,6 @@ def _read(path: Path, name: str, joint_count: int | None, choice: Choice) -> Rec
 
 
 def _refuse_foreign(magic: bytes, path: Path, name: str) -> None:
-    """Refuse a file that is no text."""
     for start, words in _FOREIGN:
         if magic.startswith(start):
             raise RecordingError(f"{name}: {words}")
@@ -132,7 +130,6 @@ def _refuse_foreign(magic: bytes, path: Path, name: str) -> None:
 
 
 def _reason(error: OSError) -> str:
-    """What the system said, in words."""
     words = {errno.ENOENT: "no such file", errno.EACCES: "no permission to read it"}
     return words.get(error.errno or 0, f"cannot be read ({error.strerror or error})")
 

@@ -74,7 +74,6 @@ def read_ros1_bag(path: Path, choice: Choice) -> Recording:
 
 
 def _ros1_name(type_name: str) -> str:
-    """The type as ROS 1 names it."""
     return type_name.replace("/msg/", "/")
 
 
@@ -147,7 +146,6 @@ def read_rosbag2(folder: Path, choice: Choice) -> Recording:
 
 
 def _add_file(path: Path, name: str, log: JointStateLog) -> None:
-    """Add the messages of one file of a bag to a log."""
     if path.suffix == ".mcap":
         add_mcap(path, name, log)
     elif path.suffix == ".db3":

@@ -142,7 +142,6 @@ class TableBuilder:
 
 
 def _append(spool: SpooledTable, block: Array) -> None:
-    """Write to the temporary file, where there is room."""
     try:
         spool.append(block)
     except OSError as error:

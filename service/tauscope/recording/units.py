@@ -138,7 +138,6 @@ def parse_units(text: str) -> dict[str, str]:
 
 
 def _factor(group: str, number: str, reading: Reading) -> float:
-    """Factor of a joint's column."""
     root = next((root for root, followers in _FOLLOWERS.items() if group in followers), None)
     if root is None:
         return 1.0

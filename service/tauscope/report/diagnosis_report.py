@@ -78,7 +78,6 @@ def diagnosis_report(
 
 
 def _key_figures(document: DiagnosisDocument) -> Iterator[KeyFigure]:
-    """What a reader looks for first."""
     yield KeyFigure("Verdict", document.verdict.replace("_", " "), "computed from tests, not chosen")
     names = ", ".join(dict.fromkeys(effect_title(finding.effect) for finding in document.findings[:3]))
     yield KeyFigure("Findings", str(len(document.findings)), names or "nothing is named")
@@ -94,7 +93,6 @@ def _key_figures(document: DiagnosisDocument) -> Iterator[KeyFigure]:
 
 
 def _where(plots: DiagnosisPlots, document: DiagnosisDocument, types: list[JointType]) -> Section:
-    """Heat maps of joint × state."""
     caption = (
         "Each cell holds as many samples as any other of its row and group; its shade is the rms of the residual in it,"
         " as a multiple of the noise."
@@ -133,7 +131,6 @@ def _what(document: DiagnosisDocument) -> Section:
 
 
 def _cards(entries: Sequence[FindingEntry], joints: Sequence[str]) -> list[Card]:
-    """A card a finding."""
     return [
         Card(
             rank,
@@ -209,7 +206,6 @@ def _headroom(document: DiagnosisDocument) -> Iterator[Section]:
 
 
 def _next(document: DiagnosisDocument, planned: PlannedExperiment | None) -> Section:
-    """The motion that would decide what is open."""
     wanted = document.next_experiment
     if wanted is None:
         return Section("next", "What next", [], ["Nothing is open that another motion would decide."])
@@ -229,7 +225,6 @@ def _next(document: DiagnosisDocument, planned: PlannedExperiment | None) -> Sec
 
 
 def _detectable(document: DiagnosisDocument) -> Section:
-    """What would have been seen."""
     sentence = (
         "The smallest size of each effect that nine of ten such data sets would have shown. What is smaller may be"
         " there and not be named; – stands where no torque along this motion shows it, or it is one with a parameter."
@@ -239,7 +234,6 @@ def _detectable(document: DiagnosisDocument) -> Section:
 
 
 def _reproduce(provenance: Provenance) -> Section:
-    """How to make it again."""
     parts = [Part(table=input_table(provenance))]
     if provenance.command:
         parts.append(Part(command=shlex.join(provenance.command)))

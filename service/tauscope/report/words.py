@@ -227,7 +227,6 @@ def location_sentence(entry: MismatchEntry, joint_type: JointType) -> str:
 
 
 def _share(share: float) -> str:
-    """A share in a sentence."""
     return f"{100.0 * share:.0f} %"
 
 

@@ -77,7 +77,6 @@ def check_robot(path: Path | str) -> RobotReport:
 
 
 def _summary(number: int, joint: Joint, segment: Segment, mass: float | None) -> JointSummary:
-    """The row of one joint."""
     before, after = segment.before, segment.after
     return JointSummary(
         number=number,
@@ -123,6 +122,5 @@ def _remarks(robot: Robot, source: str) -> Iterator[Finding]:
 
 
 def _triple(vector: np.ndarray) -> tuple[float, float, float]:
-    """Three numbers as a tuple."""
     x, y, z = (float(value) for value in vector)
     return (x, y, z)

@@ -235,7 +235,6 @@ class ActuatorDocument(Document):
 
     @model_validator(mode="after")
     def _check_loop(self) -> Self:
-        """A loop has a gain."""
         if self.kind != "torque" and self.kp is None:
             raise refusal(f"a {self.kind} loop needs kp, in the unit of `unit`: register or Nm_per_rad")
         if self.servo is not None and self.unit == "Nm_per_rad":
@@ -357,7 +356,6 @@ class RobotDocument(Document):
 
     @model_validator(mode="after")
     def _check_names(self) -> Self:
-        """A joint name may stand once."""
         names = [joint.name for joint in self.joints or ()]
         for index, name in enumerate(names):
             if name in names[:index]:

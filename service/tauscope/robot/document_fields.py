@@ -51,21 +51,18 @@ def _number(value: Any) -> float:
 
 
 def _positive(value: float) -> float:
-    """A number above zero."""
     if value <= 0.0:
         raise refusal(f"must be above zero, but is {value:g}; leave it out where it is not known")
     return value
 
 
 def _not_negative(value: float) -> float:
-    """A number of zero or more."""
     if value < 0.0:
         raise refusal(f"must not be below zero, but is {value:g}; write its size")
     return value
 
 
 def _nonzero(value: float) -> float:
-    """A number other than zero."""
     if value == 0.0:
         raise refusal("must not be zero; leave it out where it is not known")
     return value
@@ -83,7 +80,6 @@ def _name(value: Any) -> str:
 
 
 def _share(value: float) -> float:
-    """A number above 0, up to 1."""
     if not 0.0 < value <= 1.0:
         raise refusal(f"must be a share above 0 and up to 1, but is {value:g}")
     return value
@@ -121,14 +117,12 @@ def check_source(value: Any) -> Any:
 
 
 def _sign(value: Any) -> int:
-    """1 or -1."""
     if isinstance(value, bool) or not isinstance(value, int) or value not in (1, -1):
         raise refusal(f"must be 1 or -1, but is {shown(value)}")
     return int(value)
 
 
 def _motion(value: Any) -> JointType:
-    """How a joint moves."""
     if not isinstance(value, str) or value not in set(JointType):
         raise refusal(f"{shown(value)} is not a joint type; write revolute or prismatic")
     return JointType(value)
@@ -147,7 +141,6 @@ def _range(value: list[float]) -> list[float]:
 
 
 def _vector(value: list[float]) -> list[float]:
-    """Three numbers."""
     if len(value) != 3:
         raise refusal(f"must be three numbers [x, y, z], but holds {len(value)}")
     return value
@@ -182,7 +175,6 @@ def _plain(value: Any, depth: int = 0) -> Any:
 
 
 def _plain_mapping(value: Any) -> dict[str, Any]:
-    """A mapping of plain data."""
     if not isinstance(value, Mapping):
         raise refusal(f"must be a mapping, but is {shown(value)}")
     return _plain(value)

@@ -137,5 +137,4 @@ def _principal_moments(inertia: Array) -> Array:
 
 
 def _list(vector: Array) -> str:
-    """A vector as text."""
     return "[" + ", ".join(f"{value:g}" for value in vector) + "]"

@@ -182,19 +182,16 @@ def _kinematics(document: RobotDocument, origin: DocumentOrigin, file_source: Fi
 
 
 def _segment(document: SegmentDocument) -> Segment:
-    """A segment of plain data."""
     coupling = document.coupling
     follows = None if coupling is None else Coupling(coupling.joint, coupling.multiplier, coupling.offset)
     return Segment(document.type, _placement(document.before), _placement(document.after), follows)
 
 
 def _rows(rows: Rows) -> list[DenavitHartenbergRow]:
-    """Rows of the document as rows of the convention."""
     return [DenavitHartenbergRow(r.theta, r.d, r.a, r.alpha, r.type) for r in rows]
 
 
 def _placement(document: PlacementDocument) -> Placement:
-    """A placement as arrays."""
     return Placement(np.array(document.rotation), np.array(document.translation))
 
 
@@ -243,7 +240,6 @@ def _joint(document: JointDocument, kind: JointType, own: JointLimits, actuator:
 
 
 def _actuator(document: ActuatorDocument) -> Actuator:
-    """The drive of a joint."""
     values = document.model_dump()
     values["kp"] = document.kp or 0.0
     values["unit"] = document.unit or ("Nm_per_rad" if document.servo is None else "register")
@@ -287,14 +283,12 @@ def _links(
 
 
 def _link(document: LinkDocument) -> LinkInertia:
-    """A link of the model block."""
     i = document.inertia
     inertia = np.array([[i.xx, i.xy, i.xz], [i.xy, i.yy, i.yz], [i.xz, i.yz, i.zz]])
     return LinkInertia(document.mass, np.array(document.first_moment), inertia)
 
 
 def _check_count(origin: DocumentOrigin, place: tuple[str, ...], found: int, count: int, key: str) -> None:
-    """One entry a joint."""
     if found != count:
         text = f"number of entries is {found}, of joints in kinematics.{key} {count}; write one entry a joint"
         raise origin.error(place, text)

@@ -72,14 +72,12 @@ def _find_given(origin: DocumentOrigin, files: Mapping[str, bytes]) -> FileSourc
 
 
 def _segment(segment: Segment) -> dict[str, Any]:
-    """A segment as a mapping."""
     coupling = None if segment.coupling is None else asdict(segment.coupling)
     placements = {"before": _placement(segment.before), "after": _placement(segment.after)}
     return _drop_none({"type": segment.type.value, **placements, "coupling": coupling})
 
 
 def _placement(placement: Placement) -> dict[str, Any]:
-    """A placement as lists."""
     return {"rotation": placement.rotation.tolist(), "translation": placement.translation.tolist()}
 
 
@@ -108,12 +106,10 @@ def _joint(joint: Joint) -> dict[str, Any]:
 
 
 def _actuator(actuator: Actuator) -> dict[str, Any]:
-    """An actuator as a mapping."""
     return _drop_none(asdict(actuator) | ({} if actuator.has_loop else {"kp": None}))
 
 
 def _model(model: Model) -> dict[str, Any]:
-    """The model block as mappings."""
     links = None if model.links is None else [_link(link) for link in model.links]
     friction = None
     if model.friction is not None:
@@ -123,12 +119,10 @@ def _model(model: Model) -> dict[str, Any]:
 
 
 def _link(link: LinkInertia) -> dict[str, Any]:
-    """A link's inertial parameters as a mapping."""
     xx, yy, zz, xy, xz, yz = (float(value) for value in link.to_vector()[:6])
     inertia = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "xz": xz, "yz": yz}
     return {"mass": float(link.mass), "first_moment": link.first_moment.tolist(), "inertia": inertia}
 
 
 def _drop_none(mapping: Mapping[str, Any]) -> dict[str, Any]:
-    """The entries that are not None."""
     return {key: value for key, value in mapping.items() if value is not None}

@@ -253,7 +253,6 @@ def _up(tree: UrdfTree, link: str, base: str | None) -> list[UrdfJoint] | None:
 
 
 def _path(tree: UrdfTree, base: str, tip: str) -> list[UrdfJoint]:
-    """Joints from base to tip, base first."""
     path: list[UrdfJoint] = []
     link = tip
     while link != base:
@@ -271,7 +270,6 @@ def _path(tree: UrdfTree, base: str, tip: str) -> list[UrdfJoint]:
 
 
 def _remark_on_base(tree: UrdfTree, base: str, findings: list[Finding]) -> None:
-    """Say so where the base itself could move."""
     link = base
     while (joint := tree.parent_joint.get(link)) is not None:
         if joint.type != "fixed":
@@ -281,13 +279,11 @@ def _remark_on_base(tree: UrdfTree, base: str, findings: list[Finding]) -> None:
 
 
 def _follower(tree: UrdfTree, joint: UrdfJoint, master: Master) -> Finding:
-    """Which joint another one follows."""
     text = f"follows {shown(master.joint.name)}: {master.multiplier:g} times its position, plus {master.offset:g}"
     return Finding(Severity.INFO, one_line(where(tree.label, joint.element)), text)
 
 
 def _joint_type(joint: UrdfJoint) -> JointType:
-    """How a joint moves."""
     return JointType.PRISMATIC if joint.type == "prismatic" else JointType.REVOLUTE
 
 

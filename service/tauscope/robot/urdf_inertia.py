@@ -80,7 +80,6 @@ def _read_inertia(label: str, body: Element, element: Element, findings: list[Fi
 
 
 def _remark(place: str, stated: LinkInertia, findings: list[Finding]) -> None:
-    """Add what is doubtful about one body."""
     if stated.mass == 0.0 and np.any(stated.inertia):
         findings.append(Finding(Severity.WARNING, place, "has inertia but no mass, as no body has; add the mass"))
     elif stated.mass > 0.0 and not np.any(stated.inertia):

@@ -76,7 +76,6 @@ def read_yaml(text: str, label: str) -> YamlContent:
 
 
 def _compose(text: str, label: str) -> Any:
-    """The node graph of the text."""
     yaml = YAML(typ="safe", pure=True)
     yaml.Composer = _BoundedComposer
     try:
@@ -153,7 +152,6 @@ class _PlainBuilder:
         raise self._error(line, f"the tag {shown(str(node.tag))} is not accepted; write plain data")
 
     def _error(self, line: int, text: str) -> RobotFileError:
-        """The error that names the line."""
         return RobotFileError(one_line(f"{self.label}:{line}: {text}"))
 
 

@@ -83,7 +83,6 @@ def _permille(joint: Joint) -> tuple[float | None, str]:
 
 
 def _positive(joint: Joint, name: str, value: object) -> float:
-    """A positive finite number of the robot file."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value <= 0.0:
         text = f"joint {shown(joint.name)}: {name} = {shown(value)} must be a positive number; correct the robot file"
         raise ExportError(one_line(text))
@@ -258,7 +257,6 @@ def _quote_text(value: Any) -> Any:
 
 
 def _joint(number: int, joint: JointCompensation) -> dict[str, Any]:
-    """One joint as plain data."""
     prismatic = joint.type is JointType.PRISMATIC
     units = joint.units
     return {

@@ -120,7 +120,6 @@ def to_c_header(model: CompensationModel) -> str:
 
 
 def _joint_name_function(name: str, model: CompensationModel) -> str:
-    """The function that names a joint."""
     names = ",\n        ".join(c_string(joint.name) for joint in model.joints)
     return f"""static inline const char *{name}_joint_name(int joint)
 {{
@@ -135,7 +134,6 @@ def _joint_name_function(name: str, model: CompensationModel) -> str:
 
 
 def _c_torque_function(name: str, model: CompensationModel) -> str:
-    """The function that gives the joint torque."""
     rows = ",\n        ".join("{" + ", ".join(map(repr, row(joint))) + "}" for joint in model.joints)
     return f"""/* Torque in Nm (force in N) that compensates the friction of a joint moving at the given velocity. */
 static inline double {name}_friction_torque(int joint, double velocity)
@@ -156,7 +154,6 @@ static inline double {name}_friction_torque(int joint, double velocity)
 
 
 def _c_unit_function(name: str, function: UnitFunction) -> str:
-    """A function that gives the friction in a drive unit."""
     values = ", ".join(map(repr, function.torque_per_unit))
     return f"""/* The same as {function.meaning}. */
 static inline double {name}_{function.suffix}(int joint, double velocity)
@@ -190,14 +187,12 @@ def to_python(model: CompensationModel) -> str:
 
 
 def _table(model: CompensationModel) -> str:
-    """Names and coefficients of the joints."""
     names = "".join(f"    {joint.name!a},\n" for joint in model.joints)
     rows = "".join(f"    {row(joint)!r},\n" for joint in model.joints)
     return f"JOINT_NAMES = (\n{names})\n\n# {', '.join(COEFFICIENTS)}\nCOEFFICIENTS = (\n{rows})"
 
 
 def _python_torque_function(name: str) -> str:
-    """The function that gives the joint torque."""
     return f'''
 def {name}_friction_torque(joint, velocity):
     """Torque in Nm (force in N) that compensates the friction of a joint moving at the given velocity."""
@@ -210,7 +205,6 @@ def {name}_friction_torque(joint, velocity):
 
 
 def _python_unit_function(name: str, function: UnitFunction) -> str:
-    """A function that gives the friction in a drive unit."""
     return f'''
 def {name}_{function.suffix}(joint, velocity):
     """The same as {function.meaning}."""

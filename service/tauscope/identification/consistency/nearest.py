@@ -99,7 +99,6 @@ def nearest_consistent_parameters(
 
 
 def _check_input(factor: Array, target: Array, prior: Prior, inequalities: LinearInequalities) -> None:
-    """Refuse shapes that do not fit and numbers that are not finite."""
     size = prior.mean.size
     if factor.shape != (target.size, size) or inequalities.matrix.shape[1] != size:
         raise IdentificationError(

@@ -37,7 +37,6 @@ def mend_recording(recording: Recording, robot: Robot | None = None) -> Recordin
 
 
 def _build_edits(recording: Recording, defects: Defects) -> dict[int, ColumnEdit]:
-    """Edits by column."""
     edits: dict[int, ColumnEdit] = {}
     n = recording.joint_count
     for joint, found in enumerate(defects.joints):
@@ -116,7 +115,6 @@ def _describe_joint(
 
 
 def _count(rows: Numbers) -> str:
-    """A count of rows in words."""
     return "1 row" if len(rows) == 1 else f"{len(rows)} rows"
 
 

@@ -35,7 +35,6 @@ class Sketch:
 
     @cached_property
     def _steps(self) -> Array:
-        """Times from row to row, (N,) [s]."""
         return np.concatenate([np.diff(window.time) for window in self.windows])
 
     @cached_property
