@@ -91,11 +91,7 @@ class Rollout:
             is_better=bool(own < min(others)),
             parameters=[
                 RefinedEntry(
-                    name=each.term.name,
-                    value=each.value,
-                    std=each.std,
-                    unit=each.term.unit,
-                    p_value=each.p_value,
+                    name=each.term.name, value=each.value, std=each.std, unit=each.term.unit, p_value=each.p_value
                 )
                 for each in refined.terms
             ],

@@ -37,11 +37,7 @@ class ExternalContact(TimeLocalEffect):
     remedy = "clear what it touches, or leave that stretch of the recording out"
     no_scenario = "a scenario starts anew each time, so only contact at the same time in every recording fits"
     revealing_motion = "the same motion once more without contact"
-    coefficients = (
-        Coefficient("F_x", "N"),
-        Coefficient("F_y", "N"),
-        Coefficient("F_z", "N"),
-    )
+    coefficients = (Coefficient("F_x", "N"), Coefficient("F_y", "N"), Coefficient("F_z", "N"))
     shapes = _WINDOW
 
     @classmethod

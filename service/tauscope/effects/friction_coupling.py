@@ -28,10 +28,7 @@ class FrictionCoupling(Effect):
     remedy = "add Coulomb and viscous friction of the coupled motor's own speed"
     no_code = "it needs the velocities of two joints"
     revealing_motion = "both joints at once, in the same and in opposite directions, slowly and fast"
-    coefficients = (
-        Coefficient("f", "{tau}", positive=True),
-        Coefficient("w", "{tau} s/{q}"),
-    )
+    coefficients = (Coefficient("f", "{tau}", positive=True), Coefficient("w", "{tau} s/{q}"))
     shapes = (Shape("K", "s/{q}", logarithmic=True),)
 
     partner: int = 0

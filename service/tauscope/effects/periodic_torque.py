@@ -214,10 +214,7 @@ class TorqueRipple(_Periodic):
     remedy = "correct the torque constant over the motor's angle"
     code = "load * ({c[0]} * sin({s[0]} * q) + {c[1]} * cos({s[0]} * q))"
     revealing_motion = "the same angles under other loads: other poses of the other joints"
-    coefficients = (
-        Coefficient("sine", "1", largest=1.0),
-        Coefficient("cosine", "1", largest=1.0),
-    )
+    coefficients = (Coefficient("sine", "1", largest=1.0), Coefficient("cosine", "1", largest=1.0))
 
     @classmethod
     def _places(cls, context: ArmContext) -> Sequence[int]:

@@ -44,11 +44,7 @@ class ActuatorChoice:
 
 
 def actuator_elements(
-    robot: Robot,
-    links: Sequence[LinkInertia],
-    rotors: Sequence[float],
-    names: Sequence[str],
-    choice: ActuatorChoice,
+    robot: Robot, links: Sequence[LinkInertia], rotors: Sequence[float], names: Sequence[str], choice: ActuatorChoice
 ) -> tuple[list[str], list[str]]:
     """Actuator elements, one a joint, and notes on gains that are chosen rather than known.
 

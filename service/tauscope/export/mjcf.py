@@ -7,13 +7,7 @@ import numpy as np
 from tauscope.errors import ExportError
 from tauscope.export.actuators import ActuatorChoice, actuator_elements
 from tauscope.export.compensation.source_code import comment_text
-from tauscope.export.joint_model import (
-    JointModel,
-    centred,
-    dry_friction_and_damping,
-    friction_notes,
-    joint_models,
-)
+from tauscope.export.joint_model import JointModel, centred, dry_friction_and_damping, friction_notes, joint_models
 from tauscope.export.mjcf_findings import NEWER, REST, Additions, JointExtras, add_findings, numbers
 from tauscope.export.model import ExportModel
 from tauscope.robot import JointLimits, JointType, Robot, Segment

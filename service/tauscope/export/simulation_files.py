@@ -80,11 +80,7 @@ def scenario_text(diagnosis: Diagnosis) -> str:
 def _link(link: LinkInertia) -> Mapping[str, Any]:
     vector = [float(value) for value in link.to_vector()]
     xx, yy, zz, xy, xz, yz, mass, *moment = vector
-    return {
-        "mass": mass,
-        "first_moment": moment,
-        "inertia": dict(zip(INERTIA, (xx, yy, zz, xy, xz, yz), strict=True)),
-    }
+    return {"mass": mass, "first_moment": moment, "inertia": dict(zip(INERTIA, (xx, yy, zz, xy, xz, yz), strict=True))}
 
 
 def _entries(effect: Effect, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> list[Entry]:

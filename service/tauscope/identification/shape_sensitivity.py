@@ -28,11 +28,7 @@ STEPS = 10
 
 
 def columns_with_shapes(
-    prepared: PreparedMotion,
-    structure: ModelStructure,
-    joint: int,
-    parameters: Array,
-    shapes: Sequence[ShapeParameter],
+    prepared: PreparedMotion, structure: ModelStructure, joint: int, parameters: Array, shapes: Sequence[ShapeParameter]
 ) -> tuple[Array, NDArray[np.intp]]:
     """A joint's columns followed by those of its estimated shape constants.
 

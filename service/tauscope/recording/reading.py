@@ -38,10 +38,7 @@ _FOREIGN = (
 
 
 def read_recording(
-    path: str | Path,
-    joint_count: int | None = None,
-    joint_names: Sequence[str] | None = None,
-    reading: Reading = SI,
+    path: str | Path, joint_count: int | None = None, joint_names: Sequence[str] | None = None, reading: Reading = SI
 ) -> Recording:
     """Read a recording: CSV, Parquet, MCAP, a ROS 1 bag, or a rosbag2 folder or database; told apart by content.
 

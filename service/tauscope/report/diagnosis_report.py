@@ -42,10 +42,7 @@ from tauscope.robot import JointType
 
 
 def diagnosis_report(
-    diagnosis: Diagnosis,
-    document: DiagnosisDocument,
-    provenance: Provenance,
-    planned: PlannedExperiment | None = None,
+    diagnosis: Diagnosis, document: DiagnosisDocument, provenance: Provenance, planned: PlannedExperiment | None = None
 ) -> str:
     """A self-contained HTML page on a diagnosis."""
     plots = diagnosis_plots(diagnosis)

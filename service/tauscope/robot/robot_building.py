@@ -52,13 +52,7 @@ class MjcfReader(Protocol):
     """Compiles an MJCF and reads the chain between two of its bodies."""
 
     def __call__(
-        self,
-        data: bytes,
-        label: str,
-        path: Path | None,
-        base: str | None,
-        tip: str | None,
-        locked: Mapping[str, float],
+        self, data: bytes, label: str, path: Path | None, base: str | None, tip: str | None, locked: Mapping[str, float]
     ) -> Chain:
         """The chain from body `base` to body `tip`.
 

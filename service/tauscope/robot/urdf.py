@@ -152,11 +152,7 @@ class _Body:
 
 
 def read_urdf_chain(
-    data: bytes,
-    label: str,
-    base: str | None = None,
-    tip: str | None = None,
-    locked: Mapping[str, float] | None = None,
+    data: bytes, label: str, base: str | None = None, tip: str | None = None, locked: Mapping[str, float] | None = None
 ) -> Chain:
     """The chain from link `base` to link `tip`; by default from the root to the deepest leaf.
 

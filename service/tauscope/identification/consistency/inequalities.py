@@ -26,9 +26,7 @@ class LinearInequalities:
     def __add__(self, other: "LinearInequalities") -> "LinearInequalities":
         """Both sets of rows together."""
         return LinearInequalities(
-            np.vstack([self.matrix, other.matrix]),
-            np.concatenate([self.bound, other.bound]),
-            self.names + other.names,
+            np.vstack([self.matrix, other.matrix]), np.concatenate([self.bound, other.bound]), self.names + other.names
         )
 
     @staticmethod

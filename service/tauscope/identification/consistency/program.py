@@ -78,12 +78,7 @@ class ConicProgram:
 
 
 def assemble(
-    factor: Array,
-    target: Array,
-    prior: Prior,
-    inequalities: LinearInequalities,
-    *,
-    margin: float,
+    factor: Array, target: Array, prior: Prior, inequalities: LinearInequalities, *, margin: float
 ) -> ConicProgram:
     """Put information, prior and constraints together, in parameters scaled by the prior's magnitudes.
 

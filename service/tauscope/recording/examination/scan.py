@@ -6,14 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.recording.examination.edits import (
-    NO_NUMBERS,
-    ColumnEdit,
-    Numbers,
-    Rows,
-    join_ranges,
-    row_numbers,
-)
+from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, Numbers, Rows, join_ranges, row_numbers
 from tauscope.recording.examination.effort_defects import ZeroRuns, find_all_stuck, find_spikes, find_stuck
 from tauscope.recording.examination.position_defects import scan_position
 from tauscope.recording.examination.scales import (
