@@ -127,7 +127,6 @@ class Backlash(Deflection):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a joint that moves under load."""
         made = []
         for joint in cls.deflected_joints(context):
             gaps, bands = GAPS * (context.highest[joint] - context.lowest[joint]), BANDS * context.cutoff_hz
@@ -153,7 +152,6 @@ class Backlash(Deflection):
         return (replace(found, value=found.value + apart, std=float(np.hypot(found.std, 0.5 * apart))),)
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How wide."""
         return f"the transmission has {size_text(found['b'])} of backlash"
 
     def is_consistent(self, coefficients: Array, shape: Array) -> bool:
@@ -161,7 +159,6 @@ class Backlash(Deflection):
         return bool(shape[0] <= SAME * coefficients[0])
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
-        """Place between the teeth."""
         return place_between_teeth(load, inertia, float(shape[0]), rate_hz)
 
 
@@ -193,7 +190,6 @@ class SpringyTeeth(Backlash):
 
     @classmethod
     def farther_forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """None: these are."""
         return ()
 
     def is_consistent(self, coefficients: Array, shape: Array) -> bool:

@@ -54,7 +54,6 @@ class BaseTilt(Effect):
         return np.stack(torques)[None]
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """By which angle."""
         size = replace(found["alpha_1"], value=float(np.hypot(found["alpha_1"].value, found["alpha_2"].value)))
         return f"gravity in the base frame is off by {size_text(size)}"
 

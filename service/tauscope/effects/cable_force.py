@@ -48,17 +48,14 @@ class CableForce(Effect):
         return made
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """±max(±(q - q_t), 0)^p."""
         beyond = np.maximum(self.side * (signals.position[self.joint] - shapes[:, :1]), 0.0)
         return per_joint_columns((self.side * beyond ** shapes[:, 1:])[:, None])
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """On which side of which angle it pulls."""
         side = "above" if self.side > 0 else "below"
         angle = found["q_t"]
         return f"an elastic force {side} {significant(angle.value, 2)} {angle.unit} is missing"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """One side."""
         side = "above" if self.side > 0 else "below"
         return [{"stiffness": coefficients[0], "angle": shape[0], "exponent": shape[1], "side_of_angle": side}]

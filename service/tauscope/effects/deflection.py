@@ -51,7 +51,6 @@ class Deflection(Effect):
         return [joint for joint in hidden if context.moves(joint) and context.is_loaded(joint)]
 
     def touched(self, joint_count: int) -> tuple[int, ...]:
-        """All joints."""
         return tuple(range(joint_count))
 
     def quantities(

@@ -50,7 +50,6 @@ class ExternalContact(TimeLocalEffect):
         return [*whole, *(JointContact(joint, grid, *bounds) for joint in context.joints)]
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How strong a force at the tool."""
         force = replace(
             found["F_x"], value=float(np.linalg.norm([found[name].value for name in ("F_x", "F_y", "F_z")]))
         )
@@ -77,7 +76,6 @@ class JointContact(ExternalContact):
     coefficients = (Coefficient("c", "{tau}"),)
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How strong a torque, and which way."""
         sign = "+" if found["c"].value >= 0.0 else "-"
         return f"an outside torque of {sign}{size_text(found['c'])} acts"
 

@@ -46,27 +46,22 @@ class FrictionCoupling(Effect):
         return made
 
     def touched(self, joint_count: int) -> tuple[int, ...]:
-        """Both joints."""
         return (self.partner, self.joint or 0)
 
     def place(self, joint_names: Sequence[str]) -> str:
-        """Both joints by name."""
         return f"at {joint_names[self.partner]} and {joint_names[self.joint or 0]}"
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """On the sum or the difference of two speeds."""
         relation = "sum" if self.sign > 0 else "difference"
         return f"{size_text(found['f'])} of Coulomb friction on the {relation} of two speeds is missing"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(K v) and v on both joints."""
         velocity = signals.velocity[self.joint] + self.sign * signals.velocity[self.partner]
         step = smooth_sign(velocity, shapes)
         own = np.stack([step, np.broadcast_to(velocity, step.shape)], axis=1)
         return np.stack([self.sign * own, own], axis=2)
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """One coupling."""
         f, w = coefficients
         of = "sum" if self.sign > 0 else "difference"
         return [{"other_joint": self.partner + 1, "of": of, "coulomb": f, "viscous": w, "k_v": shape[0]}]

@@ -62,13 +62,11 @@ class FrictionDrift(Effect):
         return found
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """Whether friction rises or falls, at the joint's usual speed."""
         change = found["f"].value + found["w"].value * float(context.speed[self.joint or 0])
         verb, size = "rises" if change >= 0.0 else "falls", size_text(replace(found["f"], value=change))
         return f"friction {verb} by {size} {'per watt of its own heat' if self.by_heat else 'during a recording'}"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇) h, q̇ h, repetition by repetition."""
         constants = shapes[:, 0]
         if self.by_heat:
             course = self._temperature(signals, constants)
@@ -120,7 +118,6 @@ class ThermalDrift(FrictionDrift):
         return cls(joint, RATES[:, None], *bounds, max(context.durations), reference_c=reference)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇) h, q̇ h, repetition by repetition."""
         joint = self.joint or 0
         warmer = np.zeros(signals.time.shape)
         if signals.temperature is not None:
@@ -133,7 +130,6 @@ class ThermalDrift(FrictionDrift):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """f, w, r and ϑ_0."""
         return (
             *super().quantities(context, coefficients, shape, covariance),
             Quantity("T_0", self.reference_c, 0.0, "°C"),

@@ -60,7 +60,6 @@ class JointElasticity(Deflection):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a joint that moves."""
         bands = BANDS * context.cutoff_hz
         stiff = np.stack([bands, np.zeros(len(bands))], axis=1)
         made = []
@@ -93,7 +92,6 @@ class JointElasticity(Deflection):
         return (replace(found, value=found.value - apart, std=float(np.hypot(found.std, apart))),)
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How stiff."""
         compliance = found["c"].value
         if compliance <= 0.0:
             return self.meaning
@@ -101,6 +99,5 @@ class JointElasticity(Deflection):
         return f"a transmission stiffness of {size_text(stiffness)} is missing"
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
-        """What the spring transmits."""
         swinging = float(shape[1])
         return load if swinging == 0.0 or not inertia.all() else transmitted(load, inertia, swinging, rate_hz)

@@ -51,13 +51,11 @@ class KinematicError(Effect):
         return longer - exact
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """Which frame, along which axis, and which way."""
         link, axis = int(found["link"].value), "xyz"[int(found["axis"].value) - 1]
         sign = "+" if found["d"].value >= 0.0 else "-"
         return f"the frame of link {link} is off by {size_text(found['d'])} along {sign}{axis}"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """One displacement."""
         link, axis = (int(each) for each in shape)
         return [{"link": link, "translation": [coefficients[0] if each == axis else 0.0 for each in (1, 2, 3)]}]
 

@@ -42,7 +42,6 @@ class MeasuredElasticity(JointElasticity):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """Compliance as the encoder shows it."""
         return (Quantity("c", self.compliance, self.compliance_std, self.unit("{q}/{tau}", context)),)
 
 
@@ -73,7 +72,6 @@ class MeasuredPlay(Backlash):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """Play as the encoder shows it."""
         return (Quantity("b", self.play, self.play_std, self.unit("{q}", context)),)
 
 
@@ -113,7 +111,6 @@ class MeasuredTeeth(SpringyTeeth):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """Play and compliance as the encoder shows them."""
         return (
             Quantity("b", self.play, self.play_std, self.unit("{q}", context)),
             Quantity("c", self.compliance, self.compliance_std, self.unit("{q}/{tau}", context)),

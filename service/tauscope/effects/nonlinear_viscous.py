@@ -41,7 +41,6 @@ class NonlinearViscous(Effect):
         return [cls(joint, *side) for joint in context.joints if context.moves(joint) for side in sides]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """sgn(q̇) |q̇|ᵖ."""
         velocity = signals.velocity[self.joint]
         return per_joint_columns((np.sign(velocity) * np.abs(velocity) ** shapes)[:, None])
 
@@ -51,5 +50,4 @@ class NonlinearViscous(Effect):
         return f"friction grows {'faster' if faster else 'more slowly'} than in proportion to speed"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """One power of speed."""
         return [{"amplitude": coefficients[0], "exponent": shape[0]}]

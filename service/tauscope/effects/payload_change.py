@@ -38,7 +38,6 @@ class PayloadChange(TimeLocalEffect):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One for the arm."""
         grid = payload_windows(context.durations)
         longest = max(context.durations)
         lower = np.array([since(len(context.durations) - 1), 0.0, 0.0, OUTSIDE, *(-FARTHEST_M,) * 3])
@@ -60,7 +59,6 @@ class PayloadChange(TimeLocalEffect):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """Mass, first moment, and when."""
         body = (0, 5, 6, 7)
         sign, instants = carried(float(coefficients[0]), shape, context.durations)
         found = list(body_quantities(sign * float(coefficients[0]), shape[4:], covariance[np.ix_(body, body)]))
@@ -69,11 +67,9 @@ class PayloadChange(TimeLocalEffect):
         return tuple(found)
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How heavy."""
         return f"a {size_text(found['m'])} mass"
 
     def when(self, coefficients: Array, shape: Array, names: Sequence[str], durations: Sequence[float]) -> str:
-        """When it is picked up and dropped, in words."""
         recording = int(-2 - shape[0])
         if shape[0] < EVERY and shape[1] > (1.0 - NEAR_EDGE) * durations[recording]:
             verb = "is carried" if coefficients[0] > 0.0 else "is missing"

@@ -134,7 +134,6 @@ class _Periodic(Effect):
         return context.joints
 
     def is_free(self, place: int) -> bool:
-        """Whether the order lies between the grid's points."""
         return not self.geared
 
     def quantities(
@@ -194,12 +193,10 @@ class Cogging(_Periodic):
     coefficients = (Coefficient("sine", "{tau}"), Coefficient("cosine", "{tau}"))
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """Amplitude and order."""
         size, order = size_text(found["amplitude"]), found["order"].value
         return f"a cogging torque of {size} and order {order:.4g} is missing"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """Sin kq, cos kq."""
         return per_joint_columns(self._waves(signals, shapes))
 
 
@@ -221,10 +218,8 @@ class TorqueRipple(_Periodic):
         return [joint for joint in super()._places(context) if context.is_loaded(joint)]
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """Amplitude and order."""
         size, order = percent_text(found["amplitude"].value), found["order"].value
         return f"torque ripples by {size} of the load with order {order:.4g}"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """τ_rb sin kq, τ_rb cos kq."""
         return per_joint_columns(signals.load[self.joint] * self._waves(signals, shapes))

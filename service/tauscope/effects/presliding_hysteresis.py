@@ -62,7 +62,6 @@ class PreslidingHysteresis(Effect):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a joint that moves both ways."""
         made = []
         for joint in context.joints:
             if context.reverses(joint):

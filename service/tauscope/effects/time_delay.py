@@ -37,17 +37,14 @@ class LateTorque(Effect):
         return (None, *(context.joints if context.robot.joint_count > 1 else ()))
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """Whether torque lags or leads."""
         verb = "lags" if found["d"].value >= 0.0 else "leads"
         return f"torque {verb} position by {size_text(found['d'])}"
 
     def advice(self, found: Sizes) -> str:
-        """The way to shift it."""
         way = "earlier" if found["d"].value >= 0.0 else "later"
         return f"shift the torque channel {size_text(found['d'])} {way}"
 
     def place(self, joint_names: Sequence[str]) -> str:
-        """Its joint, or all."""
         return super().place(joint_names) or "at every joint"
 
     def measured(self, signals: Signals) -> Array:
@@ -78,7 +75,6 @@ class TimeDelay(LateTorque):
         return shifted(torque, float(coefficients[0]), signals) - torque
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """The delay d."""
         return [{"delay": coefficients[0]}]
 
 
@@ -94,7 +90,6 @@ class Shift(LateTorque):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a place."""
         return [cls(place, *_constants(context)) for place in cls.places(context)]
 
     def late(self, torque: Array, constant: float, signals: Signals) -> Array:
@@ -116,7 +111,6 @@ class Shift(LateTorque):
         return (Quantity("d", share * constant, float(np.sqrt(max(slope @ covariance @ slope, 0.0))), "s"),)
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """The mean delay a T."""
         return [{"delay": coefficients[0] * shape[0]}]
 
 
@@ -135,12 +129,10 @@ class Lag(Shift):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a place and order."""
         places = cls.places(context)
         return [cls(place, *_constants(context), order=order) for place in places for order in ORDERS]
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How late."""
         return f"a low-pass filter delays torque by {size_text(found['d'])}"
 
     def advice(self, found: Sizes) -> str:
@@ -154,7 +146,6 @@ class Lag(Shift):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """The mean delay, T and n."""
         (each,) = super().quantities(context, coefficients, shape, covariance)
         own = float(np.sqrt(max(covariance[1, 1], 0.0)))
         return (

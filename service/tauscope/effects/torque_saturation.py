@@ -47,7 +47,6 @@ class Saturation(Effect):
         """
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """At which level."""
         return f"the recorded torque saturates near {size_text(found['c'])}"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -63,7 +62,6 @@ class TorqueSaturation(Saturation):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """Both curves at every joint."""
         return [*cls.of_levels(context, COMPRESSIONS), *Clipping.forms(context)]
 
     def recorded(self, torque: Array, levels: Array) -> Array:
@@ -77,7 +75,6 @@ class TorqueSaturation(Saturation):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """The level c/√a."""
         share, level = max(float(coefficients[0]), 1e-12), float(shape[0])
         slope = np.array([-0.5 * level / share**1.5, 1.0 / np.sqrt(share)])
         std = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
@@ -98,7 +95,6 @@ class Clipping(Saturation):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a joint."""
         return cls.of_levels(context, CLIPS)
 
     def recorded(self, torque: Array, levels: Array) -> Array:
@@ -106,5 +102,4 @@ class Clipping(Saturation):
         return np.clip(torque, -levels, levels)
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """The level c."""
         return [{"level": shape[0], "shape": "clip"}] if coefficients[0] > 0.0 else []
