@@ -105,7 +105,6 @@ def _dynamics(robot: Robot, links: Array, position: Array, velocity: Array) -> t
 
 
 def _invert(mass: Array) -> Array:
-    """Inverse of each mass matrix, (n, n, S, V)."""
     if len(mass) == 1:
         return 1.0 / mass
     return np.asarray(np.linalg.inv(mass.transpose(2, 3, 0, 1)), dtype=np.float64).transpose(2, 3, 0, 1)

@@ -134,7 +134,6 @@ class TorqueDrive:
 
 
 def _onto(time: Array, values: Array, at: Array) -> Array:
-    """Values at other instants; missed ones are bridged."""
     known = np.isfinite(values)
     return np.interp(at, time[known], values[known]) if known.any() else np.full(len(at), np.nan)
 

@@ -57,7 +57,6 @@ class RefinableModel:
         self.terms = (*self._body_terms(), *self._friction_terms(), *self._warmth_terms())
 
     def _body_terms(self) -> list[Term]:
-        """Mass, centre of mass and gyration of each body."""
         robot = self._model.robot
         total = sum(self._links[place, 6] for place in self._bodies)
         inertia = np.diag(mass_matrix(robot, self._links.ravel(), np.zeros((1, robot.joint_count)))[0])

@@ -208,7 +208,6 @@ def _complete_loops(robot: Robot, recordings: Sequence[Recording], known: Robot 
 
 
 def _fill(loop: Actuator, known: Actuator) -> Actuator:
-    """A loop with what is not stated as the model's recordings gave it."""
     return replace(
         loop,
         delay=known.delay if loop.delay is None else loop.delay,
@@ -232,7 +231,6 @@ def _take_commands(recording: Recording) -> Recording | None:
 def _drive(
     robot: Robot, recording: Recording, motion: RecordedMotion, model: RolloutModel, loops: tuple[Actuator, ...]
 ) -> Drive:
-    """Loops where commands are there, else recorded torque."""
     if loops:
         return LoopDrive(loops, recording, motion.time, is_damped=robot.mjcf is None)
     return TorqueDrive(robot, recording, motion, model.inertia)

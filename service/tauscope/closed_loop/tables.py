@@ -107,7 +107,6 @@ def _refinement_sentences(entry: RefinementEntry) -> Iterator[str]:
 
 
 def _stabilisers(document: RolloutDocument) -> Iterator[list[float]]:
-    """Torque of the stabiliser of every model and recording."""
     for recording in document.recordings:
         for entry in recording.models:
             if entry.stabiliser_rms:
@@ -115,5 +114,4 @@ def _stabilisers(document: RolloutDocument) -> Iterator[list[float]]:
 
 
 def _milli(value: float | None) -> str:
-    """A length or an angle in thousandths."""
     return ABSENT if value is None else significant(MILLI * value, 3)

@@ -98,7 +98,6 @@ def _segments(series: FourierSeries, slow: SlowPart, options: ExcitationOptions)
 
 
 def _active(robot: Robot, margins: Margins, options: ExcitationOptions) -> tuple[str, ...]:
-    """What keeps the criterion from getting better."""
     spared = 1.0 - options.limit_fraction
     kinds = {"position": spared, "velocity": spared, "acceleration": spared, "torque": 0.0}
     table = margins.as_table()
@@ -116,7 +115,6 @@ def _active(robot: Robot, margins: Margins, options: ExcitationOptions) -> tuple
 
 
 def _notes(robot: Robot, setting: Setting, slow: SlowPart) -> tuple[str, ...]:
-    """What was assumed or could not be done."""
     notes = list(setting.stated.assumed)
     if robot.model.links is None:
         notes.append("torque is not constrained: the robot file has no model to predict it with")

@@ -123,7 +123,6 @@ class Setting:
         return criterion_value(options.criterion, information, options.information_weight)
 
     def _scaling(self) -> Array:
-        """What each column is divided by, (p,)."""
         regressor = ExcitationRegressor(
             self.robot, self.base, capacity=SCALING_STATES, noise_std=self.options.noise_std
         )
@@ -139,12 +138,10 @@ class Setting:
 
 
 def _instants(series: FourierSeries, samples: int) -> MotionSamples:
-    """One period of a series at equispaced instants."""
     return series.evaluate(np.arange(float(samples)) * (series.period_s / samples))
 
 
 def _available_torque(robot: Robot, stated: MotionLimits, options: ExcitationOptions) -> Array:
-    """Torque limits less what is kept free."""
     available = (1.0 - options.torque_margin) * stated.torque - options.torque_offset
     for joint, limit, value in zip(robot.joints, stated.torque, available, strict=True):
         if not value > 0.0:

@@ -139,7 +139,6 @@ def _is_free(segment: FourierSegment | MoveSegment | PathSegment, limits: Motion
 
 
 def _kinematic(motion: MotionSamples, limits: MotionLimits) -> float:
-    """Largest usage of position, velocity and acceleration."""
     parts = (
         np.abs(motion.position - limits.middle) / limits.half_range,
         np.abs(motion.velocity) / limits.velocity,

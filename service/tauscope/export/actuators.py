@@ -104,7 +104,6 @@ def _choose_gain(values: tuple[float, ...], joint: int) -> float | None:
 
 
 def _motor(joint: Joint, name: str) -> str:
-    """A torque motor, limited where the robot file states a limit."""
     limit = joint.limits.torque
     both = "" if limit is None else f' ctrlrange="{numbers(-limit, limit)}" forcerange="{numbers(-limit, limit)}"'
     return f"<motor name={name} joint={name}{both}/>"

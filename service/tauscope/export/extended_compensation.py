@@ -45,7 +45,6 @@ def source_code(model: ExportModel, suffix: str) -> str:
 
 
 def _list_left_out(model: ExportModel) -> list[str]:
-    """Effects that have no code, and why."""
     names = [joint.name for joint in model.robot.joints]
     without = [found.effect for found in model.effects if not found.effect.code]
     return [f"{effect.name(names)}: {effect.no_code or 'it has no code'}" for effect in without]
@@ -57,7 +56,6 @@ def _expression(found: FoundEffect, model: ExportModel) -> str:
 
 
 def _group_by_joint(model: ExportModel) -> list[tuple[int, list[str]]]:
-    """Expressions of every joint that has any, joints counted from 1."""
     found: dict[int, list[str]] = {}
     for each in model.effects:
         if each.effect.code:

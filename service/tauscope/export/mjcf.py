@@ -165,7 +165,6 @@ def _armature(label: str, model: JointModel) -> float:
 
 
 def _quote(name: str) -> str:
-    """A name as the value of an attribute."""
     from xml.sax.saxutils import quoteattr  # loads urllib and ssl
 
     return quoteattr(_xml_name(name))

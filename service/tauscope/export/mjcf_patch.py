@@ -74,7 +74,6 @@ def patch_mjcf(path: Path, model: ExportModel) -> bytes:
 
 
 def _joints(element: Element) -> Iterator[tuple[Element, Element]]:
-    """Every joint of the file, with its body."""
     for child in element.children:
         if child.name == "joint" and element.name == "body":
             yield element, child

@@ -84,7 +84,6 @@ def _link(link: LinkInertia) -> Mapping[str, Any]:
 
 
 def _entries(effect: Effect, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> list[Entry]:
-    """An effect as entries of a scenario; none where there is no such entry."""
     place = {} if effect.joint is None else {"joint": effect.joint + 1}
     made = effect.scenario_entries(coefficients, shape, robot)
     return [{"effect": effect.id, **place, **entry} for entry in made]

@@ -122,7 +122,6 @@ def _joint(element: Element) -> _Joint:
 
 
 def _write_inertial(text: XmlText, link: Element, inertia: CentredInertia) -> None:
-    """Set a link's inertial, adding what is missing of it."""
     values = {
         "origin": {"xyz": _numbers(*inertia.centre), "rpy": "0 0 0"},
         "mass": {"value": _numbers(inertia.mass)},

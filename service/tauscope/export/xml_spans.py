@@ -112,7 +112,6 @@ class XmlText:
         return b"".join([*pieces, self.data[position:]])
 
     def _indent(self, element: Element) -> bytes:
-        """White space before an element on its line."""
         line_start = self.data.rfind(b"\n", 0, element.start) + 1
         before = self.data[line_start : element.start]
         return before if not before.strip() else b""

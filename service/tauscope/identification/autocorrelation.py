@@ -168,7 +168,6 @@ def _levinson(covariance: Array, largest: int) -> Iterator[tuple[Array, float]]:
 
 
 def _floored(covariance: Array) -> Array:
-    """The autocovariance with the white noise of `FILTER_FLOOR` added."""
     return np.append((1.0 + FILTER_FLOOR) * covariance[0], covariance[1:])
 
 

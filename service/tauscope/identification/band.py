@@ -118,7 +118,6 @@ def _least_band(motions: Dataset, robot: Robot, base: BaseParameters, cutoff_hz:
 
 
 def _beginning(conditioner: Conditioner) -> Conditioner:
-    """The recording's first `ENOUGH_ROWS` rows."""
     rows, left = [], ENOUGH_ROWS
     for start, stop in conditioner.timing.rows:
         if left > 0:
@@ -246,7 +245,6 @@ def _power(signals: Array, rate_hz: float, frequency: Array) -> Array:
 
 
 def _smoothed(power: Array, frequency: Array) -> Array:
-    """Mean of a spectrum over an octave around every frequency."""
     total = np.concatenate([[0.0], np.cumsum(power)])
     low = np.searchsorted(frequency, frequency / SMOOTHING)
     high = np.searchsorted(frequency, frequency * SMOOTHING, side="right")

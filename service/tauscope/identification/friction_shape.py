@@ -238,7 +238,6 @@ def _candidate_slopes(speed: Array, given: Sequence[FrictionShape]) -> list[Arra
 
 
 def _shared_columns(structure: ModelStructure) -> NDArray[np.intp]:
-    """Global columns that do not depend on any shape constant."""
     steps = [
         structure.coefficient(joint, name)
         for joint in range(structure.robot.joint_count)

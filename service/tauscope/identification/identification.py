@@ -222,7 +222,6 @@ def identify(
 
 
 def _require_joints(robot: Robot, recordings: Sequence[Recording]) -> None:
-    """Refuse recordings of another number of joints."""
     for recording in recordings:
         if recording.joint_count != robot.joint_count:
             raise RecordingMismatchError(
@@ -232,7 +231,6 @@ def _require_joints(robot: Robot, recordings: Sequence[Recording]) -> None:
 
 
 def _estimate(motions: Dataset, options: Options, progress: Progress) -> _Estimates:
-    """Terms of the model, the free estimate, and the most probable bodies."""
     progress("choose model terms")
     structure, shapes, factors = choose_model(motions, motions.robot, motions.base, rotor_inertia=options.rotor_inertia)
     progress("estimate parameters")
@@ -255,7 +253,6 @@ def _moving_noise(found: _Estimates, fit: Fit) -> Array:
 
 @contextmanager
 def _naming(recordings: Sequence[Recording]) -> Iterator[None]:
-    """Put the recordings' names before the message of what they could not answer."""
     try:
         yield
     except IdentificationError as error:
@@ -263,7 +260,6 @@ def _naming(recordings: Sequence[Recording]) -> Iterator[None]:
 
 
 def _identifiable(found: _Estimates, covariance: Array) -> tuple[dict[str, bool], ...]:
-    """Per joint, which coefficients and shape constants the data can tell."""
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     described = []
     for joint, (factor, shape) in enumerate(zip(found.factors, found.shapes, strict=True)):

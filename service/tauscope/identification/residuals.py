@@ -85,7 +85,6 @@ class ResidualStatistics:
 
 
 def _low_power(model: Autoregression) -> float:
-    """Power of a residual at low frequency."""
     return model.variance * model.long_run_ratio
 
 

@@ -298,19 +298,9 @@ def _rotors(result: Identification) -> list[RotorEntry]:
 
 
 def _link(link: LinkInertia) -> LinkEntry:
-    inertia = link.inertia
-    return LinkEntry(
-        mass=float(link.mass),
-        first_moment=_floats(link.first_moment),
-        inertia=InertiaEntry(
-            xx=float(inertia[0, 0]),
-            yy=float(inertia[1, 1]),
-            zz=float(inertia[2, 2]),
-            xy=float(inertia[0, 1]),
-            xz=float(inertia[0, 2]),
-            yz=float(inertia[1, 2]),
-        ),
-    )
+    xx, yy, zz, xy, xz, yz = _floats(link.to_vector()[:6])
+    inertia = InertiaEntry(xx=xx, yy=yy, zz=zz, xy=xy, xz=xz, yz=yz)
+    return LinkEntry(mass=float(link.mass), first_moment=_floats(link.first_moment), inertia=inertia)
 
 
 def _fit(fit: Fit, predicted: np.ndarray | None = None) -> FitEntry:

@@ -104,7 +104,6 @@ def _normal_equations(
     weight: Array,
     shapes: Sequence[ShapeParameter],
 ) -> tuple[Array, Array]:
-    """Gram matrix and right-hand side of coefficients and shape constants together."""
     size = structure.size + len(shapes)
     gram, target = np.zeros((size, size)), np.zeros(size)
     for prepared in motions:

@@ -102,7 +102,6 @@ def _estimate(structure: ModelStructure, factors: tuple[JointFactor, ...], ratio
 
 
 def _turn(factor: JointFactor, sign: float) -> JointFactor:
-    """The equations of a joint for its torque times ±1."""
     return replace(factor, triangle=np.column_stack([factor.triangle[:, :-1], sign * factor.triangle[:, -1]]))
 
 

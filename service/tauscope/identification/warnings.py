@@ -88,7 +88,6 @@ def _signs(result: Identification) -> Iterator[ResultWarning]:
 
 
 def _scale(result: Identification) -> Iterator[ResultWarning]:
-    """Torque that is far from what the stated masses weigh."""
     scale = result.gravity_scale
     if scale is not None and not result.reversed_joints and not 1.0 / FAR_OFF < scale < FAR_OFF:
         yield ResultWarning(
@@ -99,7 +98,6 @@ def _scale(result: Identification) -> Iterator[ResultWarning]:
 
 
 def _bodies(result: Identification) -> Iterator[ResultWarning]:
-    """A free estimate that no body can have."""
     if result.constrained:
         yield ResultWarning(
             code="no-body",

@@ -152,7 +152,6 @@ def measure_gaps(recording: Recording, measures: RowMeasures) -> Gaps:
 
 
 def _measure_ranges(running: _Running, block: Array) -> None:
-    """Least, greatest and missing values of every column."""
     running.missed += np.isnan(block).sum(axis=0)
     running.least = np.fmin(running.least, np.fmin.reduce(block, axis=0))
     running.greatest = np.fmax(running.greatest, np.fmax.reduce(block, axis=0))

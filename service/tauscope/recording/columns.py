@@ -112,7 +112,6 @@ def _is_ours(header: Sequence[str]) -> bool:
 
 
 def _note_command(header: Sequence[str], renamed: Sequence[str]) -> tuple[ResultWarning, ...]:
-    """A warning where the effort is a command and no measurement."""
     column = next((name for name, target in zip(header, renamed, strict=True) if target == "tau1"), "tau1")
     role = None if column == "tau1" else role_of(words_of(column))
     if role is None or role[0] != "taucmd":
@@ -230,7 +229,6 @@ def _joint_count(joints: dict[str, list[int]], effort_kind: EffortKind, header: 
 def _order_names(
     joints: dict[str, list[int]], effort_kind: EffortKind, joint_count: int, where: dict[str, int], file: str
 ) -> tuple[str, ...]:
-    """Columns in the order in which a table keeps them."""
     names = list(table_columns(joint_count, effort_kind))
     for group in OPTIONAL_GROUPS:
         for joint in joints[group] if group != effort_kind.value else ():

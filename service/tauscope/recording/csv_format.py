@@ -120,7 +120,6 @@ def _read_header(file: BinaryIO, name: str, reading: Reading) -> _Header:
 
 
 def _find_units(cells: Sequence[bytes], layout: ColumnLayout) -> dict[str, str] | None:
-    """Units in the row below the names, None where it is none."""
     if len(cells) != layout.width or any(map(is_number, cells)):
         return None
     return read_units_row(layout.names, [_decode(cells[index]) for index in layout.source])
@@ -225,7 +224,6 @@ def _count_lines(text: bytes) -> int:
 
 
 def _parse_chunk(chunk: _Chunk, header: _Header, name: str, *, is_first: bool) -> tuple[Array, Sequence[int]]:
-    """The rows of a chunk and the line on which each stands."""
     layout = header.layout
     source = layout.source if layout.nanoseconds is None else (*layout.source, layout.nanoseconds)
     normal = header.dialect.normalize(chunk.text)

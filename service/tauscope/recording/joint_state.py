@@ -86,7 +86,6 @@ class JointStateLayout:
         return JointStates(seconds * _NANOSECONDS + nanoseconds, self.first.names, *arrays)
 
     def _column(self, raw: NDArray[np.uint8], at: int, kind: str, count: int) -> NDArray[np.generic]:
-        """`count` numbers of every message, found at byte `at`."""
         dtype = np.dtype(self._order + kind)
         block = np.ascontiguousarray(raw[:, at : at + count * dtype.itemsize])
         return block.view(dtype) if count else np.empty((len(raw), 0))
@@ -198,7 +197,6 @@ def _json_array(value: object, field: str) -> Array:
 
 
 def _decode(cursor: CdrCursor) -> JointState:
-    """Read the fields in the order of the message definition."""
     stamp = cursor.stamp()
     cursor.string()  # frame_id
     names = tuple(cursor.string() for _ in range(cursor.length()))

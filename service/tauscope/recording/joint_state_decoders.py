@@ -61,7 +61,6 @@ def _all(message: bytes, number: int) -> Sequence[bytes]:
 
 
 def _fields(message: bytes) -> Iterator[tuple[int, Value]]:
-    """Fields of a message in the wire format: number and value."""
     at = 0
     while at < len(message):
         key, at = _varint(message, at)
@@ -83,7 +82,6 @@ def _fields(message: bytes) -> Iterator[tuple[int, Value]]:
 
 
 def _varint(message: bytes, at: int) -> tuple[int, int]:
-    """A number of variable length, and where it ends."""
     value = shift = 0
     while True:
         if at >= len(message) or shift > 63:
@@ -95,7 +93,6 @@ def _varint(message: bytes, at: int) -> tuple[int, int]:
 
 
 def _double(value: Value | None) -> float:
-    """A float64; NaN where the field is absent."""
     if value is None:
         return np.nan
     return float(struct.unpack("<d", _require_bytes(value))[0])

@@ -75,7 +75,6 @@ class OtherPublishers:
 
 
 def _messages(count: int) -> str:
-    """A count of messages, up to the verb."""
     return "1 message holds" if count == 1 else f"{count} messages hold"
 
 
@@ -236,7 +235,6 @@ class JointStateTopic:
         return True
 
     def _arrange(self, states: JointStates) -> JointStates:
-        """Messages with the wanted joints in their order."""
         names = states.names
         if self._wanted is None or not names or names == self._wanted:
             return states

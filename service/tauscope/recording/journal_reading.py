@@ -133,7 +133,6 @@ class _Collector:
 
 
 def _decode(messages: list[bytes]) -> JointStates:
-    """Joint states that were all written with one layout."""
     states = JointStateLayout(messages[0]).decode(messages)
     if states is None:
         raise RecordingError("its joint states change their layout")

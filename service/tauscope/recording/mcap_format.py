@@ -319,7 +319,6 @@ def _read_whole(path: Path, log: JointStateLog) -> str | None:
 
 
 def _count(samples: int) -> str:
-    """A count of samples in words."""
     return {0: "no sample", 1: "1 sample"}.get(samples, f"{samples} samples")
 
 

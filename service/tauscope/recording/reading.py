@@ -95,7 +95,6 @@ def first_bytes(path: Path, name: str) -> bytes:
 
 
 def _count_bytes(path: Path) -> int:
-    """Size of a file, or of the files of a folder [bytes]."""
     return sum(file.stat().st_size for file in path.iterdir()) if path.is_dir() else path.stat().st_size
 
 

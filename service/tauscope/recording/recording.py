@@ -175,7 +175,6 @@ _ARGUMENTS = {
 
 
 def _joint_of(name: str, group: str) -> int | None:
-    """Joint number of a column of this group, None for other columns."""
     number = name.removeprefix(group)
     return int(number) if number != name and number.isdecimal() else None
 
@@ -189,7 +188,6 @@ def _from_groups(
     groups: Mapping[str, Array],
     period: Array | None,
 ) -> Recording:
-    """Check the arguments one by one and lay them side by side."""
     time = _check("time", time, name, None)
     position = _check("position", position, name, (len(time), None))
     shape = (len(time), position.shape[1])

@@ -132,7 +132,6 @@ class TableBuilder:
         self._data = grown
 
     def _start_spool(self) -> None:
-        """Move what is in memory to a temporary file."""
         try:
             self._spool = SpooledTable(self._names)
         except OSError as error:

@@ -143,7 +143,6 @@ def _cards(entries: Sequence[FindingEntry], joints: Sequence[str]) -> list[Card]
 
 
 def _how_much(document: DiagnosisDocument) -> Section:
-    """Residuals, and what the left-out effects had done to the parameters."""
     parts = [Part(title="Residual rms at the recorded rate", table=residual_table(document))]
     if document.parameter_differences:
         svg = Markup(difference_figure("differences", document))  # noqa: S704 - our own drawing
@@ -161,7 +160,6 @@ def _how_much(document: DiagnosisDocument) -> Section:
 
 
 def _proof(plots: DiagnosisPlots, document: DiagnosisDocument, units: list[str]) -> Section:
-    """Torque of motion that was not seen, before and after."""
     spectra = {spectrum.joint: spectrum for spectrum in plots.spectra}
     held_out = any(overlay.held_out for overlay in plots.overlays)
     parts = []
@@ -190,7 +188,6 @@ def _proof(plots: DiagnosisPlots, document: DiagnosisDocument, units: list[str])
 
 
 def _headroom(document: DiagnosisDocument) -> Iterator[Section]:
-    """What a black box still predicts; nothing where it was not asked for."""
     if document.headroom is None:
         return
     sentence = (

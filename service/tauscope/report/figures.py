@@ -85,7 +85,6 @@ def _cells(own: ResidualHistogram, left: float, top: float, width: float, *, aft
 
 
 def _legend(top: float) -> Iterator[str]:
-    """The shades, from noise to far above it."""
     words = ("noise", *(f"> {level:g} ×" for level in LEVELS))
     x = _LABELS
     for level, word in enumerate(words):
@@ -118,7 +117,6 @@ def parameter_figure(name: str, entries: Sequence[BaseParameterEntry]) -> str:
 
 
 def _draw_panel(axis: Axes, entries: Sequence[BaseParameterEntry]) -> None:
-    """One row a parameter, from the top."""
     places = np.arange(len(entries))
     values = np.array([entry.value for entry in entries])
     reach = DEVIATIONS * np.array([entry.std or 0.0 for entry in entries])
@@ -196,7 +194,6 @@ def difference_figure(name: str, document: DiagnosisDocument) -> str:
 
 
 def _bars(name: str, labels: Sequence[str], values: Sequence[float]) -> str:
-    """One bar a parameter, largest first; within the band nothing has moved."""
     places = np.arange(len(labels))
     shown = [label if len(label) <= LONGEST_SHIFT_LABEL else label[: LONGEST_SHIFT_LABEL - 1] + "…" for label in labels]
 

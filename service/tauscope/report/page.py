@@ -118,7 +118,6 @@ def render(page: Page) -> str:
 
 
 def _printable(value: object) -> object:
-    """Text without characters that are no text."""
     if not isinstance(value, str) or isinstance(value, Markup):
         return value
     return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode("ascii") for c in value)

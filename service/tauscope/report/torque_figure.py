@@ -46,7 +46,6 @@ def proof_figure(name: str, overlay: TorqueOverlay, spectrum: ResidualSpectrum |
 
 
 def _draw_spectrum(axis: Axes, spectrum: ResidualSpectrum | None, unit: str) -> None:
-    """Residual's density without and with the findings, and the noise's."""
     axis.set_title("residual spectrum", color=INK)
     if spectrum is None:
         axis.text(0.5, 0.5, "motion too short", ha="center", va="center", transform=axis.transAxes, color=MUTED)
@@ -116,7 +115,6 @@ def worst_part(residual: Array, share: float) -> slice:
 
 
 def _draw_torque(axis: Axes, series: TorqueSeries, joint: int, rows: slice, most: int) -> None:
-    """Measured below, predicted above."""
     time = series.time[rows]
     measured, predicted = series.measured[rows, joint], series.predicted[rows, joint]
     kept = envelope_indices(measured, most)

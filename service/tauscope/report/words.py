@@ -109,7 +109,6 @@ def _level(ratio: float) -> str:
 
 
 def _about_held_out(document: IdentificationDocument) -> Iterator[str]:
-    """Joints whose model does not carry over to other motion."""
     if document.fit.held_out is None:
         return
     pairs = zip(document.joints, document.fit.train.rms, document.fit.held_out.rms, strict=True)

@@ -80,7 +80,6 @@ class DocumentOrigin:
         raise self.error(place, text + more)
 
     def _word(self, detail: ErrorDetails) -> tuple[Place, str]:
-        """Place and words of one of pydantic's errors."""
         place: Place = tuple(detail["loc"])
         key = detail.get("ctx", {}).get("key")
         if key is not None:
@@ -105,7 +104,6 @@ class DocumentOrigin:
         return ""
 
     def _joint_name(self, index: int) -> str | None:
-        """Name of a joint in the data, as far as the data have the right form."""
         joints = self.data.get("joints") if isinstance(self.data, Mapping) else None
         if not isinstance(joints, list) or index >= len(joints) or not isinstance(joints[index], Mapping):
             return None
@@ -167,7 +165,6 @@ class KinematicsDocument(Document):
 
     @model_validator(mode="after")
     def _check_one(self) -> Self:
-        """Exactly one description."""
         known = type(self).model_fields
         given = [name for name in known if getattr(self, name) is not None]
         if len(given) != 1:
@@ -321,7 +318,6 @@ class RecordingDocument(Document):
 
     @model_validator(mode="after")
     def _check_layout(self) -> Self:
-        """Columns, units and separators that are known."""
         columns = find_column_fault(self.columns)
         if columns is not None:
             raise refusal(columns, "columns")
@@ -365,7 +361,6 @@ class RobotDocument(Document):
 
     @model_validator(mode="after")
     def _check_locked(self) -> Self:
-        """Rows of dh or mdh hold moving joints only."""
         if self.locked and self.kinematics.urdf is None and self.kinematics.mjcf is None:
             raise refusal("needs kinematics from a URDF or MJCF; put the fixed joint into the rows instead", "locked")
         return self

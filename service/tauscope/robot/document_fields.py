@@ -38,7 +38,6 @@ class Document(StrictModel):
 
 
 def _number(value: Any) -> float:
-    """A finite number of a size that SI quantities of an arm have."""
     if isinstance(value, str):
         raise refusal(f"{shown(value)} is text; write a number without quotes and without a unit")
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -98,7 +97,6 @@ def choice(key: str, known: Iterable[str]) -> BeforeValidator:
 
 
 def _text(value: Any) -> str:
-    """Text that may be blank."""
     if not isinstance(value, str) or not value:
         raise refusal(f"must be text, but is {shown(value)}; put it in quotes")
     return value
@@ -129,7 +127,6 @@ def _motion(value: Any) -> JointType:
 
 
 def _range(value: list[float]) -> list[float]:
-    """A lower and an upper bound, in this order."""
     if len(value) != 2:
         raise refusal(f"must be two numbers [lower, upper], but holds {len(value)}")
     lower, upper = value
@@ -147,7 +144,6 @@ def _vector(value: list[float]) -> list[float]:
 
 
 def _rotation(value: list[list[float]]) -> list[list[float]]:
-    """A right-handed orthonormal matrix, row by row."""
     if [len(row) for row in value] != [3, 3, 3]:
         raise refusal("must be three rows of three numbers")
     gram = [[sum(a * b for a, b in zip(p, q, strict=True)) for q in value] for p in value]
@@ -160,7 +156,6 @@ def _rotation(value: list[list[float]]) -> list[list[float]]:
 
 
 def _plain(value: Any, depth: int = 0) -> Any:
-    """Data that JSON can hold, in plain containers."""
     if depth > DEEPEST_DRIVE:
         raise refusal(f"is nested deeper than {DEEPEST_DRIVE} levels")
     if isinstance(value, float) and not math.isfinite(value):

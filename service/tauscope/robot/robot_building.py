@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Protocol, cast
+from typing import cast
 
 import numpy as np
 
@@ -48,17 +48,8 @@ from tauscope.robot.urdf import read_urdf_chain
 ENTRY_POINT_GROUP = "tauscope.mjcf"
 
 
-class MjcfReader(Protocol):
-    """Compiles an MJCF and reads the chain between two of its bodies."""
-
-    def __call__(
-        self, data: bytes, label: str, path: Path | None, base: str | None, tip: str | None, locked: Mapping[str, float]
-    ) -> Chain:
-        """The chain from body `base` to body `tip`.
-
-        Raises RobotFileError if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip.
-        """
-        ...
+# Compiles an MJCF and reads the chain between two of its bodies, as `read_mjcf_chain` does.
+MjcfReader = Callable[[bytes, str, Path | None, str | None, str | None, Mapping[str, float]], Chain]
 
 
 def read_mjcf_chain(
@@ -156,7 +147,6 @@ def _gravity(document: RobotDocument, chain: Chain | None) -> np.ndarray:
 
 
 def _kinematics(document: RobotDocument, origin: DocumentOrigin, file_source: FileSource) -> _Kinematics:
-    """Segments of whichever description the document holds."""
     kinematics = document.kinematics
     if kinematics.dh is not None:
         return _Kinematics(standard_segments(_rows(kinematics.dh)), "dh")
@@ -264,7 +254,6 @@ def _model(
 def _links(
     documents: list[LinkDocument], origin: DocumentOrigin, findings: list[Finding]
 ) -> tuple[tuple[LinkInertia, ...], tuple[Repair, ...]]:
-    """Links of the model block as bodies, and which of them were none."""
     links, repairs = [], []
     for index, document in enumerate(documents):
         stated, place = _link(document), origin.where(("model", "links", index))

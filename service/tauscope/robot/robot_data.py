@@ -55,7 +55,6 @@ def robot_to_dict(robot: Robot) -> dict[str, Any]:
 
 
 def _find_given(origin: DocumentOrigin, files: Mapping[str, bytes]) -> FileSource:
-    """Looks a file up among the given ones."""
 
     def look_up(kind: str, file: str) -> SourceFile:
         if file not in files:
@@ -82,7 +81,6 @@ def _placement(placement: Placement) -> dict[str, Any]:
 
 
 def _joint(joint: Joint) -> dict[str, Any]:
-    """A joint as a mapping, without what is not stated."""
     limits = {
         "position": None if joint.limits.position is None else list(joint.limits.position),
         "velocity": joint.limits.velocity,

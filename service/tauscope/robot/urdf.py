@@ -334,7 +334,6 @@ def _branch(label: str, members: list[_Body]) -> LinkInertia:
 
 
 def _branch_notes(tree: UrdfTree, branches: list[UrdfJoint], motions: JointMotions) -> list[ResultWarning]:
-    """The note on joints beside the chain, which count as rigid."""
     assumed = [joint for joint in branches if not motions.is_locked(joint)]
     mass = sum(stated_mass(tree, joint.child) for joint in _outermost(tree, assumed))
     if not mass > 0.0:
@@ -344,7 +343,6 @@ def _branch_notes(tree: UrdfTree, branches: list[UrdfJoint], motions: JointMotio
 
 
 def _outermost(tree: UrdfTree, joints: list[UrdfJoint]) -> list[UrdfJoint]:
-    """Joints that hang on none of the others."""
     names = {joint.name for joint in joints}
     return [joint for joint in joints if not any(above.name in names for above in _up(tree, joint.parent, None) or ())]
 

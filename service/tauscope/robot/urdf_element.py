@@ -108,7 +108,6 @@ def _real(label: str, element: Element, key: str, text: str) -> float:
 
 
 def _require_bounded(label: str, element: Element, key: str, value: float) -> float:
-    """A number of a size that SI quantities of an arm have."""
     if abs(value) > LARGEST_NUMBER:
         raise urdf_error(label, element, f"{key}={value:g} is beyond {LARGEST_NUMBER:g}; check the unit (SI)")
     return value

@@ -118,7 +118,6 @@ class _PlainBuilder:
         raise self._error(line, f"the tag {shown(str(node.tag))} is not accepted; write plain data")
 
     def _mapping(self, node: MappingNode, place: Place) -> dict[str, Any]:
-        """Plain dict of a mapping node; a key may stand once."""
         result: dict[str, Any] = {}
         for key_node, value_node in node.value:
             line = key_node.start_mark.line + 1
@@ -134,7 +133,6 @@ class _PlainBuilder:
         return result
 
     def _scalar(self, node: ScalarNode, line: int) -> Any:
-        """Plain data of a scalar node, by the tag that YAML resolved."""
         kind, text = str(node.tag).removeprefix(TAG), str(node.value)
         if kind in {"str", "timestamp", "value"}:
             return text

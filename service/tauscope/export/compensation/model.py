@@ -52,7 +52,6 @@ def drive_units(joint: Joint, effort_kind: EffortKind) -> DriveUnits:
 
 
 def _milliampere(joint: Joint, effort_kind: EffortKind) -> tuple[float | None, str]:
-    """Joint torque per mA, and a remark."""
     if effort_kind is not EffortKind.CURRENT:
         return None, "mA not known: the recording holds torque, so no torque constant in Nm per A was used"
     constant = joint.torque_constant
@@ -67,7 +66,6 @@ def _milliampere(joint: Joint, effort_kind: EffortKind) -> tuple[float | None, s
 
 
 def _permille(joint: Joint) -> tuple[float | None, str]:
-    """Joint torque per mille of rated torque, and a remark."""
     rated = (joint.drive or {}).get(_RATED_TORQUE)
     if rated is None:
         return None, f"per mille of rated torque not known: the robot file states no drive.{_RATED_TORQUE}"

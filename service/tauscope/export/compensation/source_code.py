@@ -87,7 +87,6 @@ def row(joint: JointCompensation) -> tuple[float, ...]:
 
 
 def _joint_line(number: int, joint: JointCompensation) -> str:
-    """A joint's number, name and units in one line."""
     kind = "prismatic" if joint.type is JointType.PRISMATIC else "revolute"
     return f"Joint {number}: {joint.name} ({kind}). " + " ".join(f"{remark}." for remark in joint.units.remarks)
 

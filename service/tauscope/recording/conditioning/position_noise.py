@@ -179,7 +179,6 @@ def encoder_step(positions: Sequence[Array]) -> Array:
 
 
 def _smallest_difference(values: Array) -> float:
-    """Smallest difference within one joint's positions."""
     differences = np.diff(np.sort(values))
     differences = differences[differences > 8.0 * np.spacing(np.abs(values).max(initial=0.0))]
     return float(differences.min(initial=np.inf)) if len(differences) else 0.0

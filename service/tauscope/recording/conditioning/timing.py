@@ -279,7 +279,6 @@ def _is_last_digit(median_s: float, interval: Array) -> bool:
 
 
 def _longest_bridge(typical_s: float) -> float:
-    """Longest interval that is bridged [s]."""
     longest = max(min(BRIDGED_SAMPLES * typical_s, LONGEST_BRIDGE_S), BRIDGED_SECONDS)
     return max(min(longest, MOST_BRIDGED_SAMPLES * typical_s), FEWEST_BRIDGED_SAMPLES * typical_s)
 

@@ -174,7 +174,6 @@ def _is_gap(recording: Recording, run: tuple[int, int]) -> bool:
 
 
 def _moves(recording: Recording, run: tuple[int, int]) -> bool:
-    """Whether the arm moves in a run, read block by block."""
     blocks = (recording.samples(row, min(row + BLOCK_ROWS, run[1])) for row in range(*run, BLOCK_ROWS))
     return any(is_moving(block.position) for block in blocks)
 

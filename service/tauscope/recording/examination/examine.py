@@ -54,7 +54,6 @@ def _build_edits(recording: Recording, defects: Defects) -> dict[int, ColumnEdit
 
 
 def _describe_defects(recording: Recording, defects: Defects, joints: Sequence[str | None]) -> Iterator[ResultWarning]:
-    """A warning about each kind of defect of each joint."""
 
     def begin(row: int) -> str:
         return f"first at t = {recording.samples(row, row + 1).time[0]:.6g} s"
@@ -86,7 +85,6 @@ def _describe_defects(recording: Recording, defects: Defects, joints: Sequence[s
 def _describe_joint(
     joint: JointDefects, begin: Callable[[int], str]
 ) -> Iterator[tuple[Literal["q", "effort"], str, str, str | None]]:
-    """Column, code, text and remedy of each kind of defect of one joint."""
     if joint.wraps:
         first, times = min(joint.wraps)[0], "once" if len(joint.wraps) == 1 else f"{len(joint.wraps)} times"
         yield "q", "wrapped-angle", f"wraps by 2π {times}, {begin(first)}; unwrapped", None

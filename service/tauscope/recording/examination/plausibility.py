@@ -114,7 +114,6 @@ def _velocity_ratios(sketch: Sketch) -> np.ndarray:
 
 
 def _name_foreign_units(time: str, position: str, speed: str) -> list[str]:
-    """The units that are not SI, in words."""
     words = (
         "" if time == "s" else f"{time} to s",
         "" if position in SI_LENGTHS else f"{position} to {'m' if position == 'mm' else 'rad'}",
@@ -266,7 +265,6 @@ def find_implausible_torque(recording: Recording, sketch: Sketch, robot: Robot |
 
 
 def _find_missing_constant(robot: Robot) -> str | None:
-    """Current that nothing turns into torque."""
     for number, joint in enumerate(robot.joints, 1):
         if not joint.has_torque_constant and joint.torque_constant == 1.0:
             return (
@@ -334,7 +332,6 @@ def _find_magnitude(recording: Recording, sketch: Sketch) -> str | None:
 
 
 def _find_excess(sketch: Sketch, robot: Robot | None) -> str | None:
-    """Torque beyond limits, or beyond gravity's on the stated masses."""
     effort = sketch.effort
     peak = percentile(np.abs(effort), 99.0)
     mend = "read current with --units tau=mA (or tau=A), and state torque_constant in the robot file"

@@ -77,7 +77,6 @@ def scan_position(
 
 
 def _returns(surprise: Array, a: int, b: int) -> bool:
-    """Whether a second step takes a first one back."""
     out, back = float(surprise[a]), float(surprise[b])
     return abs(out + back) < RETURN * max(abs(out), abs(back))
 

@@ -273,5 +273,4 @@ def _measure_holds(pieces: list[Array]) -> tuple[float, int, int]:
 
 
 def _percentile(values: Array, share: float) -> float:
-    """A percentile, 0 of nothing."""
     return float(np.percentile(values, share)) if len(values) else 0.0

@@ -157,7 +157,6 @@ class _Scan:
         return defects
 
     def _keep(self, joint: int, name: str, rows: Numbers, core: tuple[int, int]) -> None:
-        """Keep the rows that are a block's own."""
         own = rows[(rows >= core[0]) & (rows < core[1])]
         if len(own):
             self.found.setdefault((joint, name), []).append(own)

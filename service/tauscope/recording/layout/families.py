@@ -159,7 +159,6 @@ def _find_numbered(header: Sequence[str]) -> list[Family]:
 
 
 def _find_named_families(header: Sequence[str], joint_names: Sequence[str]) -> list[Family]:
-    """Families that name every joint of the robot."""
     patterns = {
         name: re.compile(f"(?<![A-Za-z0-9]){re.escape(name)}(?![A-Za-z0-9])")
         for name in sorted(joint_names, key=len, reverse=True)

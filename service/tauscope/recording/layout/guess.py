@@ -145,5 +145,4 @@ def _source(family: Family, count: int | None) -> Source:
 
 
 def _unit(current: Family | None) -> str | None:
-    """The unit of currents, where their name states one."""
     return None if current is None else unit_of(current.template)

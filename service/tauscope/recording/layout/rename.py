@@ -42,7 +42,6 @@ def rename_columns(header: Sequence[str], reading: Reading, file: str) -> list[s
 
 
 def _preset_columns(header: Sequence[str], preset: str, reading: Reading, file: str) -> Mapping[str, Source]:
-    """The mapping of a preset for this header."""
     layout = guess_layout(header, reading.joint_names, preset=preset, prefers_torque=reading.prefers_torque)
     _require_as_many(header, preset, layout, reading, file)
     if layout is None:
@@ -117,7 +116,6 @@ class _Mapping:
         raise RecordingError(f"{self._file}: columns: {target}: {self._absence(name)}")
 
     def _group(self, group: str, source: Source) -> Sequence[str | int]:
-        """One column a joint."""
         if not isinstance(source, str | int):
             return source
         template = str(source)
@@ -162,14 +160,12 @@ class _Mapping:
         return bool(names_in(self._header, template.replace("{0}", BY_NAME)))
 
     def _absence(self, name: str) -> str:
-        """A column that is not there, and those that are."""
         near = difflib.get_close_matches(name, self._header, 1)
         hint = f"did you mean {printable(near[0])}?" if near else f"the columns are {listed(self._header)}"
         return f"no column is named {printable(name)}; {hint}"
 
 
 def _split(target: str) -> tuple[str, str]:
-    """Group and number of a column of CONTRACT.md."""
     match = _TARGET.fullmatch(target)
     return (match[1], match[2]) if match else (target, "")
 
