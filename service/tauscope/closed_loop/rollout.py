@@ -30,10 +30,8 @@ from tauscope.closed_loop.result import (
 )
 from tauscope.errors import RecordingMismatchError
 from tauscope.export.model import ExportModel
-from tauscope.recording import EffortKind, Recording
-from tauscope.recording.columns import table_columns
-from tauscope.recording.recording import Array
-from tauscope.recording.table import MemoryTable
+from tauscope.recording import Recording
+from tauscope.recording.recording import Array, take_commands
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import Actuator, Robot
 
@@ -181,7 +179,7 @@ def _models(robot: Robot, exports: Sequence[ExportModel]) -> list[RolloutModel]:
 def _complete_loops(robot: Robot, recordings: Sequence[Recording], known: Robot | None) -> tuple[Robot, bool]:
     """The robot with delays of its loops, and whether loops can close: commands of all joints are there."""
     loops = [joint.actuator for joint in robot.joints]
-    commands = [_take_commands(recording) for recording in recordings]
+    commands = [take_commands(recording) for recording in recordings]
     if not all(loop is not None and loop.has_loop for loop in loops) or any(each is None for each in commands):
         return robot, False
     others = [None] * len(loops) if known is None else [joint.actuator for joint in known.joints]
@@ -215,19 +213,6 @@ def _fill(loop: Actuator, known: Actuator) -> Actuator:
     )
 
 
-def _take_commands(recording: Recording) -> Recording | None:
-    """The recording with its commands in place of effort; None where a joint has none."""
-    if recording.effort_kind is EffortKind.COMMAND:
-        return recording
-    names, first = recording.table.names, table_columns(recording.joint_count, EffortKind.COMMAND)
-    if not set(first) <= set(names):
-        return None
-    lost = recording.effort_kind.value
-    kept = (*first, *(name for name in names if name not in first and name.rstrip("0123456789") != lost))
-    rows = recording.table.rows(0, len(recording))[:, [names.index(name) for name in kept]]
-    return replace(recording, effort_kind=EffortKind.COMMAND, table=MemoryTable(kept, rows))
-
-
 def _drive(
     robot: Robot, recording: Recording, motion: RecordedMotion, model: RolloutModel, loops: tuple[Actuator, ...]
 ) -> Drive:
@@ -246,7 +231,7 @@ def _refine(
     model: ExportModel | None, loops: tuple[Actuator, ...], training: Sequence[Recording], progress: Progress
 ) -> Refined:
     """The refined model. Raises RecordingMismatchError where no commands reach loops."""
-    commands = [_take_commands(recording) for recording in training]
+    commands = [take_commands(recording) for recording in training]
     lacking = [recording.name for recording, each in zip(training, commands, strict=True) if each is None]
     if not loops or model is None or lacking:
         raise RecordingMismatchError(

@@ -267,8 +267,9 @@ def _links(
 
 def _link(document: LinkDocument) -> LinkInertia:
     i = document.inertia
-    inertia = np.array([[i.xx, i.xy, i.xz], [i.xy, i.yy, i.yz], [i.xz, i.yz, i.zz]])
-    return LinkInertia(document.mass, np.array(document.first_moment), inertia)
+    return LinkInertia.from_vector(
+        np.array([i.xx, i.yy, i.zz, i.xy, i.xz, i.yz, document.mass, *document.first_moment])
+    )
 
 
 def _check_count(origin: DocumentOrigin, place: tuple[str, ...], found: int, count: int, key: str) -> None:
