@@ -111,7 +111,6 @@ def is_moving(position: Array) -> bool:
 DROP = 10.0  # multiple of the usual change from row to row by which one joint's effort falls to zero, and comes back
 COMMON_DROP = 2.0  # the same of at least one joint, where the efforts of all joints are exactly zero at once
 COMMON_ROWS = 3  # rows, at least, in which noisy efforts of all joints are exactly zero by no accident
-OPEN_ROWS = 10  # rows of a dropout, at least, that reaches to the beginning or the end of the recording
 MOST_RUNS = 100_000  # runs of zero of one joint beyond which zero is a value like any other
 
 
@@ -143,7 +142,7 @@ class ZeroRuns:
         return any(0 < scale.run <= USUAL_RUN * scale.hold and scale.change > 0.0 for scale in self._scales)
 
     def find_dropouts(self, recording: Recording) -> list[Rows]:
-        """Ranges of rows that are dropouts, of every joint, (k, 2)."""
+        """Ranges of rows that are dropouts, of every joint, (k, 2); they may overlap."""
         change = np.array([scale.change for scale in self._scales])
         *own, common = ([] if len(runs) > MOST_RUNS else runs for runs in self._runs)
         shared = [
@@ -154,10 +153,7 @@ class ZeroRuns:
         ]
         lost = [set(shared) for _ in own]
         for joint, runs in enumerate(own):
-            for run in runs:
-                overlaps = any(run[0] < stop and start < run[1] for start, stop in shared)
-                if not overlaps and _measure_drops(recording, run)[joint] > DROP * change[joint]:
-                    lost[joint].add(run)
+            lost[joint].update(run for run in runs if _measure_drops(recording, run)[joint] > DROP * change[joint])
         return [np.array(sorted(ranges), dtype=np.int64).reshape(-1, 2) for ranges in lost]
 
 
@@ -169,8 +165,7 @@ def _is_gap(recording: Recording, run: tuple[int, int]) -> bool:
     start, stop = run
     if start > 0 and stop < len(recording):
         return True
-    is_whole = start == 0 and stop == len(recording)
-    return not is_whole and stop - start >= OPEN_ROWS and not _moves(recording, run)
+    return stop - start < len(recording) and not _moves(recording, run)
 
 
 def _moves(recording: Recording, run: tuple[int, int]) -> bool:

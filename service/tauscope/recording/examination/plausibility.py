@@ -73,10 +73,8 @@ def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> str | None:
         for q in positions
         for v in speeds
     ]
-    # Of equal ratios the one with fewest units other than SI: that of q and qd both in degrees is 1.
-    deviation, time, position, speed = min(
-        fits, key=lambda f: (f[0] > SAME_RATIO, len(_name_foreign_units(*f[1:])), f[0])
-    )
+    # Of equal ratios the first, which is in SI: that of q and qd both in degrees is 1.
+    deviation, time, position, speed = min(fits, key=lambda fit: fit[0])
     evidence = f"Δq/Δt is {typical:.3g} times column qd{joint + 1}"
     if deviation <= SAME_RATIO:
         column = "t" if time != "s" else f"q{joint + 1}" if position not in SI_LENGTHS else f"qd{joint + 1}"

@@ -15,7 +15,6 @@ WINDOWS = 8
 WINDOW_ROWS = 1 << 13  # rows of one window; a recording of at most `WINDOWS` of them is looked at whole
 RANKED_ROWS = 4096  # rows of which a percentile is taken
 BURST = 0.1  # share of the mean step below which the usual step is one within a burst, as buffers are emptied
-BREAK = 2.5  # steps of the clock above this many medians are gaps, across which nothing is differenced
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +66,11 @@ class Sketch:
 
     @cached_property
     def slope(self) -> Array:
-        """Δq/Δt over two steps about every inner row of the windows, NaN across gaps, (N, n)."""
+        """Δq/Δt over two steps about every inner row of the windows, NaN within bursts, (N, n)."""
         parts = []
         for window in self.windows:
             elapsed = window.time[2:] - window.time[:-2]
-            elapsed = np.where((elapsed > self.interval) & (elapsed < 2.0 * BREAK * self.interval), elapsed, np.nan)
+            elapsed = np.where(elapsed > self.interval, elapsed, np.nan)
             parts.append((window.position[2:] - window.position[:-2]) / elapsed[:, None])
         return np.concatenate(parts)
 

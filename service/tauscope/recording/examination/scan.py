@@ -153,7 +153,7 @@ class _Scan:
         if len(defects.bunched) > MOST_BUNCHED * len(recording):
             defects.bunched = NO_NUMBERS
         for joint, ranges in zip(defects.joints, self.zeros.find_dropouts(recording), strict=True):
-            joint.rows["zeros"] = row_numbers(ranges)
+            joint.rows["zeros"] = np.unique(row_numbers(ranges))
         return defects
 
     def _keep(self, joint: int, name: str, rows: Numbers, core: tuple[int, int]) -> None:
