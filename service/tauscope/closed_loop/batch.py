@@ -75,7 +75,6 @@ def simulate_segments(robot: Robot, loops: Sequence[Actuator], segments: Segment
 def _drive(
     loops: Sequence[Actuator], segments: Segments, step: int, position: Array, velocity: Array, slope: Array
 ) -> Array:
-    """Torque of the loops, (n, S, V)."""
     torque = np.empty_like(position)
     for joint, loop in enumerate(loops):
         channels = (segments.voltage, segments.gain, segments.temperature)
@@ -90,7 +89,6 @@ def _drive(
 
 
 def _dynamics(robot: Robot, links: Array, position: Array, velocity: Array) -> tuple[Array, Array]:
-    """Mass matrix (n, n, S, V) and torque without acceleration (n, S, V)."""
     joints, count, number = position.shape
     q, qd = (values.reshape(joints, -1).T for values in (position, velocity))
     zero = np.zeros_like(q)

@@ -110,7 +110,6 @@ class JointLaws:
         return np.maximum(level - self._held, 0.0), torque
 
     def _evaluate(self, position: Array, velocity: Array, load: Array, step: Array) -> Array:
-        """Torque of all effects for a sign of the velocity, (n,)."""
         now = replace(
             self._signals,
             position=position[:, None],

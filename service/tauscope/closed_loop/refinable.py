@@ -87,7 +87,6 @@ class RefinableModel:
         return terms
 
     def _warmth_terms(self) -> list[Term]:
-        """Loss of torque per volt, where temperatures were recorded and nothing states it."""
         loss = Term("loss of torque per volt", "1/K", WARM_LOSS, WARM_LOSS_STD, WARM_LOSS_STD)
         return [loss] if self._is_warmed else []
 
@@ -102,7 +101,6 @@ class RefinableModel:
         return np.nan_to_num(np.clip(found - self.segments.position[..., None], -LOST, LOST), nan=LOST)
 
     def _variants(self, values: Array) -> Variants:
-        """Models of parameters (V, P)."""
         number, joints, law = len(values), len(self._rotor), self._model.friction
         bodies = PER_BODY * len(self._bodies)
         links = np.repeat(self._links[None], number, axis=0)
@@ -137,7 +135,6 @@ class RefinableModel:
         return model, LoadFriction(found.driving[0], found.braking[0]), loops
 
     def _warm(self, loop: Actuator, slope: float) -> Actuator:
-        """A loop whose torque per volt is as stated at the mean temperature of the segments."""
         mean = self.segments.mean_temperature
         if not self._is_warmed or mean is None or loop.unit != "register":
             return loop

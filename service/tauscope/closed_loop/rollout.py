@@ -152,7 +152,6 @@ def roll_out(
 
 
 def _models(robot: Robot, exports: Sequence[ExportModel]) -> list[RolloutModel]:
-    """What the robot file states, and the model file without and with its findings."""
     names = [joint.name for joint in robot.joints]
     for export in exports:
         others = [joint.name for joint in export.robot.joints]

@@ -108,7 +108,6 @@ def place_between_springs(
 
 
 def _first(is_so: np.ndarray) -> int:
-    """Index of the first True; the length where there is none."""
     return int(is_so.argmax()) if is_so.any() else len(is_so)
 
 

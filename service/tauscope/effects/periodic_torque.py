@@ -121,7 +121,6 @@ class _Periodic(Effect):
 
     @classmethod
     def _of_orders(cls, context: ArmContext, orders: Callable[[ArmContext, int], Array]) -> Sequence[Effect]:
-        """One a joint where the effect may be and has such orders."""
         found = {joint: orders(context, joint) for joint in cls._places(context)}
         return [
             cls(joint, own[:, None], 0.9 * own[:1], 1.1 * own[-1:], geared=_is_geared(context, joint))

@@ -160,7 +160,6 @@ class ExcitationRegressor:
 
 
 def _slopes(robot: Robot, joint: int, steepest: Array | None) -> tuple[float, ...]:
-    """Steepness of the sign columns of a joint: K_v, and δ where the robot file states it."""
     shape = robot.joints[joint].friction_shape
     k_v = ORDINARY_STEEPNESS if shape.k_v is None else shape.k_v
     if steepest is not None:

@@ -92,12 +92,10 @@ def _size(swing: FourierSegment) -> Array:
 
 
 def _size_in_the_middle(robot: Robot, limits: MotionLimits) -> Array:
-    """Peak speed of every joint where it has as much room as it can have."""
     return _size(_swing(robot, limits.middle, limits, 1.0))
 
 
 def _far_apart(places: Array, admissible: list[int], count: int) -> list[int]:
-    """Places as far from one another as can be had, one after the other."""
     if not admissible or count < 1:
         return []
     distance = np.linalg.norm(places[admissible] - places[admissible].mean(axis=0), axis=1)

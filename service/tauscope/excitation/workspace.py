@@ -149,7 +149,6 @@ class WorkspaceUsage:
         return _Chain(joints, links)
 
     def _places(self, chain: _Chain) -> Array:
-        """Where the points are, (N, points, 3)."""
         places = np.empty((len(chain.links), len(self._points), 3))
         for place, point in enumerate(self._points):
             frame = (chain.joints if point.in_joint_frame else chain.links)[:, point.link]
@@ -178,5 +177,4 @@ class WorkspaceUsage:
 
 
 def _beyond(box: Box, points: Array) -> Array:
-    """How far each coordinate lies outside the box, (…, 3) [m]."""
     return np.abs(points - 0.5 * (box.low + box.high)) - 0.5 * (box.high - box.low)

@@ -99,7 +99,6 @@ def joint_gains(
 
 
 def _choose_gain(values: tuple[float, ...], joint: int) -> float | None:
-    """A gain that is given for all joints or for this one."""
     return None if not values else values[0] if len(values) == 1 else values[joint]
 
 

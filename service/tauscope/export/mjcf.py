@@ -92,7 +92,6 @@ def passive_elements(joint: int, extras: JointExtras, names: list[str]) -> list[
 
 
 def _followers(robot: Robot, names: list[str]) -> list[str]:
-    """Joints that follow another, as equalities."""
     lines: list[str] = []
     own = robot.own_links
     for link, coupling in enumerate(robot.couplings):
@@ -136,7 +135,6 @@ def _body(
 
 
 def _joint(segment: Segment, label: str, model: JointModel, extras: JointExtras, limits: JointLimits) -> str:
-    """The joint element: axis, limits, friction and armature."""
     after = segment.after
     attributes = {
         "type": "slide" if segment.type is JointType.PRISMATIC else "hinge",
@@ -156,7 +154,6 @@ def _joint(segment: Segment, label: str, model: JointModel, extras: JointExtras,
 
 
 def _armature(label: str, model: JointModel) -> float:
-    """The rotor's reflected inertia, 0 where none was identified."""
     armature = 0.0 if model.rotor_inertia is None else float(model.rotor_inertia)
     if not (np.isfinite(armature) and armature >= 0.0):
         text = f"joint {shown(label)}: rotor inertia {armature:g} must be 0 or more; export the consistent model"

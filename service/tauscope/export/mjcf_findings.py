@@ -87,7 +87,6 @@ def add_findings(model: ExportModel, *, without: Collection[str] = ()) -> Additi
 
 
 def _values(found: FoundEffect) -> str:
-    """Equation and values of a finding, for those who add it themselves."""
     named = [*zip(found.effect.coefficients, found.coefficients, strict=True)]
     shaped = [*zip(found.effect.shapes, found.shape, strict=True)]
     values = ", ".join(f"{each.name} = {float(value):.6g}" for each, value in (*named, *shaped))

@@ -183,7 +183,6 @@ def _zero_inertial(text: XmlText, element: Element, name: str, joint: str, carri
 
 
 def _write_dynamics(text: XmlText, element: Element, name: str, friction: JointFriction) -> list[str]:
-    """Set a joint's damping and friction; notes on what they cannot hold."""
     dry, damping = dry_friction_and_damping(name, friction)
     values = {"damping": _numbers(damping), "friction": _numbers(dry)}
     existing = list(element.named("dynamics"))

@@ -118,7 +118,6 @@ class XmlText:
 
 
 def _attribute_text(value: str) -> bytes:
-    """A value as it may stand between quotes of either kind."""
     from xml.sax.saxutils import escape  # loads urllib and ssl
 
     return escape(value, {'"': "&quot;", "'": "&apos;"}).encode()

@@ -51,7 +51,6 @@ def thin(signals: Array, most: int = MOST_SAMPLES) -> Array:
 
 
 def _count_reversals(velocity: Array, threshold: Array) -> np.ndarray:
-    """How often each joint's velocity changes its sign beyond a threshold, (n,)."""
     counts = []
     for column, least in zip(velocity.T, threshold, strict=True):
         moving = column[np.abs(column) > least]

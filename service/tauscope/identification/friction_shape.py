@@ -262,7 +262,6 @@ def _search(grids: list[JointGrid], given: Sequence[FrictionShape]) -> list[list
 
 
 def _steps(grid: JointGrid, shape: FrictionShape) -> list[int]:
-    """Grid indices that K_v may take; the stated one where the robot file states it."""
     if shape.k_v is not None:
         return [GRID_POINTS]
     least = (1.0 - 1e-9) * LEAST_STEP / 10 ** GRID_DECADES[0] * grid.slopes[0]  # a grid point: not left to rounding

@@ -189,7 +189,6 @@ def _with_rotors(structure: ModelStructure, rotors: Sequence[bool]) -> ModelStru
 def _preliminary_residual(
     motions: Dataset, structure: ModelStructure, factors: tuple[JointFactor, ...]
 ) -> tuple[Array, Array]:
-    """Residual standard deviation in the band and its inflation by autocorrelation, (n,) each."""
     (statistics,) = evaluate(motions, structure, [infer(structure, factors).mean])
     inflation = np.array([model.long_run_ratio for model in statistics.autoregressions])
     return np.maximum(statistics.fit.band_rms, np.finfo(float).tiny), inflation

@@ -186,6 +186,5 @@ class _Sums:
 
 
 def _squares(residual: Array, used: NDArray[np.bool_]) -> Array:
-    """Σ e² of every joint, (n, M) each, over the samples that count."""
     kept = residual if used.all() else np.where(used, residual, 0.0)
     return np.einsum("jt,jt->j", kept, kept)

@@ -227,7 +227,6 @@ def _standard_names(link_count: int) -> list[str]:
 
 
 def _std(result: Identification) -> list[float | None]:
-    """Standard errors of all parameters, then of the shape constants' logarithms."""
     errors: list[float | None] = [*_floats(np.sqrt(np.maximum(np.diag(result.covariance), 0.0)))]
     believed = result.structure.base_count if result.options.prior else 0
     for column in np.flatnonzero(result.undetermined):

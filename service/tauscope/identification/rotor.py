@@ -109,6 +109,5 @@ def kept_columns(structure: ModelStructure, rotors: set[int]) -> np.ndarray:
 
 
 def _column(structure: ModelStructure, joint: int) -> int:
-    """Global column of a joint's rotor inertia."""
     column = structure.coefficient(joint, "rotor_inertia")
     return -1 if column is None else column

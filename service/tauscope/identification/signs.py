@@ -87,7 +87,6 @@ def reversed_joints(
 
 
 def _neighbours(signs: Array) -> Iterator[Array]:
-    """The signs with one joint turned round, and all of them."""
     for joint in range(len(signs)):
         yield np.where(np.arange(len(signs)) == joint, -signs, signs)
     yield -signs

@@ -68,7 +68,6 @@ def weak_points(result: Identification, joint: int) -> list[str]:
 
 
 def _own_bodies(result: Identification, joint: int) -> Iterator[tuple[str, float]]:
-    """Base parameters that lead with a joint's link, and how much the data say of each."""
     base = result.structure.base
     for place, column in enumerate(base.independent_columns):
         if column // 10 == joint:

@@ -88,7 +88,6 @@ def _element_names(path: Path) -> Mapping[str, Sequence[str]]:
 
 
 def _names(names: Any) -> Sequence[str]:
-    """Names of a feature: a list, or a mapping with one list."""
     while isinstance(names, dict):
         names = next(iter(names.values()), None)
     is_named = isinstance(names, list) and all(isinstance(name, str) for name in names)

@@ -162,7 +162,6 @@ def find_mapping(path: Path, robot: Robot | None = None, reading: Reading = SI) 
 
 
 def _suggest(header: Sequence[str], reading: Reading) -> ColumnMapping:
-    """As much as was stated, or else as the names of the columns suggest."""
     if reading.columns is None:
         guess = suggest_layout(header, reading, "") or guess_parts(header, reading.joint_names)
         reading = replace(reading, columns=guess.columns, units={**guess.units, **reading.units})

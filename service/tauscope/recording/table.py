@@ -148,7 +148,6 @@ def _append(spool: SpooledTable, block: Array) -> None:
 
 
 def _no_room(error: OSError) -> RecordingError:
-    """A temporary folder that cannot take the rows, said in one line."""
     return RecordingError(
         f"the temporary folder {tempfile.gettempdir()} cannot hold the recording ({error.strerror}): "
         "make room there or set TMPDIR to a larger folder"

@@ -140,7 +140,6 @@ def _draw_panel(axis: Axes, entries: Sequence[BaseParameterEntry]) -> None:
 
 
 def _shorten(name: str) -> str:
-    """A label that leaves room for the drawing; the table has all of it."""
     return name if len(name) <= LONGEST_LABEL else name[: LONGEST_LABEL - 1] + "…"
 
 

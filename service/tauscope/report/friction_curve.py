@@ -66,7 +66,6 @@ def _columns(identification: Identification, joint: int, velocity: Array) -> tup
 
 
 def _torque(identification: Identification, joint: int, velocity: Array) -> Array:
-    """τ_f of the delivered parameters."""
     columns, rows = _columns(identification, joint, velocity)
     return identification.parameters[columns] @ rows
 

@@ -78,7 +78,6 @@ def torque_series(identification: Identification, recording: Recording) -> Torqu
 
 
 def _pieces(identification: Identification, recording: Recording) -> Iterator[PreparedMotion]:
-    """Pieces in the band of the estimate."""
     conditioner = Conditioner.survey(recording, identification.robot)
     structure = identification.structure
     return iter(Dataset([conditioner], identification.robot, structure.base, identification.cutoff_hz))

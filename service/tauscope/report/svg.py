@@ -102,6 +102,5 @@ def _adapt_to_page(svg: str, name: str) -> str:
 
 
 def _shorten(path: str) -> str:
-    """Path data to a hundredth of a point, white space folded."""
     rounded = re.sub(r"-?\d+\.\d+", lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), path)
     return " ".join(rounded.split())

@@ -125,7 +125,6 @@ def _draw_torque(axis: Axes, series: TorqueSeries, joint: int, rows: slice, most
 
 
 def _draw_residual(axis: Axes, series: TorqueSeries, joint: int, rows: slice, most: int, noise_std: float) -> None:
-    """The residual within twice the noise, were there nothing else in it."""
     time, residual = series.time[rows], series.residual[rows, joint]
     kept = envelope_indices(residual, most)
     axis.axhspan(-2.0 * noise_std, 2.0 * noise_std, color=BAND, linewidth=0, label="± 2 σ of the noise")

@@ -309,7 +309,6 @@ def _bodies(
     branches: list[UrdfJoint],
     findings: list[Finding],
 ) -> list[_Body]:
-    """Bodies that move with a joint's child link; notes moving branches."""
     bodies: list[_Body] = []
     waiting = [(joint.child, Placement(), False)]
     while waiting:
@@ -328,7 +327,6 @@ def _bodies(
 
 
 def _branch(label: str, members: list[_Body]) -> LinkInertia:
-    """Bodies of a link on joints beside the chain."""
     carried = [(body.element, body.placement) for body in members if body.on_branch]
     return lumped_inertia(label, 0, carried, [])[0] or LinkInertia.from_vector(np.zeros(10))
 
@@ -365,7 +363,6 @@ def _limits(tree: UrdfTree, joint: UrdfJoint, findings: list[Finding]) -> JointL
 
 
 def _largest(tree: UrdfTree, element: Element, key: str) -> float | None:
-    """The size of a velocity or an effort limit, None where it is not stated."""
     value = _limit(tree, element, key)
     return value if 0.0 < value <= LARGEST_NUMBER else None
 

@@ -246,7 +246,6 @@ _PlainRepresenter.add_representer(_Quoted, _represent_quoted)
 
 
 def _quote_text(value: Any) -> Any:
-    """The same data with every text, but no key, to be quoted."""
     if isinstance(value, dict):
         return {key: _quote_text(item) for key, item in value.items()}
     if isinstance(value, list):
