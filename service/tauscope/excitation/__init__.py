@@ -4,7 +4,7 @@ from tauscope.excitation.design import ExcitationDesign, ExcitationDocument, des
 from tauscope.excitation.information import ColumnScaling, Criterion
 from tauscope.excitation.margins import Margins, require_within_limits
 from tauscope.excitation.optimiser import OptimiserProgress
-from tauscope.excitation.options import ExcitationOptions
+from tauscope.excitation.setting import ExcitationOptions
 from tauscope.excitation.workspace import Box, Workspace
 
 __all__ = [

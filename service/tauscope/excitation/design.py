@@ -8,8 +8,7 @@ import numpy as np
 from tauscope.excitation.information import Criterion, reported_value
 from tauscope.excitation.margins import Margins, trajectory_margins
 from tauscope.excitation.optimiser import OptimiserProgress, optimise
-from tauscope.excitation.options import ExcitationOptions
-from tauscope.excitation.setting import Setting
+from tauscope.excitation.setting import ExcitationOptions, Setting
 from tauscope.excitation.slow_reversals import SlowPart, slow_part
 from tauscope.robot import Robot
 from tauscope.trajectory.document import trajectory_document

@@ -60,7 +60,6 @@ def write_mcap(recording: Recording, file: BinaryIO, joint_names: Sequence[str] 
 
 
 def _stamps(time: Array, previous: int, name: str) -> list[int]:
-    """Times as whole nanoseconds, still strictly increasing."""
     if time[-1] >= _LATEST_STAMP_S:
         raise RecordingError(f"{name}: time {float(time[-1])!r} s is beyond a ROS time stamp; let t start near 0 s")
     stamps = np.rint(time * 1e9).astype(np.int64)
@@ -137,7 +136,6 @@ def write_recording(
 def _read(
     path: Path, name: str, joint_names: Sequence[str] | None, reading: Reading, *, recover: bool
 ) -> tuple[Recording, str | None]:
-    """The recording, and the damage that was passed over where that was asked for."""
     if recover and path.is_file() and first_bytes(path, name).startswith(MCAP_MAGIC):
         names = tuple(joint_names) if joint_names is not None else None
         salvage = recover_mcap(path, Choice(name, len(names) if names else None, names, reading=reading))

@@ -10,8 +10,18 @@ import numpy as np
 
 from tauscope.errors import RecordingError
 from tauscope.recording.columns import ColumnLayout, find_layout, require_joint_count
-from tauscope.recording.csv_dialect import BLANK, Dialect, find_delimiter, find_first_row, read_units_row
-from tauscope.recording.csv_numbers import Clock, is_number, parse_number, parse_quickly, shown
+from tauscope.recording.csv_dialect import (
+    BLANK,
+    Clock,
+    Dialect,
+    find_delimiter,
+    find_first_row,
+    is_number,
+    parse_number,
+    parse_quickly,
+    read_units_row,
+    shown,
+)
 from tauscope.recording.intake import RowIntake, SplitClock
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
@@ -199,7 +209,6 @@ def _decode(field: bytes) -> str:
 
 
 def _chunks(file: BinaryIO, line: int, name: str) -> Iterator[_Chunk]:
-    """The rest of the file in pieces that end with a line."""
     rest = b""
     while data := file.read(_CHUNK_BYTES):
         end = data.rfind(b"\n") + 1

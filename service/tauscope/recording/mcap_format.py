@@ -152,7 +152,6 @@ def read_by_index(file: BinaryIO, size: int, sink: MessageSink) -> bool:
 
 
 def _read_summary(file: BinaryIO, size: int) -> _Summary | None:
-    """The summary, None where there is none with the places of all chunks."""
     end = size - _MAGIC_BYTES - _FOOTER.size
     opcode, length, start, _, checksum = _FOOTER.unpack(_read(file, end, _FOOTER.size))
     if opcode != Opcode.FOOTER or length != _FOOTER.size - RECORD.size or not _MAGIC_BYTES <= start < end:

@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from tauscope.errors import RecordingError
-from tauscope.recording.column_batches import ROWS_AT_ONCE, Batch, read_batches
+from tauscope.recording.column_files import ROWS_AT_ONCE, Batch, read_batches
 from tauscope.recording.columns import ColumnLayout
 from tauscope.recording.inflation import require_plausible_inflation
 from tauscope.recording.recording import Array, Recording

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tauscope.errors import RecordingError
+from tauscope.recording.column_files import ZIP_MAGIC, read_npz, read_npz_header
 from tauscope.recording.columns import find_layout, is_column, require_joint_count, suggest_layout
 from tauscope.recording.csv_format import read_csv, read_csv_header
 from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.layout.guess import guess_parts
 from tauscope.recording.layout.rename import rename_columns
 from tauscope.recording.mcap_format import MCAP_MAGIC, read_mcap
-from tauscope.recording.npz_format import ZIP_MAGIC, read_npz, read_npz_header
 from tauscope.recording.parquet_format import PARQUET_MAGIC, read_parquet, read_parquet_header
 from tauscope.recording.recording import Recording
 from tauscope.recording.ros_bags import ROS1_MAGIC, SQLITE_MAGIC, read_database, read_ros1_bag, read_rosbag2

@@ -169,7 +169,6 @@ class Conditioner:
         )
 
     def _stretch_motions(self, rows: tuple[int, int], cutoff_hz: float | None) -> Iterator[Motion]:
-        """Averaged periods where there are any, and what lies between them, in order of time."""
         cursor = rows[0]
         half = 0.5 / self.timing.rate_hz
         for group in self._groups(rows):
@@ -182,7 +181,6 @@ class Conditioner:
         yield from self._transients(cursor, rows[1], rows, cutoff_hz)
 
     def _groups(self, rows: tuple[int, int]) -> Iterator[PeriodRun]:
-        """Parts of a stretch with as many whole periods as are averaged at once."""
         begin, end = (float(self.recording.samples(row, row + 1).time[0]) for row in (rows[0], rows[1] - 1))
         interval = 1.0 / self.timing.rate_hz
         for run in (run.within(rows, begin, end + interval, interval) for run in self.timing.runs):

@@ -90,7 +90,6 @@ def split_periods(stretch: Stretch, refine: bool = False) -> Periods | None:
 
 
 def _align(stretch: Stretch, first: int, length: float, count: int) -> Periods | None:
-    """The periods by their samples where both fit, else by interpolation."""
     samples = round(length)
     fits = first + count * samples <= len(stretch.position)
     if fits and abs(length - samples) * count <= WHOLE_SAMPLES:
@@ -176,7 +175,6 @@ def _longest_steady(progress: Array) -> tuple[int, int] | None:
 
 
 def _whole(stretch: Stretch, first: int, samples: int, count: int) -> Periods:
-    """Periods that are a whole number of samples long."""
     index = first + np.arange(count)[:, None] * samples + np.arange(samples)
     return Periods(
         rate_hz=stretch.rate_hz,

@@ -107,7 +107,6 @@ class PeriodLabels:
 
 
 def _run(rows: tuple[int, int], label: Array, edge: Array, interval_s: float) -> PeriodRun | None:
-    """One run of consecutive labels between K + 1 edges, or None where their lengths differ."""
     if len(label) == 2:
         # Both periods may be cut short; that they are not shows only in their being equally long.
         before, after = np.diff(edge)
@@ -257,7 +256,6 @@ def _scan(recording: Recording) -> tuple[Array, NDArray[np.int_], PeriodLabels |
 
 
 def _typical_interval(interval: Array) -> tuple[float, float]:
-    """Time from sample to sample, and the sampling rate, from intervals of which some are gaps."""
     stride = (len(interval) // MEDIAN_SAMPLES) | 1  # odd: stamps that come in pairs are not seen one-sidedly
     few = interval[::stride]
     median = float(np.median(few))

@@ -177,7 +177,6 @@ def _spline(knots: Array | NDArray[np.int_], at: Array | NDArray[np.int_]) -> Ca
 
 
 def _spread(values: Array, index: NDArray[np.int_], count: int) -> Array:
-    """Samples at their grid points, NaN where there is none."""
     if count == len(index):
         return values
     spread = np.full((count, values.shape[1]), np.nan)

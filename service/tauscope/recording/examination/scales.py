@@ -245,7 +245,6 @@ def distance_beyond(windows: Array) -> Array:
 
 
 def _leave_stops_out(time: Array, values: Array, interval: float) -> Array:
-    """A joint's known values without the rows before which the clock stands."""
     known = np.isfinite(values)
     time, values = time[known], values[known]
     return values[np.diff(time, prepend=-np.inf) > 0.1 * interval]

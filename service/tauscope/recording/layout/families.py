@@ -197,5 +197,4 @@ def _segments(column: str) -> list[tuple[str, str]]:
 
 
 def _is_named(columns: Mapping[str, str]) -> bool:
-    """Whether keys are names rather than numbers or quantities."""
     return not any(key.isdecimal() or not is_joint_name(words_of(key)) for key in columns)

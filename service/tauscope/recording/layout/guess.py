@@ -89,7 +89,6 @@ def is_numbered(header: Sequence[str]) -> bool:
 
 
 def _guess_by_place(width: int, joint_count: int | None) -> RecordingLayout:
-    """Time, positions, perhaps velocities, and efforts, side by side."""
     counts = [joint_count] if joint_count else [*_COMMON_JOINT_COUNTS, (width - 1) // 2]
     for n in counts:
         for groups in (("q", "tau"), ("q", "qd", "tau")):

@@ -142,7 +142,6 @@ class _Mapping:
         return found or [fill_template(template, 0, None)]
 
     def _match_by_name(self, template: str) -> Sequence[str]:
-        """One column a joint of the robot; of the file, in its order, where no robot is known."""
         found = names_in(self._header, template)
         if self._names is None:
             self._names = found
@@ -156,7 +155,6 @@ class _Mapping:
         return [fill_template(template, 0, name) for name in self._names]
 
     def _fits(self, template: str) -> bool:
-        """Whether a list column of this name was unfolded."""
         return bool(names_in(self._header, template.replace("{0}", BY_NAME)))
 
     def _absence(self, name: str) -> str:
