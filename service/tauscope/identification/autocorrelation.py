@@ -131,9 +131,9 @@ class AutocovarianceSum:
         reach = int(min(len(covariance) - 1, count // 10, unbroken))
         whitener = np.ones(1)
         if self._white[1:].any():
-            whitener = _prediction_error_filter(_floored(self._white), min(FILTER_ORDER, reach // 2))
-            covariance = _floored(covariance)
-        whitened = _filtered(covariance[: reach + 1], whitener)
+            whitener = _prediction_error_filter(_add_floor(self._white), min(FILTER_ORDER, reach // 2))
+            covariance = _add_floor(covariance)
+        whitened = _filter(covariance[: reach + 1], whitener)
         orders = list(_levinson(whitened, min(LARGEST_ORDER, len(whitened) - 1)))
         if not orders:  # pairs of what was measured fit together no more
             return Autoregression(np.empty(0), float(covariance[0]), variance=float(covariance[0]))
@@ -167,7 +167,7 @@ def _levinson(covariance: Array, largest: int) -> Iterator[tuple[Array, float]]:
         yield coefficients[:order].copy(), variance
 
 
-def _floored(covariance: Array) -> Array:
+def _add_floor(covariance: Array) -> Array:
     return np.append((1.0 + FILTER_FLOOR) * covariance[0], covariance[1:])
 
 
@@ -177,7 +177,7 @@ def _prediction_error_filter(covariance: Array, order: int) -> Array:
     return np.append(1.0, -coefficients)
 
 
-def _filtered(covariance: Array, taps: Array) -> Array:
+def _filter(covariance: Array, taps: Array) -> Array:
     """Autocovariance of what leaves a filter of K taps, from that of what enters it: shorter by K - 1 lags."""
     both_sides = np.append(covariance[:0:-1], covariance)
     leaving = np.convolve(both_sides, np.correlate(taps, taps, "full"), "valid")

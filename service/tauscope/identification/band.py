@@ -234,7 +234,7 @@ def _crossing(motions: Dataset, structure: ModelStructure, parameters: Array, re
         measured += _power(torque, rate, frequency)
         unexplained += _power(torque - modelled, rate, frequency)
     peak = int(np.argmax(measured))
-    below = np.flatnonzero(_smoothed(measured, frequency)[peak:] < 2.0 * _smoothed(unexplained, frequency)[peak:])
+    below = np.flatnonzero(_smooth(measured, frequency)[peak:] < 2.0 * _smooth(unexplained, frequency)[peak:])
     return float(frequency[peak + below[0]]) if len(below) else None
 
 
@@ -244,7 +244,7 @@ def _power(signals: Array, rate_hz: float, frequency: Array) -> Array:
     return np.interp(frequency, own, power.sum(axis=0)) * signals.shape[1]
 
 
-def _smoothed(power: Array, frequency: Array) -> Array:
+def _smooth(power: Array, frequency: Array) -> Array:
     total = np.concatenate([[0.0], np.cumsum(power)])
     low = np.searchsorted(frequency, frequency / SMOOTHING)
     high = np.searchsorted(frequency, frequency * SMOOTHING, side="right")

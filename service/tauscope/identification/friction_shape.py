@@ -20,7 +20,7 @@ from scipy import linalg
 
 from tauscope.dynamics.friction import smooth_sign
 from tauscope.identification.dataset import PreparedMotion
-from tauscope.identification.least_squares import JointFactor, Solution, restricted, solve
+from tauscope.identification.least_squares import JointFactor, Solution, restrict, solve
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 from tauscope.robot import FrictionShape
@@ -54,7 +54,7 @@ class JointGrid:
         return product + self.gram[np.ix_(mine, theirs)] if self is other else product
 
 
-def projected_grids(
+def project_grids(
     motions: Iterable[PreparedMotion],
     structure: ModelStructure,
     shared: NDArray[np.intp],
@@ -207,10 +207,10 @@ def estimate_shapes(
     """
     given = [joint.friction_shape for joint in structure.robot.joints]
     shared = _shared_columns(structure)
-    without_steps = restricted(factors, shared)
+    without_steps = restrict(factors, shared)
     solution = solve(without_steps, len(shared), noise_std)
     slopes = _candidate_slopes(speed, given)
-    grids = projected_grids(motions, structure, shared, solution, noise_std, slopes)
+    grids = project_grids(motions, structure, shared, solution, noise_std, slopes)
     chosen = _search(grids, given)
     squares = (f.squared_residual(solution.parameters) for f in without_steps)
     energy = sum(square / std**2 for square, std in zip(squares, noise_std, strict=True))

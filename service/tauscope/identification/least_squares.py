@@ -110,7 +110,7 @@ def solve(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Solu
     `noise_std`: (n,), σ_j; all ones for LS.
     """
     triangle = stacked_factor(factors, size, noise_std)
-    return _solved(triangle[:size, :size], triangle[:size, size])
+    return _solve(triangle[:size, :size], triangle[:size, size])
 
 
 def stacked_factor(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Array:
@@ -128,7 +128,7 @@ def stacked_factor(factors: tuple[JointFactor, ...], size: int, noise_std: Array
     return _triangle(stacked)
 
 
-def restricted(factors: tuple[JointFactor, ...], keep: NDArray[np.intp]) -> tuple[JointFactor, ...]:
+def restrict(factors: tuple[JointFactor, ...], keep: NDArray[np.intp]) -> tuple[JointFactor, ...]:
     """The factors of a smaller model: columns left out without another pass over the data.
 
     `keep`: (k,) int, its global columns that stay, ascending; they are numbered anew from 0.
@@ -177,7 +177,7 @@ def _is_well_conditioned(triangle: Array) -> bool:
     return bool(lapack.dtrcon(triangle)[0] > WELL_CONDITIONED)
 
 
-def _solved(factor: Array, target: Array) -> Solution:
+def _solve(factor: Array, target: Array) -> Solution:
     """Minimum-norm solution in scaled columns."""
     scale = np.linalg.norm(factor, axis=0)
     scale[scale == 0.0] = 1.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from tauscope.dynamics.base_parameters import BaseParameters
 from tauscope.dynamics.regressor import torque_regressor
-from tauscope.identification.least_squares import RANK_TOLERANCE, JointFactor, restricted, solve
+from tauscope.identification.least_squares import RANK_TOLERANCE, JointFactor, restrict, solve
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
@@ -66,7 +66,7 @@ def needed_rotors(
         return (False,) * structure.robot.joint_count
     while joints:
         keep = kept_columns(structure, joints)
-        smaller = restricted(factors, keep)
+        smaller = restrict(factors, keep)
         solution = solve(smaller, len(keep), noise_std)
         places = {joint: int(np.searchsorted(keep, _column(structure, joint))) for joint in joints}
         excess = {
@@ -85,7 +85,7 @@ def needed_rotors(
 def _gain_of_all(factors: tuple[JointFactor, ...], structure: ModelStructure, noise_std: Array) -> float:
     """What all rotors together take off the criterion: no single one can take more."""
     keep = kept_columns(structure, set())
-    smaller = restricted(factors, keep)
+    smaller = restrict(factors, keep)
     fits = ((factors, structure.size), (smaller, len(keep)))
     criteria = []
     for joint_factors, size in fits:

@@ -52,7 +52,7 @@ def columns_with_shapes(
     return np.concatenate([columns, sensitivity]), np.concatenate([index, places])
 
 
-def refined_structure(
+def refine_structure(
     motions: Iterable[PreparedMotion],
     structure: ModelStructure,
     parameters: Array,

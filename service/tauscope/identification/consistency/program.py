@@ -118,7 +118,7 @@ def solve(program: ConicProgram) -> tuple[Array, str, float]:
         return interior, "interior", 0.0
     status = clarabel.SolverStatus.Unsolved
     for candidate, status, gap in _attempts(program, interior):
-        settled = _settled(program, candidate)
+        settled = _settle(program, candidate)
         if gap <= _GAP and program.admits(settled):
             return settled, str(status), gap
     _require_feasible(program)
@@ -186,7 +186,7 @@ def _require_feasible(program: ConicProgram) -> None:
         )
 
 
-def _settled(program: ConicProgram, scaled: Array) -> Array:
+def _settle(program: ConicProgram, scaled: Array) -> Array:
     """Project onto the inequalities that the solver's rounding missed, so that a viscous friction of -1e-12 reads 0."""
     settled = scaled.copy()
     for row, bound in zip(program.matrix, program.bound[: len(program.names)], strict=False):
