@@ -22,8 +22,8 @@ from tauscope.errors import RobotFileError
 from tauscope.robot.actuator import Actuator
 from tauscope.robot.chain import Chain, ResultWarning, default_ends_note, rigid_branch_note
 from tauscope.robot.document import MOST_JOINTS
+from tauscope.robot.kinematics import compose, rotation_of_z_to
 from tauscope.robot.messages import Finding, Severity, nearest, one_line, shown
-from tauscope.robot.placement import compose, rotation_of_z_to
 from tauscope.robot.robot import Coupling, FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
 from tauscope.robot.urdf_inertia import inertia_about_frame
 from tauscope_sim.mjcf_compiler import compile_model

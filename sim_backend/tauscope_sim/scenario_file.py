@@ -23,8 +23,8 @@ from pydantic import Field, ValidationError
 
 from tauscope.errors import RobotFileError, ScenarioError
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
+from tauscope.robot.document import WORDING
 from tauscope.robot.document_fields import Document
-from tauscope.robot.document_origin import WORDING
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot import Robot
 from tauscope.robot.yaml_text import Place, read_yaml

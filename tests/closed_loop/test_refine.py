@@ -8,7 +8,7 @@ import pytest
 from arms import arm, dh_segment
 from tauscope.closed_loop import roll_out
 from tauscope.closed_loop.batch import Variants, simulate_segments
-from tauscope.closed_loop.load_friction import RELAXED, LoadFriction
+from tauscope.closed_loop.laws import RELAXED, LoadFriction
 from tauscope.closed_loop.model import rollout_model, stated_model
 from tauscope.closed_loop.plant import STEP_S, make_plant
 from tauscope.closed_loop.refine import refine_model

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from excitation.excited_arms import Array, derivative_along
-from tauscope.excitation.criteria import Criterion, criterion_value, reported_value
+from tauscope.excitation.information import Criterion, criterion_value, reported_value
 
 
 def regressor(seed: int, rows: int = 60, columns: int = 9) -> Array:

@@ -18,8 +18,7 @@ from pinocchio_arm import pinocchio_model
 from tauscope.dynamics import base_parameters, friction_columns, torque_regressor
 from tauscope.excitation import Box, Criterion, Workspace
 from tauscope.excitation.constraints import KinematicUsage, StateUsage, smooth_maximum
-from tauscope.excitation.criteria import criterion_value
-from tauscope.excitation.information import ExcitationRegressor, MotionGradient
+from tauscope.excitation.information import ExcitationRegressor, MotionGradient, criterion_value
 from tauscope.excitation.problem import ExcitationProblem, Objective
 from tauscope.excitation.series_space import SeriesSpace
 from tauscope.excitation.torque_prediction import TorquePrediction

@@ -12,7 +12,7 @@ from runtime.doubles import PointArm, connection, point_robot, short_motion
 from shared_data import REPOSITORY
 from tauscope.errors import AcquisitionError, TauscopeError
 from tauscope.excitation import ExcitationOptions, Workspace, design_excitation
-from tauscope.export.compensation.drive_units import drive_units
+from tauscope.export.compensation.model import drive_units
 from tauscope.recording import EffortKind, read_recording
 from tauscope.robot import Joint, read_robot
 from tauscope.runtime.drivers import make_backend

@@ -11,7 +11,7 @@ from tauscope.dynamics import TorqueRegressor
 from tauscope.errors import IdentificationError, RecordingMismatchError
 from tauscope.identification import Estimator, Identification, Options, dataset, document, identify, least_squares
 from tauscope.identification.dataset import Dataset, PreparedMotion
-from tauscope.identification.least_squares import JointFactor, condition_number, factorise, restricted, solve
+from tauscope.identification.least_squares import JointFactor, condition_number, factorise, restrict, solve
 from tauscope.identification.structure import JointTerms, ModelStructure
 from tauscope.recording import Recording
 from tauscope.recording.conditioning import Conditioner
@@ -120,7 +120,7 @@ def test_the_condition_number_is_that_of_the_stacked_regressor(arm: SimulatedArm
 def test_restricted_factors_are_those_of_the_smaller_model(arm, recording, result, dropped: list[int]) -> None:
     matrices, target = stacked_equations(arm, recording, result.structure)
     keep = np.setdiff1d(np.arange(result.structure.size), dropped)
-    factors = restricted(factorise(prepared(arm, recording, result.structure), result.structure), keep)
+    factors = restrict(factorise(prepared(arm, recording, result.structure), result.structure), keep)
     solution = solve(factors, len(keep), PAPER_NOISE)
     rows = np.vstack([matrix[:, keep] / s for matrix, s in zip(matrices, PAPER_NOISE, strict=True)])
     expected = np.linalg.lstsq(rows, (target / PAPER_NOISE).T.ravel())[0]

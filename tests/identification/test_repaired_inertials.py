@@ -12,7 +12,7 @@ from shared_data import SHARED_CASES, needs_shared_cases
 from tauscope.diagnosis import against_model, diagnose
 from tauscope.diagnosis import document as diagnosis_document
 from tauscope.excitation import design_excitation
-from tauscope.excitation.options import ExcitationOptions
+from tauscope.excitation.setting import ExcitationOptions
 from tauscope.identification import Identification, document, identify
 from tauscope.identification.consistency import LinearInequalities, nearest_consistent_parameters, plausible_prior
 from tauscope.recording import Recording

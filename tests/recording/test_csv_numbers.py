@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from recording.recording_files import outcome
 from tauscope.recording import csv_format
+from tauscope.recording.csv_dialect import parse_quickly
 from tauscope.recording.csv_format import read_csv
-from tauscope.recording.csv_numbers import parse_quickly
 
 TRICKY = [
     "0", "-0", "-0.0", "+1.5", ".5", "-.5", "5.", "007", "1e5", "1E+05", "1e-400", "1e308", "1.7976931348623157e308",

@@ -16,8 +16,12 @@ from mcap_ros2._dynamic import serialize_dynamic
 
 from recording.recording_files import arrays, encoded_messages, message_of, messages, write_plain_log
 from tauscope.recording import Recording, read_recording
-from tauscope.recording.joint_state_decoders import decode_dynamic, decode_foxglove_json, decode_ros1
-from tauscope.recording.protobuf import decode_foxglove_protobuf
+from tauscope.recording.joint_state_decoders import (
+    decode_dynamic,
+    decode_foxglove_json,
+    decode_foxglove_protobuf,
+    decode_ros1,
+)
 
 NAMES = ("lift", "elbow")
 MOTION = arrays()

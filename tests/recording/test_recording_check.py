@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from recording.recording_files import csv_text, message_of
-from tauscope.recording import Recording, check_recording, measures, report_recording
+from tauscope.recording import Recording, check_recording, checks, report_recording
 from tauscope.robot.messages import Severity
 
 SAMPLES = 4000
@@ -150,7 +150,7 @@ def test_blocks_do_not_show(monkeypatch):
     expected = report(**whole)
     assert expected.periods is not None
     assert (expected.periods.count, expected.periods.shortest) == (2, 1500)
-    monkeypatch.setattr(measures, "_ROWS_AT_ONCE", 500)
+    monkeypatch.setattr(checks, "_ROWS_AT_ONCE", 500)
     in_blocks = report(**whole)
     assert in_blocks.findings == expected.findings
     assert in_blocks.periods == expected.periods

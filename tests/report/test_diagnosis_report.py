@@ -16,8 +16,8 @@ from tauscope.diagnosis import Diagnosis, DiagnosisDocument, diagnose, document
 from tauscope.diagnosis.next_experiment import PlannedExperiment, plan_experiment
 from tauscope.recording import read_recording
 from tauscope.report.diagnosis_report import diagnosis_report
-from tauscope.report.diagnosis_words import summary_sentences
 from tauscope.report.provenance import InputFile, Provenance
+from tauscope.report.words import summary_sentences
 from tauscope.robot import Model, read_robot
 from tauscope_sim.examples import example_robot
 

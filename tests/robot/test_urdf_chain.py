@@ -9,7 +9,7 @@ import pytest
 from robot.robot_texts import URDF, replaced
 from tauscope.errors import RobotFileError
 from tauscope.robot import Chain, Coupling, JointType, Severity, link_placements, read_urdf_chain
-from tauscope.robot.placement import rotation_of_z_to
+from tauscope.robot.kinematics import rotation_of_z_to
 
 
 @dataclass

@@ -11,7 +11,7 @@ from tauscope.cli.verbs import OptionsOf
 from tauscope.errors import RobotFileError
 from tauscope.recording.units import parse_units
 from tauscope.robot.recording_layout import RecordingLayout
-from tauscope.robot.recording_layout_file import read_layout
+from tauscope.robot.robot_file import read_layout
 from tauscope.tasks.task import ReadingOptions
 
 

@@ -29,7 +29,7 @@ from tauscope.excitation import ExcitationOptions, OptimiserProgress, design_exc
 from tauscope.export.formats import EXPORT_FILES
 from tauscope.identification import Identification
 from tauscope.number_text import given, with_uncertainty
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 from tauscope.robot import Robot, read_robot
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.states import RunState

@@ -16,7 +16,7 @@ from tauscope.cli.verbs import make_group
 from tauscope.errors import AcquisitionError, MissingExtraError
 from tauscope.extras import require_extra
 from tauscope.number_text import counted
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 from tauscope.robot import Robot, read_robot
 from tauscope.runtime.drivers import (
     Finding,

@@ -25,10 +25,8 @@ from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.result import FindingEntry
 from tauscope.export.formats import CODE_FILES, EXPORT_FILES
 from tauscope.number_text import significant
-from tauscope.report.diagnosis_words import MOST_FINDINGS, VERDICTS, refutations
-from tauscope.report.table import Table
-from tauscope.report.tables import difference_table, headroom_table, residual_table, shift_table
-from tauscope.report.words import noise_words
+from tauscope.report.tables import Table, difference_table, headroom_table, residual_table, shift_table
+from tauscope.report.words import MOST_FINDINGS, VERDICTS, noise_words, refutations
 from tauscope.tasks import diagnose as task
 
 Against = Annotated[

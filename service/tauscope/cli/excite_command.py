@@ -12,7 +12,7 @@ from tauscope.cli.terminal import output, plain, table
 from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
 from tauscope.excitation import ExcitationDesign
 from tauscope.number_text import ABSENT, counted, percent, significant
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 from tauscope.robot import Robot
 from tauscope.tasks import design_excitation as task
 

@@ -9,9 +9,8 @@ from tauscope.cli.arguments import name_input
 from tauscope.cli.output_files import require_free, write_file
 from tauscope.cli.task_run import parse_export_format
 from tauscope.cli.terminal import output, plain
-from tauscope.export.actuators import ActuatorChoice, ActuatorKind
+from tauscope.export.actuators import ActuatorChoice, ActuatorKind, to_isaac_lab
 from tauscope.export.formats import EXPORT_FILES, ExportFormat, make_export
-from tauscope.export.isaac_lab import to_isaac_lab
 from tauscope.export.mjcf_patch import patch_mjcf
 from tauscope.export.model_file import read_export_model
 

@@ -23,8 +23,7 @@ from tauscope.cli.verbs import OptionsOf, make_request
 from tauscope.export.formats import EXPORT_FILES
 from tauscope.identification import IdentificationDocument
 from tauscope.number_text import counted, percent, significant
-from tauscope.report.table import Table
-from tauscope.report.tables import base_parameter_table, fit_table, friction_table, rotor_table
+from tauscope.report.tables import Table, base_parameter_table, fit_table, friction_table, rotor_table
 from tauscope.report.words import band_words, cautions, fit_sentences, masked_samples, noise_words
 from tauscope.robot import Robot
 from tauscope.tasks import identify as task

@@ -20,7 +20,7 @@ from tauscope.recording.columns import map_columns
 from tauscope.recording.convert import FORMATS
 from tauscope.recording.layout.guess import guess_parts, layout_text
 from tauscope.recording.reading import read_header
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 from tauscope.robot import JointSummary, RecordingLayout, RobotReport, layout_from_dict, read_robot
 from tauscope.robot.messages import listed
 from tauscope.robot.recording_layout import Source

@@ -13,7 +13,7 @@ from tauscope.cli.terminal import output, plain, table
 from tauscope.cli.verbs import make_group
 from tauscope.errors import StoreError, TauscopeError
 from tauscope.number_text import ABSENT
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 from tauscope.server.http.services import Services, open_services
 from tauscope.server.http.settings import Settings, default_data_folder
 from tauscope.server.schedules.repository import FiringEntry, ScheduleRepository

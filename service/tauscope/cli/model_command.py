@@ -11,7 +11,7 @@ from tauscope.cli.terminal import output, plain, table
 from tauscope.cli.verbs import make_group
 from tauscope.errors import StoreError
 from tauscope.number_text import ABSENT, counted, significant
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 from tauscope.server.history.model_history import ModelEntry, ModelHistory
 from tauscope.server.history.trend import parameter_trends
 

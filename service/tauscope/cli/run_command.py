@@ -18,7 +18,7 @@ from tauscope.cli.terminal import output, plain, show_progress, table
 from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
 from tauscope.errors import AcquisitionError
 from tauscope.number_text import ABSENT, counted, significant
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 from tauscope.robot import JointType, Robot
 from tauscope.robot.messages import one_line
 from tauscope.runtime.drivers import DEFAULT_BACKEND, BackendName, driver_names, find_driver

@@ -16,7 +16,7 @@ from tauscope.cli.terminal import output, plain, show_progress, table
 from tauscope.cli.verbs import make_group
 from tauscope.errors import StoreError
 from tauscope.number_text import ABSENT, counted
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 from tauscope.server.history.indexer import Indexer, open_index
 from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.history.retention import RetentionRule, plan_removal, remove

@@ -5,15 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tauscope.closed_loop.load_friction import RELAXED, LoadFriction
+from tauscope.closed_loop.laws import RELAXED, LoadFriction
 from tauscope.closed_loop.segments import STEP_S, Segments
 from tauscope.dynamics import torque_regressor
 from tauscope.recording.recording import Array
 from tauscope.robot import Actuator, Robot
 
-SWEEPS = 4
-"""Gauss-Seidel sweeps over the dry friction of coupled joints."""
-
+SWEEPS = 4  # Gauss-Seidel sweeps over the dry friction of coupled joints
 _TWO_OVER_PI = 2.0 / np.pi
 
 
@@ -77,7 +75,6 @@ def simulate_segments(robot: Robot, loops: Sequence[Actuator], segments: Segment
 def _drive(
     loops: Sequence[Actuator], segments: Segments, step: int, position: Array, velocity: Array, slope: Array
 ) -> Array:
-    """Torque of the loops, (n, S, V)."""
     torque = np.empty_like(position)
     for joint, loop in enumerate(loops):
         channels = (segments.voltage, segments.gain, segments.temperature)
@@ -92,7 +89,6 @@ def _drive(
 
 
 def _dynamics(robot: Robot, links: Array, position: Array, velocity: Array) -> tuple[Array, Array]:
-    """Mass matrix (n, n, S, V) and torque without acceleration (n, S, V)."""
     joints, count, number = position.shape
     q, qd = (values.reshape(joints, -1).T for values in (position, velocity))
     zero = np.zeros_like(q)
@@ -107,7 +103,6 @@ def _dynamics(robot: Robot, links: Array, position: Array, velocity: Array) -> t
 
 
 def _invert(mass: Array) -> Array:
-    """Inverse of each mass matrix, (n, n, S, V)."""
     if len(mass) == 1:
         return 1.0 / mass
     return np.asarray(np.linalg.inv(mass.transpose(2, 3, 0, 1)), dtype=np.float64).transpose(2, 3, 0, 1)

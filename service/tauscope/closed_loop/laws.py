@@ -1,19 +1,48 @@
-"""Torque that an MJCF cannot hold, at one instant: Stribeck and load-dependent friction, constants, and the like."""
+"""Torque that an MJCF cannot hold, at one instant: Stribeck and load-dependent friction, constants, and the like.
 
-from dataclasses import replace
+Driving: μ_d τ². Braking, where the load drives the motor: μ_b |τ|. τ is the torque of the rigid body.
+A gear loses more of a higher load where the motor drives it, and a share of any load that drives the motor; compare
+form M6 of Duclusaud et al. (ICRA 2025).
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tauscope.closed_loop.load_friction import LoadFriction
 from tauscope.effects import Signals
 from tauscope.export.compensation import JointFriction
 from tauscope.export.model import ExportModel, FoundEffect
 from tauscope.recording.recording import Array
 
+# Weight of the last step's load in the load that friction follows: friction acts back on it through the acceleration,
+# and a friction that takes more than half of any further load would make the two alternate from step to step.
+RELAXED = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class LoadFriction:
+    """Coefficients of all joints.
+
+    `driving`: (n,) or (n, 1, V), μ_d [1/Nm or 1/N].
+    `braking`: (n,) or (n, 1, V), μ_b [1].
+    """
+
+    driving: Array
+    braking: Array
+
+    def level(self, load: Array, direction: Array) -> Array:
+        """Level of dry friction.
+
+        `load`: (n,) or (n, S, V), torque of the rigid body [Nm or N]; `direction`: (n,) or (n, S, V), sign of the
+        motion. Returns (n,) or (n, S, V) [Nm or N].
+        """
+        size = np.abs(load)
+        return np.where(direction * load > 0.0, self.driving * size, self.braking) * size
+
+
 _TWO_OVER_PI = 2.0 / np.pi
 
-RESTING = 1e-4
-"""Speed below which a joint's direction is that of the torque on it [rad/s or m/s]."""
+RESTING = 1e-4  # speed below which a joint's direction is that of the torque on it [rad/s or m/s]
 
 
 class JointLaws:
@@ -81,7 +110,6 @@ class JointLaws:
         return np.maximum(level - self._held, 0.0), torque
 
     def _evaluate(self, position: Array, velocity: Array, load: Array, step: Array) -> Array:
-        """Torque of all effects for a sign of the velocity, (n,)."""
         now = replace(
             self._signals,
             position=position[:, None],

@@ -4,14 +4,9 @@ import numpy as np
 
 from tauscope.recording.recording import Array
 
-LONGEST_LAG_S = 0.25
-"""Largest delay between both motions that is looked for [s]."""
-
-REVERSAL_S = 0.1
-"""Time on either side of a reversal that belongs to it [s]."""
-
-MOVES = 0.05
-"""Share of its top speed above which a joint moves: below it, it may rest and turn for noise."""
+LONGEST_LAG_S = 0.25  # largest delay between both motions that is looked for [s]
+REVERSAL_S = 0.1  # time on either side of a reversal that belongs to it [s]
+MOVES = 0.05  # share of its top speed above which a joint moves: below it, it may rest and turn for noise
 
 
 def rms_error(measured: Array, simulated: Array) -> Array:

@@ -5,8 +5,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from tauscope.closed_loop.laws import JointLaws
-from tauscope.closed_loop.load_friction import LoadFriction
+from tauscope.closed_loop.laws import JointLaws, LoadFriction
 from tauscope.export.compensation import JointFriction
 from tauscope.export.mjcf import to_mjcf
 from tauscope.export.mjcf_findings import IN_THE_MODEL, add_findings
@@ -14,14 +13,10 @@ from tauscope.export.model import ExportModel, Origin
 from tauscope.recording import EffortKind
 from tauscope.robot import LinkInertia, Robot
 
+# Mass added to stated links, relative to the arm's: MuJoCo moves no body without mass, and no rod without width.
 TRACE_SHARE = 1e-6
-"""Mass added to stated links, relative to the arm's: MuJoCo moves no body without mass, and no rod without width."""
-
-UNUSED_K_V = 1.0
-"""K_v of stated friction [s/rad or s/m]: a rollout takes friction as a step."""
-
-TRACE_RADIUS_M = 0.01
-"""Radius of that mass [m]."""
+UNUSED_K_V = 1.0  # k_v of stated friction [s/rad or s/m]: a rollout takes friction as a step
+TRACE_RADIUS_M = 0.01  # radius of that mass [m]
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,14 +20,11 @@ from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Sectio
 from tauscope.report.provenance import Provenance
 from tauscope.report.series import envelope_indices
 from tauscope.report.svg import HELD_OUT, INK, MEASURED, PREDICTED, RESIDUAL, draw_svg
-from tauscope.report.table import csv_text
-from tauscope.report.tables import input_table
+from tauscope.report.tables import csv_text, input_table
 
 HEIGHT_INCHES = 3.4
 
-MOST_POINTS = 1400
-"""Points a curve; two a pixel."""
-
+MOST_POINTS = 1400  # points a curve; two a pixel
 COLOURS = {"stated": HELD_OUT, "identified": PREDICTED, "findings": RESIDUAL, "refined": INK}
 
 
@@ -69,7 +66,6 @@ def rollout_page(rollout: Rollout, provenance: Provenance) -> str:
 
 
 def _key_figures(document: RolloutDocument) -> list[KeyFigure]:
-    """Error of each model at its worst joint."""
     figures = []
     for entry in document.summary:
         place = max(range(len(entry.rms)), key=entry.rms.__getitem__)
@@ -79,7 +75,6 @@ def _key_figures(document: RolloutDocument) -> list[KeyFigure]:
 
 
 def _motion(trace: Trace, joint: int, name: str) -> Part:
-    """Real and simulated position of one joint, and their difference."""
     time, real = trace.motion.rows, trace.motion.measured[:, joint]
     curves = {model: positions[:, joint] for model, positions in trace.simulated.items()}
 

@@ -10,8 +10,7 @@ from tauscope.recording.recording import Array
 
 ENTRY_POINT_GROUP = "tauscope.rollout"
 
-STEP_S = 1e-3
-"""Step of the simulation [s]: loops of servos run at 1 kHz."""
+STEP_S = 1e-3  # step of the simulation [s]: loops of servos run at 1 kHz
 
 
 class Plant(Protocol):

@@ -5,27 +5,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauscope.closed_loop.batch import Variants, simulate_segments
-from tauscope.closed_loop.load_friction import LoadFriction
+from tauscope.closed_loop.drive import LOST
+from tauscope.closed_loop.laws import LoadFriction
 from tauscope.closed_loop.segments import Segments
-from tauscope.closed_loop.simulate import LOST
 from tauscope.dynamics import mass_matrix
 from tauscope.export.model import ExportModel
 from tauscope.recording.recording import Array
 from tauscope.robot import Actuator, LinkInertia
 from tauscope.robot.actuator import ROOM_C
 
+# Standard error of masses relative to themselves, and of centres of mass relative to the arm of their inertia.
 BODY_STD = 0.1
-"""Standard error of masses relative to themselves, and of centres of mass relative to the arm of their inertia."""
-
-GYRATION_STD = 0.3
-"""Relative standard error of radii of gyration about centres of mass: torque tells them last of all."""
-
+GYRATION_STD = 0.3  # relative standard error of radii of gyration about centres of mass: torque tells them last of all
+# Loss of torque per volt with temperature, prior [1/K]: copper 0.4 %/K, magnets 0.2 %/K; the sensor is not at both.
 WARM_LOSS, WARM_LOSS_STD = 0.006, 0.01
-"""Loss of torque per volt with temperature, prior [1/K]: copper 0.4 %/K, magnets 0.2 %/K; the sensor is not at both."""
-
-STEP = 0.3
-"""Size of a step of friction relative to its level."""
-
+STEP = 0.3  # size of a step of friction relative to its level
 PER_BODY, PER_JOINT = 5, 5
 
 
@@ -63,7 +57,6 @@ class RefinableModel:
         self.terms = (*self._body_terms(), *self._friction_terms(), *self._warmth_terms())
 
     def _body_terms(self) -> list[Term]:
-        """Mass, centre of mass and gyration of each body."""
         robot = self._model.robot
         total = sum(self._links[place, 6] for place in self._bodies)
         inertia = np.diag(mass_matrix(robot, self._links.ravel(), np.zeros((1, robot.joint_count)))[0])
@@ -94,7 +87,6 @@ class RefinableModel:
         return terms
 
     def _warmth_terms(self) -> list[Term]:
-        """Loss of torque per volt, where temperatures were recorded and nothing states it."""
         loss = Term("loss of torque per volt", "1/K", WARM_LOSS, WARM_LOSS_STD, WARM_LOSS_STD)
         return [loss] if self._is_warmed else []
 
@@ -109,7 +101,6 @@ class RefinableModel:
         return np.nan_to_num(np.clip(found - self.segments.position[..., None], -LOST, LOST), nan=LOST)
 
     def _variants(self, values: Array) -> Variants:
-        """Models of parameters (V, P)."""
         number, joints, law = len(values), len(self._rotor), self._model.friction
         bodies = PER_BODY * len(self._bodies)
         links = np.repeat(self._links[None], number, axis=0)
@@ -144,7 +135,6 @@ class RefinableModel:
         return model, LoadFriction(found.driving[0], found.braking[0]), loops
 
     def _warm(self, loop: Actuator, slope: float) -> Actuator:
-        """A loop whose torque per volt is as stated at the mean temperature of the segments."""
         mean = self.segments.mean_temperature
         if not self._is_warmed or mean is None or loop.unit != "register":
             return loop

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from tauscope.closed_loop.load_friction import LoadFriction
+from tauscope.closed_loop.laws import LoadFriction
 from tauscope.closed_loop.refinable import RefinableModel, Term
 from tauscope.closed_loop.segments import STEP_S, Segments
 from tauscope.export.model import ExportModel
@@ -18,20 +18,11 @@ from tauscope.recording import Recording
 from tauscope.recording.recording import Array
 from tauscope.robot import Actuator
 
-INDEPENDENT_S = 0.1
-"""Time between independent position errors [s]: loops of servos pass about 10 Hz."""
-
-SIGNIFICANT = 0.05
-"""p above which a term of friction by load is left out."""
-
-MOST_STEPS = 30
-"""Gauss-Newton steps at most."""
-
-IMPROVES = 1e-4
-"""Relative fall of the cost below which the search ends."""
-
-DIFFERENCE = 0.02
-"""Step of numerical derivatives, relative to the scale of a parameter."""
+INDEPENDENT_S = 0.1  # time between independent position errors [s]: loops of servos pass about 10 Hz
+SIGNIFICANT = 0.05  # p above which a term of friction by load is left out
+MOST_STEPS = 30  # Gauss-Newton steps at most
+IMPROVES = 1e-4  # relative fall of the cost below which the search ends
+DIFFERENCE = 0.02  # step of numerical derivatives, relative to the scale of a parameter
 
 
 @dataclass(frozen=True)
@@ -109,7 +100,6 @@ def refine_model(
 
 
 def _rms(errors: Array) -> float:
-    """Root mean square of all errors."""
     return float(np.sqrt(np.mean(errors**2)))
 
 

@@ -6,7 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauscope.actuation import estimate_delays, is_open, require_loops
-from tauscope.closed_loop.drive import Drive, LoopDrive, RecordedMotion, TorqueDrive, loop_damping, record_motion
+from tauscope.closed_loop.drive import (
+    Drive,
+    LoopDrive,
+    RecordedMotion,
+    TorqueDrive,
+    loop_damping,
+    record_motion,
+    simulate_motion,
+)
 from tauscope.closed_loop.measure import lag, reversal_error, rms_error, worst_error
 from tauscope.closed_loop.model import RolloutModel, rollout_model, stated_model
 from tauscope.closed_loop.plant import STEP_S, make_plant
@@ -20,19 +28,14 @@ from tauscope.closed_loop.result import (
     RolloutDocument,
     SummaryEntry,
 )
-from tauscope.closed_loop.simulate import simulate_motion
 from tauscope.errors import RecordingMismatchError
 from tauscope.export.model import ExportModel
-from tauscope.recording import EffortKind, Recording
-from tauscope.recording.columns import table_columns
-from tauscope.recording.recording import Array
-from tauscope.recording.table import MemoryTable
+from tauscope.recording import Recording
+from tauscope.recording.recording import Array, take_commands
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import Actuator, Robot
 
-HORIZONS_S = (0.1, 1.0, 10.0)
-"""Times between restarts at the real state [s]: one command, one move, one task."""
-
+HORIZONS_S = (0.1, 1.0, 10.0)  # times between restarts at the real state [s]: one command, one move, one task
 Progress = Callable[[str], None]
 
 
@@ -86,11 +89,7 @@ class Rollout:
             is_better=bool(own < min(others)),
             parameters=[
                 RefinedEntry(
-                    name=each.term.name,
-                    value=each.value,
-                    std=each.std,
-                    unit=each.term.unit,
-                    p_value=each.p_value,
+                    name=each.term.name, value=each.value, std=each.std, unit=each.term.unit, p_value=each.p_value
                 )
                 for each in refined.terms
             ],
@@ -98,7 +97,6 @@ class Rollout:
         )
 
     def _summary(self, place: int) -> SummaryEntry:
-        """One model over all recordings."""
         entries = [trace.entry.models[place] for trace in self.traces]
         rms, worst = np.array([entry.rms for entry in entries]), np.array([entry.worst for entry in entries])
         return SummaryEntry(model=entries[0].model, rms=rms.mean(axis=0).tolist(), worst=worst.max(axis=0).tolist())
@@ -154,7 +152,6 @@ def roll_out(
 
 
 def _models(robot: Robot, exports: Sequence[ExportModel]) -> list[RolloutModel]:
-    """What the robot file states, and the model file without and with its findings."""
     names = [joint.name for joint in robot.joints]
     for export in exports:
         others = [joint.name for joint in export.robot.joints]
@@ -181,7 +178,7 @@ def _models(robot: Robot, exports: Sequence[ExportModel]) -> list[RolloutModel]:
 def _complete_loops(robot: Robot, recordings: Sequence[Recording], known: Robot | None) -> tuple[Robot, bool]:
     """The robot with delays of its loops, and whether loops can close: commands of all joints are there."""
     loops = [joint.actuator for joint in robot.joints]
-    commands = [_take_commands(recording) for recording in recordings]
+    commands = [take_commands(recording) for recording in recordings]
     if not all(loop is not None and loop.has_loop for loop in loops) or any(each is None for each in commands):
         return robot, False
     others = [None] * len(loops) if known is None else [joint.actuator for joint in known.joints]
@@ -208,7 +205,6 @@ def _complete_loops(robot: Robot, recordings: Sequence[Recording], known: Robot 
 
 
 def _fill(loop: Actuator, known: Actuator) -> Actuator:
-    """A loop with what is not stated as the model's recordings gave it."""
     return replace(
         loop,
         delay=known.delay if loop.delay is None else loop.delay,
@@ -216,30 +212,15 @@ def _fill(loop: Actuator, known: Actuator) -> Actuator:
     )
 
 
-def _take_commands(recording: Recording) -> Recording | None:
-    """The recording with its commands in place of effort; None where a joint has none."""
-    if recording.effort_kind is EffortKind.COMMAND:
-        return recording
-    names, first = recording.table.names, table_columns(recording.joint_count, EffortKind.COMMAND)
-    if not set(first) <= set(names):
-        return None
-    lost = recording.effort_kind.value
-    kept = (*first, *(name for name in names if name not in first and name.rstrip("0123456789") != lost))
-    rows = recording.table.rows(0, len(recording))[:, [names.index(name) for name in kept]]
-    return replace(recording, effort_kind=EffortKind.COMMAND, table=MemoryTable(kept, rows))
-
-
 def _drive(
     robot: Robot, recording: Recording, motion: RecordedMotion, model: RolloutModel, loops: tuple[Actuator, ...]
 ) -> Drive:
-    """Loops where commands are there, else recorded torque."""
     if loops:
         return LoopDrive(loops, recording, motion.time, is_damped=robot.mjcf is None)
     return TorqueDrive(robot, recording, motion, model.inertia)
 
 
 def _plain_model(robot: Robot, exports: Sequence[ExportModel]) -> ExportModel | None:
-    """The model without findings."""
     if not exports:
         return stated_model(robot)
     return exports[0] if len(exports) > 1 else replace(exports[-1], effects=())
@@ -249,7 +230,7 @@ def _refine(
     model: ExportModel | None, loops: tuple[Actuator, ...], training: Sequence[Recording], progress: Progress
 ) -> Refined:
     """The refined model. Raises RecordingMismatchError where no commands reach loops."""
-    commands = [_take_commands(recording) for recording in training]
+    commands = [take_commands(recording) for recording in training]
     lacking = [recording.name for recording, each in zip(training, commands, strict=True) if each is None]
     if not loops or model is None or lacking:
         raise RecordingMismatchError(
@@ -262,7 +243,6 @@ def _refine(
 def _entry(
     name: str, motion: RecordedMotion, runs: dict[float | None, Array], stabiliser: list[float] | None
 ) -> ModelEntry:
-    """Errors of one model on one recording."""
     real, free = motion.measured, runs[None]
     turned = reversal_error(motion.rows, real, free, motion.time, motion.velocity)
     return ModelEntry(
@@ -277,7 +257,6 @@ def _entry(
 
 
 def _warn_drive(*, is_closed: bool) -> tuple[ResultWarning, ...]:
-    """That a stabiliser holds the arm."""
     if is_closed:
         return ()
     text = "no loop is stated, or commands are missing: recorded torque drives the arm, and a stabiliser holds it"

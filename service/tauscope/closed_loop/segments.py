@@ -13,16 +13,12 @@ from tauscope.recording import Recording
 from tauscope.recording.recording import Array
 from tauscope.robot import Actuator
 
+# Length of a segment [s]: several times the response of a servo, and too short for stick-slip to lose its phase.
 SEGMENT_S = 0.3
-"""Length of a segment [s]: several times the response of a servo, and too short for stick-slip to lose its phase."""
-
-STRIDE = 2
-"""Steps of a rollout in one of a segment: half the effort, and still several in the response of a fast servo."""
-
+STRIDE = 2  # steps of a rollout in one of a segment: half the effort, and still several in the response of a fast servo
 STEP_S = STRIDE * plant.STEP_S
 
-MOST_SEGMENTS = 120
-"""Segments that are simulated side by side, evenly chosen."""
+MOST_SEGMENTS = 120  # segments that are simulated side by side, evenly chosen
 
 
 @dataclass(frozen=True, eq=False)

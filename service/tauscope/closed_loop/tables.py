@@ -4,15 +4,13 @@ from collections.abc import Iterator
 
 from tauscope.closed_loop.result import RefinementEntry, RolloutDocument
 from tauscope.number_text import ABSENT, significant
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 
+# Models in words: the identified one is without findings of a diagnosis.
 MODEL_WORDS = {"stated": "robot file", "identified": "identified", "findings": "with findings", "refined": "refined"}
-"""Models in words: the identified one is without findings of a diagnosis."""
-
 MILLI = 1e3
 
-LEAST_P = 1e-3
-"""p below which its size says nothing."""
+LEAST_P = 1e-3  # p below which its size says nothing
 
 
 def summary_table(document: RolloutDocument) -> Table:
@@ -98,7 +96,6 @@ def rollout_sentences(document: RolloutDocument) -> Iterator[str]:
 
 
 def _refinement_sentences(entry: RefinementEntry) -> Iterator[str]:
-    """How the refinement went, and whether to use it."""
     before, after = (significant(MILLI * value, 3) for value in (entry.rms_before, entry.rms_after))
     yield f"The refinement lowers the error of {entry.segments} segments of 0.3 s from {before} to {after} mrad."
     if entry.left_out:
@@ -110,7 +107,6 @@ def _refinement_sentences(entry: RefinementEntry) -> Iterator[str]:
 
 
 def _stabilisers(document: RolloutDocument) -> Iterator[list[float]]:
-    """Torque of the stabiliser of every model and recording."""
     for recording in document.recordings:
         for entry in recording.models:
             if entry.stabiliser_rms:
@@ -118,5 +114,4 @@ def _stabilisers(document: RolloutDocument) -> Iterator[list[float]]:
 
 
 def _milli(value: float | None) -> str:
-    """A length or an angle in thousandths."""
     return ABSENT if value is None else significant(MILLI * value, 3)

@@ -28,15 +28,12 @@ class AsymmetricCoulomb(Effect):
 
     @classmethod
     def can_act(cls, context: ArmContext, joint: int) -> bool:
-        """Whether the joint moves both ways."""
         return context.reverses(joint)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """|A(q̇)|."""
         return per_joint_columns(np.abs(signals.step[self.joint])[None, None])
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """In which direction friction is larger."""
         larger, smaller = ("positive", "negative") if found["a"].value >= 0.0 else ("negative", "positive")
         size = replace(found["a"], value=2.0 * found["a"].value)
         return f"Coulomb friction is {size_text(size)} larger in {larger} than in {smaller} direction"

@@ -27,15 +27,12 @@ class AsymmetricViscous(Effect):
 
     @classmethod
     def can_act(cls, context: ArmContext, joint: int) -> bool:
-        """Whether the joint moves both ways."""
         return context.reverses(joint)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """|q̇|."""
         return per_joint_columns(np.abs(signals.velocity[self.joint])[None, None])
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """In which direction friction is larger."""
         larger, smaller = ("positive", "negative") if found["b"].value >= 0.0 else ("negative", "positive")
         size = replace(found["b"], value=2.0 * found["b"].value)
         return f"viscous friction is {size_text(size)} larger in {larger} than in {smaller} direction"

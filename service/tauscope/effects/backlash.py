@@ -16,36 +16,25 @@ from tauscope.effects.deflection import BAND, Deflection
 from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, Sizes, mesh, size_text
 from tauscope.recording.recording import Array
 
-GAPS = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
-"""Gaps looked at, relative to the joint's range of motion."""
-
-BANDS = np.array([2.0, 1.0, 0.35])
-"""Bands to which the load is smoothed, relative to the common one."""
-
+GAPS = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])  # gaps looked at, relative to the joint's range of motion
+BANDS = np.array([2.0, 1.0, 0.35])  # bands to which the load is smoothed, relative to the common one
+# Factor between the gap that a link crosses and the one by which it is found to move, up to which they are the same: a
+# link that bounces at other instants than the model's seems to move by less, and on simulated arms by up to 1.7 times.
 SAME = 2.0
-"""Factor between the gap that a link crosses and the one by which it is found to move, up to which they are the same: a
-link that bounces at other instants than the model's seems to move by less, and on simulated arms by up to 1.7 times."""
-
+# Gaps on springy teeth that are looked at, relative to the joint's range of motion: closer to each other, as a link
+# that swings comes back at other instants, and smaller, as it swings on after them.
 SPRINGY_GAPS = np.geomspace(2e-5, 1e-2, 9)
-"""Gaps on springy teeth that are looked at, relative to the joint's range of motion: closer to each other, as a link
-that swings comes back at other instants, and smaller, as it swings on after them."""
-
+# Band of the load on springy teeth, relative to the common one: when a link meets them hangs on all of it.
 SPRINGY_BAND = 3.0
-"""Band of the load on springy teeth, relative to the common one: when a link meets them hangs on all of it."""
-
+# Resonances of the link on springy teeth at its mean inertia, relative to the common band.
 RESONANCES = np.array([0.7, 1.0, 1.5, 2.2])
-"""Resonances of the link on springy teeth at its mean inertia, relative to the common band."""
-
-STEPS = 15.0
-"""Steps of the integration in a period of the resonance at its least inertia."""
-
+STEPS = 15.0  # steps of the integration in a period of the resonance at its least inertia
+# Least, usual and largest share of their force that teeth lose a speed [s/rad or s/m]: what strikes them by v bounces
+# back by some v - 2/3 c v².
 LOSSES = np.array([0.8, 8.0, 80.0])
-"""Least, usual and largest share of their force that teeth lose a speed [s/rad or s/m]: what strikes them by v bounces
-back by some v - 2/3 c v²."""
-
+# Damping ratio of teeth that touch, beside what they lose under load: where less is lost a link bounces on, but when it
+# comes back hangs on everything that a recording does not show.
 DAMPING = 0.2
-"""Damping ratio of teeth that touch, beside what they lose under load: where less is lost a link bounces on, but when
-it comes back hangs on everything that a recording does not show."""
 
 
 def place_between_teeth(load: Array, inertia: Array, gap: float, rate_hz: float) -> Array:
@@ -119,7 +108,6 @@ def place_between_springs(
 
 
 def _first(is_so: np.ndarray) -> int:
-    """Index of the first True; the length where there is none."""
     return int(is_so.argmax()) if is_so.any() else len(is_so)
 
 
@@ -138,7 +126,6 @@ class Backlash(Deflection):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a joint that moves under load."""
         made = []
         for joint in cls.deflected_joints(context):
             gaps, bands = GAPS * (context.highest[joint] - context.lowest[joint]), BANDS * context.cutoff_hz
@@ -164,7 +151,6 @@ class Backlash(Deflection):
         return (replace(found, value=found.value + apart, std=float(np.hypot(found.std, 0.5 * apart))),)
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How wide."""
         return f"the transmission has {size_text(found['b'])} of backlash"
 
     def is_consistent(self, coefficients: Array, shape: Array) -> bool:
@@ -172,7 +158,6 @@ class Backlash(Deflection):
         return bool(shape[0] <= SAME * coefficients[0])
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
-        """Place between the teeth."""
         return place_between_teeth(load, inertia, float(shape[0]), rate_hz)
 
 
@@ -204,7 +189,6 @@ class SpringyTeeth(Backlash):
 
     @classmethod
     def farther_forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """None: these are."""
         return ()
 
     def is_consistent(self, coefficients: Array, shape: Array) -> bool:

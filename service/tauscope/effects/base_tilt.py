@@ -15,10 +15,7 @@ from tauscope.robot import Robot
 def tilt_directions(gravity: Array) -> tuple[Array, Array]:
     """Two unit vectors across gravity, the frame's own axes where gravity lies along one.
 
-    Parameters
-    ----------
-    gravity : (3,) float64
-        in the base frame [m/s²]
+    `gravity`: (3,), in the base frame [m/s²].
     """
     axes = np.eye(3)
     main = int(np.argmax(np.abs(gravity)))
@@ -57,7 +54,6 @@ class BaseTilt(Effect):
         return np.stack(torques)[None]
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """By which angle."""
         size = replace(found["alpha_1"], value=float(np.hypot(found["alpha_1"].value, found["alpha_2"].value)))
         return f"gravity in the base frame is off by {size_text(size)}"
 

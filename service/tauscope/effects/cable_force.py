@@ -11,9 +11,8 @@ from tauscope.number_text import significant
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Angles at which a cable begins to pull, relative to the range of motion: one that always pulls is a spring.
 ONSETS = np.linspace(0.2, 0.9, 8)
-"""Angles at which a cable begins to pull, relative to the range of motion: one that always pulls is a spring."""
-
 EXPONENTS = np.array([1.0, 1.5, 2.0])
 
 
@@ -49,17 +48,14 @@ class CableForce(Effect):
         return made
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """±max(±(q - q_t), 0)^p."""
         beyond = np.maximum(self.side * (signals.position[self.joint] - shapes[:, :1]), 0.0)
         return per_joint_columns((self.side * beyond ** shapes[:, 1:])[:, None])
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """On which side of which angle it pulls."""
         side = "above" if self.side > 0 else "below"
         angle = found["q_t"]
         return f"an elastic force {side} {significant(angle.value, 2)} {angle.unit} is missing"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """One side."""
         side = "above" if self.side > 0 else "below"
         return [{"stiffness": coefficients[0], "angle": shape[0], "exponent": shape[1], "side_of_angle": side}]

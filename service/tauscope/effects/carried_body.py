@@ -14,22 +14,14 @@ from tauscope.recording.recording import Array
 from tauscope.robot import LinkInertia
 from tauscope.robot.robot import STANDARD_PARAMETERS
 
-FARTHEST_M = 0.5
-"""Distance from the last link's origin at which nobody carries anything [m]."""
-
+FARTHEST_M = 0.5  # distance from the last link's origin at which nobody carries anything [m]
 MASS = Coefficient("m", "kg")
 
 PLACE = (Shape("r_x", "m", reported=False), Shape("r_y", "m", reported=False), Shape("r_z", "m", reported=False))
 
 
 def unit_body(place: Array) -> Array:
-    """Standard parameters (10,) of one kilogramme at a place.
-
-    Parameters
-    ----------
-    place : (3,) float64
-        r, in the last link's frame [m]
-    """
+    """Standard parameters (10,) of one kilogramme at a place. `place`: (3,), r, in the last link's frame [m]."""
     return LinkInertia(1.0, place, place @ place * np.eye(3) - np.outer(place, place)).to_vector()
 
 
@@ -48,14 +40,7 @@ def body_columns(signals: Signals) -> Array:
 def body_quantities(mass: float, place: Array, covariance: Array) -> Sequence[Quantity]:
     """Mass and first moment with their standard errors; components of the place that no torque shows are left out.
 
-    Parameters
-    ----------
-    mass : float
-        m [kg]
-    place : (3,) float64
-        r [m]
-    covariance : (4, 4) float64
-        of m and r
+    `mass`: m [kg]; `place`: (3,), r [m]; `covariance`: (4, 4), of m and r.
     """
     found = [Quantity("m", mass, float(np.sqrt(max(covariance[0, 0], 0.0))), "kg")]
     for axis, name in enumerate(("ms_x", "ms_y", "ms_z")):

@@ -10,8 +10,7 @@ Done = TypeVar("Done")
 Key = TypeVar("Key", bound=Hashable)
 Made = TypeVar("Made")
 
-THREADS = 2
-"""More threads gain nothing: they share the memory's speed, and Python between arrays."""
+THREADS = 2  # more threads gain nothing: they share the memory's speed, and Python between arrays
 
 
 def side_by_side(work: Callable[[Item], Done], items: Iterable[Item]) -> list[Done]:

@@ -12,37 +12,27 @@ from tauscope.robot import Robot
 
 T = TypeVar("T")
 
+# Rms of a joint's rigid-body torque relative to its largest torque below which nothing presses its transmission.
 LEAST_LOAD = 0.02
-"""Rms of a joint's rigid-body torque relative to its largest torque below which nothing presses its transmission."""
-
-ONE_WAY = 0.1
-"""Speed the other way, relative to the rms, below which a joint does not reverse."""
+ONE_WAY = 0.1  # speed the other way, relative to the rms, below which a joint does not reverse
 
 
 @dataclass(frozen=True, eq=False)
 class ArmContext:
     """The arm and the ranges of its recorded motion.
 
-    slowest, fastest : (n,) float64
-        range of every joint's velocity, the rarest percents left out [rad/s or m/s]
-    lowest, highest : (n,) float64
-        range of every joint's position [rad or m]
-    speed, top_speed : (n,) float64
-        rms and largest magnitude of every joint's velocity [rad/s or m/s]
-    load, top_torque : (n,) float64
-        rms of the fitted rigid-body torque, largest magnitude of the model's torque [Nm or N]
-    inertia : (n,) float64
-        mean of every joint's inertia with all that it carries, zero where the fit knows of none [kg m² or kg]
-    durations : tuple of float
-        length of every training recording [s]
-    cutoff_hz : float
-        highest frequency that torque and columns share [Hz]
-    position_std : (n,) float64 or None
-        noise of every joint's position, its encoder's steps included [rad or m]; None where it is negligible
-    coldest, hottest : (n,) float64
-        range of every joint's recorded temperature [°C]; NaN where there is none
-    link_encoders : frozenset of int
-        joints, from 0, whose transmission an encoder on the link has shown as it is
+    `slowest`, `fastest`: (n,), range of every joint's velocity, the rarest percents left out [rad/s or m/s].
+    `lowest`, `highest`: (n,), range of every joint's position [rad or m].
+    `speed`, `top_speed`: (n,), rms and largest magnitude of every joint's velocity [rad/s or m/s].
+    `load`, `top_torque`: (n,), rms of the fitted rigid-body torque, largest magnitude of the model's torque [Nm or N].
+    `inertia`: (n,), mean of every joint's inertia with all that it carries, zero where the fit knows of none [kg m² or
+    kg].
+    `durations`: length of every training recording [s].
+    `cutoff_hz`: highest frequency that torque and columns share [Hz].
+    `position_std`: (n,) or None, noise of every joint's position, its encoder's steps included [rad or m]; None where
+    it is negligible.
+    `coldest`, `hottest`: (n,), range of every joint's recorded temperature [°C]; NaN where there is none.
+    `link_encoders`: joints, from 0, whose transmission an encoder on the link has shown as it is.
     """
 
     robot: Robot
@@ -68,45 +58,21 @@ class ArmContext:
         return range(self.robot.joint_count)
 
     def moves(self, joint: int) -> bool:
-        """Whether a joint moves at all.
-
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        """
+        """Whether a joint moves at all."""
         return bool(self.highest[joint] > self.lowest[joint] and self.speed[joint] > 0.0)
 
     def reverses(self, joint: int) -> bool:
-        """Whether a joint moves both ways.
-
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        """
+        """Whether a joint moves both ways."""
         return bool(
             self.slowest[joint] < -ONE_WAY * self.speed[joint] and self.fastest[joint] > ONE_WAY * self.speed[joint]
         )
 
     def warming(self, joint: int) -> float:
-        """Range of a joint's recorded temperature [K]; zero where there is none.
-
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        """
+        """Range of a joint's recorded temperature [K]; zero where there is none."""
         return float(np.nan_to_num(self.hottest[joint] - self.coldest[joint])) if self.hottest.size else 0.0
 
     def is_loaded(self, joint: int) -> bool:
-        """Whether the rigid body loads a joint's transmission at all.
-
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        """
+        """Whether the rigid body loads a joint's transmission at all."""
         return bool(self.load[joint] > LEAST_LOAD * self.top_torque[joint])
 
 
@@ -114,28 +80,19 @@ class ArmContext:
 class Signals:
     """One piece of conditioned motion at the recorded rate, samples last, with the fitted model's torque.
 
-    rate_hz : float
-        sampling rate [Hz]
-    time : (P, N) float64
-        instants of every repetition, from the beginning of the recording [s]
-    recording : int
-        index of the recording, from 0; held-out recordings have negative ones
-    position, velocity, acceleration : (n, N) float64
-        q, q̇, q̈
-    load : (n, N) float64
-        fitted torque of the rigid body, which the transmission carries [Nm or N]
-    torque : (n, N) float64
-        fitted torque of the whole model [Nm or N]
-    step : (n, N) float64
-        A(K_v q̇), the smooth sign of the velocity
-    steepness : (n,) float64
-        K_v [s/rad or s/m]
-    bodies : (10 n,) float64
-        standard parameters that stand for the fitted base parameters: all that torque along this chain needs
-    links : (10 n,) float64
-        standard parameters of the nearest physically consistent links, for another chain or another gravity
-    temperature : (n, P, N) float64 or None
-        recorded temperature [°C]; NaN at joints without, None where none was recorded
+    `rate_hz`: sampling rate [Hz].
+    `time`: (P, N), instants of every repetition, from the beginning of the recording [s].
+    `recording`: index of the recording, from 0; held-out recordings have negative ones.
+    `position`, `velocity`, `acceleration`: (n, N), q, q̇, q̈.
+    `load`: (n, N), fitted torque of the rigid body, which the transmission carries [Nm or N].
+    `torque`: (n, N), fitted torque of the whole model [Nm or N].
+    `step`: (n, N), A(K_v q̇), the smooth sign of the velocity.
+    `steepness`: (n,), K_v [s/rad or s/m].
+    `bodies`: (10 n,), standard parameters that stand for the fitted base parameters: all that torque along this chain
+    needs.
+    `links`: (10 n,), standard parameters of the nearest physically consistent links, for another chain or another
+    gravity.
+    `temperature`: (n, P, N) or None, recorded temperature [°C]; NaN at joints without, None where none was recorded.
     """
 
     robot: Robot
@@ -171,10 +128,7 @@ class Signals:
     def derivative(self, values: Array) -> Array:
         """Derivative in time of signals (..., N): by their Fourier series where periodic, else by differences.
 
-        Parameters
-        ----------
-        values : (..., N) float64
-            signals, time last
+        `values`: (..., N), signals, time last.
         """
         count = values.shape[-1]
         if not self.periodic:
@@ -187,12 +141,7 @@ class Signals:
     def smoothed(self, values: Array, cutoff_hz: float) -> Array:
         """Signals (N,) without what lies above a frequency, the phase kept.
 
-        Parameters
-        ----------
-        values : (N,) float64
-            a signal
-        cutoff_hz : float
-            highest frequency kept [Hz]
+        `values`: (N,), a signal; `cutoff_hz`: highest frequency kept [Hz].
         """
         if not self.periodic:
             return smooth(values[:, None], self.rate_hz, cutoff_hz)[:, 0]

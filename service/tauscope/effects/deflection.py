@@ -17,31 +17,24 @@ from tauscope.effects.context import ArmContext, Signals
 from tauscope.effects.effect import Effect, Quantity, Shape
 from tauscope.recording.recording import Array
 
+# Step of the difference quotient by position [rad or m]: far above rounding, far below the curvature of any sine.
 SMALL = 1e-4
-"""Step of the difference quotient by position [rad or m]: far above rounding, far below the curvature of any sine."""
-
+# Rates at which derivatives by position, velocity and acceleration are taken. They change with the pose, by far slower
+# than a recording, that by position with the acceleration too: at the 16 joints of three simulated arms they err by
+# 0.4, 0.8 and 0.02 % at most, rms.
 SLOPES_HZ = (100.0, 25.0, 25.0)
-"""Rates at which derivatives by position, velocity and acceleration are taken. They change with the pose, by far slower
-than a recording, that by position with the acceleration too: at the 16 joints of three simulated arms they err by 0.4,
-0.8 and 0.02 % at most, rms."""
-
+# Joints whose columns' slopes are kept a piece: fits are about one or two joints at a time, and each motion needs some
+# 0.1 MB a second and joint.
 KEPT = 2 * THREADS
-"""Joints whose columns' slopes are kept a piece: fits are about one or two joints at a time, and each motion needs
-some 0.1 MB a second and joint."""
-
-LEAST_INERTIA = 0.05
-"""Share of a joint's largest inertia below which a fitted one is an error of the fit."""
-
+LEAST_INERTIA = 0.05  # share of a joint's largest inertia below which a fitted one is an error of the fit
+# What the first order in δ, with the load of the motor's own motion, errs by, relative to the size that is found: on
+# simulated arms 0.02 to 0.25 beyond the standard error.
 FIRST_ORDER = 0.12
-"""What the first order in δ, with the load of the motor's own motion, errs by, relative to the size that is found: on
-simulated arms 0.02 to 0.25 beyond the standard error."""
-
-BAND = Shape("band", "Hz", fixed=True, reported=False)
-"""Of the load that deflects the transmission."""
+BAND = Shape("band", "Hz", fixed=True, reported=False)  # of the load that deflects the transmission
 
 
+# Samples (K,) at which slopes are taken, and those of some columns of Φ there, (n, C, K): 1e-7 is more than enough.
 _Slopes = tuple[NDArray[np.intp], NDArray[np.float32]]
-"""Samples (K,) at which slopes are taken, and those of some columns of Φ there, (n, C, K): 1e-7 is more than enough."""
 
 
 class Deflection(Effect):
@@ -58,7 +51,6 @@ class Deflection(Effect):
         return [joint for joint in hidden if context.moves(joint) and context.is_loaded(joint)]
 
     def touched(self, joint_count: int) -> tuple[int, ...]:
-        """All joints."""
         return tuple(range(joint_count))
 
     def quantities(
@@ -72,25 +64,16 @@ class Deflection(Effect):
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
         """δ per unit of the coefficient along a motion, (N,).
 
-        Parameters
-        ----------
-        load : (N,) float64
-            τ_rb, smoothed [Nm or N]
-        inertia : (N,) float64
-            of the link and all that it carries, zero where it is not known [kg m² or kg]
-        shape : (k,) float64
-            values of the shape parameters
-        rate_hz : float
-            sampling rate [Hz]
+        `load`: (N,), τ_rb, smoothed [Nm or N].
+        `inertia`: (N,), of the link and all that it carries, zero where it is not known [kg m² or kg].
+        `shape`: (k,), values of the shape parameters.
+        `rate_hz`: sampling rate [Hz].
         """
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """Torque of the deflection; where the motion repeats, as in a repetition that follows another.
 
-        Parameters
-        ----------
-        shapes : (g, k) float64
-            values of the shape parameters, `BAND` among them
+        `shapes`: (g, k), values of the shape parameters, `BAND` among them.
         """
         joint, band = self.joint or 0, self.shapes.index(BAND)
         times, count = 2 if signals.periodic else 1, signals.position.shape[-1]
@@ -107,17 +90,8 @@ class Deflection(Effect):
 def torque_of_deflection(signals: Signals, joint: int, deflection: Array) -> Array:
     """Torque that a small deflection of one joint's transmission makes at all joints.
 
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    deflection : (N,) float64
-        δ, by how much the link lags the motor [rad or m]
-
-    Returns
-    -------
-    (n, N) float64
-        τ(q - δ) - τ(q), to first order [Nm or N]
+    `deflection`: (N,), δ, by how much the link lags the motor [rad or m].
+    Returns (n, N), τ(q - δ) - τ(q), to first order [Nm or N].
     """
     by_position, by_velocity, by_acceleration = _slopes(signals, joint)
     rate = signals.derivative(deflection)
@@ -128,13 +102,7 @@ def torque_of_deflection(signals: Signals, joint: int, deflection: Array) -> Arr
 
 
 def inertia_of_link(signals: Signals, joint: int) -> Array:
-    """Inertia that a joint's transmission moves, (N,) [kg m² or kg]; zero where the fit knows of none.
-
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    """
+    """Inertia that a joint's transmission moves, (N,) [kg m² or kg]; zero where the fit knows of none."""
     inertia = _slopes(signals, joint)[2][joint]
     return np.asarray(np.maximum(inertia, LEAST_INERTIA * max(float(inertia.max()), 0.0)))
 

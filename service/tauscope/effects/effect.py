@@ -17,31 +17,23 @@ from tauscope.number_text import significant
 from tauscope.recording.recording import Array
 from tauscope.robot import JointType, Robot
 
+# An entry of a scenario file without its joint; without its effect too where that is the effect's own id.
 Entry = dict[str, Any]
-"""An entry of a scenario file without its joint; without its effect too where that is the effect's own id."""
-
-_STEP = "atan({k_v} * v) * 0.6366197723675814"
-"""A(K_v v), the smooth sign, in C and Python."""
-
+_STEP = "atan({k_v} * v) * 0.6366197723675814"  # A(K_v v), the smooth sign, in C and Python
 _POSITION = {JointType.REVOLUTE: "rad", JointType.PRISMATIC: "m"}
 _TORQUE = {JointType.REVOLUTE: "Nm", JointType.PRISMATIC: "N"}
 
 
-SHORT_S = 0.5
-"""Times below this are told in milliseconds [s]."""
-
-NO_SHAPE = np.zeros((1, 0))
-"""The grid of an effect without shape parameters."""
+SHORT_S = 0.5  # times below this are told in milliseconds [s]
+NO_SHAPE = np.zeros((1, 0))  # the grid of an effect without shape parameters
 
 
 @dataclass(frozen=True)
 class Coefficient:
     """A linear coefficient of an effect.
 
-    largest, smallest : float
-        magnitudes beyond which there is no such effect
-    whole : float
-        value of what is complete, where an estimate stops
+    `largest`, `smallest`: magnitudes beyond which there is no such effect.
+    `whole`: value of what is complete, where an estimate stops.
     """
 
     name: str
@@ -81,8 +73,7 @@ class Quantity:
         return replace(self, value=1e3 * self.value, std=1e3 * self.std, unit="ms", period=1e3 * self.period)
 
 
-Sizes = Mapping[str, Quantity]
-"""Parameters of a finding by name."""
+Sizes = Mapping[str, Quantity]  # parameters of a finding by name
 
 
 def size_text(quantity: Quantity) -> str:
@@ -100,12 +91,9 @@ def percent_text(value: float) -> str:
 class Effect(ABC):
     """One form of an effect at one place.
 
-    joint : int or None
-        joint index, from 0; None for the whole arm
-    grid : (g, k) float64
-        values of the shape parameters at which the effect is looked for
-    lower, upper : (k,) float64
-        bounds of the shape parameters
+    `joint`: None for the whole arm.
+    `grid`: (g, k), values of the shape parameters at which the effect is looked for.
+    `lower`, `upper`: (k,), bounds of the shape parameters.
 
     Columns of an effect `of_motion_alone` are the same beside every model, and are made once; those of one that
     `has_step` change with K_v of its joint; one `of_motion_and_step` changes with nothing else of the model.

@@ -13,14 +13,9 @@ from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 from tauscope.robot.robot import STANDARD_PARAMETERS
 
-LENGTHS_S = (0.5, 1.5, 4.5)
-"""Lengths of the windows looked through [s]."""
-
-OVERLAP = 0.4
-"""Part of a window that its neighbour covers too."""
-
-JOINTS_FOR_A_FORCE = 3
-"""Joints from which the three components of a force can be told apart."""
+LENGTHS_S = (0.5, 1.5, 4.5)  # lengths of the windows looked through [s]
+OVERLAP = 0.4  # part of a window that its neighbour covers too
+JOINTS_FOR_A_FORCE = 3  # joints from which the three components of a force can be told apart
 
 _WINDOW = (
     Shape("scope", "1", fixed=True, reported=False),
@@ -42,11 +37,7 @@ class ExternalContact(TimeLocalEffect):
     remedy = "clear what it touches, or leave that stretch of the recording out"
     no_scenario = "a scenario starts anew each time, so only contact at the same time in every recording fits"
     revealing_motion = "the same motion once more without contact"
-    coefficients = (
-        Coefficient("F_x", "N"),
-        Coefficient("F_y", "N"),
-        Coefficient("F_z", "N"),
-    )
+    coefficients = (Coefficient("F_x", "N"), Coefficient("F_y", "N"), Coefficient("F_z", "N"))
     shapes = _WINDOW
 
     @classmethod
@@ -59,7 +50,6 @@ class ExternalContact(TimeLocalEffect):
         return [*whole, *(JointContact(joint, grid, *bounds) for joint in context.joints)]
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How strong a force at the tool."""
         force = replace(
             found["F_x"], value=float(np.linalg.norm([found[name].value for name in ("F_x", "F_y", "F_z")]))
         )
@@ -86,7 +76,6 @@ class JointContact(ExternalContact):
     coefficients = (Coefficient("c", "{tau}"),)
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How strong a torque, and which way."""
         sign = "+" if found["c"].value >= 0.0 else "-"
         return f"an outside torque of {sign}{size_text(found['c'])} acts"
 
@@ -111,10 +100,7 @@ def transposed_jacobian(signals: Signals) -> Array:
 def contact_windows(durations: Sequence[float]) -> tuple[Array, tuple[Array, Array]]:
     """Windows of one recording each, and windows at the same instants of all, with the bounds of their shapes.
 
-    Parameters
-    ----------
-    durations : sequence of float
-        of the recordings [s]
+    `durations`: of the recordings [s].
     """
     scopes = [(float(place), length) for place, length in enumerate(durations)]
     if len(durations) > 1:

@@ -11,8 +11,8 @@ from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, si
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Steepness of the coupled motor's Coulomb step, times the rms of the joint's own speed.
 STEEPNESSES = np.array([30.0, 120.0, 500.0, 2000.0])
-"""Steepness of the coupled motor's Coulomb step, times the rms of the joint's own speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +28,7 @@ class FrictionCoupling(Effect):
     remedy = "add Coulomb and viscous friction of the coupled motor's own speed"
     no_code = "it needs the velocities of two joints"
     revealing_motion = "both joints at once, in the same and in opposite directions, slowly and fast"
-    coefficients = (
-        Coefficient("f", "{tau}", positive=True),
-        Coefficient("w", "{tau} s/{q}"),
-    )
+    coefficients = (Coefficient("f", "{tau}", positive=True), Coefficient("w", "{tau} s/{q}"))
     shapes = (Shape("K", "s/{q}", logarithmic=True),)
 
     partner: int = 0
@@ -49,27 +46,22 @@ class FrictionCoupling(Effect):
         return made
 
     def touched(self, joint_count: int) -> tuple[int, ...]:
-        """Both joints."""
         return (self.partner, self.joint or 0)
 
     def place(self, joint_names: Sequence[str]) -> str:
-        """Both joints by name."""
         return f"at {joint_names[self.partner]} and {joint_names[self.joint or 0]}"
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """On the sum or the difference of two speeds."""
         relation = "sum" if self.sign > 0 else "difference"
         return f"{size_text(found['f'])} of Coulomb friction on the {relation} of two speeds is missing"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(K v) and v on both joints."""
         velocity = signals.velocity[self.joint] + self.sign * signals.velocity[self.partner]
         step = smooth_sign(velocity, shapes)
         own = np.stack([step, np.broadcast_to(velocity, step.shape)], axis=1)
         return np.stack([self.sign * own, own], axis=2)
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """One coupling."""
         f, w = coefficients
         of = "sum" if self.sign > 0 else "difference"
         return [{"other_joint": self.partner + 1, "of": of, "coulomb": f, "viscous": w, "k_v": shape[0]}]

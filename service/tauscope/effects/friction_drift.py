@@ -10,21 +10,14 @@ from tauscope.effects.context import ArmContext, Signals
 from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, Sizes, size_text
 from tauscope.recording.recording import Array
 
-TIMES = np.array([0.08, 0.2, 0.5, 1.2, 3.0])
-"""Time constants looked at, relative to the longest recording."""
+TIMES = np.array([0.08, 0.2, 0.5, 1.2, 3.0])  # time constants looked at, relative to the longest recording
 
 
+# Range of a recorded temperature from which friction may follow it [K]: motors report whole degrees.
 LEAST_WARMING = 2.0
-"""Range of a recorded temperature from which friction may follow it [K]: motors report whole degrees."""
-
-RATES = np.array([0.0, 0.03])
-"""Relative changes of viscosity looked at [1/K]: greases and oils lose 2 to 5 % a kelvin."""
-
-FASTEST = 0.06
-"""…and the largest [1/K]."""
-
-NO_RATE = 1e-9
-"""Rate below which friction is a straight line in temperature [1/K]."""
+RATES = np.array([0.0, 0.03])  # relative changes of viscosity looked at [1/K]: greases and oils lose 2 to 5 % a kelvin
+FASTEST = 0.06  # …and the largest [1/K]
+NO_RATE = 1e-9  # rate below which friction is a straight line in temperature [1/K]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +28,7 @@ class FrictionDrift(Effect):
     would else leave them open. By the clock p is 1. By heat it is the power that the model's friction dissipates, in
     watts: a joint that rests or creeps cools.
 
-    duration_s : float
-        D, of the longest recording [s]
+    `duration_s`: D, of the longest recording [s].
     """
 
     has_step = True
@@ -70,13 +62,11 @@ class FrictionDrift(Effect):
         return found
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """Whether friction rises or falls, at the joint's usual speed."""
         change = found["f"].value + found["w"].value * float(context.speed[self.joint or 0])
         verb, size = "rises" if change >= 0.0 else "falls", size_text(replace(found["f"], value=change))
         return f"friction {verb} by {size} {'per watt of its own heat' if self.by_heat else 'during a recording'}"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇) h, q̇ h, repetition by repetition."""
         constants = shapes[:, 0]
         if self.by_heat:
             course = self._temperature(signals, constants)
@@ -106,8 +96,7 @@ class ThermalDrift(FrictionDrift):
 
     f and w are what friction changes by a kelvin at ϑ_0. Where no temperature is known h is zero.
 
-    reference_c : float
-        ϑ_0, middle of the temperatures of training [°C]
+    `reference_c`: ϑ_0, middle of the temperatures of training [°C].
     """
 
     is_variant = True
@@ -123,19 +112,12 @@ class ThermalDrift(FrictionDrift):
 
     @classmethod
     def of(cls, context: ArmContext, joint: int) -> "ThermalDrift":
-        """The form of a joint whose temperature was recorded.
-
-        Parameters
-        ----------
-        joint : int
-            index, from 0
-        """
+        """The form of a joint whose temperature was recorded. `joint`: index, from 0."""
         bounds = np.zeros(1), np.array([FASTEST])
         reference = 0.5 * float(context.coldest[joint] + context.hottest[joint])
         return cls(joint, RATES[:, None], *bounds, max(context.durations), reference_c=reference)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇) h, q̇ h, repetition by repetition."""
         joint = self.joint or 0
         warmer = np.zeros(signals.time.shape)
         if signals.temperature is not None:
@@ -148,7 +130,6 @@ class ThermalDrift(FrictionDrift):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """f, w, r and ϑ_0."""
         return (
             *super().quantities(context, coefficients, shape, covariance),
             Quantity("T_0", self.reference_c, 0.0, "°C"),

@@ -11,20 +11,14 @@ from tauscope.effects.deflection import BAND, Deflection
 from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, Sizes, size_text
 from tauscope.recording.recording import Array
 
+# Bands to which the load is smoothed, relative to the common one; the widest passes all that is compared there.
 BANDS = np.array([1.41, 1.0, 0.35, 0.12])
-"""Bands to which the load is smoothed, relative to the common one; the widest passes all that is compared there."""
-
+# The same where the link swings: near a resonance, what a narrower one takes from the load passes for compliance.
 SWINGING_BANDS = BANDS[:2]
-"""The same where the link swings: near a resonance, what a narrower one takes from the load passes for compliance."""
-
+# Resonances of the link at its mean inertia, the motor held, relative to the common band; beyond, nothing is seen.
 RESONANCES = np.array([0.6, 0.75, 0.9, 1.1, 1.35, 1.7, 2.2, 3.0])
-"""Resonances of the link at its mean inertia, the motor held, relative to the common band; beyond, nothing is seen."""
-
-SAME = 1.6
-"""Factor between the compliance that swings and the one that is found, up to which they are the same."""
-
-DAMPING = 0.1
-"""Damping ratio of the resonance: gears and bearings make it heavier than steel alone."""
+SAME = 1.6  # factor between the compliance that swings and the one that is found, up to which they are the same
+DAMPING = 0.1  # damping ratio of the resonance: gears and bearings make it heavier than steel alone
 
 
 def transmitted(load: Array, inertia: Array, compliance: float, rate_hz: float) -> Array:
@@ -66,7 +60,6 @@ class JointElasticity(Deflection):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a joint that moves."""
         bands = BANDS * context.cutoff_hz
         stiff = np.stack([bands, np.zeros(len(bands))], axis=1)
         made = []
@@ -99,7 +92,6 @@ class JointElasticity(Deflection):
         return (replace(found, value=found.value - apart, std=float(np.hypot(found.std, apart))),)
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How stiff."""
         compliance = found["c"].value
         if compliance <= 0.0:
             return self.meaning
@@ -107,6 +99,5 @@ class JointElasticity(Deflection):
         return f"a transmission stiffness of {size_text(stiffness)} is missing"
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
-        """What the spring transmits."""
         swinging = float(shape[1])
         return load if swinging == 0.0 or not inertia.all() else transmitted(load, inertia, swinging, rate_hz)

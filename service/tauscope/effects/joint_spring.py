@@ -27,7 +27,6 @@ class JointSpring(Effect):
     coefficients = (Coefficient("k", "{tau}/{q}"),)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """The angle."""
         return per_joint_columns(signals.position[self.joint][None, None])
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
@@ -37,9 +36,7 @@ class JointSpring(Effect):
         return f"a {size_text(found['k'])} spring is missing"
 
     def advice(self, found: Sizes) -> str:
-        """A spring of that sign."""
         return self.remedy if found["k"].value >= 0.0 else "add a spring of negative stiffness to the joint"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """One stiffness."""
         return [{"stiffness": coefficients[0]}]

@@ -14,11 +14,9 @@ from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, si
 from tauscope.recording.recording import Array
 from tauscope.robot import Placement, Robot
 
+# Displacement of a frame for the difference quotient [m]; torque is quadratic in it, on the scale of the arm.
 STEP_M = 1e-5
-"""Displacement of a frame for the difference quotient [m]; torque is quadratic in it, on the scale of the arm."""
-
-LARGEST_M = 0.2
-"""A frame farther off is no error of measurement [m]."""
+LARGEST_M = 0.2  # a frame farther off is no error of measurement [m]
 
 
 class KinematicError(Effect):
@@ -53,13 +51,11 @@ class KinematicError(Effect):
         return longer - exact
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """Which frame, along which axis, and which way."""
         link, axis = int(found["link"].value), "xyz"[int(found["axis"].value) - 1]
         sign = "+" if found["d"].value >= 0.0 else "-"
         return f"the frame of link {link} is off by {size_text(found['d'])} along {sign}{axis}"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """One displacement."""
         link, axis = (int(each) for each in shape)
         return [{"link": link, "translation": [coefficients[0] if each == axis else 0.0 for each in (1, 2, 3)]}]
 
@@ -78,12 +74,7 @@ def _torques(signals: Signals, displacements: Sequence[tuple[Array, float]]) -> 
 def displaced(robot: Robot, link: int, by: Array) -> Robot:
     """The arm with the frame of one link, and all that follows, displaced.
 
-    Parameters
-    ----------
-    link : int
-        index of the link, from 0
-    by : (3,) float64
-        displacement in the moved joint's frame [m]
+    `link`: index of the link, from 0; `by`: (3,), displacement in the moved joint's frame [m].
     """
     segment = robot.segments[link]
     after = Placement(segment.after.rotation, segment.after.translation + by)

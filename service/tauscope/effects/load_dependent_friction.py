@@ -27,18 +27,14 @@ class LoadDependentFriction(Effect):
 
     @classmethod
     def can_act(cls, context: ArmContext, joint: int) -> bool:
-        """Whether the joint moves under load."""
         return context.moves(joint) and context.is_loaded(joint)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """|τ_rb| A(q̇)."""
         return per_joint_columns((np.abs(signals.load[self.joint]) * signals.step[self.joint])[None, None])
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """By which part of the load friction rises or falls."""
         verb = "rises" if found["mu"].value >= 0.0 else "falls"
         return f"friction {verb} by {percent_text(found['mu'].value)} of the transmitted torque"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """One coefficient."""
         return [{"mu": coefficients[0]}]

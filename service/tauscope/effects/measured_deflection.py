@@ -19,8 +19,7 @@ from tauscope.recording.recording import Array
 class MeasuredElasticity(JointElasticity):
     """Compliance from q - q_link over the load.
 
-    compliance, compliance_std : float
-        c and its standard error [rad/Nm or m/N]
+    `compliance`, `compliance_std`: c and its standard error [rad/Nm or m/N].
     """
 
     is_variant = True
@@ -34,12 +33,7 @@ class MeasuredElasticity(JointElasticity):
     def of(cls, context: ArmContext, joint: int, compliance: float, std: float) -> "MeasuredElasticity":
         """The form of a joint.
 
-        Parameters
-        ----------
-        joint : int
-            index, from 0
-        compliance, std : float
-            c and its standard error [rad/Nm or m/N]
+        `joint`: index, from 0; `compliance`, `std`: c and its standard error [rad/Nm or m/N].
         """
         swings = (0.0, compliance) if context.inertia[joint] > 0.0 else (0.0,)
         grid = mesh(LOAD_BANDS * context.cutoff_hz, np.array(swings))
@@ -48,7 +42,6 @@ class MeasuredElasticity(JointElasticity):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """Compliance as the encoder shows it."""
         return (Quantity("c", self.compliance, self.compliance_std, self.unit("{q}/{tau}", context)),)
 
 
@@ -56,8 +49,7 @@ class MeasuredElasticity(JointElasticity):
 class MeasuredPlay(Backlash):
     """Play from the jump of q - q_link where the load changes its sign.
 
-    play, play_std : float
-        b and its standard error [rad or m]
+    `play`, `play_std`: b and its standard error [rad or m].
     """
 
     is_variant = True
@@ -69,15 +61,7 @@ class MeasuredPlay(Backlash):
 
     @classmethod
     def of(cls, context: ArmContext, joint: int, play: float, std: float) -> "MeasuredPlay":
-        """The form of a joint.
-
-        Parameters
-        ----------
-        joint : int
-            index, from 0
-        play, std : float
-            b and its standard error [rad or m]
-        """
+        """The form of a joint. `joint`: index, from 0; `play`, `std`: b and its standard error [rad or m]."""
         grid = mesh(np.array([play]), BANDS * context.cutoff_hz)
         return cls(joint, grid, grid.min(axis=0), grid.max(axis=0), play, std)
 
@@ -88,7 +72,6 @@ class MeasuredPlay(Backlash):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """Play as the encoder shows it."""
         return (Quantity("b", self.play, self.play_std, self.unit("{q}", context)),)
 
 
@@ -96,10 +79,8 @@ class MeasuredPlay(Backlash):
 class MeasuredTeeth(SpringyTeeth):
     """The same where the encoder also shows that the teeth give way.
 
-    play, play_std : float
-        b and its standard error [rad or m]
-    compliance, compliance_std : float
-        c and its standard error [rad/Nm or m/N]
+    `play`, `play_std`: b and its standard error [rad or m].
+    `compliance`, `compliance_std`: c and its standard error [rad/Nm or m/N].
     """
 
     is_variant = True
@@ -115,14 +96,9 @@ class MeasuredTeeth(SpringyTeeth):
     def of(cls, context: ArmContext, joint: int, play: Array, compliance: Array) -> "MeasuredTeeth":
         """The form of a joint.
 
-        Parameters
-        ----------
-        joint : int
-            index, from 0
-        play : (2,) float64
-            b and its standard error [rad or m]
-        compliance : (2,) float64
-            c and its standard error [rad/Nm or m/N]
+        `joint`: index, from 0.
+        `play`: (2,), b and its standard error [rad or m].
+        `compliance`: (2,), c and its standard error [rad/Nm or m/N].
         """
         band = np.array([SPRINGY_BAND * context.cutoff_hz])
         grid = mesh(play[:1], band, compliance[:1], LOSSES)
@@ -135,7 +111,6 @@ class MeasuredTeeth(SpringyTeeth):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """Play and compliance as the encoder shows them."""
         return (
             Quantity("b", self.play, self.play_std, self.unit("{q}", context)),
             Quantity("c", self.compliance, self.compliance_std, self.unit("{q}/{tau}", context)),

@@ -9,12 +9,11 @@ from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, pe
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Powers looked at, below one and above.
 POWERS = (np.array([0.35, 0.5, 0.65, 0.8]), np.array([1.25, 1.6, 2.0, 2.4, 3.0]))
-"""Powers looked at, below one and above."""
-
+# Powers that are estimated. Nearer to one the column is the nominal model's own, and a coefficient of any size only
+# cancels that.
 BOUNDS = ((0.3, 0.85), (1.15, 3.5))
-"""Powers that are estimated. Nearer to one the column is the nominal model's own, and a coefficient of any size only
-cancels that."""
 
 
 class NonlinearViscous(Effect):
@@ -42,7 +41,6 @@ class NonlinearViscous(Effect):
         return [cls(joint, *side) for joint in context.joints if context.moves(joint) for side in sides]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """sgn(q̇) |q̇|ᵖ."""
         velocity = signals.velocity[self.joint]
         return per_joint_columns((np.sign(velocity) * np.abs(velocity) ** shapes)[:, None])
 
@@ -52,5 +50,4 @@ class NonlinearViscous(Effect):
         return f"friction grows {'faster' if faster else 'more slowly'} than in proportion to speed"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """One power of speed."""
         return [{"amplitude": coefficients[0], "exponent": shape[0]}]

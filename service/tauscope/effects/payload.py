@@ -32,7 +32,6 @@ class Payload(Effect):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One for the arm."""
         return [cls(None, np.zeros((1, 3)), np.full(3, -FARTHEST_M), np.full(3, FARTHEST_M))]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -41,17 +40,14 @@ class Payload(Effect):
         return np.stack([np.tensordot(unit_body(place), body, axes=1)[None] for place in shapes])
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How heavy."""
         if found["m"].value < 0.0:
             return f"the model's tool is {size_text(found['m'])} too heavy"
         return f"a {size_text(found['m'])} payload is missing"
 
     def advice(self, found: Sizes) -> str:
-        """More or less mass."""
         return self.remedy if found["m"].value >= 0.0 else "lower the mass of the last link"
 
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """Mass and first moment."""
         return tuple(body_quantities(float(coefficients[0]), shape, covariance))

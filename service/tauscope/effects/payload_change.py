@@ -11,11 +11,8 @@ from tauscope.effects.time_local import EVERY, OUTSIDE, TimeLocalEffect, since
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
-NEAR_EDGE = 0.03
-"""Part of a recording within which an edge of a window is the recording's own."""
-
-INSTANTS = 12
-"""Instants of every recording at which the payload may change."""
+NEAR_EDGE = 0.03  # part of a recording within which an edge of a window is the recording's own
+INSTANTS = 12  # instants of every recording at which the payload may change
 
 
 class PayloadChange(TimeLocalEffect):
@@ -41,7 +38,6 @@ class PayloadChange(TimeLocalEffect):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One for the arm."""
         grid = payload_windows(context.durations)
         longest = max(context.durations)
         lower = np.array([since(len(context.durations) - 1), 0.0, 0.0, OUTSIDE, *(-FARTHEST_M,) * 3])
@@ -63,7 +59,6 @@ class PayloadChange(TimeLocalEffect):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """Mass, first moment, and when."""
         body = (0, 5, 6, 7)
         sign, instants = carried(float(coefficients[0]), shape, context.durations)
         found = list(body_quantities(sign * float(coefficients[0]), shape[4:], covariance[np.ix_(body, body)]))
@@ -72,11 +67,9 @@ class PayloadChange(TimeLocalEffect):
         return tuple(found)
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How heavy."""
         return f"a {size_text(found['m'])} mass"
 
     def when(self, coefficients: Array, shape: Array, names: Sequence[str], durations: Sequence[float]) -> str:
-        """When it is picked up and dropped, in words."""
         recording = int(-2 - shape[0])
         if shape[0] < EVERY and shape[1] > (1.0 - NEAR_EDGE) * durations[recording]:
             verb = "is carried" if coefficients[0] > 0.0 else "is missing"
@@ -99,14 +92,7 @@ def carried(mass: float, shape: Array, durations: Sequence[float]) -> tuple[floa
 
     Beside a nominal model that has it or not, a mass that is missing in one part is a mass that is carried in the rest.
 
-    Parameters
-    ----------
-    mass : float
-        m [kg]
-    shape : (7,) float64
-        the window
-    durations : sequence of float
-        of the recordings [s]
+    `mass`: m [kg]; `shape`: (7,), the window; `durations`: of the recordings [s].
     """
     scope, start, end = shape[:3]
     if shape[3] == OUTSIDE:
@@ -127,10 +113,7 @@ def payload_windows(durations: Sequence[float]) -> Array:
 
     Within one recording, at the same instants of all, or from one recording on.
 
-    Parameters
-    ----------
-    durations : sequence of float
-        of the recordings [s]
+    `durations`: of the recordings [s].
     """
     rows = []
     scopes = [(float(place), length) for place, length in enumerate(durations)]

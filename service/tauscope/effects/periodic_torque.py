@@ -27,52 +27,30 @@ from tauscope.effects.effect import (
 from tauscope.recording.recording import Array
 from tauscope.robot import JointType, Robot
 
+# Cycles over the range of motion below which a periodic torque is a spring or a bump by another name.
 FEWEST_CYCLES = 1.5
-"""Cycles over the range of motion below which a periodic torque is a spring or a bump by another name."""
-
-CYCLES_A_STEP = 0.35
-"""Step of the scan in cycles over the range of motion: a peak is two wide."""
-
-BAND_SHARE = 0.8
-"""Share of the band up to which the frequency at typical speed may reach."""
-
+CYCLES_A_STEP = 0.35  # step of the scan in cycles over the range of motion: a peak is two wide
+BAND_SHARE = 0.8  # share of the band up to which the frequency at typical speed may reach
 MOST_ORDERS = 220
 
+# Spread of steps, relative to one, up to which they are even: over a thousand orders no phase is off by as much.
 EVEN = 1e-9
-"""Spread of steps, relative to one, up to which they are even: over a thousand orders no phase is off by as much."""
-
+# Factor up to which orders are looked at where something is left: they reach the band near reversals only, in a
+# twentieth of the time of a sine.
 FARTHER = 8.0
-"""Factor up to which orders are looked at where something is left: they reach the band near reversals only, in a
-twentieth of the time of a sine."""
-
 MOST_FARTHER_ORDERS = 800
 
-FEW = 2
-"""Orders at once up to which sines are kept: one of a fit, and the two of its difference quotient."""
-
-KEPT = 24 * THREADS
-"""Sets of them that are kept a piece: those of a model with all orders that it may have."""
+FEW = 2  # orders at once up to which sines are kept: one of a fit, and the two of its difference quotient
+KEPT = 24 * THREADS  # sets of them that are kept a piece: those of a model with all orders that it may have
 
 
 def possible_orders(context: ArmContext, joint: int) -> Array:
-    """Orders of a periodic torque that this motion can show, (g,), ascending; empty where there are none.
-
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    """
+    """Orders of a periodic torque that this motion can show, (g,), ascending; empty where there are none."""
     return _orders(context, joint, 1.0)[:MOST_ORDERS]
 
 
 def farther_orders(context: ArmContext, joint: int) -> Array:
-    """Orders beyond those, that show in a part of the motion only, (g,), ascending.
-
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    """
+    """Orders beyond those, that show in a part of the motion only, (g,), ascending."""
     near = possible_orders(context, joint)
     return _orders(context, joint, FARTHER)[len(near) :][:MOST_FARTHER_ORDERS]
 
@@ -107,17 +85,7 @@ def _is_geared(context: ArmContext, joint: int) -> bool:
 def waves(position: Array, orders: Array) -> Array:
     """Sines and cosines of orders of a position; of even steps by sin(a + b) and cos(a + b), ten times as quick.
 
-    Parameters
-    ----------
-    position : (N,) float64
-        q [rad or m]
-    orders : (g,) float64
-        k [1/rad or 1/m]
-
-    Returns
-    -------
-    (g, 2, N) float64
-        sin kq, cos kq
+    `position`: (N,), q [rad or m]; `orders`: (g,), k [1/rad or 1/m]. Returns (g, 2, N), sin kq, cos kq.
     """
     steps = np.diff(orders)
     if len(steps) < 2 or np.ptp(steps) > EVEN * abs(steps[0]):
@@ -153,7 +121,6 @@ class _Periodic(Effect):
 
     @classmethod
     def _of_orders(cls, context: ArmContext, orders: Callable[[ArmContext, int], Array]) -> Sequence[Effect]:
-        """One a joint where the effect may be and has such orders."""
         found = {joint: orders(context, joint) for joint in cls._places(context)}
         return [
             cls(joint, own[:, None], 0.9 * own[:1], 1.1 * own[-1:], geared=_is_geared(context, joint))
@@ -166,7 +133,6 @@ class _Periodic(Effect):
         return context.joints
 
     def is_free(self, place: int) -> bool:
-        """Whether the order lies between the grid's points."""
         return not self.geared
 
     def quantities(
@@ -226,12 +192,10 @@ class Cogging(_Periodic):
     coefficients = (Coefficient("sine", "{tau}"), Coefficient("cosine", "{tau}"))
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """Amplitude and order."""
         size, order = size_text(found["amplitude"]), found["order"].value
         return f"a cogging torque of {size} and order {order:.4g} is missing"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """Sin kq, cos kq."""
         return per_joint_columns(self._waves(signals, shapes))
 
 
@@ -246,20 +210,15 @@ class TorqueRipple(_Periodic):
     remedy = "correct the torque constant over the motor's angle"
     code = "load * ({c[0]} * sin({s[0]} * q) + {c[1]} * cos({s[0]} * q))"
     revealing_motion = "the same angles under other loads: other poses of the other joints"
-    coefficients = (
-        Coefficient("sine", "1", largest=1.0),
-        Coefficient("cosine", "1", largest=1.0),
-    )
+    coefficients = (Coefficient("sine", "1", largest=1.0), Coefficient("cosine", "1", largest=1.0))
 
     @classmethod
     def _places(cls, context: ArmContext) -> Sequence[int]:
         return [joint for joint in super()._places(context) if context.is_loaded(joint)]
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """Amplitude and order."""
         size, order = percent_text(found["amplitude"].value), found["order"].value
         return f"torque ripples by {size} of the load with order {order:.4g}"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """τ_rb sin kq, τ_rb cos kq."""
         return per_joint_columns(signals.load[self.joint] * self._waves(signals, shapes))

@@ -42,12 +42,10 @@ class ViscousFriction(PlainTerm):
     coefficients = (Coefficient("c", "{tau} s/{q}", positive=True),)
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How much is missing, or too much."""
         state = "missing" if found["c"].value >= 0.0 else "too much"
         return f"viscous friction of {size_text(found['c'])} is {state}"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """q̇."""
         return per_joint_columns(signals.velocity[self.joint][None, None])
 
 
@@ -65,12 +63,10 @@ class CoulombFriction(PlainTerm):
     coefficients = (Coefficient("f", "{tau}", positive=True),)
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How much is missing, or too much."""
         state = "missing" if found["f"].value >= 0.0 else "too much"
         return f"Coulomb friction of {size_text(found['f'])} is {state}"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇)."""
         return per_joint_columns(signals.step[self.joint][None, None])
 
 
@@ -88,16 +84,13 @@ class TorqueOffset(PlainTerm):
     coefficients = (Coefficient("c", "{tau}"),)
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """Which way."""
         sign = "+" if found["c"].value >= 0.0 else "-"
         return f"the torque has an offset of {sign}{size_text(found['c'])}"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """One."""
         return per_joint_columns(np.ones_like(signals.position[self.joint])[None, None])
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """One constant."""
         return [{"torque": coefficients[0]}]
 
 
@@ -121,5 +114,4 @@ class StribeckTerm(PlainTerm):
         return f"friction {verb} by {size_text(found['s'])} towards zero velocity"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(δ q̇)."""
         return per_joint_columns(smooth_sign(signals.velocity[self.joint][None], shapes)[:, None])

@@ -11,11 +11,9 @@ from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, pe
 from tauscope.recording.recording import Array
 from tauscope.robot import JointType, Robot
 
-TIMES_A_TURN = np.array([1.0, 2.0, 3.0])
-"""An eccentric bearing, an oval one, and one that three jaws hold."""
-
+TIMES_A_TURN = np.array([1.0, 2.0, 3.0])  # an eccentric bearing, an oval one, and one that three jaws hold
+# k times the stroke of a linear axis: from what is bent a little up to three waves.
 RADIANS_A_STROKE = np.array([1.0, 2.0, 4.0, 6.0, 9.0, 12.0, 15.0, 18.0])
-"""k times the stroke of a linear axis: from what is bent a little up to three waves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +37,6 @@ class PositionDependentFriction(Effect):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a joint that moves."""
         return [cls._of_joint(context, joint) for joint in context.joints if context.moves(joint)]
 
     @classmethod
@@ -50,20 +47,16 @@ class PositionDependentFriction(Effect):
         return cls(joint, waves[:, None], 0.8 * waves[:1], 1.2 * waves[-1:], turns=turns)
 
     def is_free(self, place: int) -> bool:
-        """Whether k is estimated between the grid's points."""
         return not self.turns
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇) cos kq, A(q̇) sin kq."""
         step, angle = signals.step[self.joint], shapes * signals.position[self.joint]
         return per_joint_columns(np.stack([step * np.cos(angle), step * np.sin(angle)], axis=1))
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """By how much."""
         size = replace(found["a"], value=hypot(found["a"].value, found["b"].value))
         return f"friction varies by ±{size_text(size)} with position"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """One wave."""
         a, b = coefficients
         return [{"amplitude": hypot(a, b), "order": shape[0], "phase": atan2(a, b)}]

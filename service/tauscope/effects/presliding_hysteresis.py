@@ -14,29 +14,19 @@ from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, pe
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Bristle lengths looked at, relative to the joint's range of motion.
 DISTANCES = np.array([5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3.2e-2])
-"""Bristle lengths looked at, relative to the joint's range of motion."""
-
+# Bristle length, in standard deviations of the position's noise, below which it is a step like any other.
 RESOLVED = 4.0
-"""Bristle length, in standard deviations of the position's noise, below which it is a step like any other."""
 
 
 def bristle_deflection(position: Array, lengths: Array, start: Array) -> Array:
     """Deflection z of Dahl bristles along a motion, -1 … 1.
 
-    Parameters
-    ----------
-    position : (N,) float64
-        q [rad or m]
-    lengths : (g,) float64
-        x_s [rad or m]
-    start : (g,) float64
-        z at the first sample
-
-    Returns
-    -------
-    (g, N) float64
-        z; exact between samples of one direction
+    `position`: (N,), q [rad or m].
+    `lengths`: (g,), x_s [rad or m].
+    `start`: (g,), z at the first sample.
+    Returns (g, N), z; exact between samples of one direction.
     """
     step = np.diff(position)
     direction = np.sign(step)
@@ -72,7 +62,6 @@ class PreslidingHysteresis(Effect):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a joint that moves both ways."""
         made = []
         for joint in context.joints:
             if context.reverses(joint):

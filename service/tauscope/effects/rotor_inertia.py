@@ -24,18 +24,14 @@ class RotorInertia(Effect):
     coefficients = (Coefficient("I_a", "{tau} s^2/{q}", positive=True),)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """q̈."""
         return per_joint_columns(signals.acceleration[self.joint][None, None])
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How much is missing, or too much."""
         state = "missing" if found["I_a"].value >= 0.0 else "too much"
         return f"a rotor inertia of {size_text(found['I_a'])} is {state}"
 
     def advice(self, found: Sizes) -> str:
-        """More or less armature inertia."""
         return self.remedy if found["I_a"].value >= 0.0 else "lower the joint's armature inertia"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """One inertia."""
         return [{"inertia": coefficients[0]}]

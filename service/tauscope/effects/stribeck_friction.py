@@ -9,14 +9,12 @@ from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, me
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
-SPEEDS = np.array([0.04, 0.08, 0.15, 0.25, 0.4, 0.65, 1.0])
-"""Decay speeds looked at, relative to the joint's top speed."""
-
+SPEEDS = np.array([0.04, 0.08, 0.15, 0.25, 0.4, 0.65, 1.0])  # decay speeds looked at, relative to the joint's top speed
 EXPONENTS = np.array([1.0, 2.0])
 
+# Least K_v v_s: where friction has not risen to half its size before it decays, step and decay together are any small
+# bump, and s is of any size.
 SHORTEST_DECAY = 1.0
-"""Least K_v v_s: where friction has not risen to half its size before it decays, step and decay together are any small
-bump, and s is of any size."""
 
 
 class StribeckFriction(Effect):
@@ -48,24 +46,19 @@ class StribeckFriction(Effect):
         return made
 
     def is_possible(self, shape: Array, k_v: float | None) -> bool:
-        """Whether friction rises before it decays."""
         return k_v is None or k_v * float(shape[0]) >= SHORTEST_DECAY
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇) exp(-(|q̇|/v_s)^α)."""
         speed = np.abs(signals.velocity[self.joint])
         decay = np.exp(-((speed / shapes[:, :1]) ** shapes[:, 1:]))
         return per_joint_columns((signals.step[self.joint] * decay)[:, None])
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """Whether friction rises or falls towards zero velocity."""
         verb = "rises" if found["s"].value >= 0.0 else "falls"
         return f"friction {verb} by {size_text(found['s'])} towards zero velocity"
 
     def advice(self, found: Sizes) -> str:
-        """More or less friction at low speed."""
         return self.remedy if found["s"].value >= 0.0 else "lower friction near zero velocity by a Stribeck term"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """One decay."""
         return [{"amplitude": coefficients[0], "velocity": shape[0], "exponent": shape[1]}]

@@ -11,15 +11,12 @@ from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape,
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Share of the torque that a constant near the right one makes late: the right one makes all of it late at most.
 LARGEST_SHARE = 2.0
-"""Share of the torque that a constant near the right one makes late: the right one makes all of it late at most."""
-
+# A channel is late as a whole: where less than half of its torque seems to be, noise or something else does.
 SMALLEST_SHARE = 0.5
-"""A channel is late as a whole: where less than half of its torque seems to be, noise or something else does."""
-
+# Time constants looked at, relative to that of the band: one that is much shorter is a delay.
 LAGS = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
-"""Time constants looked at, relative to that of the band: one that is much shorter is a delay."""
-
 ORDERS = (1, 2)
 
 
@@ -40,17 +37,14 @@ class LateTorque(Effect):
         return (None, *(context.joints if context.robot.joint_count > 1 else ()))
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """Whether torque lags or leads."""
         verb = "lags" if found["d"].value >= 0.0 else "leads"
         return f"torque {verb} position by {size_text(found['d'])}"
 
     def advice(self, found: Sizes) -> str:
-        """The way to shift it."""
         way = "earlier" if found["d"].value >= 0.0 else "later"
         return f"shift the torque channel {size_text(found['d'])} {way}"
 
     def place(self, joint_names: Sequence[str]) -> str:
-        """Its joint, or all."""
         return super().place(joint_names) or "at every joint"
 
     def measured(self, signals: Signals) -> Array:
@@ -81,7 +75,6 @@ class TimeDelay(LateTorque):
         return shifted(torque, float(coefficients[0]), signals) - torque
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """The delay d."""
         return [{"delay": coefficients[0]}]
 
 
@@ -97,19 +90,10 @@ class Shift(LateTorque):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a place."""
         return [cls(place, *_constants(context)) for place in cls.places(context)]
 
     def late(self, torque: Array, constant: float, signals: Signals) -> Array:
-        """Torque (m, N) as it is recorded with a = 1.
-
-        Parameters
-        ----------
-        torque : (m, N) float64
-            as it is [Nm or N]
-        constant : float
-            T [s]
-        """
+        """Torque (m, N) as it is recorded with a = 1. `torque`: (m, N), as it is [Nm or N]; `constant`: T [s]."""
         return shifted(torque, constant, signals)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -127,7 +111,6 @@ class Shift(LateTorque):
         return (Quantity("d", share * constant, float(np.sqrt(max(slope @ covariance @ slope, 0.0))), "s"),)
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """The mean delay a T."""
         return [{"delay": coefficients[0] * shape[0]}]
 
 
@@ -146,12 +129,10 @@ class Lag(Shift):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a place and order."""
         places = cls.places(context)
         return [cls(place, *_constants(context), order=order) for place in places for order in ORDERS]
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """How late."""
         return f"a low-pass filter delays torque by {size_text(found['d'])}"
 
     def advice(self, found: Sizes) -> str:
@@ -165,7 +146,6 @@ class Lag(Shift):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """The mean delay, T and n."""
         (each,) = super().quantities(context, coefficients, shape, covariance)
         own = float(np.sqrt(max(covariance[1, 1], 0.0)))
         return (
@@ -186,15 +166,7 @@ def _constants(context: ArmContext) -> tuple[Array, Array, Array]:
 
 
 def shifted(torque: Array, delay: float, signals: Signals) -> Array:
-    """Torque that is late, linear from sample to sample, (m, N).
-
-    Parameters
-    ----------
-    torque : (m, N) float64
-        as it is [Nm or N]
-    delay : float
-        [s]
-    """
+    """Torque that is late, linear from sample to sample, (m, N). `torque`: (m, N), as it is [Nm or N]; `delay`: [s]."""
     instants = np.arange(torque.shape[1]) / signals.rate_hz
     period = torque.shape[1] / signals.rate_hz if signals.periodic else None
     return np.stack([np.interp(instants - delay, instants, row, period=period) for row in torque])
@@ -203,12 +175,7 @@ def shifted(torque: Array, delay: float, signals: Signals) -> Array:
 def low_passed(torque: Array, constant: float, order: int, signals: Signals) -> Array:
     """Torque behind a filter, exact for torque that is linear from sample to sample, (m, N).
 
-    Parameters
-    ----------
-    torque : (m, N) float64
-        before it [Nm or N]
-    constant : float
-        each time constant T of the filter [s]
+    `torque`: (m, N), before it [Nm or N]; `constant`: each time constant T of the filter [s].
     """
     samples = constant * signals.rate_hz
     kept = float(np.exp(-1.0 / samples))

@@ -9,23 +9,16 @@ from tauscope.effects.context import Signals
 from tauscope.effects.effect import Effect
 from tauscope.recording.recording import Array
 
-EVERY = -1.0
-"""Scope of a window that lies at the same instants of every recording, held-out ones included."""
-
-HALF_SINE = 1.0
-"""Profile of a window that rises and falls as half a sine."""
-
+EVERY = -1.0  # scope of a window that lies at the same instants of every recording, held-out ones included
+HALF_SINE = 1.0  # profile of a window that rises and falls as half a sine
+# …of one that is open wherever the rectangular one is shut, in the training recordings; any other is rectangular.
 OUTSIDE = -1.0
-"""…of one that is open wherever the rectangular one is shut, in the training recordings; any other is rectangular."""
 
 
 def since(recording: int) -> float:
     """Scope of a window that opens in one recording and stays open through all later ones.
 
-    Parameters
-    ----------
-    recording : int
-        index of the recording, from 0
+    `recording`: index of the recording, from 0.
     """
     return -2.0 - recording
 
@@ -42,29 +35,20 @@ class TimeLocalEffect(Effect):
     def torque(self, signals: Signals, shape: Array) -> Array:
         """Torque per unit of each coefficient as if the window were always open, (c, m, N).
 
-        Parameters
-        ----------
-        shape : (k,) float64
-            values of the shape parameters; those of the window do not matter
+        `shape`: (k,), values of the shape parameters; those of the window do not matter.
         """
 
     def outside(self, shape: Array) -> Array | None:
         """Shape of the same effect wherever else in the training recordings, where that may be meant; else None.
 
-        Parameters
-        ----------
-        shape : (k,) float64
-            values of the shape parameters
+        `shape`: (k,), values of the shape parameters.
         """
         return None
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """The torque within the windows.
 
-        Parameters
-        ----------
-        shapes : (g, k) float64
-            scope, start [s], end [s], profile, then the effect's own
+        `shapes`: (g, k), scope, start [s], end [s], profile, then the effect's own.
         """
         found = []
         for shape in shapes:
@@ -75,14 +59,7 @@ class TimeLocalEffect(Effect):
     def when(self, coefficients: Array, shape: Array, names: Sequence[str], durations: Sequence[float]) -> str:
         """When, in words.
 
-        Parameters
-        ----------
-        coefficients : (c,) float64
-            estimates
-        shape : (k,) float64
-            values of the shape parameters
-        durations : sequence of float
-            of the same [s]
+        `coefficients`: (c,), estimates; `shape`: (k,), values of the shape parameters; `durations`: of the same [s].
         """
         scope, start, end = shape[:3]
         if scope < EVERY:
@@ -91,13 +68,7 @@ class TimeLocalEffect(Effect):
 
     @staticmethod
     def recording_words(shape: Array, names: Sequence[str]) -> str:
-        """Which recording, in words.
-
-        Parameters
-        ----------
-        shape : (k,) float64
-            values of the shape parameters
-        """
+        """Which recording, in words. `shape`: (k,), values of the shape parameters."""
         scope = shape[0]
         if scope == EVERY:
             return "every recording"
@@ -107,14 +78,9 @@ class TimeLocalEffect(Effect):
 def open_share(shapes: Array, recording: int, time: Array, interval_s: float) -> Array:
     """w(t) of windows, (N,): 1 where one is open, the part of an interval at the samples that its edges cut.
 
-    Parameters
-    ----------
-    shapes : (..., k) float64
-        scope, start [s], end [s], profile: of one window, or of one a sample
-    time : (...) float64
-        instants, from the beginning of the recording [s]
-    interval_s : float
-        what one instant stands for [s]
+    `shapes`: (..., k), scope, start [s], end [s], profile: of one window, or of one a sample.
+    `time`: instants, from the beginning of the recording [s].
+    `interval_s`: what one instant stands for [s].
     """
     scope, start, end, profile = np.moveaxis(shapes[..., :4], -1, 0)
     first = np.where(scope < EVERY, -2.0 - scope, np.inf)  # the recording in which it opens for good

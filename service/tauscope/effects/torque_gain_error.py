@@ -8,8 +8,7 @@ from tauscope.number_text import significant
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
-ALIKE = 0.05
-"""Part of a torque constant by which motors of one kind differ: so much is no scale."""
+ALIKE = 0.05  # part of a torque constant by which motors of one kind differ: so much is no scale
 
 
 class TorqueGainError(Effect):
@@ -30,7 +29,6 @@ class TorqueGainError(Effect):
         return True
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """The model's torque."""
         return signals.torque[list(self.touched(len(signals.torque)))][None, None]
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
@@ -43,7 +41,6 @@ class TorqueGainError(Effect):
         return sign if abs(abs(gain) - 1.0) < ALIKE else f"{sign} and is {off}"
 
     def advice(self, found: Sizes) -> str:
-        """The sign and the constant that are right."""
         gain = 1.0 + found["g"].value
         constant = f"divide the joint's torque_constant by {significant(abs(gain), 3)}"
         if gain >= 0.0:
@@ -51,7 +48,6 @@ class TorqueGainError(Effect):
         return "invert the joint's sign" if abs(abs(gain) - 1.0) < ALIKE else f"invert the joint's sign and {constant}"
 
     def place(self, joint_names: Sequence[str]) -> str:
-        """Its joint, or all."""
         return super().place(joint_names) or "at every joint"
 
     def factor(self, coefficients: Array) -> float:
@@ -59,5 +55,4 @@ class TorqueGainError(Effect):
         return 1.0 + float(coefficients[0])
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """The gain 1 + g."""
         return [{"gain": 1.0 + coefficients[0]}]

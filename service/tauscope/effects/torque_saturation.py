@@ -11,14 +11,11 @@ from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape,
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Levels of a soft curve looked at, relative to the largest torque.
 COMPRESSIONS = np.array([0.3, 0.5, 0.8, 1.3, 2.2, 4.0])
-"""Levels of a soft curve looked at, relative to the largest torque."""
-
-CLIPS = np.array([0.3, 0.45, 0.6, 0.7, 0.8, 0.9])
-"""Levels of a hard one."""
-
+CLIPS = np.array([0.3, 0.45, 0.6, 0.7, 0.8, 0.9])  # levels of a hard one
+# Part of what lies beyond the level that a hard curve takes off: one that takes off little is a soft curve.
 CLIPPED_AT_LEAST = 0.5
-"""Part of what lies beyond the level that a hard curve takes off: one that takes off little is a soft curve."""
 
 
 class Saturation(Effect):
@@ -35,13 +32,7 @@ class Saturation(Effect):
 
     @classmethod
     def of_levels(cls, context: ArmContext, parts: Array) -> list[Effect]:
-        """One a joint.
-
-        Parameters
-        ----------
-        parts : (g,) float64
-            levels looked at, relative to the joint's largest torque
-        """
+        """One a joint. `parts`: (g,), levels looked at, relative to the joint's largest torque."""
         made: list[Effect] = []
         for joint in context.joints:
             levels = parts * float(context.top_torque[joint])
@@ -52,16 +43,10 @@ class Saturation(Effect):
     def recorded(self, torque: Array, levels: Array) -> Array:
         """Torque r(τ) as it is recorded with a = 1, (g, N).
 
-        Parameters
-        ----------
-        torque : (N,) float64
-            as it is [Nm or N]
-        levels : (g, 1) float64
-            c [Nm or N]
+        `torque`: (N,), as it is [Nm or N]; `levels`: (g, 1), c [Nm or N].
         """
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        """At which level."""
         return f"the recorded torque saturates near {size_text(found['c'])}"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -77,7 +62,6 @@ class TorqueSaturation(Saturation):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """Both curves at every joint."""
         return [*cls.of_levels(context, COMPRESSIONS), *Clipping.forms(context)]
 
     def recorded(self, torque: Array, levels: Array) -> Array:
@@ -91,7 +75,6 @@ class TorqueSaturation(Saturation):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """The level c/√a."""
         share, level = max(float(coefficients[0]), 1e-12), float(shape[0])
         slope = np.array([-0.5 * level / share**1.5, 1.0 / np.sqrt(share)])
         std = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
@@ -112,7 +95,6 @@ class Clipping(Saturation):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a joint."""
         return cls.of_levels(context, CLIPS)
 
     def recorded(self, torque: Array, levels: Array) -> Array:
@@ -120,5 +102,4 @@ class Clipping(Saturation):
         return np.clip(torque, -levels, levels)
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """The level c."""
         return [{"level": shape[0], "shape": "clip"}] if coefficients[0] > 0.0 else []

@@ -1,12 +1,10 @@
 """Which motion to ask for: its constraints and criteria, the optimiser that finds it, and what it has found."""
 
-from tauscope.excitation.criteria import Criterion
-from tauscope.excitation.design import ExcitationDesign, design_excitation
-from tauscope.excitation.design_document import ExcitationDocument, excitation_document
-from tauscope.excitation.information import ColumnScaling
+from tauscope.excitation.design import ExcitationDesign, ExcitationDocument, design_excitation, excitation_document
+from tauscope.excitation.information import ColumnScaling, Criterion
 from tauscope.excitation.margins import Margins, require_within_limits
 from tauscope.excitation.optimiser import OptimiserProgress
-from tauscope.excitation.options import ExcitationOptions
+from tauscope.excitation.setting import ExcitationOptions
 from tauscope.excitation.workspace import Box, Workspace
 
 __all__ = [

@@ -20,17 +20,12 @@ from tauscope.trajectory.limits import MotionLimits
 
 Array = NDArray[np.float64]
 
-POWER = 30.0
-"""p of the p-norm over time: the largest usages decide, yet several peaks at once have a say."""
-
+POWER = 30.0  # p of the p-norm over time: the largest usages decide, yet several peaks at once have a say
+# Instants a period of the highest harmonic at which kinematic limits are held: 0.3 % is left for what lies between.
 SAMPLES_PER_HARMONIC = 40
-"""Instants a period of the highest harmonic at which kinematic limits are held: 0.3 % is left for what lies between."""
-
+# Usage below which, in random states anywhere within the limits, a constraint needs no attention while optimising.
 INACTIVE = 0.8
-"""Usage below which, in random states anywhere within the limits, a constraint needs no attention while optimising."""
-
-RANDOM_STATES = 256
-"""States looked at for that."""
+RANDOM_STATES = 256  # states looked at for that
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,26 +1,25 @@
-"""Designing an excitation: from a robot and a few wishes to a trajectory that a run can play."""
+"""Designing an excitation: from a robot and a few wishes to a trajectory that a run can play, and its document."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tauscope.excitation.criteria import Criterion, reported_value
+from tauscope.excitation.information import Criterion, reported_value
 from tauscope.excitation.margins import Margins, trajectory_margins
 from tauscope.excitation.optimiser import OptimiserProgress, optimise
-from tauscope.excitation.options import ExcitationOptions
-from tauscope.excitation.setting import Setting
+from tauscope.excitation.setting import ExcitationOptions, Setting
 from tauscope.excitation.slow_reversals import SlowPart, slow_part
 from tauscope.robot import Robot
+from tauscope.trajectory.document import trajectory_document
+from tauscope.trajectory.excitation_document import ExcitationDocument, HistoryPart
 from tauscope.trajectory.fourier_series import FourierSeries
 from tauscope.trajectory.segments import FourierSegment, Segment
 from tauscope.trajectory.trajectory import DesignRecord, Trajectory
 
+# Part of a limit: a limit that leaves no more than this above what is spared by wish is one that limits the design.
 ACTIVE = 0.01
-"""Part of a limit: a limit that leaves no more than this above what is spared by wish is one that limits the design."""
-
-ACTIVE_CLEARANCE_M = 0.005
-"""Clearance from floor or boxes at which they limit the design [m]."""
+ACTIVE_CLEARANCE_M = 0.005  # clearance from floor or boxes at which they limit the design [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +97,6 @@ def _segments(series: FourierSeries, slow: SlowPart, options: ExcitationOptions)
 
 
 def _active(robot: Robot, margins: Margins, options: ExcitationOptions) -> tuple[str, ...]:
-    """What keeps the criterion from getting better."""
     spared = 1.0 - options.limit_fraction
     kinds = {"position": spared, "velocity": spared, "acceleration": spared, "torque": 0.0}
     table = margins.as_table()
@@ -116,7 +114,6 @@ def _active(robot: Robot, margins: Margins, options: ExcitationOptions) -> tuple
 
 
 def _notes(robot: Robot, setting: Setting, slow: SlowPart) -> tuple[str, ...]:
-    """What was assumed or could not be done."""
     notes = list(setting.stated.assumed)
     if robot.model.links is None:
         notes.append("torque is not constrained: the robot file has no model to predict it with")
@@ -128,3 +125,32 @@ def _notes(robot: Robot, setting: Setting, slow: SlowPart) -> tuple[str, ...]:
     if slow.postures < wanted:
         notes.append(f"slow reversals at {slow.postures} of {wanted} postures: no more have room within the limits")
     return tuple(notes)
+
+
+def excitation_document(design: ExcitationDesign) -> ExcitationDocument:
+    """The document of a designed excitation."""
+    trajectory = trajectory_document(design.trajectory)
+    return ExcitationDocument(
+        robot=trajectory.robot,
+        joints=trajectory.joints,
+        criterion=design.criterion.value,
+        value=design.value,
+        condition_number=design.condition_number,
+        random_value=design.random_value,
+        period_s=design.series.period_s,
+        harmonics=design.series.harmonics,
+        periods=design.periods,
+        duration_s=design.trajectory.duration_s,
+        margins={kind: list(values) for kind, values in design.margins.as_table().items()},
+        clearance_m=design.margins.workspace_m,
+        active=list(design.active),
+        notes=list(design.notes),
+        evaluations=design.evaluations,
+        seconds=design.seconds,
+        history=[
+            HistoryPart(start=start, iteration=iteration, value=value, violation=violation)
+            for start, iteration, value, violation in design.history
+            if np.isfinite(value)
+        ],
+        trajectory=trajectory,
+    )

@@ -14,20 +14,11 @@ from tauscope.trajectory.limits import MotionLimits
 
 Array = NDArray[np.float64]
 
-POSTURES = 2048
-"""Random postures at which is asked whether the arm can stand there at all."""
-
-LEAST_HALF_RANGE = 1e-3
-"""Half range below which a joint has no room to move [rad or m]."""
-
-LEAST_HARMONIC = 0.3
-"""Smallest amplitude of a random start, as part of what the joints' own limits allow."""
-
-BISECTIONS = 12
-"""Halvings between a feasible and an infeasible motion."""
-
-SETTLED = 0.999
-"""Usage that is aimed at where torque or workspace bind: what lies between samples has the rest."""
+POSTURES = 2048  # random postures at which is asked whether the arm can stand there at all
+LEAST_HALF_RANGE = 1e-3  # half range below which a joint has no room to move [rad or m]
+LEAST_HARMONIC = 0.3  # smallest amplitude of a random start, as part of what the joints' own limits allow
+BISECTIONS = 12  # halvings between a feasible and an infeasible motion
+SETTLED = 0.999  # usage that is aimed at where torque or workspace bind: what lies between samples has the rest
 
 
 @dataclass(frozen=True, eq=False)

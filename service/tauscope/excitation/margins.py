@@ -16,14 +16,9 @@ from tauscope.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
-CHECK_RATE_HZ = 500.0
-"""Rate at which segments are looked at that are no Fourier series [Hz]."""
-
-SAMPLES_PER_HARMONIC = 400
-"""Instants a period of the highest harmonic at which a Fourier series is looked at."""
-
-ROUNDING = 1e-6
-"""Part of a limit by which rounding may exceed it: a file's digits."""
+CHECK_RATE_HZ = 500.0  # rate at which segments are looked at that are no Fourier series [Hz]
+SAMPLES_PER_HARMONIC = 400  # instants a period of the highest harmonic at which a Fourier series is looked at
+ROUNDING = 1e-6  # part of a limit by which rounding may exceed it: a file's digits
 
 
 @dataclass(frozen=True, eq=False)

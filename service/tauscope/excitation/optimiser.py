@@ -10,29 +10,18 @@ from scipy.optimize import minimize
 from threadpoolctl import threadpool_limits
 
 from tauscope.errors import ExcitationError
-from tauscope.excitation.criteria import CriterionValue, reported_value
 from tauscope.excitation.feasibility import Feasibility
+from tauscope.excitation.information import CriterionValue, reported_value
 from tauscope.excitation.problem import ExcitationProblem
 
 Array = NDArray[np.float64]
 
-CANDIDATES = 192
-"""Random feasible series of which the best are improved."""
-
-STARTS = 4
-"""Series that are improved from."""
-
-SHORT_ROUND = 30
-"""Iterations from every start."""
-
-LONG_ROUND = 50
-"""Iterations from the best of them, its constraints calibrated anew, and once more."""
-
-ROUNDS = 2
-"""Rounds from the best."""
-
-TOLERANCE = 1e-4
-"""Change of the cost, a logarithm, at which a round ends."""
+CANDIDATES = 192  # random feasible series of which the best are improved
+STARTS = 4  # series that are improved from
+SHORT_ROUND = 30  # iterations from every start
+LONG_ROUND = 50  # iterations from the best of them, its constraints calibrated anew, and once more
+ROUNDS = 2  # rounds from the best
+TOLERANCE = 1e-4  # change of the cost, a logarithm, at which a round ends
 
 
 @dataclass(frozen=True)
@@ -183,7 +172,6 @@ def _run(search: _Search, rng: np.random.Generator, starts: int) -> tuple[Array,
 
 
 def _candidates(search: _Search, rng: np.random.Generator) -> list[Array]:
-    """Random feasible series, the best first."""
     search.tell("random motions", 0.0)
     postures = search.feasibility.standing_postures(rng)
     found: list[tuple[float, int, Array]] = []

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.excitation.constraints import KinematicUsage, StateUsage
-from tauscope.excitation.criteria import Criterion, CriterionValue, criterion_value
-from tauscope.excitation.information import ExcitationRegressor
+from tauscope.excitation.information import Criterion, CriterionValue, ExcitationRegressor, criterion_value
 from tauscope.excitation.series_space import SeriesGrid, SeriesSpace
 from tauscope.trajectory.fourier_series import MotionSamples
 

@@ -1,6 +1,6 @@
 """What a design works with: one robot's limits, predictions and spaces, made once."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,39 +8,81 @@ from numpy.typing import NDArray
 from tauscope.dynamics import BaseParameters, base_parameters
 from tauscope.errors import ExcitationError
 from tauscope.excitation.constraints import KinematicUsage, StateUsage
-from tauscope.excitation.criteria import Criterion, CriterionValue, criterion_value, reported_value
 from tauscope.excitation.feasibility import Feasibility, require_room
-from tauscope.excitation.information import ColumnScaling, ExcitationRegressor
-from tauscope.excitation.optimiser import Stages
-from tauscope.excitation.options import ExcitationOptions
+from tauscope.excitation.information import (
+    ColumnScaling,
+    Criterion,
+    CriterionValue,
+    ExcitationRegressor,
+    criterion_value,
+    reported_value,
+)
+from tauscope.excitation.optimiser import STARTS, Stages
 from tauscope.excitation.problem import ExcitationProblem, Objective
 from tauscope.excitation.series_space import SeriesSpace
 from tauscope.excitation.torque_prediction import TorquePrediction
-from tauscope.excitation.workspace import WorkspaceUsage
+from tauscope.excitation.workspace import Workspace, WorkspaceUsage
 from tauscope.robot import Robot
 from tauscope.trajectory.fourier_series import FourierSeries, MotionSamples
 from tauscope.trajectory.limits import MotionLimits, motion_limits
 
 Array = NDArray[np.float64]
 
+
+@dataclass(frozen=True, eq=False)
+class ExcitationOptions:
+    """What is wished of an excitation.
+
+    `period_s`: duration of one period [s].
+    `noise_std`: (n,), expected torque noise of each joint, which weights its equations [Nm or N]; equal weights where
+        None.
+    `torque_offset`: torque kept free besides [Nm or N].
+    """
+
+    period_s: float = 10.0
+    harmonics: int = 5
+    periods: int = 5
+    criterion: Criterion = Criterion.COND_F
+    information_weight: float = 0.5
+    scaling: ColumnScaling = ColumnScaling.NONE
+    noise_std: Array | None = None
+    limit_fraction: float = 0.95
+    torque_margin: float = 0.2
+    torque_offset: float = 0.0
+    workspace: Workspace = field(default_factory=Workspace)
+    slow_postures: int = 3
+    closing_period: bool = True
+    starts: int = STARTS
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse wishes that mean nothing."""
+        wrong = {
+            "period_s": not (np.isfinite(self.period_s) and self.period_s > 0.0) and "give a positive duration [s]",
+            "harmonics": not 2 <= self.harmonics <= 100 and "give 2 to 100",
+            "periods": not 1 <= self.periods <= 10_000 and "give 1 or more",
+            "information_weight": not 0.0 <= self.information_weight < np.inf and "give a number of 0 or more",
+            "limit_fraction": not 0.0 < self.limit_fraction <= 1.0 and "give a number above 0 and up to 1",
+            "torque_margin": not 0.0 <= self.torque_margin < 1.0 and "give a number from 0 to below 1",
+            "torque_offset": not 0.0 <= self.torque_offset < np.inf and "give a torque of 0 or more",
+            "slow_postures": not 0 <= self.slow_postures <= 60 and "give 0 to 60",
+            "starts": not 1 <= self.starts <= 64 and "give 1 to 64",
+            "seed": self.seed < 0 and "give 0 or more",
+        }
+        for name, hint in wrong.items():
+            if hint:
+                raise ExcitationError(f"{name} is {getattr(self, name)}; {hint}")
+
+
+# Instants a period of the highest harmonic at which the optimiser looks, first and last: friction's sign asks for more
+# than the ten that the rest of the regressor needs.
 SAMPLES_PER_HARMONIC = (24, 48)
-"""Instants a period of the highest harmonic at which the optimiser looks, first and last: friction's sign asks for more
-than the ten that the rest of the regressor needs."""
-
-FINE_SAMPLES_PER_HARMONIC = 80
-"""Instants a period of the highest harmonic at which torque and workspace are held."""
-
-REPORT_SAMPLES = 2000
-"""Instants a period from which the reported criterion and condition number are computed."""
-
-EXACT_SAMPLES = 1000
-"""Instants a period from which candidates are compared."""
-
+FINE_SAMPLES_PER_HARMONIC = 80  # instants a period of the highest harmonic at which torque and workspace are held
+REPORT_SAMPLES = 2000  # instants a period from which the reported criterion and condition number are computed
+EXACT_SAMPLES = 1000  # instants a period from which candidates are compared
+# The sign function may turn within this part of the change of speed from instant to instant, as 1/K_v.
 RESOLVED_STEPS = 5.0
-"""The sign function may turn within this part of the change of speed from instant to instant, as 1/K_v."""
-
-SCALING_STATES = 512
-"""Random states from which `ColumnScaling.TYPICAL` takes the size of a column."""
+SCALING_STATES = 512  # random states from which `ColumnScaling.TYPICAL` takes the size of a column
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +168,6 @@ class Setting:
         return criterion_value(options.criterion, information, options.information_weight)
 
     def _scaling(self) -> Array:
-        """What each column is divided by, (p,)."""
         regressor = ExcitationRegressor(
             self.robot, self.base, capacity=SCALING_STATES, noise_std=self.options.noise_std
         )
@@ -142,12 +183,10 @@ class Setting:
 
 
 def _instants(series: FourierSeries, samples: int) -> MotionSamples:
-    """One period of a series at equispaced instants."""
     return series.evaluate(np.arange(float(samples)) * (series.period_s / samples))
 
 
 def _available_torque(robot: Robot, stated: MotionLimits, options: ExcitationOptions) -> Array:
-    """Torque limits less what is kept free."""
     available = (1.0 - options.torque_margin) * stated.torque - options.torque_offset
     for joint, limit, value in zip(robot.joints, stated.torque, available, strict=True):
         if not value > 0.0:
@@ -159,6 +198,5 @@ def _available_torque(robot: Robot, stated: MotionLimits, options: ExcitationOpt
 
 
 def _require_noise(noise_std: Array, robot: Robot) -> None:
-    """Refuse noise that weights cannot be made of."""
     if noise_std.shape != (robot.joint_count,) or not (np.isfinite(noise_std) & (noise_std > 0.0)).all():
         raise ExcitationError(f"noise_std needs {robot.joint_count} positive numbers, one a joint")

@@ -24,43 +24,21 @@ from tauscope.trajectory.trajectory import ramp, whole_steps
 
 Array = NDArray[np.float64]
 
-SPEED_SHARE = 0.05
-"""Peak speed as part of the speed limit."""
-
+SPEED_SHARE = 0.05  # peak speed as part of the speed limit
+# Peak speed however fast the joint may move [rad/s or m/s].
 LARGEST_SPEED = {JointType.REVOLUTE: 0.1, JointType.PRISMATIC: 0.02}
-"""Peak speed however fast the joint may move [rad/s or m/s]."""
-
-LEVELS = (1.0, 0.5, 0.25)
-"""Peak speeds of successive postures, relative to the first."""
-
-DURATION_S = 8.0
-"""Time at one posture [s]."""
-
-LOWEST_ORDERS = (2, 3, 4)
-"""l of successive joints: five, seven and nine reversals."""
-
-PLACES = 60
-"""Instants of the excitation's period that are considered as postures."""
-
-ROOMY = 0.5
-"""Part of its peak speed that every joint has to reach at a posture: near a position limit there is no room."""
-
-SAME_POSTURE = 1e-12
-"""Postures closer than this need no move [rad or m]."""
-
-MOVE_FRACTION = 0.6
-"""Part of the limits that moves between postures use."""
-
-PATH_PACE = 1.0
-"""Largest pace along the excitation's path, in its own time."""
-
-LONGER = 1.25
-"""Factor by which a move is slowed down until it keeps all limits."""
-
+LEVELS = (1.0, 0.5, 0.25)  # peak speeds of successive postures, relative to the first
+DURATION_S = 8.0  # time at one posture [s]
+LOWEST_ORDERS = (2, 3, 4)  # l of successive joints: five, seven and nine reversals
+PLACES = 60  # instants of the excitation's period that are considered as postures
+ROOMY = 0.5  # part of its peak speed that every joint has to reach at a posture: near a position limit there is no room
+SAME_POSTURE = 1e-12  # postures closer than this need no move [rad or m]
+MOVE_FRACTION = 0.6  # part of the limits that moves between postures use
+PATH_PACE = 1.0  # largest pace along the excitation's path, in its own time
+LONGER = 1.25  # factor by which a move is slowed down until it keeps all limits
 MOST_SLOWDOWNS = 12
 
-STEP_S = 0.02
-"""Instants at which moves are checked are this far apart [s]."""
+STEP_S = 0.02  # instants at which moves are checked are this far apart [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,17 +88,14 @@ def _swing(robot: Robot, posture: Array, limits: MotionLimits, level: float) -> 
 
 
 def _size(swing: FourierSegment) -> Array:
-    """Peak speed of every joint."""
     return np.abs(swing.series.cosine).max(axis=1)
 
 
 def _size_in_the_middle(robot: Robot, limits: MotionLimits) -> Array:
-    """Peak speed of every joint where it has as much room as it can have."""
     return _size(_swing(robot, limits.middle, limits, 1.0))
 
 
 def _far_apart(places: Array, admissible: list[int], count: int) -> list[int]:
-    """Places as far from one another as can be had, one after the other."""
     if not admissible or count < 1:
         return []
     distance = np.linalg.norm(places[admissible] - places[admissible].mean(axis=0), axis=1)
@@ -156,14 +131,12 @@ def _transfer(
 
 
 def _is_free(segment: FourierSegment | MoveSegment | PathSegment, limits: MotionLimits, states: StateUsage) -> bool:
-    """Whether a segment keeps all limits."""
     count = max(int(np.ceil(segment.duration_s / STEP_S)), 2)
     motion = segment.evaluate(np.linspace(0.0, segment.duration_s, count + 1))
     return _kinematic(motion, limits) <= 1.0 + 1e-9 and states.largest(motion) <= 1.0
 
 
 def _kinematic(motion: MotionSamples, limits: MotionLimits) -> float:
-    """Largest usage of position, velocity and acceleration."""
     parts = (
         np.abs(motion.position - limits.middle) / limits.half_range,
         np.abs(motion.velocity) / limits.velocity,

@@ -10,11 +10,8 @@ from tauscope.trajectory.fourier_series import MotionSamples
 
 Array = NDArray[np.float64]
 
-REST_SPEED = 1e-3
-"""Part of the speed limit below which |v| is rounded off, for a gradient at rest."""
-
-SMALL_TORQUE = 1e-2
-"""Part of the torque limit below which |τ| is rounded off, for a gradient where it changes its sign."""
+REST_SPEED = 1e-3  # part of the speed limit below which |v| is rounded off, for a gradient at rest
+SMALL_TORQUE = 1e-2  # part of the torque limit below which |τ| is rounded off, for a gradient where it changes its sign
 
 
 class TorquePrediction:
@@ -79,7 +76,6 @@ class TorquePrediction:
         )
 
     def _rigid(self, base: Array) -> Array:
-        """Rigid-body torque, (N, n)."""
         first = self._regressor.first_columns
         return np.stack([self._base[at:] @ base[joint, at:] for joint, at in enumerate(first)], axis=1)
 

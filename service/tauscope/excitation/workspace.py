@@ -13,11 +13,8 @@ from tauscope.trajectory.fourier_series import MotionSamples
 
 Array = NDArray[np.float64]
 
-REFERENCE_M = 0.1
-"""Clearance from which nothing is said to be used of it; at zero clearance all of it is [m]."""
-
-STILL_M = 1e-9
-"""A point that moves less than this is fixed to the base: where it stands is nobody's choice [m]."""
+REFERENCE_M = 0.1  # clearance from which nothing is said to be used of it; at zero clearance all of it is [m]
+STILL_M = 1e-9  # a point that moves less than this is fixed to the base: where it stands is nobody's choice [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +149,6 @@ class WorkspaceUsage:
         return _Chain(joints, links)
 
     def _places(self, chain: _Chain) -> Array:
-        """Where the points are, (N, points, 3)."""
         places = np.empty((len(chain.links), len(self._points), 3))
         for place, point in enumerate(self._points):
             frame = (chain.joints if point.in_joint_frame else chain.links)[:, point.link]
@@ -181,5 +177,4 @@ class WorkspaceUsage:
 
 
 def _beyond(box: Box, points: Array) -> Array:
-    """How far each coordinate lies outside the box, (…, 3) [m]."""
     return np.abs(points - 0.5 * (box.low + box.high)) - 0.5 * (box.high - box.low)

@@ -1,6 +1,10 @@
-"""Actuators of an MJCF: torque motors, position servos with gains, or DC motors, one a joint."""
+"""Actuators of an MJCF (torque motors, position servos with gains, or DC motors), and of Isaac Lab.
 
-from collections.abc import Sequence
+Isaac Sim 5 takes friction as torque: static, dynamic and viscous, which are τ_s, τ_s + τ_sc and τ_v of equation (7).
+"""
+
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -8,11 +12,14 @@ import numpy as np
 
 from tauscope.dynamics import mass_matrix
 from tauscope.errors import ExportError
-from tauscope.export.mjcf_findings import numbers
+from tauscope.export.compensation.source_code import comment_text, identifier
+from tauscope.export.joint_model import dry_friction_and_damping
+from tauscope.export.mjcf_findings import effects_in, numbers
+from tauscope.export.model import ExportModel
 from tauscope.robot import Joint, LinkInertia, Robot
 
+# Bandwidth of gains that nothing states [rad/s]: 5 Hz, the reach of a small servo's position loop.
 BANDWIDTH_RAD_S = 2.0 * np.pi * 5.0
-"""Bandwidth of gains that nothing states [rad/s]: 5 Hz, the reach of a small servo's position loop."""
 
 
 class ActuatorKind(StrEnum):
@@ -37,11 +44,7 @@ class ActuatorChoice:
 
 
 def actuator_elements(
-    robot: Robot,
-    links: Sequence[LinkInertia],
-    rotors: Sequence[float],
-    names: Sequence[str],
-    choice: ActuatorChoice,
+    robot: Robot, links: Sequence[LinkInertia], rotors: Sequence[float], names: Sequence[str], choice: ActuatorChoice
 ) -> tuple[list[str], list[str]]:
     """Actuator elements, one a joint, and notes on gains that are chosen rather than known.
 
@@ -96,12 +99,10 @@ def joint_gains(
 
 
 def _choose_gain(values: tuple[float, ...], joint: int) -> float | None:
-    """A gain that is given for all joints or for this one."""
     return None if not values else values[0] if len(values) == 1 else values[joint]
 
 
 def _motor(joint: Joint, name: str) -> str:
-    """A torque motor, limited where the robot file states a limit."""
     limit = joint.limits.torque
     both = "" if limit is None else f' ctrlrange="{numbers(-limit, limit)}" forcerange="{numbers(-limit, limit)}"'
     return f"<motor name={name} joint={name}{both}/>"
@@ -124,3 +125,45 @@ def _dc_motor(joint: Joint, name: str, kp: float, kv: float) -> str:
         f'<dcmotor name={name} joint={name} motorconst="{numbers(constant, 0.0)}" resistance="1.0" '
         f'input="pos vel ff" controller="{numbers(kp, 0.0, kv, 0.0, 0.0, 0.0)}"{saturation}/>'
     )
+
+
+def to_isaac_lab(model: ExportModel, choice: ActuatorChoice) -> str:
+    """Python source with ``NAME_ACTUATORS``, for ``ArticulationCfg(actuators=…)``.
+
+    Raises ExportError if a coefficient is not finite, or the number of gains is not one, nor that of the joints.
+    """
+    rotors = [value or 0.0 for value in model.rotor_inertia]
+    gains, notes = joint_gains(model.robot, model.links, rotors, choice)
+    names = [re.escape(joint.name) for joint in model.robot.joints]
+    limits = {n: j.limits.torque for n, j in zip(names, model.robot.joints, strict=True) if j.limits.torque is not None}
+    fields: dict[str, dict[str, float]] = {
+        "stiffness": {name: kp for name, (kp, _) in zip(names, gains, strict=True)},
+        "damping": {name: kv for name, (_, kv) in zip(names, gains, strict=True)},
+        "armature": dict(zip(names, rotors, strict=True)),
+        "friction": {},
+        "dynamic_friction": {},
+        "viscous_friction": {},
+        **({"effort_limit": limits} if limits else {}),
+    }
+    for name, joint, friction in zip(names, model.robot.joints, model.friction, strict=True):
+        dynamic, viscous = dry_friction_and_damping(joint.name, friction)
+        fields["friction"][name] = max(friction.stiction, dynamic)
+        fields["dynamic_friction"][name] = dynamic
+        fields["viscous_friction"][name] = viscous
+        if friction.offset:
+            notes.append(f"{joint.name}: there is no constant torque; the identified offset is {friction.offset:.6g}.")
+    notes += effects_in(model, (), "Isaac Lab has no such parameter")
+    entries = "".join(_entry(field, values) for field, values in fields.items())
+    comment = "".join(f"# {comment_text(note)}\n" for note in notes)
+    return (
+        f"# Actuators of {comment_text(model.robot.name)}, written by Tauscope {model.origin.version}.\n"
+        "# Isaac Lab 2.3 or later, Isaac Sim 5 or later: friction is a torque there. Masses are in the exported URDF.\n"
+        f"{comment}\nfrom isaaclab.actuators import ImplicitActuatorCfg\n\n"
+        f"{identifier(model.robot.name).upper()}_ACTUATORS = {{\n"
+        f'    "arm": ImplicitActuatorCfg(\n        joint_names_expr={names!r},\n{entries}    ),\n}}\n'
+    )
+
+
+def _entry(field: str, values: Mapping[str, float]) -> str:
+    rows = "".join(f"            {name!r}: {value!r},\n" for name, value in values.items())
+    return f"        {field}={{\n{rows}        }},\n"

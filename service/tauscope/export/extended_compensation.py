@@ -45,20 +45,17 @@ def source_code(model: ExportModel, suffix: str) -> str:
 
 
 def _list_left_out(model: ExportModel) -> list[str]:
-    """Effects that have no code, and why."""
     names = [joint.name for joint in model.robot.joints]
     without = [found.effect for found in model.effects if not found.effect.code]
     return [f"{effect.name(names)}: {effect.no_code or 'it has no code'}" for effect in without]
 
 
 def _expression(found: FoundEffect, model: ExportModel) -> str:
-    """An effect's torque."""
     k_v = model.delivered_friction[found.effect.joint or 0].k_v
     return found.effect.torque_code(found.coefficients.tolist(), found.shape.tolist(), k_v)
 
 
 def _group_by_joint(model: ExportModel) -> list[tuple[int, list[str]]]:
-    """Expressions of every joint that has any, joints counted from 1."""
     found: dict[int, list[str]] = {}
     for each in model.effects:
         if each.effect.code:
@@ -67,7 +64,6 @@ def _group_by_joint(model: ExportModel) -> list[tuple[int, list[str]]]:
 
 
 def _python(name: str, model: ExportModel) -> str:
-    """Function of the effects in Python."""
     lines = ["", "", f"def {name}_effect_torque(joint, position, velocity, load):"]
     lines.append('    """Torque in Nm (force in N) of what was found beside friction; load: rigid-body torque."""')
     lines += [f"    # Not in this code: {each}" for each in _list_left_out(model)]
@@ -80,7 +76,6 @@ def _python(name: str, model: ExportModel) -> str:
 
 
 def _c(name: str, model: ExportModel) -> str:
-    """Function of the effects in C."""
     lines = [f"/* Not in this code: {each} */" for each in _list_left_out(model)]
     lines.append("/* Torque in Nm (force in N) of what was found beside friction; load: rigid-body torque. */")
     lines.append(f"static inline double {name}_effect_torque(int joint, double q, double v, double load)")

@@ -40,6 +40,7 @@ class ExportFile:
         return f"exports/{self.name}"
 
 
+# Exports of an identified model.
 EXPORT_FILES: Mapping[ExportFormat, ExportFile] = {
     ExportFormat.JSON: ExportFile("friction.json", "application/json"),
     ExportFormat.YAML: ExportFile("friction.yaml", "application/yaml"),
@@ -48,14 +49,14 @@ EXPORT_FILES: Mapping[ExportFormat, ExportFile] = {
     ExportFormat.URDF: ExportFile("model.urdf", "application/xml"),
     ExportFormat.MJCF: ExportFile("model.xml", "application/xml"),
 }
-"""Exports of an identified model."""
 
+# Exports of a model with the findings of a diagnosis.
 CODE_FILES: Mapping[ExportFormat, ExportFile] = {
     ExportFormat.C: ExportFile("compensation.h", "text/x-c"),
     ExportFormat.PYTHON: ExportFile("compensation.py", "text/x-python"),
 }
-"""Exports of a model with the findings of a diagnosis."""
 
+# Formats by the suffix of a file.
 SUFFIXES = {
     ".json": ExportFormat.JSON,
     ".yaml": ExportFormat.YAML,
@@ -66,7 +67,6 @@ SUFFIXES = {
     ".xml": ExportFormat.MJCF,
     ".mjcf": ExportFormat.MJCF,
 }
-"""Formats by the suffix of a file."""
 
 
 def make_export(export_format: ExportFormat, model: ExportModel, choice: ActuatorChoice | None = None) -> bytes:

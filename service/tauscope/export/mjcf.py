@@ -7,20 +7,13 @@ import numpy as np
 from tauscope.errors import ExportError
 from tauscope.export.actuators import ActuatorChoice, actuator_elements
 from tauscope.export.compensation.source_code import comment_text
-from tauscope.export.joint_model import (
-    JointModel,
-    centred,
-    dry_friction_and_damping,
-    friction_notes,
-    joint_models,
-)
+from tauscope.export.joint_model import JointModel, centred, dry_friction_and_damping, friction_notes, joint_models
 from tauscope.export.mjcf_findings import NEWER, REST, Additions, JointExtras, add_findings, numbers
 from tauscope.export.model import ExportModel
 from tauscope.robot import JointLimits, JointType, Robot, Segment
 from tauscope.robot.messages import one_line, shown
 
-MOTORS = ActuatorChoice()
-"""Torque motors, which need no gains."""
+MOTORS = ActuatorChoice()  # torque motors, which need no gains
 
 
 @dataclass(frozen=True)
@@ -99,7 +92,6 @@ def passive_elements(joint: int, extras: JointExtras, names: list[str]) -> list[
 
 
 def _followers(robot: Robot, names: list[str]) -> list[str]:
-    """Joints that follow another, as equalities."""
     lines: list[str] = []
     own = robot.own_links
     for link, coupling in enumerate(robot.couplings):
@@ -123,7 +115,6 @@ def tendon_elements(added: Additions, names: list[str]) -> list[str]:
 def _body(
     robot: Robot, index: int, label: str, model: JointModel, extras: JointExtras, limits: JointLimits
 ) -> list[str]:
-    """Start tag, inertial and joint of one body."""
     from scipy.spatial.transform import Rotation
 
     if model.link is None:
@@ -144,7 +135,6 @@ def _body(
 
 
 def _joint(segment: Segment, label: str, model: JointModel, extras: JointExtras, limits: JointLimits) -> str:
-    """The joint element: axis, limits, friction and armature."""
     after = segment.after
     attributes = {
         "type": "slide" if segment.type is JointType.PRISMATIC else "hinge",
@@ -164,7 +154,6 @@ def _joint(segment: Segment, label: str, model: JointModel, extras: JointExtras,
 
 
 def _armature(label: str, model: JointModel) -> float:
-    """The rotor's reflected inertia, 0 where none was identified."""
     armature = 0.0 if model.rotor_inertia is None else float(model.rotor_inertia)
     if not (np.isfinite(armature) and armature >= 0.0):
         text = f"joint {shown(label)}: rotor inertia {armature:g} must be 0 or more; export the consistent model"
@@ -173,7 +162,6 @@ def _armature(label: str, model: JointModel) -> float:
 
 
 def _quote(name: str) -> str:
-    """A name as the value of an attribute."""
     from xml.sax.saxutils import quoteattr  # loads urllib and ssl
 
     return quoteattr(_xml_name(name))

@@ -18,12 +18,10 @@ from tauscope.export.compensation.model import JointFriction
 from tauscope.export.model import ExportModel, FoundEffect
 from tauscope.robot import LinkInertia, Robot
 
+# Effects that the joints' own friction and armature hold.
 IN_THE_MODEL = frozenset({"coulomb_friction", "viscous_friction", "torque_offset", "rotor_inertia"})
-"""Effects that the joints' own friction and armature hold."""
-
+# Attributes with which frictionloss holds a joint at rest: MuJoCo's own let it creep, by 25 mrad/s under 2/3 of it.
 REST = {"solreffriction": "0.002 1", "solimpfriction": "0.9999 0.9999 0.001 0.5 2"}
-"""Attributes with which frictionloss holds a joint at rest: MuJoCo's own let it creep, by 25 mrad/s under 2/3 of it."""
-
 NEWER = "needs MuJoCo 3.8 or later"
 
 
@@ -89,7 +87,6 @@ def add_findings(model: ExportModel, *, without: Collection[str] = ()) -> Additi
 
 
 def _values(found: FoundEffect) -> str:
-    """Equation and values of a finding, for those who add it themselves."""
     named = [*zip(found.effect.coefficients, found.coefficients, strict=True)]
     shaped = [*zip(found.effect.shapes, found.shape, strict=True)]
     values = ", ".join(f"{each.name} = {float(value):.6g}" for each, value in (*named, *shaped))
@@ -139,14 +136,12 @@ def _bristles(added: Additions, found: FoundEffect) -> str | None:
 
 
 def _payload(added: Additions, found: FoundEffect) -> str | None:
-    """A point mass in the last link."""
     body = float(found.coefficients[0]) * unit_body(found.shape)
     added.links[-1] = LinkInertia.from_vector(added.links[-1].to_vector() + body)
     return None
 
 
 def _tilt(added: Additions, found: FoundEffect) -> str | None:
-    """Gravity in the direction that was found."""
     gravity = added.robot.gravity
     strength, across = float(np.linalg.norm(gravity)), tilt_directions(gravity)
     turned = gravity + strength * sum(float(a) * e for a, e in zip(found.coefficients, across, strict=True))
@@ -155,14 +150,12 @@ def _tilt(added: Additions, found: FoundEffect) -> str | None:
 
 
 def _displacement(added: Additions, found: FoundEffect) -> str | None:
-    """A link's frame where it was found."""
     link, axis = (int(each) - 1 for each in found.shape)
     added.robot = displaced(added.robot, link, float(found.coefficients[0]) * np.eye(3)[axis])
     return None
 
 
 def _coupling(added: Additions, found: FoundEffect) -> str | None:
-    """A fixed tendon over both joints."""
     effect = found.effect
     if not isinstance(effect, FrictionCoupling):
         return "its form is not known"
@@ -173,6 +166,7 @@ def _coupling(added: Additions, found: FoundEffect) -> str | None:
     return None
 
 
+# Functions that write an effect into a file, or return the reason against it.
 WRITERS: Mapping[str, Callable[[Additions, FoundEffect], str | None]] = {
     "joint_spring": _spring,
     "nonlinear_viscous": _add_power_of_speed,
@@ -183,7 +177,6 @@ WRITERS: Mapping[str, Callable[[Additions, FoundEffect], str | None]] = {
     "kinematic_error": _displacement,
     "friction_coupling": _coupling,
 }
-"""Functions that write an effect into a file, or return the reason against it."""
 
 
 def effects_in(model: ExportModel, included: Sequence[str], why: str) -> list[str]:

@@ -74,7 +74,6 @@ def patch_mjcf(path: Path, model: ExportModel) -> bytes:
 
 
 def _joints(element: Element) -> Iterator[tuple[Element, Element]]:
-    """Every joint of the file, with its body."""
     for child in element.children:
         if child.name == "joint" and element.name == "body":
             yield element, child
@@ -88,7 +87,6 @@ def _weighs(model: JointModel) -> bool:
 
 
 def _write_inertial(text: XmlText, body: Element, inertia: CentredInertia) -> None:
-    """Set a body's inertial."""
     full = [inertia.inertia[row, column] for row, column in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
     line = f'<inertial pos="{numbers(*inertia.centre)}" mass="{numbers(inertia.mass)}" fullinertia="{numbers(*full)}"/>'
     stated = next(body.named("inertial"), None)

@@ -138,7 +138,6 @@ def of_extended_model(model: ExtendedModel, links: Sequence[LinkInertia], origin
 
 
 def _frictions(identification: Identification, parameters: NDArray[np.float64]) -> tuple[JointFriction, ...]:
-    """Friction of each joint; terms that the model lacks are zero."""
     frictions = []
     for joint, shape in enumerate(identification.shapes):
         names = ("stiction", "stribeck", "viscous", "offset")
@@ -150,7 +149,6 @@ def _frictions(identification: Identification, parameters: NDArray[np.float64]) 
 def _coefficient(
     identification: Identification, parameters: NDArray[np.float64], joint: int, name: str
 ) -> float | None:
-    """One coefficient of a joint; None where the model lacks it."""
     column = identification.structure.coefficient(joint, name)
     return None if column is None else float(parameters[column])
 

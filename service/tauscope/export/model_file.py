@@ -158,7 +158,6 @@ def read_export_models(path: Path) -> tuple[ExportModel, ...]:
 
 
 def _robot(arm: ArmEntry) -> Robot:
-    """The robot of the block."""
     robot = robot_from_dict(arm.robot, "arm.robot")
     branches = tuple(LinkInertia.from_vector(np.array(link)) for link in arm.branches)
     return replace(robot, segment_names=tuple(arm.segments), branches=branches)

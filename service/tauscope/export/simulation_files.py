@@ -80,15 +80,10 @@ def scenario_text(diagnosis: Diagnosis) -> str:
 def _link(link: LinkInertia) -> Mapping[str, Any]:
     vector = [float(value) for value in link.to_vector()]
     xx, yy, zz, xy, xz, yz, mass, *moment = vector
-    return {
-        "mass": mass,
-        "first_moment": moment,
-        "inertia": dict(zip(INERTIA, (xx, yy, zz, xy, xz, yz), strict=True)),
-    }
+    return {"mass": mass, "first_moment": moment, "inertia": dict(zip(INERTIA, (xx, yy, zz, xy, xz, yz), strict=True))}
 
 
 def _entries(effect: Effect, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> list[Entry]:
-    """An effect as entries of a scenario; none where there is no such entry."""
     place = {} if effect.joint is None else {"joint": effect.joint + 1}
     made = effect.scenario_entries(coefficients, shape, robot)
     return [{"effect": effect.id, **place, **entry} for entry in made]

@@ -108,7 +108,6 @@ class _Tree:
 
 
 def _read(source: bytes | Path) -> tuple[bytes, str]:
-    """The file's bytes and its name for messages."""
     if isinstance(source, bytes):
         return source, "URDF"
     try:
@@ -118,13 +117,11 @@ def _read(source: bytes | Path) -> tuple[bytes, str]:
 
 
 def _joint(element: Element) -> _Joint:
-    """Type and ends of a joint element."""
     ends = [next((e.attributes.get("link", "") for e in element.named(end)), "") for end in ("parent", "child")]
     return _Joint(element, element.attributes.get("type", ""), ends[0], ends[1])
 
 
 def _write_inertial(text: XmlText, link: Element, inertia: CentredInertia) -> None:
-    """Set a link's inertial, adding what is missing of it."""
     values = {
         "origin": {"xyz": _numbers(*inertia.centre), "rpy": "0 0 0"},
         "mass": {"value": _numbers(inertia.mass)},
@@ -186,7 +183,6 @@ def _zero_inertial(text: XmlText, element: Element, name: str, joint: str, carri
 
 
 def _write_dynamics(text: XmlText, element: Element, name: str, friction: JointFriction) -> list[str]:
-    """Set a joint's damping and friction; notes on what they cannot hold."""
     dry, damping = dry_friction_and_damping(name, friction)
     values = {"damping": _numbers(damping), "friction": _numbers(dry)}
     existing = list(element.named("dynamics"))
@@ -198,7 +194,6 @@ def _write_dynamics(text: XmlText, element: Element, name: str, friction: JointF
 
 
 def _tag(name: str, attributes: Mapping[str, str]) -> str:
-    """An empty element."""
     return f"<{name} " + " ".join(f'{key}="{value}"' for key, value in attributes.items()) + "/>"
 
 

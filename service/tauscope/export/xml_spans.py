@@ -112,14 +112,12 @@ class XmlText:
         return b"".join([*pieces, self.data[position:]])
 
     def _indent(self, element: Element) -> bytes:
-        """White space before an element on its line."""
         line_start = self.data.rfind(b"\n", 0, element.start) + 1
         before = self.data[line_start : element.start]
         return before if not before.strip() else b""
 
 
 def _attribute_text(value: str) -> bytes:
-    """A value as it may stand between quotes of either kind."""
     from xml.sax.saxutils import escape  # loads urllib and ssl
 
     return escape(value, {'"': "&quot;", "'": "&apos;"}).encode()
@@ -139,7 +137,6 @@ def _require_utf8(data: bytes, label: str) -> None:
 
 
 def _parse(data: bytes, label: str) -> Element:
-    """The root element with all spans."""
     _require_utf8(data, label)
     parser = expat.ParserCreate("utf-8")
     parser.buffer_text = True

@@ -20,31 +20,20 @@ from tauscope.recording.recording import Array
 
 LARGEST_ORDER = 30
 
-FILTER_ORDER = 24
-"""Orders that stand for the band's filter: the density in the pass band is that of all orders to 1 %."""
-
+FILTER_ORDER = 24  # orders that stand for the band's filter: the density in the pass band is that of all orders to 1 %
+# White noise that is added to a filtered residual, as a share of its variance: the stop band is empty, and an
+# autoregression that is to follow it that far down needs hundreds of orders.
 FILTER_FLOOR = 1e-2
-"""White noise that is added to a filtered residual, as a share of its variance: the stop band is empty, and an
-autoregression that is to follow it that far down needs hundreds of orders."""
-
-FILTERED_LAGS = LARGEST_ORDER + FILTER_ORDER
-"""Lags that a model of a filtered residual needs."""
-
+FILTERED_LAGS = LARGEST_ORDER + FILTER_ORDER  # lags that a model of a filtered residual needs
+# Where samples are missing, orders end where fewer than this share of so many consecutive samples are all there: what
+# pairs at longer lags say no longer fits together.
 UNBROKEN_SHARE = 0.3
-"""Where samples are missing, orders end where fewer than this share of so many consecutive samples are all there: what
-pairs at longer lags say no longer fits together."""
-
-SMALLEST_SHARE = 1e-3
-"""…and at least so many are: a share of none has no logarithm."""
+SMALLEST_SHARE = 1e-3  # …and at least so many are: a share of none has no logarithm
 
 
 @dataclass(frozen=True, eq=False)
 class Autoregression:
-    """e_t = Σ a_k e_{t-k} + ε_t.
-
-    coefficients : (p,) float64
-        a_1 … a_p; empty for white noise
-    """
+    """e_t = Σ a_k e_{t-k} + ε_t. `coefficients`: (p,), a_1 … a_p; empty for white noise."""
 
     coefficients: Array
     innovation_variance: float
@@ -69,10 +58,7 @@ class Autoregression:
     def colour(self, columns: Array) -> Array:
         """Columns run through σ_ε / a(z): their Gram matrix is LᵀΩL, Ω the residual's covariance.
 
-        Parameters
-        ----------
-        columns : (k, M) float64
-            signals, time last
+        `columns`: (k, M), signals, time last.
         """
         scale = np.sqrt(self.innovation_variance)
         if self.order == 0:
@@ -84,10 +70,8 @@ class Autoregression:
 class LaggedProducts:
     """Σ e_t e_{t+k} of one stretch of a residual, and how many products that are.
 
-    products, counts : (K + 1,) float64
-        for the lags k = 0 … K; pairs of which one was not measured are left out of both
-    spans : (K + 1,) float64
-        pairs that there would be if all had been measured
+    `products`, `counts`: (K + 1,), for the lags k = 0 … K; pairs of which one was not measured are left out of both.
+    `spans`: (K + 1,), pairs that there would be if all had been measured.
     """
 
     products: Array
@@ -98,12 +82,7 @@ class LaggedProducts:
     def of(residual: Array, used: NDArray[np.bool_], lags: int = LARGEST_ORDER) -> "LaggedProducts":
         """The products of consecutive samples, those left out that do not count.
 
-        Parameters
-        ----------
-        residual : (M,) float64
-            consecutive samples
-        used : (M,) bool
-            which of them count
+        `residual`: (M,), consecutive samples; `used`: (M,), which of them count.
         """
         sums = LaggedProducts(np.zeros(lags + 1), np.zeros(lags + 1), np.zeros(lags + 1))
         whole = bool(used.all())
@@ -127,10 +106,8 @@ class AutocovarianceSum:
     def add(self, piece: LaggedProducts, filtered_white: Array | None = None) -> None:
         """Add one piece.
 
-        Parameters
-        ----------
-        filtered_white : (K + 1,) float64 or None
-            autocovariance of white noise that passed the filter which the residual passed; None where it passed none
+        `filtered_white`: (K + 1,) or None, autocovariance of white noise that passed the filter which the residual
+        passed; None where it passed none.
         """
         both = slice(min(len(piece.products), len(self._sums.products)))
         self._sums.products[both] += piece.products[both]
@@ -154,9 +131,9 @@ class AutocovarianceSum:
         reach = int(min(len(covariance) - 1, count // 10, unbroken))
         whitener = np.ones(1)
         if self._white[1:].any():
-            whitener = _prediction_error_filter(_floored(self._white), min(FILTER_ORDER, reach // 2))
-            covariance = _floored(covariance)
-        whitened = _filtered(covariance[: reach + 1], whitener)
+            whitener = _prediction_error_filter(_add_floor(self._white), min(FILTER_ORDER, reach // 2))
+            covariance = _add_floor(covariance)
+        whitened = _filter(covariance[: reach + 1], whitener)
         orders = list(_levinson(whitened, min(LARGEST_ORDER, len(whitened) - 1)))
         if not orders:  # pairs of what was measured fit together no more
             return Autoregression(np.empty(0), float(covariance[0]), variance=float(covariance[0]))
@@ -190,8 +167,7 @@ def _levinson(covariance: Array, largest: int) -> Iterator[tuple[Array, float]]:
         yield coefficients[:order].copy(), variance
 
 
-def _floored(covariance: Array) -> Array:
-    """The autocovariance with the white noise of `FILTER_FLOOR` added."""
+def _add_floor(covariance: Array) -> Array:
     return np.append((1.0 + FILTER_FLOOR) * covariance[0], covariance[1:])
 
 
@@ -201,7 +177,7 @@ def _prediction_error_filter(covariance: Array, order: int) -> Array:
     return np.append(1.0, -coefficients)
 
 
-def _filtered(covariance: Array, taps: Array) -> Array:
+def _filter(covariance: Array, taps: Array) -> Array:
     """Autocovariance of what leaves a filter of K taps, from that of what enters it: shorter by K - 1 lags."""
     both_sides = np.append(covariance[:0:-1], covariance)
     leaving = np.convolve(both_sides, np.correlate(taps, taps, "full"), "valid")

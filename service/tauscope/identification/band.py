@@ -29,60 +29,35 @@ from tauscope.recording.conditioning.common_band import Decimator
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
-KEPT_BEYOND = 2.0
-"""Width of the band over the frequency where the unexplained torque outgrows the explained one."""
-
+KEPT_BEYOND = 2.0  # width of the band over the frequency where the unexplained torque outgrows the explained one
+# Largest torque that noise of the positions may make in the regressor, relative to what the fit leaves.
 NOISE_TORQUE_SHARE = 0.15
-"""Largest torque that noise of the positions may make in the regressor, relative to what the fit leaves."""
-
-MOTION_SHARE = 0.95
-"""Share of the power of every joint's velocity that makes its motion's own band…"""
-
-MOTION_MARGIN = 2.0
-"""…and the width of the band over it that is kept at least."""
-
-ROWS_A_PARAMETER = 3.0
-"""Rows of every joint's equations for each of its parameters that a band leaves at least."""
-
+MOTION_SHARE = 0.95  # share of the power of every joint's velocity that makes its motion's own band…
+MOTION_MARGIN = 2.0  # …and the width of the band over it that is kept at least
+ROWS_A_PARAMETER = 3.0  # rows of every joint's equations for each of its parameters that a band leaves at least
+# Share of the positions' noise that differs from period to period, below which what torque does not repeat says nothing
+# of what that noise makes in the regressor: it is the same in every period.
 INDEPENDENT = 0.5
-"""Share of the positions' noise that differs from period to period, below which what torque does not repeat says
-nothing of what that noise makes in the regressor: it is the same in every period."""
-
+# Part of the residual that is the torque's own at least, however much the noise of the positions made of it.
 SMALLEST_OWN_SHARE = 0.01
-"""Part of the residual that is the torque's own at least, however much the noise of the positions made of it."""
-
 PROBED_POSTURES = 50
 
-ROUNDS = 2
-"""Fits at a narrower band each: a fit disturbed by noise misplaces the crossing."""
-
+ROUNDS = 2  # fits at a narrower band each: a fit disturbed by noise misplaces the crossing
+# A band holds at least this many cycles of its cut-off within the longest stretch of the recording.
 SMALLEST_CYCLES = 20.0
-"""A band holds at least this many cycles of its cut-off within the longest stretch of the recording."""
-
-ENOUGH_ROWS = 1 << 17
-"""Rows of a recording that its spectra are taken from: more changes nothing."""
-
-ENOUGH_PIECES = 8
-"""Pieces of motion that tell the joints' typical speeds."""
-
-SPECTRUM_SEGMENT = 4096
-"""Samples in one segment of the motion's spectrum."""
-
-FILTER_POINTS = 1 << 14
-"""Points of a filter's frequency response, both halves."""
-
+ENOUGH_ROWS = 1 << 17  # rows of a recording that its spectra are taken from: more changes nothing
+ENOUGH_PIECES = 8  # pieces of motion that tell the joints' typical speeds
+SPECTRUM_SEGMENT = 4096  # samples in one segment of the motion's spectrum
+FILTER_POINTS = 1 << 14  # points of a filter's frequency response, both halves
 SPECTRUM_POINTS = 200
+# Spectra are averaged from f/√2 to f·√2 before they are compared: an octave, no single harmonic decides.
 SMOOTHING = np.sqrt(2.0)
-"""Spectra are averaged from f/√2 to f·√2 before they are compared: an octave, no single harmonic decides."""
 
 
 def choose_cutoff(conditioners: Sequence[Conditioner], robot: Robot, base: BaseParameters) -> float | None:
     """Cut-off of the common band, chosen from the data.
 
-    Returns
-    -------
-    float or None
-        cut-off [Hz]; None where the positions are clean enough for no filter
+    Returns cut-off [Hz]; None where the positions are clean enough for no filter.
     """
     conditioners = [_beginning(conditioner) for conditioner in conditioners]
     quiet = quiet_limit(conditioners)
@@ -143,7 +118,6 @@ def _least_band(motions: Dataset, robot: Robot, base: BaseParameters, cutoff_hz:
 
 
 def _beginning(conditioner: Conditioner) -> Conditioner:
-    """The recording's first `ENOUGH_ROWS` rows."""
     rows, left = [], ENOUGH_ROWS
     for start, stop in conditioner.timing.rows:
         if left > 0:
@@ -260,7 +234,7 @@ def _crossing(motions: Dataset, structure: ModelStructure, parameters: Array, re
         measured += _power(torque, rate, frequency)
         unexplained += _power(torque - modelled, rate, frequency)
     peak = int(np.argmax(measured))
-    below = np.flatnonzero(_smoothed(measured, frequency)[peak:] < 2.0 * _smoothed(unexplained, frequency)[peak:])
+    below = np.flatnonzero(_smooth(measured, frequency)[peak:] < 2.0 * _smooth(unexplained, frequency)[peak:])
     return float(frequency[peak + below[0]]) if len(below) else None
 
 
@@ -270,8 +244,7 @@ def _power(signals: Array, rate_hz: float, frequency: Array) -> Array:
     return np.interp(frequency, own, power.sum(axis=0)) * signals.shape[1]
 
 
-def _smoothed(power: Array, frequency: Array) -> Array:
-    """Mean of a spectrum over an octave around every frequency."""
+def _smooth(power: Array, frequency: Array) -> Array:
     total = np.concatenate([[0.0], np.cumsum(power)])
     low = np.searchsorted(frequency, frequency / SMOOTHING)
     high = np.searchsorted(frequency, frequency * SMOOTHING, side="right")

@@ -1,4 +1,4 @@
-"""Standard errors that stay right when the residual is autocorrelated.
+"""Standard errors that stay right when the residual is autocorrelated, and the torque that they leave uncertain.
 
 cov Θ̂ = B M B,  B = (Σ_j w_j² A_jᵀ A_j + P⁻¹)⁻¹,  M = Σ_j w_j⁴ A_jᵀ Ω_j A_j + D P⁻¹ D,
 
@@ -21,8 +21,8 @@ from tauscope.identification.shape_sensitivity import ShapeParameter, columns_wi
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
+# The covariance is enlarged by no more than the inverse of this for the degrees of freedom that parameters took.
 MOST_FREEDOM_LOST = 0.25
-"""The covariance is enlarged by no more than the inverse of this for the degrees of freedom that parameters took."""
 
 
 def parameter_covariance(
@@ -39,19 +39,10 @@ def parameter_covariance(
 ) -> Array:
     """Covariance of all parameters, with the estimated shape constants appended.
 
-    Parameters
-    ----------
-    parameters : (p,) float64
-        the estimate
-    weight : (n,) float64
-        w_j, the weights that the estimate was made with
-    scale_std : sequence of float
-        s_j, one a joint; empty where torque was measured
-
-    Returns
-    -------
-    (p + s, p + s) float64
-        covariance of Θ and of the logarithms of the shape constants
+    `parameters`: (p,), the estimate.
+    `weight`: (n,), w_j, the weights that the estimate was made with.
+    `scale_std`: s_j, one a joint; empty where torque was measured.
+    Returns (p + s, p + s), covariance of Θ and of the logarithms of the shape constants.
     """
     size = structure.size + len(shapes)
     bread, meat = np.zeros((size, size)), np.zeros((size, size))
@@ -84,3 +75,32 @@ def parameter_covariance(
     taken = size if posterior is None else posterior.freedom + len(shapes)
     inverse = pseudo_inverse(bread)
     return rows / max(rows - taken, MOST_FREEDOM_LOST * rows) * inverse @ meat @ inverse
+
+
+def uncertain_torque(
+    motions: Iterable[PreparedMotion],
+    structure: ModelStructure,
+    parameters: Array,
+    shapes: Sequence[ShapeParameter],
+    covariance: Array,
+    noise_std: Array,
+) -> Array:
+    """Root mean square of the torque that parameters and friction at rest leave uncertain, √(mean of a S aᵀ + v σ²).
+
+    a are the rows of a joint, v is what `PreparedMotion` says of friction at rest.
+
+    `parameters`: (p,), the coefficients, for the amplitudes of the shape constants.
+    `covariance`: (p + s, p + s), S, of the parameters and of the logarithms of the estimated shape constants.
+    `noise_std`: (n,), σ of a row [Nm or N].
+    Returns (n,), in the common band [Nm or N].
+    """
+    squares, resting, count = np.zeros((3, structure.robot.joint_count))
+    for prepared in motions:
+        for joint, used in enumerate(prepared.used):
+            columns, index = columns_with_shapes(prepared, structure, joint, parameters, shapes)
+            columns = columns if used.all() else columns[:, used]
+            squares[joint] += np.sum((covariance[np.ix_(index, index)] @ columns) * columns)
+            resting[joint] += prepared.rest_variance[joint] * prepared.at_rest[joint][used].sum()
+            count[joint] += columns.shape[1]
+    rows = np.maximum(count, 1)
+    return np.hypot(np.sqrt(np.maximum(squares, 0.0) / rows), noise_std * np.sqrt(resting / rows))

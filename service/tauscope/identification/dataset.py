@@ -14,39 +14,27 @@ from tauscope.recording.conditioning.common_band import HarmonicBand
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Bytes of columns that are kept between passes; beyond, every pass conditions the recording again.
 MEMORY_LIMIT = 256 * 1024 * 1024
-"""Bytes of columns that are kept between passes; beyond, every pass conditions the recording again."""
 
 
-REST_S = 0.1
-"""A joint that moves by no more than its encoder resolves for so long stands still [s]."""
-
-STOP_S = 0.5
-"""A joint that stands so long is held by its friction; a shorter rest is a turning point [s]."""
-
-MOSTLY = 0.1
-"""Share of a row's samples at rest from which on it says little of the noise in motion."""
-
-FEWEST_AT_REST = 3
-"""Samples that tell rest from a turning point."""
+REST_S = 0.1  # a joint that moves by no more than its encoder resolves for so long stands still [s]
+STOP_S = 0.5  # a joint that stands so long is held by its friction; a shorter rest is a turning point [s]
+MOSTLY = 0.1  # share of a row's samples at rest from which on it says little of the noise in motion
+FEWEST_AT_REST = 3  # samples that tell rest from a turning point
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedMotion:
     """One piece of motion with its rigid-body columns.
 
-    rigid : tuple of (m_j, N) float64, length n
-        base regressor L at the recorded rate: of each joint's row the columns of the links that it moves
-    reduced_rigid : tuple of (m_j, M) float64, length n
-        the same in the common band, decimated
-    reduced_torque : (n, M) float64
-        measured torque in the common band, mean of the repetitions
-    used : (n, M) bool
-        rows that rest on measured torque
-    at_rest : (n, M) float64
-        share of each row's samples at which the joint stands still
-    rest_variance : (n,) float64
-        variance of friction at rest over that of a row's noise
+    `rigid`: tuple of (m_j, N), length n, base regressor L at the recorded rate: of each joint's row the columns of the
+    links that it moves.
+    `reduced_rigid`: tuple of (m_j, M), length n, the same in the common band, decimated.
+    `reduced_torque`: (n, M), measured torque in the common band, mean of the repetitions.
+    `used`: (n, M), rows that rest on measured torque.
+    `at_rest`: (n, M), share of each row's samples at which the joint stands still.
+    `rest_variance`: (n,), variance of friction at rest over that of a row's noise.
     """
 
     motion: Motion
@@ -68,11 +56,6 @@ class PreparedMotion:
 
         At rest friction holds with any torque up to breakaway, the same one throughout a stop: the covariance of its L
         rows is σ² (1 + v 1 1ᵀ), so their mean counts for 1 / √(1 + v L) of itself and their differences for all.
-
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
         """
         white = rows * (self.used[joint] * self.row_weight)
         if self.rest_variance[joint] > 0.0:
@@ -82,13 +65,7 @@ class PreparedMotion:
         return white
 
     def stops(self, joint: int) -> list[slice]:
-        """Consecutive rows of every stop of a joint that is longer than a turning point.
-
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        """
+        """Consecutive rows of every stop of a joint that is longer than a turning point."""
         resting = self.used[joint] & (self.at_rest[joint] >= MOSTLY)
         edges = np.flatnonzero(np.diff(resting, prepend=False, append=False)).reshape(-1, 2)
         least = STOP_S * self.motion.band.rate_hz
@@ -106,35 +83,17 @@ class PreparedMotion:
         return sum(columns.nbytes for columns in (*self.rigid, *self.reduced_rigid))
 
     def joint_columns(self, structure: ModelStructure, joint: int) -> Array:
-        """All columns of a joint's equation in the common band, (p_j, M).
-
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        """
+        """All columns of a joint's equation in the common band, (p_j, M)."""
         return np.concatenate(self.joint_column_groups(structure, joint))
 
     def joint_column_groups(self, structure: ModelStructure, joint: int) -> tuple[Array, Array]:
-        """The same columns without a copy: those of the links that the joint moves, and its own terms.
-
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        """
+        """The same columns without a copy: those of the links that the joint moves, and its own terms."""
         motion = self.motion
         own = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
         return self.reduced_rigid[joint], motion.band.reduce(own)
 
     def predicted_rows(self, structure: ModelStructure, parameters: Array) -> Array:
-        """Model torque in the common band, (n, M).
-
-        Parameters
-        ----------
-        parameters : (p,) float64
-            one parameter set
-        """
+        """Model torque in the common band, (n, M). `parameters`: (p,), one parameter set."""
         motion = self.motion
         outward, others = [], []
         for joint, rigid in enumerate(self.reduced_rigid):
@@ -147,15 +106,7 @@ class PreparedMotion:
     def predict_torque(self, structure: ModelStructure, candidates: Array) -> Array:
         """Model torque at the recorded rate, before any filter, of several parameter sets at once.
 
-        Parameters
-        ----------
-        candidates : (c, p) float64
-            parameter sets
-
-        Returns
-        -------
-        (c, n, N) float64
-            torque of every set at every joint
+        `candidates`: (c, p), parameter sets. Returns (c, n, N), torque of every set at every joint.
         """
         motion = self.motion
         samples, count = motion.position.shape
@@ -172,8 +123,7 @@ class PreparedMotion:
 class Dataset:
     """All pieces of motion of some recordings, in one band, that can be gone through again and again.
 
-    cutoff_hz : float or None
-        the common band; None for no filter
+    `cutoff_hz`: the common band; None for no filter.
     """
 
     conditioners: Sequence[Conditioner]
@@ -207,7 +157,6 @@ class Dataset:
         return prepared if self.rest_variance is None else replace(prepared, rest_variance=self.rest_variance)
 
     def _prepare(self) -> Iterator[PreparedMotion]:
-        """Condition, evaluate the regressor, and reduce."""
         for index, conditioner in enumerate(self.conditioners):
             for measured in conditioner.motions(self.cutoff_hz):
                 motion = _without_jitter(measured, conditioner.moving)
@@ -219,10 +168,8 @@ def prepared_motion(
 ) -> PreparedMotion:
     """One piece of motion with its rigid-body columns, at the recorded rate and in the common band.
 
-    Parameters
-    ----------
-    resolution : (n,) float64 or None
-        change of position that is told from noise [rad or m]; None where rest is not looked for
+    `resolution`: (n,) or None, change of position that is told from noise [rad or m]; None where rest is not looked
+    for.
     """
     regressor = TorqueRegressor(robot, columns=base.independent_columns)
     whole = np.empty((robot.joint_count, regressor.column_count, len(motion.position)))

@@ -8,27 +8,20 @@ import numpy as np
 from tauscope.identification.dataset import PreparedMotion
 from tauscope.recording.recording import Array
 
-TURNING = 0.05
-"""Share of a joint's top speed that it passes on both sides of a reversal: less is noise at rest."""
-
-TOP = 0.99
-"""Share of the samples that are slower than the top speed."""
+TURNING = 0.05  # share of a joint's top speed that it passes on both sides of a reversal: less is noise at rest
+TOP = 0.99  # share of the samples that are slower than the top speed
 
 
-MOST_SAMPLES = 2048
-"""Samples of one piece of motion, which has up to 32,768, by which it is described."""
+MOST_SAMPLES = 2048  # samples of one piece of motion, which has up to 32,768, by which it is described
 
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
     """How the joints move.
 
-    lowest, highest : (n,) float64
-        positions [rad or m]
-    speed : (n,) float64
-        top speed, which one sample in a hundred exceeds [rad/s or m/s]
-    reversals : (n,) int
-        how often the joints turn round
+    `lowest`, `highest`: (n,), positions [rad or m].
+    `speed`: (n,), top speed, which one sample in a hundred exceeds [rad/s or m/s].
+    `reversals`: (n,) int, how often the joints turn round.
     """
 
     lowest: Array
@@ -52,16 +45,12 @@ def measure_excitation(motions: Iterable[PreparedMotion]) -> Excitation:
 def thin(signals: Array, most: int = MOST_SAMPLES) -> Array:
     """Every so many rows of a piece, so that a long recording is not held in memory.
 
-    Parameters
-    ----------
-    signals : (N, n) float64
-        one row a sample
+    `signals`: (N, n), one row a sample.
     """
     return signals[:: -(-len(signals) // most)].copy()
 
 
 def _count_reversals(velocity: Array, threshold: Array) -> np.ndarray:
-    """How often each joint's velocity changes its sign beyond a threshold, (n,)."""
     counts = []
     for column, least in zip(velocity.T, threshold, strict=True):
         moving = column[np.abs(column) > least]

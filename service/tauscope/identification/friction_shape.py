@@ -1,5 +1,9 @@
 """Shape constants K_v and δ of the friction curve, by separable least squares.
 
+All columns Z that do not depend on a shape constant (rigid body, viscous, offset) are projected off: with S Sᵀ =
+(ZᵀZ)⁻¹ from the factors at hand, Q = Z S is never formed, only Qᵀ G = Sᵀ (ZᵀG) of the candidate columns G, summed in
+one pass. What is left are Gram matrices of the candidates.
+
 The coefficients of (7) are linear and are eliminated exactly (variable projection); only the shape constants remain.
 Every joint's constants are searched over a logarithmic grid of candidates, joint after joint until nothing moves, and
 refined between grid points. A constant that the data cannot tell says so and takes an ordinary value that fits as well:
@@ -8,48 +12,152 @@ never a slope that ran away.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 
-from tauscope.identification.candidate_steps import Conditional, JointGrid, projected_grids, total_gain
+from tauscope.dynamics.friction import smooth_sign
 from tauscope.identification.dataset import PreparedMotion
-from tauscope.identification.least_squares import JointFactor, restricted, solve
+from tauscope.identification.least_squares import JointFactor, Solution, restrict, solve
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 from tauscope.robot import FrictionShape
 
+COLLINEAR = 1e-9  # a second column with less than this share of its energy left beside the first adds nothing
+
+
+@dataclass(frozen=True, eq=False)
+class JointGrid:
+    """One joint's candidate columns after projection: a step of every slope, and v|v| as the last.
+
+    `slopes`: (g,), candidate constants.
+    `gram`: (g + 1, g + 1), GᵀG of its columns, before projection.
+    `inner`: (z, g + 1), Q_jᵀ G: what the projection takes away.
+    `target`: (g + 1,), Gᵀ y after projection.
+    """
+
+    slopes: Array
+    gram: Array
+    inner: Array
+    target: Array
+
+    @property
+    def bend(self) -> int:
+        """The candidate v|v|: viscous friction that bends with speed, which the model itself does not have."""
+        return len(self.slopes)
+
+    def block(self, other: "JointGrid", mine: list[int], theirs: list[int]) -> Array:
+        """Projected Gram matrix between columns of two joints, (mine, theirs)."""
+        product = -self.inner[:, mine].T @ other.inner[:, theirs]
+        return product + self.gram[np.ix_(mine, theirs)] if self is other else product
+
+
+def project_grids(
+    motions: Iterable[PreparedMotion],
+    structure: ModelStructure,
+    shared: NDArray[np.intp],
+    solution: Solution,
+    noise_std: Array,
+    slopes: list[Array],
+) -> list[JointGrid]:
+    """Candidate columns of every joint, projected off the shared ones; one pass over the data.
+
+    `shared`: (z,) int, its global columns that do not depend on any shape constant, ascending.
+    `noise_std`: (n,), residual standard deviation of every joint, for the weights [Nm or N].
+    `slopes`: list of (g,), length n, every joint's candidates [s/rad or s/m].
+    """
+    joints = range(structure.robot.joint_count)
+    gram = [np.zeros((len(values) + 1, len(values) + 1)) for values in slopes]
+    cross = [np.zeros((len(shared), len(values) + 1)) for values in slopes]
+    target = [np.zeros(len(values) + 1) for values in slopes]
+    for prepared in motions:
+        for joint in joints:
+            columns = prepared.joint_columns(structure, joint)
+            index = structure.joint_columns(joint)
+            kept = np.isin(index, shared)
+            place = np.searchsorted(shared, index[kept])
+            velocity = prepared.motion.velocity[:, joint]
+            candidates = np.vstack([smooth_sign(velocity, slopes[joint][:, None]), velocity * np.abs(velocity)])
+            whiten = partial(prepared.whiten, joint)
+            steps = whiten(prepared.motion.band.reduce(candidates)) / noise_std[joint]
+            common = whiten(columns[kept]) / noise_std[joint]
+            torque = whiten(prepared.reduced_torque[None, joint])[0] / noise_std[joint]
+            residual = torque - solution.parameters[place] @ common
+            gram[joint] += steps @ steps.T
+            cross[joint][place] += common @ steps.T
+            target[joint] += steps @ residual
+    return [JointGrid(slopes[j], gram[j], solution.spread.T @ cross[j], target[j]) for j in joints]
+
+
+def total_gain(grids: list[JointGrid], chosen: list[list[int]]) -> float:
+    """What the chosen columns of all joints together take off the criterion."""
+    pairs = list(zip(grids, chosen, strict=True))
+    matrix = np.block([[a.block(b, i, j) for b, j in pairs] for a, i in pairs])
+    target = np.concatenate([grid.target[indices] for grid, indices in pairs])
+    return float(target @ linalg.lstsq(matrix, target, cond=1e-12)[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Conditional:
+    """One joint's candidates after the chosen columns of all other joints are projected off as well.
+
+    `gram`: (g + 1, g + 1), Gram matrix of the candidates; `target`: (g + 1,), their products with the torque.
+    """
+
+    gram: Array
+    target: Array
+
+    @staticmethod
+    def of(grids: list[JointGrid], chosen: list[list[int]], joint: int) -> "Conditional":
+        """The candidates of one joint with the other joints as chosen."""
+        grid, every = grids[joint], list(range(len(grids[joint].target)))
+        gram, target = grid.block(grid, every, every), grid.target
+        others = [(grids[k], chosen[k]) for k in range(len(grids)) if k != joint]
+        if not others:
+            return Conditional(gram, target)
+        matrix = np.block([[a.block(b, i, j) for b, j in others] for a, i in others])
+        cross = np.vstack([other.block(grid, indices, every) for other, indices in others])
+        known = np.concatenate([other.target[indices] for other, indices in others])
+        solved = linalg.lstsq(matrix, np.column_stack([cross, known]), cond=1e-12)[0]
+        return Conditional(gram - cross.T @ solved[:, :-1], target - cross.T @ solved[:, -1])
+
+    def gains(self, options: list[list[int]], *, physical: bool = False) -> Array:
+        """What each option, one or two columns, takes off the criterion, (options,)."""
+        first = np.array([option[0] for option in options])
+        energy = np.maximum(np.diag(self.gram), np.finfo(float).tiny)
+        single = self.target[first] ** 2 / energy[first]
+        if len(options[0]) == 1:
+            return single
+        second = np.array([option[1] for option in options])
+        overlap = self.gram[first, second] / energy[first]
+        left = energy[second] - overlap * self.gram[first, second]
+        apart = left > COLLINEAR * energy[second]
+        stribeck = np.where(apart, self.target[second] - overlap * self.target[first], 0.0) / np.where(apart, left, 1.0)
+        added = stribeck**2 * left
+        if physical:
+            stiction = self.target[first] / energy[first] - overlap * stribeck
+            falls = (stribeck < 0.0) & (stiction + stribeck >= 0.0)
+            added = np.where(falls, added, 0.0)
+        return single + added
+
+
 GRID_POINTS = 42
+# Candidates times the joint's rms velocity run over these powers of ten: from a gentle Stribeck slope to a step.
 GRID_DECADES = (0.2, 4.3)
-"""Candidates times the joint's rms velocity run over these powers of ten: from a gentle Stribeck slope to a step."""
-
-LEAST_STEP = 10**0.8
-"""K_v times the rms velocity is at least this: what is gentler is viscous friction by another name."""
-
+LEAST_STEP = 10**0.8  # k_v times the rms velocity is at least this: what is gentler is viscous friction by another name
+# K times the rms velocity of a constant that the data leave open, as near as they allow: the step of a textbook.
 ORDINARY = 1000.0
-"""K times the rms velocity of a constant that the data leave open, as near as they allow: the step of a textbook."""
-
-STRAIGHT = 0.17
-"""δ times the rms velocity v below which A(δ v) is a straight line but for a hundredth: (δ v)²/3."""
-
-AT_LIMIT = 0.95
-"""Share of the steepest δ from which on it is at its limit."""
-
-SEPARATION = 4.0
-"""K_v is at least this many times δ: closer, their columns are one."""
-
+STRAIGHT = 0.17  # δ times the rms velocity v below which A(δ v) is a straight line but for a hundredth: (δ v)²/3
+AT_LIMIT = 0.95  # share of the steepest δ from which on it is at its limit
+SEPARATION = 4.0  # k_v is at least this many times δ: closer, their columns are one
+# What a Stribeck term must take off the criterion to be proposed, in residual variances: five standard errors.
 IMPROVEMENT = 25.0
-"""What a Stribeck term must take off the criterion to be proposed, in residual variances: five standard errors."""
-
+# …and the share of the joint's residual energy that it must explain, so that it is not a proxy of something else.
 IMPROVEMENT_SHARE = 0.005
-"""…and the share of the joint's residual energy that it must explain, so that it is not a proxy of something else."""
-
-KNOWN_BAND = 25.0
-"""Constants whose criterion is within this much of the best are not told apart: five standard errors."""
-
-AS_GOOD = 0.02
-"""Share of the residual's energy that is no practical difference between two constants."""
-
+KNOWN_BAND = 25.0  # constants whose criterion is within this much of the best are not told apart: five standard errors
+AS_GOOD = 0.02  # share of the residual's energy that is no practical difference between two constants
 SWEEPS = 4
 
 
@@ -57,14 +165,10 @@ SWEEPS = 4
 class EstimatedShape:
     """Shape constants of one joint.
 
-    k_v : float
-        slope of the step at zero velocity [s/rad or s/m]
-    delta : float or None
-        slope of the Stribeck term [s/rad or s/m]; None where the data show no such term
-    k_v_identifiable, delta_identifiable : bool
-        False where the data cannot tell the constant
-    k_v_given, delta_given : bool
-        True where the robot file states it
+    `k_v`: slope of the step at zero velocity [s/rad or s/m].
+    `delta`: slope of the Stribeck term [s/rad or s/m]; None where the data show no such term.
+    `k_v_identifiable`, `delta_identifiable`: False where the data cannot tell the constant.
+    `k_v_given`, `delta_given`: True where the robot file states it.
     """
 
     k_v: float
@@ -96,22 +200,17 @@ def estimate_shapes(
 ) -> tuple[EstimatedShape, ...]:
     """Shape constants of all joints; those that the robot file states are kept.
 
-    Parameters
-    ----------
-    noise_std : (n,) float64
-        residual standard deviation in the common band, for the weights
-    unit : (n,) float64
-        one noise variance, inflated by autocorrelation, relative to `noise_std`²: the measure of what the data can
-        tell; zeros for the best candidates whatever they are worth
-    speed : (n,) float64
-        rms velocity of every joint, which the candidates are relative to [rad/s or m/s]
+    `noise_std`: (n,), residual standard deviation in the common band, for the weights.
+    `unit`: (n,), one noise variance, inflated by autocorrelation, relative to `noise_std`²: the measure of what the
+    data can tell; zeros for the best candidates whatever they are worth.
+    `speed`: (n,), rms velocity of every joint, which the candidates are relative to [rad/s or m/s].
     """
     given = [joint.friction_shape for joint in structure.robot.joints]
     shared = _shared_columns(structure)
-    without_steps = restricted(factors, shared)
+    without_steps = restrict(factors, shared)
     solution = solve(without_steps, len(shared), noise_std)
     slopes = _candidate_slopes(speed, given)
-    grids = projected_grids(motions, structure, shared, solution, noise_std, slopes)
+    grids = project_grids(motions, structure, shared, solution, noise_std, slopes)
     chosen = _search(grids, given)
     squares = (f.squared_residual(solution.parameters) for f in without_steps)
     energy = sum(square / std**2 for square, std in zip(squares, noise_std, strict=True))
@@ -139,7 +238,6 @@ def _candidate_slopes(speed: Array, given: Sequence[FrictionShape]) -> list[Arra
 
 
 def _shared_columns(structure: ModelStructure) -> NDArray[np.intp]:
-    """Global columns that do not depend on any shape constant."""
     steps = [
         structure.coefficient(joint, name)
         for joint in range(structure.robot.joint_count)
@@ -164,7 +262,6 @@ def _search(grids: list[JointGrid], given: Sequence[FrictionShape]) -> list[list
 
 
 def _steps(grid: JointGrid, shape: FrictionShape) -> list[int]:
-    """Grid indices that K_v may take; the stated one where the robot file states it."""
     if shape.k_v is not None:
         return [GRID_POINTS]
     least = (1.0 - 1e-9) * LEAST_STEP / 10 ** GRID_DECADES[0] * grid.slopes[0]  # a grid point: not left to rounding
@@ -276,17 +373,9 @@ def _with_stribeck(
 def gentle_range(k_v: float, speed: float) -> tuple[float, float]:
     """Between which slopes a δ stands for a term of its own: gentler ones are viscous friction, steeper ones K_v's.
 
-    Parameters
-    ----------
-    k_v : float
-        slope of the step at zero velocity [s/rad or s/m]
-    speed : float
-        the joint's rms velocity [rad/s or m/s]
-
-    Returns
-    -------
-    tuple of float
-        gentlest and steepest δ [s/rad or s/m]
+    `k_v`: slope of the step at zero velocity [s/rad or s/m].
+    `speed`: the joint's rms velocity [rad/s or m/s].
+    Returns gentlest and steepest δ [s/rad or s/m].
     """
     return STRAIGHT / speed, k_v / SEPARATION
 

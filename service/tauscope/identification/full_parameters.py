@@ -13,8 +13,8 @@ from tauscope.recording.recording import Array
 class FullParameters:
     """Θ* = M x, a model in its own columns from full parameters x of shape (q,).
 
-    map : (p, q) float64
-        M: base parameters Θ_L + B Θ_K of the links' ten parameters each, then the joints' coefficients as they are
+    `map`: (p, q), M: base parameters Θ_L + B Θ_K of the links' ten parameters each, then the joints' coefficients as
+    they are.
     """
 
     map: Array

@@ -12,31 +12,38 @@ from tauscope.dynamics.base_parameters import base_parameters
 from tauscope.errors import IdentificationError, RecordingMismatchError
 from tauscope.identification.band import choose_cutoff
 from tauscope.identification.consistency import ConsistentParameters
-from tauscope.identification.covariance import parameter_covariance
+from tauscope.identification.covariance import parameter_covariance, uncertain_torque
 from tauscope.identification.dataset import Dataset
-from tauscope.identification.estimate import Estimator, estimate
 from tauscope.identification.excitation import Excitation, measure_excitation
 from tauscope.identification.friction_shape import EstimatedShape, shape_parameters
 from tauscope.identification.full_parameters import FullParameters
-from tauscope.identification.gravity_scale import gravity_scale
-from tauscope.identification.least_squares import JointFactor, Solution, condition_number
+from tauscope.identification.least_squares import Estimator, JointFactor, Solution, condition_number, estimate
 from tauscope.identification.model_terms import choose_model
 from tauscope.identification.physical_estimate import consistent_estimate, is_rejected
 from tauscope.identification.posterior import Posterior, infer
-from tauscope.identification.preconditions import require_motion
-from tauscope.identification.prediction import uncertain_torque
 from tauscope.identification.residuals import Fit, ResidualStatistics, evaluate
-from tauscope.identification.signs import reversed_joints
+from tauscope.identification.signs import gravity_scale, reversed_joints
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.conditioning import Conditioner, ConditioningSummary
 from tauscope.recording.recording import Array, Recording
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import Robot
 
-KNOWN_SHARE = 0.1
-"""A coefficient whose standard error moves the joint's torque by more than this share of its rms is not
-identifiable."""
 
+def require_motion(conditioners: Sequence[Conditioner]) -> None:
+    """Refuse recordings in which no joint leaves the noise of its own encoder.
+
+    Raises IdentificationError, which names the recordings.
+    """
+    if not any(conditioner.moving.any() for conditioner in conditioners):
+        names = ", ".join(conditioner.recording.name for conditioner in conditioners)
+        raise IdentificationError(
+            f"{names}: no joint moves by more than the noise of its position: record a motion that excites every joint"
+        )
+
+
+# A coefficient whose standard error moves the joint's torque by more than this share of its rms is not identifiable.
+KNOWN_SHARE = 0.1
 Progress = Callable[[str], None]
 
 
@@ -44,10 +51,8 @@ Progress = Callable[[str], None]
 class Options:
     """What a user may ask of an identification.
 
-    cutoff_hz : float, None or "auto"
-        band that torque and regressor share [Hz]; None for no filter; chosen from the data by default
-    prior : bool
-        whether the most probable bodies are delivered, or the free least-squares estimate
+    `cutoff_hz`: band that torque and regressor share [Hz]; None for no filter; chosen from the data by default.
+    `prior`: whether the most probable bodies are delivered, or the free least-squares estimate.
     """
 
     estimator: Estimator = Estimator.WLS
@@ -60,30 +65,19 @@ class Options:
 class Identification:
     """A model of the arm with what is known about its uncertainty.
 
-    parameters : (p,) float64
-        the model that is delivered
-    free_parameters : (p,) float64
-        the LS or WLS estimate, without prior and without bodies
-    consistent_parameters : (p,) float64
-        the most probable bodies and friction, in the same columns
-    constrained : bool
-        whether no body can have the free estimate
-    price_of_bodies : (n,) float64
-        training residual over that of the free estimate
-    gravity_scale : float or None
-        torque of gravity over that of the stated links; None where it cannot be told
-    reversed_joints : tuple of int
-        joints whose torque fits much better with the other sign, which is not used
-    covariance : (p + s, p + s) float64
-        of the parameters, and of the logarithms of the estimated shape constants
-    undetermined : (p,) bool
-        parameters about which the recordings say nothing
-    predicted_train, predicted_held_out : (n,) float64
-        residual at the recorded rate that noise and covariance lead to expect [Nm or N]
-    extrapolation : (n,) float64 or None
-        share of the held-out torque's rms that training leaves uncertain
-    uncertainty_growth : (n,) float64 or None
-        uncertain torque of held-out motion over that of training
+    `parameters`: (p,), the model that is delivered.
+    `free_parameters`: (p,), the LS or WLS estimate, without prior and without bodies.
+    `consistent_parameters`: (p,), the most probable bodies and friction, in the same columns.
+    `constrained`: whether no body can have the free estimate.
+    `price_of_bodies`: (n,), training residual over that of the free estimate.
+    `gravity_scale`: torque of gravity over that of the stated links; None where it cannot be told.
+    `reversed_joints`: joints whose torque fits much better with the other sign, which is not used.
+    `covariance`: (p + s, p + s), of the parameters, and of the logarithms of the estimated shape constants.
+    `undetermined`: (p,), parameters about which the recordings say nothing.
+    `predicted_train`, `predicted_held_out`: (n,), residual at the recorded rate that noise and covariance lead to
+    expect [Nm or N].
+    `extrapolation`: (n,) or None, share of the held-out torque's rms that training leaves uncertain.
+    `uncertainty_growth`: (n,) or None, uncertain torque of held-out motion over that of training.
     """
 
     robot: Robot
@@ -120,11 +114,7 @@ class Identification:
 
 @dataclass(frozen=True, eq=False)
 class _Estimates:
-    """The free and the most probable model of the training recordings.
-
-    weights : (n,) float64
-        1/σ_j of the free estimate
-    """
+    """The free and the most probable model of the training recordings. `weights`: (n,), 1/σ_j of the free estimate."""
 
     structure: ModelStructure
     shapes: tuple[EstimatedShape, ...]
@@ -232,7 +222,6 @@ def identify(
 
 
 def _require_joints(robot: Robot, recordings: Sequence[Recording]) -> None:
-    """Refuse recordings of another number of joints."""
     for recording in recordings:
         if recording.joint_count != robot.joint_count:
             raise RecordingMismatchError(
@@ -242,7 +231,6 @@ def _require_joints(robot: Robot, recordings: Sequence[Recording]) -> None:
 
 
 def _estimate(motions: Dataset, options: Options, progress: Progress) -> _Estimates:
-    """Terms of the model, the free estimate, and the most probable bodies."""
     progress("choose model terms")
     structure, shapes, factors = choose_model(motions, motions.robot, motions.base, rotor_inertia=options.rotor_inertia)
     progress("estimate parameters")
@@ -265,7 +253,6 @@ def _moving_noise(found: _Estimates, fit: Fit) -> Array:
 
 @contextmanager
 def _naming(recordings: Sequence[Recording]) -> Iterator[None]:
-    """Put the recordings' names before the message of what they could not answer."""
     try:
         yield
     except IdentificationError as error:
@@ -273,7 +260,6 @@ def _naming(recordings: Sequence[Recording]) -> Iterator[None]:
 
 
 def _identifiable(found: _Estimates, covariance: Array) -> tuple[dict[str, bool], ...]:
-    """Per joint, which coefficients and shape constants the data can tell."""
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     described = []
     for joint, (factor, shape) in enumerate(zip(found.factors, found.shapes, strict=True)):

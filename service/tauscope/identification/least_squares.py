@@ -7,6 +7,7 @@ between them need one pass over the data.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
@@ -18,28 +19,20 @@ from tauscope.identification.dataset import PreparedMotion
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
+# Singular values of the column-scaled factor below this share of the largest are directions without information.
 RANK_TOLERANCE = 1e-9
-"""Singular values of the column-scaled factor below this share of the largest are directions without information."""
-
+# Reciprocal condition (1-norm) of a factor above which no direction can lack information: the ratio of the singular
+# values is at least that over the number of columns.
 WELL_CONDITIONED = 1e-6
-"""Reciprocal condition (1-norm) of a factor above which no direction can lack information: the ratio of the singular
-values is at least that over the number of columns."""
-
-ROWS_AT_ONCE = 1 << 10
-"""Rows factorised at once: such a block stays in the processor's cache."""
-
-PANEL = 8
-"""Columns that are eliminated before the rest is updated by one matrix product."""
+ROWS_AT_ONCE = 1 << 10  # rows factorised at once: such a block stays in the processor's cache
+PANEL = 8  # columns that are eliminated before the rest is updated by one matrix product
 
 
 @dataclass(frozen=True, eq=False)
 class JointFactor:
     """Triangular factor of one joint's equations.
 
-    columns : (p_j,) int
-        global columns of the model
-    triangle : (p_j + 1, p_j + 1) float64
-        R_j of [A_j | y_j]
+    `columns`: (p_j,) int, global columns of the model; `triangle`: (p_j + 1, p_j + 1), R_j of [A_j | y_j].
     """
 
     columns: NDArray[np.intp]
@@ -59,13 +52,7 @@ class JointFactor:
         return float(np.sum((columns @ solution - target) ** 2))
 
     def squared_residual(self, parameters: Array) -> float:
-        """‖A_j Θ - y_j‖².
-
-        Parameters
-        ----------
-        parameters : (p,) float64
-            all parameters of the model
-        """
+        """‖A_j Θ - y_j‖². `parameters`: (p,), all parameters of the model."""
         own = np.append(parameters[self.columns], -1.0)
         return float(np.sum((self.triangle @ own) ** 2))
 
@@ -74,16 +61,11 @@ class JointFactor:
 class Solution:
     """A least-squares estimate.
 
-    parameters : (p,) float64
-        Θ; where a direction has no information, its smallest value
-    factor : (p, p) float64
-        R of the weighted equations
-    target : (p,) float64
-        z, so that the criterion is ‖R Θ - z‖² and a constant
-    spread : (p, r) float64
-        S with S Sᵀ = (Lᵀ W L)⁺, r the rank
-    undetermined : (p,) bool
-        parameters that take part in a direction without information
+    `parameters`: (p,), Θ; where a direction has no information, its smallest value.
+    `factor`: (p, p), R of the weighted equations.
+    `target`: (p,), z, so that the criterion is ‖R Θ - z‖² and a constant.
+    `spread`: (p, r), S with S Sᵀ = (Lᵀ W L)⁺, r the rank.
+    `undetermined`: (p,), parameters that take part in a direction without information.
     """
 
     parameters: Array
@@ -125,22 +107,16 @@ def solve(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Solu
 
     Θ = argmin Σ_j ‖A_j Θ - y_j‖² / σ_j².
 
-    Parameters
-    ----------
-    noise_std : (n,) float64
-        σ_j; all ones for LS
+    `noise_std`: (n,), σ_j; all ones for LS.
     """
     triangle = stacked_factor(factors, size, noise_std)
-    return _solved(triangle[:size, :size], triangle[:size, size])
+    return _solve(triangle[:size, :size], triangle[:size, size])
 
 
 def stacked_factor(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Array:
     """Triangular factor of all joints' equations together, (p + 1, p + 1).
 
-    Parameters
-    ----------
-    noise_std : (n,) float64
-        σ_j, by which the equations are divided
+    `noise_std`: (n,), σ_j, by which the equations are divided.
     """
     stacked = np.zeros((sum(len(factor.triangle) for factor in factors), size + 1))
     row = 0
@@ -152,13 +128,10 @@ def stacked_factor(factors: tuple[JointFactor, ...], size: int, noise_std: Array
     return _triangle(stacked)
 
 
-def restricted(factors: tuple[JointFactor, ...], keep: NDArray[np.intp]) -> tuple[JointFactor, ...]:
+def restrict(factors: tuple[JointFactor, ...], keep: NDArray[np.intp]) -> tuple[JointFactor, ...]:
     """The factors of a smaller model: columns left out without another pass over the data.
 
-    Parameters
-    ----------
-    keep : (k,) int
-        its global columns that stay, ascending; they are numbered anew from 0
+    `keep`: (k,) int, its global columns that stay, ascending; they are numbered anew from 0.
     """
     position = np.full(max(int(factor.columns.max()) for factor in factors) + 1, -1)
     position[keep] = np.arange(len(keep))
@@ -204,7 +177,7 @@ def _is_well_conditioned(triangle: Array) -> bool:
     return bool(lapack.dtrcon(triangle)[0] > WELL_CONDITIONED)
 
 
-def _solved(factor: Array, target: Array) -> Solution:
+def _solve(factor: Array, target: Array) -> Solution:
     """Minimum-norm solution in scaled columns."""
     scale = np.linalg.norm(factor, axis=0)
     scale[scale == 0.0] = 1.0
@@ -217,3 +190,50 @@ def _solved(factor: Array, target: Array) -> Solution:
     spread = right[known].T / singular[known] / scale[:, None]
     undetermined = np.any(np.abs(right[~known]) > 1e-3, axis=0)
     return Solution(spread @ (left[:, known].T @ target), factor, target, spread, np.asarray(undetermined))
+
+
+# Rounds of estimating σ_j from the common solution's residual, after a first one from each joint alone.
+REWEIGHTINGS = 1
+SMALLEST_TORQUE = 1e-9  # torque below which a recording has none [Nm or N]
+# Share of a joint's torque that counts as its noise at least: no sensor resolves more, and weights stay finite.
+FINEST_TORQUE = 1e-6
+
+
+class Estimator(StrEnum):
+    """How the joints' equations are weighted."""
+
+    LS = "ls"
+    WLS = "wls"
+
+
+def estimate(factors: tuple[JointFactor, ...], size: int, estimator: Estimator) -> tuple[Array, Solution]:
+    """LS, or WLS with σ_j estimated from the residual and the equations solved again.
+
+    Returns tuple of (n,) and Solution, weights 1/σ_j (ones for LS), and the solution.
+    """
+    if estimator is Estimator.LS:
+        return np.ones(len(factors)), solve(factors, size, np.ones(len(factors)))
+    std = single_joint_std(factors)
+    solution = solve(factors, size, std)
+    for _ in range(REWEIGHTINGS):
+        std = _noise_std(factors, [factor.squared_residual(solution.parameters) for factor in factors], size)
+        solution = solve(factors, size, std)
+    return 1.0 / std, solution
+
+
+def single_joint_std(factors: tuple[JointFactor, ...]) -> Array:
+    """A first σ_j of every joint: what its own equations leave, solved without the other joints', (n,)."""
+    return _noise_std(factors, [factor.least_squared_residual for factor in factors], 0)
+
+
+def _noise_std(factors: tuple[JointFactor, ...], squares: list[float], size: int) -> Array:
+    """σ_j with the degrees of freedom that the parameters took, shared by rows; never below `FINEST_TORQUE`."""
+    total = sum(factor.rows for factor in factors)
+    freedom = np.array([factor.rows * max(1.0 - size / total, 1e-3) for factor in factors])
+    return np.maximum(np.sqrt(np.array(squares) / freedom), FINEST_TORQUE * torque_rms(factors))
+
+
+def torque_rms(factors: tuple[JointFactor, ...]) -> Array:
+    """Root mean square of each joint's torque, (n,); positive also where a joint, or every one, has none."""
+    rms = np.sqrt([np.sum(factor.triangle[:, -1] ** 2) / factor.rows for factor in factors])
+    return np.maximum(rms, FINEST_TORQUE * max(rms.max(), SMALLEST_TORQUE))

@@ -11,24 +11,22 @@ from tauscope.identification.band import preliminary_terms
 from tauscope.identification.consistency import LEAST_COULOMB
 from tauscope.identification.covariance import parameter_covariance
 from tauscope.identification.dataset import Dataset, rms_speed
-from tauscope.identification.estimate import FINEST_TORQUE, single_joint_std
 from tauscope.identification.friction_shape import EstimatedShape, estimate_shapes, shape_parameters
-from tauscope.identification.least_squares import JointFactor, factorise, restricted
+from tauscope.identification.least_squares import FINEST_TORQUE, JointFactor, factorise, restrict, single_joint_std
 from tauscope.identification.posterior import infer
 from tauscope.identification.residuals import evaluate
 from tauscope.identification.rotor import kept_columns, needed_rotors, separable_rotors
-from tauscope.identification.shape_sensitivity import refined_structure
+from tauscope.identification.shape_sensitivity import refine_structure
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Standard error of a constant's logarithm that leaves no doubt about it. K_v has its profile as well; δ is known where
+# five standard errors are within a factor of e.
 TIGHT = {"k_v": 0.1, "delta": 0.2}
-"""Standard error of a constant's logarithm that leaves no doubt about it. K_v has its profile as well; δ is known where
-five standard errors are within a factor of e."""
-
+# Noise variances that a Stribeck term must take off the criterion to stay in the model: what chance does as rarely as
+# five standard errors, with the term's two unknowns τ_sc and δ.
 SIGNIFICANT = float(stats.chi2.isf(2.0 * stats.norm.sf(5.0), df=2))
-"""Noise variances that a Stribeck term must take off the criterion to stay in the model: what chance does as rarely as
-five standard errors, with the term's two unknowns τ_sc and δ."""
 
 
 def choose_model(
@@ -41,7 +39,7 @@ def choose_model(
     _doubt_friction_at_rest(motions, structure)
     if any(shape.k_v is None or shape.delta is None for shape in given):
         speed = rms_speed(motions)
-        shapes = _refined(motions, structure, _estimated_shapes(motions, structure, speed), speed)
+        shapes = _refine(motions, structure, _estimate_shapes(motions, structure, speed), speed)
     else:
         shapes = tuple(EstimatedShape(s.k_v or 0.0, s.delta, True, True, True, True) for s in given)
     shapes = tuple(shape.open_at_limit() for shape in shapes)
@@ -49,7 +47,7 @@ def choose_model(
     factors = factorise(motions, complete)
     needed = _needed_rotors(motions, complete, factors) if any(separable) else separable
     keep = kept_columns(complete, {joint for joint, is_needed in enumerate(needed) if is_needed})
-    return _with_rotors(complete, needed), shapes, restricted(factors, keep)
+    return _with_rotors(complete, needed), shapes, restrict(factors, keep)
 
 
 def _doubt_friction_at_rest(motions: Dataset, structure: ModelStructure) -> None:
@@ -75,7 +73,7 @@ def _doubt_friction_at_rest(motions: Dataset, structure: ModelStructure) -> None
     motions.rest_variance = np.clip(held / rows, 0.0, stiction**2) / posterior.noise_std**2
 
 
-def _estimated_shapes(motions: Dataset, structure: ModelStructure, speed: Array) -> tuple[EstimatedShape, ...]:
+def _estimate_shapes(motions: Dataset, structure: ModelStructure, speed: Array) -> tuple[EstimatedShape, ...]:
     """Shape constants; a Stribeck term stays where it is far from zero against the residual that it leaves.
 
     Its significance cannot be judged by the residual without it: what it would explain is the colour in that residual.
@@ -85,8 +83,8 @@ def _estimated_shapes(motions: Dataset, structure: ModelStructure, speed: Array)
     noise_std, _ = _preliminary_residual(motions, structure, factors)
     proposed = estimate_shapes(motions, structure, factors, noise_std, np.zeros(count), (True,) * count, speed)
     # Judged by what the refined candidates leave: beside constants off their optimum every other one looks open.
-    refined = _refined(motions, structure, proposed, speed)
-    gains, unit, tight = _judged(motions, _with_shapes(structure, refined), refined, noise_std)
+    refined = _refine(motions, structure, proposed, speed)
+    gains, unit, tight = _judge(motions, _with_shapes(structure, refined), refined, noise_std)
     supported = [
         shape.delta is not None and not shape.delta_given and bool(gains[joint] >= SIGNIFICANT)
         for joint, shape in enumerate(proposed)
@@ -112,7 +110,7 @@ def _with_tight(shape: EstimatedShape, refined: EstimatedShape, tight: set[str])
     return shape
 
 
-def _refined(
+def _refine(
     motions: Dataset, structure: ModelStructure, shapes: tuple[EstimatedShape, ...], speed: Array
 ) -> tuple[EstimatedShape, ...]:
     """Identifiable constants of all joints moved to their common optimum."""
@@ -121,13 +119,13 @@ def _refined(
         return shapes
     structure = _with_shapes(structure, shapes)
     posterior = infer(structure, factorise(motions, structure))
-    refined = refined_structure(motions, structure, posterior.mean, posterior.weights, estimated, speed)
+    refined = refine_structure(motions, structure, posterior.mean, posterior.weights, estimated, speed)
     return tuple(
         replace(shape, k_v=terms.k_v, delta=terms.delta) for shape, terms in zip(shapes, refined.terms, strict=True)
     )
 
 
-def _judged(
+def _judge(
     motions: Dataset, structure: ModelStructure, shapes: tuple[EstimatedShape, ...], noise_std: Array
 ) -> tuple[Array, Array, list[set[str]]]:
     """What a model with all proposed terms says of them, per joint.
@@ -169,7 +167,6 @@ def _stribeck_gain(structure: ModelStructure, parameters: Array, covariance: Arr
 
 
 def _with_shapes(structure: ModelStructure, shapes: Sequence[EstimatedShape]) -> ModelStructure:
-    """The structure with these shape constants."""
     terms = zip(structure.terms, shapes, strict=True)
     return structure.with_terms(tuple(replace(joint, k_v=s.k_v, delta=s.delta) for joint, s in terms))
 
@@ -185,7 +182,6 @@ def _needed_rotors(motions: Dataset, complete: ModelStructure, factors: tuple[Jo
 
 
 def _with_rotors(structure: ModelStructure, rotors: Sequence[bool]) -> ModelStructure:
-    """The structure with rotor inertia at some joints."""
     terms = zip(structure.terms, rotors, strict=True)
     return structure.with_terms(tuple(replace(joint, rotor=rotor) for joint, rotor in terms))
 
@@ -193,7 +189,6 @@ def _with_rotors(structure: ModelStructure, rotors: Sequence[bool]) -> ModelStru
 def _preliminary_residual(
     motions: Dataset, structure: ModelStructure, factors: tuple[JointFactor, ...]
 ) -> tuple[Array, Array]:
-    """Residual standard deviation in the band and its inflation by autocorrelation, (n,) each."""
     (statistics,) = evaluate(motions, structure, [infer(structure, factors).mean])
     inflation = np.array([model.long_run_ratio for model in statistics.autoregressions])
     return np.maximum(statistics.fit.band_rms, np.finfo(float).tiny), inflation

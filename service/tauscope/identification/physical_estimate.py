@@ -16,14 +16,10 @@ from tauscope.identification.full_parameters import FullParameters
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
-NOISE_DECADES = 6
-"""Powers of ten by which the noise may be enlarged where the consistent model is hard to reach."""
-
-LEAST_MASS = 0.1
-"""No link weighs less than this share of what is believed of it, whatever its equations say."""
-
+NOISE_DECADES = 6  # powers of ten by which the noise may be enlarged where the consistent model is hard to reach
+LEAST_MASS = 0.1  # no link weighs less than this share of what is believed of it, whatever its equations say
+# The free estimate counts as impossible, not merely unlucky, where physics rejects it at this level.
 CONSISTENCY_LEVEL = 0.999
-"""The free estimate counts as impossible, not merely unlucky, where physics rejects it at this level."""
 
 
 def consistent_estimate(structure: ModelStructure, factor: Array, target: Array, prior: Prior) -> ConsistentParameters:
@@ -33,10 +29,7 @@ def consistent_estimate(structure: ModelStructure, factor: Array, target: Array,
     then solved for a noise ten times as large, and so on: the prior weighs more. Raises IdentificationError where no
     noise makes the program solvable.
 
-    Parameters
-    ----------
-    factor, target : (r, p), (r,) float64
-        R and z of the whitened equations of the model's columns
+    `factor`, `target`: (r, p), (r,), R and z of the whitened equations of the model's columns.
     """
     full = FullParameters.of(structure)
     columns = factor @ full.map

@@ -16,45 +16,30 @@ from scipy.linalg import qr, solve_triangular, svd
 
 from tauscope.dynamics.friction import FRICTION_COLUMNS
 from tauscope.identification.consistency import Prior, plausible_prior
-from tauscope.identification.estimate import FINEST_TORQUE, Estimator, torque_rms
 from tauscope.identification.full_parameters import FullParameters
-from tauscope.identification.least_squares import JointFactor, stacked_factor
+from tauscope.identification.least_squares import FINEST_TORQUE, Estimator, JointFactor, stacked_factor, torque_rms
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
-WIDTHS = np.geomspace(1 / 16, 32.0, 19)
-"""Candidates of w: at 2 a link's mass is believed to as much as all of itself."""
-
+WIDTHS = np.geomspace(1 / 16, 32.0, 19)  # candidates of w: at 2 a link's mass is believed to as much as all of itself
+# The estimate believes no body more than this, however well the stated ones agree with the data so far: w is at least
+# as large in it, while its uncertainty is that of the w which the data show.
 WIDE = 2.0
-"""The estimate believes no body more than this, however well the stated ones agree with the data so far: w is at least
-as large in it, while its uncertainty is that of the w which the data show."""
-
-ROUNDS = 20
-"""Most rounds of noise, width and parameters…"""
-
-SETTLED = 1e-3
-"""…which end where no joint's noise changes by more than this share."""
-
-DETERMINED = 0.9
-"""Share of the prior's variance that data take from a parameter which they determine."""
+ROUNDS = 20  # most rounds of noise, width and parameters…
+SETTLED = 1e-3  # …which end where no joint's noise changes by more than this share
+DETERMINED = 0.9  # share of the prior's variance that data take from a parameter which they determine
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
     """What prior and data together say of the parameters, before bodies and friction restrict them.
 
-    doubt : (p,) float64
-        deviation from the prior that the data show, in its standard deviations
-    noise_std : (n,) float64
-        σ_j of a row in the common band
-    weights : (n,) float64
-        1/(σ_j √ρ_j), by which the joints' equations are multiplied
-    factor, target : (p, p), (p,) float64
-        R and z of the data's weighted equations
-    mean : (p,) float64
-        of the posterior, before bodies and friction restrict it
-    covariance, precision : (p, p) float64
-        S of the posterior, and P⁻¹ of the prior
+    `doubt`: (p,), deviation from the prior that the data show, in its standard deviations.
+    `noise_std`: (n,), σ_j of a row in the common band.
+    `weights`: (n,), 1/(σ_j √ρ_j), by which the joints' equations are multiplied.
+    `factor`, `target`: (p, p), (p,), R and z of the data's weighted equations.
+    `mean`: (p,), of the posterior, before bodies and friction restrict it.
+    `covariance`, `precision`: (p, p), S of the posterior, and P⁻¹ of the prior.
     """
 
     prior: Prior
@@ -86,10 +71,7 @@ def infer(
 ) -> Posterior:
     """The posterior of all parameters.
 
-    Parameters
-    ----------
-    ratios : (n,) float64 or None
-        ρ_j, long-run over white variance of each joint's residual; ones where it is not known
+    `ratios`: (n,) or None, ρ_j, long-run over white variance of each joint's residual; ones where it is not known.
     """
     full = FullParameters.of(structure)
     colour = np.ones(len(factors)) if ratios is None else np.sqrt(ratios)
@@ -116,12 +98,8 @@ def infer(
 def _friction_doubt(structure: ModelStructure, deviation: Array, learnt: Array) -> Array:
     """Deviation from the prior that coefficients of a kind show at the joints whose data determine them, (p,).
 
-    Parameters
-    ----------
-    deviation : (p,) float64
-        of the mean from the prior's, in its standard deviations
-    learnt : (p,) float64
-        share of the prior's variance that the data took away
+    `deviation`: (p,), of the mean from the prior's, in its standard deviations.
+    `learnt`: (p,), share of the prior's variance that the data took away.
     """
     doubt = np.ones(structure.size)
     joints = range(structure.robot.joint_count)

@@ -19,28 +19,19 @@ from tauscope.identification.structure import ModelStructure
 from tauscope.recording.conditioning import AllPass, Stretch, split_periods
 from tauscope.recording.recording import Array
 
-FEWEST_PERIOD_SAMPLES = 50
-"""Differences between periods that are needed before their variance is trusted."""
-
-LEAST_TORQUE = 1e-12
-"""Share of the residual below which a recording has no torque to be compared with."""
-
-CLEARLY_MORE = 1.3
-"""Ratio of two estimated powers that is no chance."""
+FEWEST_PERIOD_SAMPLES = 50  # differences between periods that are needed before their variance is trusted
+LEAST_TORQUE = 1e-12  # share of the residual below which a recording has no torque to be compared with
+CLEARLY_MORE = 1.3  # ratio of two estimated powers that is no chance
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
     """How well a parameter set explains the torque.
 
-    rms : (n,) float64
-        root mean square of the torque residual at the recorded rate, no filter [Nm or N]
-    band_rms : (n,) float64
-        the same in the common band
-    moving_rms : (n,) float64
-        the same in the common band, of rows in which the joint moves
-    torque_rms : (n,) float64
-        root mean square of the measured torque in the common band [Nm or N]
+    `rms`: (n,), root mean square of the torque residual at the recorded rate, no filter [Nm or N].
+    `band_rms`: (n,), the same in the common band.
+    `moving_rms`: (n,), the same in the common band, of rows in which the joint moves.
+    `torque_rms`: (n,), root mean square of the measured torque in the common band [Nm or N].
     """
 
     rms: Array
@@ -54,8 +45,8 @@ class Fit:
 class ResidualStatistics:
     """What the residuals of one parameter set tell.
 
-    period_noise_std : (n,) float64 or None
-        standard deviation of the torque noise from what differs between periods; None without enough periods
+    `period_noise_std`: (n,) or None, standard deviation of the torque noise from what differs between periods; None
+    without enough periods.
     """
 
     fit: Fit
@@ -94,20 +85,13 @@ class ResidualStatistics:
 
 
 def _low_power(model: Autoregression) -> float:
-    """Power of a residual at low frequency."""
     return model.variance * model.long_run_ratio
 
 
 def evaluate(
     motions: Iterable[PreparedMotion], structure: ModelStructure, candidates: Sequence[Array]
 ) -> tuple[ResidualStatistics, ...]:
-    """Residual statistics of several parameter sets in one pass.
-
-    Parameters
-    ----------
-    candidates : sequence of (p,) float64
-        parameter sets
-    """
+    """Residual statistics of several parameter sets in one pass. `candidates`: sequence of (p,), parameter sets."""
     sums = [_Sums(structure.robot.joint_count) for _ in candidates]
     for prepared in motions:
         predicted = prepared.predict_torque(structure, np.stack(candidates))
@@ -202,6 +186,5 @@ class _Sums:
 
 
 def _squares(residual: Array, used: NDArray[np.bool_]) -> Array:
-    """Σ e² of every joint, (n, M) each, over the samples that count."""
     kept = residual if used.all() else np.where(used, residual, 0.0)
     return np.einsum("jt,jt->j", kept, kept)

@@ -227,7 +227,6 @@ def _standard_names(link_count: int) -> list[str]:
 
 
 def _std(result: Identification) -> list[float | None]:
-    """Standard errors of all parameters, then of the shape constants' logarithms."""
     errors: list[float | None] = [*_floats(np.sqrt(np.maximum(np.diag(result.covariance), 0.0)))]
     believed = result.structure.base_count if result.options.prior else 0
     for column in np.flatnonzero(result.undetermined):
@@ -298,19 +297,9 @@ def _rotors(result: Identification) -> list[RotorEntry]:
 
 
 def _link(link: LinkInertia) -> LinkEntry:
-    inertia = link.inertia
-    return LinkEntry(
-        mass=float(link.mass),
-        first_moment=_floats(link.first_moment),
-        inertia=InertiaEntry(
-            xx=float(inertia[0, 0]),
-            yy=float(inertia[1, 1]),
-            zz=float(inertia[2, 2]),
-            xy=float(inertia[0, 1]),
-            xz=float(inertia[0, 2]),
-            yz=float(inertia[1, 2]),
-        ),
-    )
+    xx, yy, zz, xy, xz, yz = _floats(link.to_vector()[:6])
+    inertia = InertiaEntry(xx=xx, yy=yy, zz=zz, xy=xy, xz=xz, yz=yz)
+    return LinkEntry(mass=float(link.mass), first_moment=_floats(link.first_moment), inertia=inertia)
 
 
 def _fit(fit: Fit, predicted: np.ndarray | None = None) -> FitEntry:

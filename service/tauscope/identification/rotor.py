@@ -9,34 +9,25 @@ import numpy as np
 
 from tauscope.dynamics.base_parameters import BaseParameters
 from tauscope.dynamics.regressor import torque_regressor
-from tauscope.identification.least_squares import RANK_TOLERANCE, JointFactor, restricted, solve
+from tauscope.identification.least_squares import RANK_TOLERANCE, JointFactor, restrict, solve
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
-SEPARATION = 1e-6
-"""Share of a rotor's column that must lie outside the base parameters' columns."""
-
-STANDARD_ERRORS = 5.0
-"""A rotor must be this many standard errors away from zero, and positive."""
-
+SEPARATION = 1e-6  # share of a rotor's column that must lie outside the base parameters' columns
+STANDARD_ERRORS = 5.0  # a rotor must be this many standard errors away from zero, and positive
+# …or this many where the robot file states a gear ratio: a geared motor has a rotor, the question is only whether it
+# shows.
 GEARED_STANDARD_ERRORS = 2.0
-"""…or this many where the robot file states a gear ratio: a geared motor has a rotor, the question is only whether it
-shows."""
-
+# …and explain this share of its joint's residual energy: less is more likely a stand-in for something else.
 SMALLEST_SHARE = 0.02
-"""…and explain this share of its joint's residual energy: less is more likely a stand-in for something else."""
-
 PROBE_STATES = 30
 
 
 def separable_rotors(robot: Robot, base: BaseParameters, seed: int = 0) -> tuple[bool, ...]:
     """Joints whose rotor inertia no combination of link parameters, offsets and viscous friction can imitate.
 
-    Returns
-    -------
-    tuple of bool, length n
-        True where I_a can be told from the links
+    Returns True where I_a can be told from the links.
     """
     rng = np.random.default_rng(seed)
     count = robot.joint_count
@@ -64,17 +55,9 @@ def needed_rotors(
 ) -> tuple[bool, ...]:
     """Of the rotors in a model, those that the data ask for: the least needed one is dropped until all that stay count.
 
-    Parameters
-    ----------
-    noise_std : (n,) float64
-        residual standard deviation of each joint in the common band
-    inflation : (n,) float64
-        variance inflation by autocorrelation, at least 1
-
-    Returns
-    -------
-    tuple of bool, length n
-        True where the rotor stays
+    `noise_std`: (n,), residual standard deviation of each joint in the common band.
+    `inflation`: (n,), variance inflation by autocorrelation, at least 1.
+    Returns True where the rotor stays.
     """
     joints = {joint for joint, terms in enumerate(structure.terms) if terms.rotor}
     if _gain_of_all(factors, structure, noise_std) < min(
@@ -83,7 +66,7 @@ def needed_rotors(
         return (False,) * structure.robot.joint_count
     while joints:
         keep = kept_columns(structure, joints)
-        smaller = restricted(factors, keep)
+        smaller = restrict(factors, keep)
         solution = solve(smaller, len(keep), noise_std)
         places = {joint: int(np.searchsorted(keep, _column(structure, joint))) for joint in joints}
         excess = {
@@ -102,7 +85,7 @@ def needed_rotors(
 def _gain_of_all(factors: tuple[JointFactor, ...], structure: ModelStructure, noise_std: Array) -> float:
     """What all rotors together take off the criterion: no single one can take more."""
     keep = kept_columns(structure, set())
-    smaller = restricted(factors, keep)
+    smaller = restrict(factors, keep)
     fits = ((factors, structure.size), (smaller, len(keep)))
     criteria = []
     for joint_factors, size in fits:
@@ -120,18 +103,11 @@ def _needed_gain(structure: ModelStructure, joint: int, inflation: float, rows: 
 
 
 def kept_columns(structure: ModelStructure, rotors: set[int]) -> np.ndarray:
-    """Global columns of a model when only some of its rotors stay.
-
-    Returns
-    -------
-    (k,) int
-        ascending
-    """
+    """Global columns of a model when only some of its rotors stay. Returns (k,) int, ascending."""
     dropped = [_column(structure, j) for j, terms in enumerate(structure.terms) if terms.rotor and j not in rotors]
     return np.setdiff1d(np.arange(structure.size), np.array(dropped, dtype=int))
 
 
 def _column(structure: ModelStructure, joint: int) -> int:
-    """Global column of a joint's rotor inertia."""
     column = structure.coefficient(joint, "rotor_inertia")
     return -1 if column is None else column

@@ -17,40 +17,23 @@ from tauscope.identification.friction_shape import gentle_range
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
+# Joint index and ``k_v`` or ``delta``: a shape constant that was estimated, as its logarithm.
 ShapeParameter = tuple[int, str]
-"""Joint index and ``k_v`` or ``delta``: a shape constant that was estimated, as its logarithm."""
-
-LARGEST_STEP = 0.3
-"""Change of a constant's logarithm in one step, about half the way to the next grid point and a bit."""
-
+LARGEST_STEP = 0.3  # change of a constant's logarithm in one step, about half the way to the next grid point and a bit
+# A K_v whose logarithm wants to move further than this from where its profile peaked is left there. A δ may go wherever
+# it stands for a term of its own: its profile was taken beside a K_v of the grid, which displaces its peak.
 LARGEST_CHANGE = 0.7
-"""A K_v whose logarithm wants to move further than this from where its profile peaked is left there. A δ may go
-wherever it stands for a term of its own: its profile was taken beside a K_v of the grid, which displaces its peak."""
-
 SETTLED = 1e-3
 STEPS = 10
 
 
 def columns_with_shapes(
-    prepared: PreparedMotion,
-    structure: ModelStructure,
-    joint: int,
-    parameters: Array,
-    shapes: Sequence[ShapeParameter],
+    prepared: PreparedMotion, structure: ModelStructure, joint: int, parameters: Array, shapes: Sequence[ShapeParameter]
 ) -> tuple[Array, NDArray[np.intp]]:
     """A joint's columns followed by those of its estimated shape constants.
 
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    parameters : (p,) float64
-        the coefficients, for the amplitudes c
-
-    Returns
-    -------
-    tuple of (k, M) float64 and (k,) int
-        columns in the common band, and their global places
+    `parameters`: (p,), the coefficients, for the amplitudes c.
+    Returns tuple of (k, M) and (k,) int, columns in the common band, and their global places.
     """
     columns = prepared.joint_columns(structure, joint)
     index = structure.joint_columns(joint)
@@ -69,7 +52,7 @@ def columns_with_shapes(
     return np.concatenate([columns, sensitivity]), np.concatenate([index, places])
 
 
-def refined_structure(
+def refine_structure(
     motions: Iterable[PreparedMotion],
     structure: ModelStructure,
     parameters: Array,
@@ -79,14 +62,9 @@ def refined_structure(
 ) -> ModelStructure:
     """The structure with its estimated shape constants moved to the joint optimum, by Gauss–Newton steps.
 
-    Parameters
-    ----------
-    parameters : (p,) float64
-        its coefficients
-    weight : (n,) float64
-        1/σ_j of every joint
-    speed : (n,) float64
-        rms velocity of every joint [rad/s or m/s]
+    `parameters`: (p,), its coefficients.
+    `weight`: (n,), 1/σ_j of every joint.
+    `speed`: (n,), rms velocity of every joint [rad/s or m/s].
     """
     start = structure
     for _ in range(STEPS):
@@ -109,10 +87,7 @@ def refined_structure(
 def pseudo_inverse(matrix: Array) -> Array:
     """Inverse (p, p) of a normal matrix in scaled columns; directions without information are left out.
 
-    Parameters
-    ----------
-    matrix : (p, p) float64
-        symmetric, positive semidefinite
+    `matrix`: (p, p), symmetric, positive semidefinite.
     """
     scale = np.sqrt(np.diag(matrix))
     scale[scale == 0.0] = 1.0
@@ -129,7 +104,6 @@ def _normal_equations(
     weight: Array,
     shapes: Sequence[ShapeParameter],
 ) -> tuple[Array, Array]:
-    """Gram matrix and right-hand side of coefficients and shape constants together."""
     size = structure.size + len(shapes)
     gram, target = np.zeros((size, size)), np.zeros(size)
     for prepared in motions:
@@ -143,13 +117,11 @@ def _normal_equations(
 
 
 def _constant(structure: ModelStructure, joint: int, name: str) -> float:
-    """Present value of a shape constant."""
     terms = structure.terms[joint]
     return terms.k_v if name == "k_v" else terms.delta or 0.0
 
 
 def _with_constant(structure: ModelStructure, joint: int, name: str, value: float) -> ModelStructure:
-    """The structure with one shape constant exchanged."""
     terms = list(structure.terms)
     terms[joint] = replace(terms[joint], k_v=value) if name == "k_v" else replace(terms[joint], delta=value)
     return structure.with_terms(tuple(terms))

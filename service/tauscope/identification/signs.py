@@ -1,4 +1,4 @@
-"""Joints whose torque is recorded with the wrong sign.
+"""Joints whose torque is recorded with the wrong sign, or not in the scale of the stated masses.
 
 A free fit cannot tell: with the torque of all joints its parameters change their sign too. Bodies and friction can:
 masses are positive and friction takes power. So the most probable bodies are estimated for each joint's sign, and for
@@ -10,25 +10,49 @@ from dataclasses import replace
 
 import numpy as np
 
+from tauscope.dynamics.regressor import torque_regressor
 from tauscope.identification.consistency import ConsistentParameters
-from tauscope.identification.dataset import PreparedMotion
-from tauscope.identification.estimate import torque_rms
+from tauscope.identification.dataset import Dataset, PreparedMotion
+from tauscope.identification.excitation import thin
 from tauscope.identification.full_parameters import FullParameters
-from tauscope.identification.least_squares import JointFactor
+from tauscope.identification.least_squares import JointFactor, torque_rms
 from tauscope.identification.physical_estimate import consistent_estimate, is_rejected
 from tauscope.identification.posterior import Posterior, infer
 from tauscope.identification.residuals import evaluate
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
+POSTURES = 200  # of the training motion, by which both are compared
+FELT = 1e-3  # gravity below this share of the masses' weight at one metre, per kilogram, does not show [Nm/Nm]
+
+
+def gravity_scale(motions: Dataset, structure: ModelStructure, parameters: Array) -> float | None:
+    """Least-squares factor between the estimated torque of gravity and that of the stated links.
+
+    `parameters`: (p,), the estimate.
+    Returns 1 where both agree; None where the file states no links, or gravity does not show.
+    """
+    links = structure.robot.model.links
+    if links is None:
+        return None
+    position = thin(np.concatenate([thin(prepared.motion.position, POSTURES) for prepared in motions]), POSTURES)
+    still = np.zeros_like(position)
+    columns = torque_regressor(
+        structure.robot, position, still, still, columns=np.asarray(structure.base.independent_columns)
+    )
+    stated = columns @ structure.base.project(np.concatenate([link.to_vector() for link in links]))
+    weight = sum(link.mass for link in links) * float(np.linalg.norm(structure.robot.gravity))
+    power = float(np.mean(stated**2))
+    if power <= (FELT * weight) ** 2:
+        return None
+    return float(np.mean(stated * (columns @ parameters[: structure.base_count])) / power)
+
+
+# Log likelihood by which another sign has to explain the torque better: odds of 150 for one joint in a hundred.
 CLEARLY = 5.0
-"""Log likelihood by which another sign has to explain the torque better: odds of 150 for one joint in a hundred."""
-
-UNEXPLAINED = 0.2
-"""Share of a joint's torque that a wrong sign leaves unexplained at least…"""
-
+UNEXPLAINED = 0.2  # share of a joint's torque that a wrong sign leaves unexplained at least…
+# …and by how much the long-run variance of that exceeds white noise's; without both no other sign is tried.
 COLOURED = 1.2
-"""…and by how much the long-run variance of that exceeds white noise's; without both no other sign is tried."""
 
 
 def reversed_joints(
@@ -41,10 +65,7 @@ def reversed_joints(
 ) -> tuple[int, ...]:
     """Indices of the joints whose torque explains itself much better with the other sign.
 
-    Parameters
-    ----------
-    ratios : (n,) float64
-        ρ_j, long-run over white variance of each joint's residual
+    `ratios`: (n,), ρ_j, long-run over white variance of each joint's residual.
     """
     unexplained = (posterior.noise_std > UNEXPLAINED * torque_rms(factors)) & (ratios > COLOURED)
     if not (is_rejected(consistent) or unexplained.any()):
@@ -66,7 +87,6 @@ def reversed_joints(
 
 
 def _neighbours(signs: Array) -> Iterator[Array]:
-    """The signs with one joint turned round, and all of them."""
     for joint in range(len(signs)):
         yield np.where(np.arange(len(signs)) == joint, -signs, signs)
     yield -signs
@@ -81,7 +101,6 @@ def _estimate(structure: ModelStructure, factors: tuple[JointFactor, ...], ratio
 
 
 def _turn(factor: JointFactor, sign: float) -> JointFactor:
-    """The equations of a joint for its torque times ±1."""
     return replace(factor, triangle=np.column_stack([factor.triangle[:, :-1], sign * factor.triangle[:, -1]]))
 
 

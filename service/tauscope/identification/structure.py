@@ -20,10 +20,8 @@ from tauscope.robot import Robot
 class JointTerms:
     """Which terms one joint has beside the rigid body, and the shape constants of its friction.
 
-    k_v : float
-        slope of the friction's step at zero velocity [s/rad or s/m]
-    delta : float or None
-        slope of the Stribeck term [s/rad or s/m]; None where the joint has no such term
+    `k_v`: slope of the friction's step at zero velocity [s/rad or s/m].
+    `delta`: slope of the Stribeck term [s/rad or s/m]; None where the joint has no such term.
     """
 
     k_v: float
@@ -63,54 +61,27 @@ class ModelStructure:
         return (*self.base.expressions, *(f"{name} {joint.name}" for terms, joint in joints for name in terms.names))
 
     def coefficient(self, joint: int, name: str) -> int | None:
-        """Global column of a joint's coefficient, None where the model has no such term.
-
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        """
+        """Global column of a joint's coefficient, None where the model has no such term."""
         names = self.terms[joint].names
         if name not in names:
             return None
         return self.base_count + sum(len(terms.names) for terms in self.terms[:joint]) + names.index(name)
 
     def joint_columns(self, joint: int) -> NDArray[np.intp]:
-        """Global columns, (p_j,), that can be non-zero in a joint's equation: links from it outwards, its own terms.
-
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        """
+        """Global columns, (p_j,), that can be non-zero in a joint's equation: links from it outwards, its own terms."""
         first = self.base_count + sum(len(terms.names) for terms in self.terms[:joint])
         own = np.arange(first, first + len(self.terms[joint].names))
         return np.concatenate([self.outward_columns(joint), own])
 
     def outward_columns(self, joint: int) -> NDArray[np.intp]:
-        """Base columns of the links that a joint moves, (p_j,).
-
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        """
+        """Base columns of the links that a joint moves, (p_j,)."""
         return np.arange(self.base_count)[self.base.outward(joint)]
 
     def joint_term_columns(self, joint: int, velocity: Array, acceleration: Array) -> Array:
         """The joint's own columns along a motion.
 
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        velocity, acceleration : (N,) float64
-            of this joint [rad/s or m/s, and per s]
-
-        Returns
-        -------
-        (k, N) float64
-            in the order of `JointTerms.names`
+        `velocity`, `acceleration`: (N,), of this joint [rad/s or m/s, and per s].
+        Returns (k, N), in the order of `JointTerms.names`.
         """
         terms = self.terms[joint]
         rows = {

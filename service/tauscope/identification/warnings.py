@@ -11,17 +11,11 @@ from tauscope.result_warning import ResultWarning
 from tauscope.robot import JointType, Robot
 from tauscope.robot.messages import listed
 
-FEWEST_REVERSALS = 2
-"""A joint turns round at least so often where friction is to be told from a constant torque."""
-
-UNSEEN = 0.1
-"""Share of a joint's held-out torque above which it matters that training leaves it uncertain."""
-
+FEWEST_REVERSALS = 2  # a joint turns round at least so often where friction is to be told from a constant torque
+UNSEEN = 0.1  # share of a joint's held-out torque above which it matters that training leaves it uncertain
+# Times the top speed, the range or the uncertain torque of training at which held-out motion is another motion.
 BEYOND = 1.25
-"""Times the top speed, the range or the uncertain torque of training at which held-out motion is another motion."""
-
-FAR_OFF = 3.0
-"""Factor between recorded and stated weight beyond which a unit is wrong rather than a mass."""
+FAR_OFF = 3.0  # factor between recorded and stated weight beyond which a unit is wrong rather than a mass
 
 _FRICTION = {
     "stiction": "Coulomb friction; turn the joint round more often",
@@ -60,13 +54,7 @@ def robot_warnings(robot: Robot) -> list[ResultWarning]:
 
 
 def weak_points(result: Identification, joint: int) -> list[str]:
-    """What the recordings do not tell of a joint and of its link, each with the motion that would.
-
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    """
+    """What the recordings do not tell of a joint and of its link, each with the motion that would."""
     if result.excitation.speed[joint] == 0.0:
         return ["motion: it stands still; move it through its range"]
     known = result.identifiable[joint]
@@ -80,7 +68,6 @@ def weak_points(result: Identification, joint: int) -> list[str]:
 
 
 def _own_bodies(result: Identification, joint: int) -> Iterator[tuple[str, float]]:
-    """Base parameters that lead with a joint's link, and how much the data say of each."""
     base = result.structure.base
     for place, column in enumerate(base.independent_columns):
         if column // 10 == joint:
@@ -88,7 +75,6 @@ def _own_bodies(result: Identification, joint: int) -> Iterator[tuple[str, float
 
 
 def _signs(result: Identification) -> Iterator[ResultWarning]:
-    """Torques with the wrong sign."""
     joints = result.robot.joints
     for joint in result.reversed_joints:
         sign = "-1" if joints[joint].sign > 0 else "1"
@@ -101,7 +87,6 @@ def _signs(result: Identification) -> Iterator[ResultWarning]:
 
 
 def _scale(result: Identification) -> Iterator[ResultWarning]:
-    """Torque that is far from what the stated masses weigh."""
     scale = result.gravity_scale
     if scale is not None and not result.reversed_joints and not 1.0 / FAR_OFF < scale < FAR_OFF:
         yield ResultWarning(
@@ -112,7 +97,6 @@ def _scale(result: Identification) -> Iterator[ResultWarning]:
 
 
 def _bodies(result: Identification) -> Iterator[ResultWarning]:
-    """A free estimate that no body can have."""
     if result.constrained:
         yield ResultWarning(
             code="no-body",
@@ -167,7 +151,6 @@ def undetermined(result: Identification) -> frozenset[int]:
 
 
 def _range(motion: Excitation, joint: int) -> str:
-    """Lowest and highest position of a joint in words."""
     return f"{motion.lowest[joint]:.2g} to {motion.highest[joint]:.2g}"
 
 
@@ -184,7 +167,6 @@ def extrapolation_warnings(result: Identification) -> Iterator[ResultWarning]:
 
 
 def _samples(summaries: tuple[ConditioningSummary, ...]) -> Iterator[ResultWarning]:
-    """Samples that were missing, and gaps of the clock."""
     for each in summaries:
         counts = {
             "without a position": each.missed_positions,

@@ -4,8 +4,7 @@ from tauscope.recording.checks import RecordingReport, check_recording, report_r
 from tauscope.recording.convert import Conversion, convert_recording, write_recording
 from tauscope.recording.examination import examine_recording, open_recording
 from tauscope.recording.layout.guess import flow_text
-from tauscope.recording.mapping import ColumnMapping, find_mapping
-from tauscope.recording.reading import read_recording
+from tauscope.recording.reading import ColumnMapping, find_mapping, read_recording
 from tauscope.recording.recording import EffortKind, Recording, Samples
 from tauscope.recording.units import Reading, parse_units
 

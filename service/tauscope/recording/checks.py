@@ -2,18 +2,230 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tauscope.errors import RecordingError
 from tauscope.recording.examination import find_implausible, find_missing_effort, mend_recording
-from tauscope.recording.measures import Gaps, JointMeasures, StepMeasures, measure_gaps, measure_rows
 from tauscope.recording.reading import read_recording
-from tauscope.recording.recording import EffortKind, Recording
+from tauscope.recording.recording import Array, EffortKind, Recording, Samples
 from tauscope.recording.units import SI, Reading
 from tauscope.robot.messages import Finding, Severity, listed
 from tauscope.robot.robot import Robot
+
+_ROWS_AT_ONCE = 2**15
+_KEPT_STEPS = 10**6
+_GAP_FACTOR = 1.9
+_WRAP_TOLERANCE = 0.5
+_STEP_SAMPLES = 30
+_CLIPPED_RUN = 5
+_CLIPPED_SHARE = 0.005
+_CLIPPED_SAMPLES = 10
+
+
+@dataclass(frozen=True)
+class StepMeasures:
+    """Steps of the clock; the percentiles are those of at most a million evenly chosen steps.
+
+    `minimum`, `percentile_1`, `median`, `percentile_99`, `maximum`: length of a step [s].
+    """
+
+    minimum: float
+    percentile_1: float
+    median: float
+    percentile_99: float
+    maximum: float
+
+
+@dataclass(frozen=True)
+class JointMeasures:
+    """One joint's channels.
+
+    `position`, `effort`: (float, float), least and greatest value, NaN where every sample was missed.
+    `first_wrap`: time of the first of them [s].
+    `clipped`: tuple of (float, int), levels at which the effort stays, and number of samples.
+    """
+
+    position: tuple[float, float]
+    effort: tuple[float, float]
+    position_step: float | None
+    wraps: int
+    first_wrap: float | None
+    clipped: tuple[tuple[float, int], ...]
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """Steps of the clock beyond 1.9 medians: one lost sample of a regular clock is one.
+
+    `longest`: the longest of them [s], 0 without gaps.
+    `longest_at`: time at which it begins [s].
+    """
+
+    count: int
+    longest: float
+    longest_at: float | None
+
+
+@dataclass(frozen=True)
+class RowMeasures:
+    """All figures but the gaps.
+
+    `duration`: from the first to the last sample [s].
+    """
+
+    duration: float
+    steps: StepMeasures
+    missed: dict[str, int]
+    period_lengths: tuple[int, ...]
+    joints: tuple[JointMeasures, ...]
+
+
+@dataclass
+class _Running:
+    """Figures that grow from block to block."""
+
+    least: Array
+    greatest: Array
+    missed: NDArray[np.int64]
+    wraps: NDArray[np.int64]
+    first_wrap: Array
+    steps: list[Array] = dataclass_field(default_factory=list)
+    shortest_step: float = np.inf
+    longest_step: float = 0.0
+    period_lengths: list[int] = dataclass_field(default_factory=list)
+    period: float = np.nan
+
+
+def measure_rows(recording: Recording) -> RowMeasures:
+    """Take every figure that needs no other figure first, and then the clipped samples."""
+    n, columns = recording.joint_count, len(recording.table.names)
+    running = _Running(
+        least=np.full(columns, np.inf),
+        greatest=np.full(columns, -np.inf),
+        missed=np.zeros(columns, dtype=np.int64),
+        wraps=np.zeros(n, dtype=np.int64),
+        first_wrap=np.full(n, np.nan),
+    )
+    stride = max(1, -(-len(recording) // _KEPT_STEPS))
+    for start in range(0, len(recording), _ROWS_AT_ONCE):
+        # One sample more than the block, so that the steps between blocks are seen too.
+        samples = recording.samples(max(start - 1, 0), start + _ROWS_AT_ONCE)
+        _measure_ranges(running, recording.table.rows(start, min(start + _ROWS_AT_ONCE, len(recording))))
+        _measure_steps(running, samples, stride)
+        if samples.period is not None:
+            _measure_periods(running, samples.period if start == 0 else samples.period[1:])
+    least, greatest = (np.where(np.isinf(values), np.nan, values) for values in (running.least, running.greatest))
+    clipped = _find_clipped(recording, running.least[n + 1 : 2 * n + 1], running.greatest[n + 1 : 2 * n + 1])
+    first = recording.samples(0, _ROWS_AT_ONCE)
+    joints = tuple(
+        JointMeasures(
+            position=(float(least[1 + j]), float(greatest[1 + j])),
+            effort=(float(least[1 + n + j]), float(greatest[1 + n + j])),
+            position_step=_position_step(first.position[:, j]),
+            wraps=int(running.wraps[j]),
+            first_wrap=float(running.first_wrap[j]) if running.wraps[j] else None,
+            clipped=clipped[j],
+        )
+        for j in range(n)
+    )
+    low, median, high = (float(value) for value in np.percentile(np.concatenate(running.steps), [1, 50, 99]))
+    steps = StepMeasures(running.shortest_step, low, median, high, running.longest_step)
+    missed = {name: int(count) for name, count in zip(recording.table.names, running.missed, strict=True) if count}
+    return RowMeasures(float(greatest[0] - least[0]), steps, missed, tuple(running.period_lengths), joints)
+
+
+def measure_gaps(recording: Recording, measures: RowMeasures) -> Gaps:
+    """Find where the clock skips."""
+    limit = _GAP_FACTOR * measures.steps.median
+    count, longest, longest_at = 0, 0.0, None
+    for start in range(0, len(recording), _ROWS_AT_ONCE):
+        time = recording.samples(max(start - 1, 0), start + _ROWS_AT_ONCE).time
+        steps = np.diff(time)
+        count += int((steps > limit).sum())
+        if len(steps) and steps.max() > max(limit, longest):
+            longest, longest_at = float(steps.max()), float(time[np.argmax(steps)])
+    return Gaps(count, longest, longest_at)
+
+
+def _measure_ranges(running: _Running, block: Array) -> None:
+    running.missed += np.isnan(block).sum(axis=0)
+    running.least = np.fmin(running.least, np.fmin.reduce(block, axis=0))
+    running.greatest = np.fmax(running.greatest, np.fmax.reduce(block, axis=0))
+
+
+def _measure_steps(running: _Running, samples: Samples, stride: int) -> None:
+    steps = np.diff(samples.time)
+    if not len(steps):
+        return
+    running.steps.append(steps[::stride])
+    running.shortest_step = min(running.shortest_step, float(steps.min()))
+    running.longest_step = max(running.longest_step, float(steps.max()))
+    turned = np.abs(np.abs(np.diff(samples.position, axis=0)) - 2 * np.pi) < _WRAP_TOLERANCE
+    for joint in np.flatnonzero(turned.any(axis=0)):
+        if not running.wraps[joint]:
+            running.first_wrap[joint] = samples.time[1 + np.argmax(turned[:, joint])]
+        running.wraps[joint] += turned[:, joint].sum()
+
+
+def _measure_periods(running: _Running, period: Array) -> None:
+    """Lengths of the runs of one period index; NaN belongs to no run."""
+    edges = np.flatnonzero(np.diff(period, prepend=np.nan) != 0)
+    for start, stop in zip(edges, [*edges[1:], len(period)], strict=True):
+        index = float(period[start])
+        if index == running.period:
+            running.period_lengths[-1] += int(stop - start)
+        elif not np.isnan(index):
+            running.period_lengths.append(int(stop - start))
+        running.period = index
+
+
+def _position_step(position: Array) -> float | None:
+    """The least step of q, where the small steps are its multiples: an encoder's resolution."""
+    moves = np.abs(np.diff(position))
+    resting = int((moves == 0).sum())
+    moves = moves[moves > 1e-9 * max(float(np.nanmax(np.abs(position), initial=0.0)), 1e-300)]
+    if len(moves) < _STEP_SAMPLES:
+        return None
+    step = float(np.percentile(moves, 1))
+    multiples = moves[moves < 20 * step] / step
+    if len(multiples) < len(moves) / 2 or np.abs(multiples - np.rint(multiples)).max() > 0.1:
+        return None
+    # Motion at one speed has equal steps too; an encoder also shows none and two at a time.
+    if resting + int((multiples > 1.5).sum()) < len(moves) / 100:
+        return None
+    return float(np.median(moves[moves < 1.5 * step]))
+
+
+def _find_clipped(recording: Recording, least: Array, greatest: Array) -> list[tuple[tuple[float, int], ...]]:
+    """Levels, of the two extremes of each joint's effort, at which it stays for several samples time and again."""
+    levels = np.stack([least, greatest])
+    counts = np.zeros(levels.shape, dtype=np.int64)
+    for start in range(0, len(recording), _ROWS_AT_ONCE):
+        effort = recording.samples(start, start + _ROWS_AT_ONCE).effort
+        if len(effort) < _CLIPPED_RUN:
+            continue
+        for side in range(2):
+            at_level = effort == levels[side]
+            runs = np.logical_and.reduce(
+                [at_level[k : len(effort) - _CLIPPED_RUN + 1 + k] for k in range(_CLIPPED_RUN)]
+            )
+            # Every sample that a run of five covers counts once.
+            covered = np.zeros_like(at_level)
+            for k in range(_CLIPPED_RUN):
+                covered[k : k + len(runs)] |= runs
+            counts[side] += covered.sum(axis=0)
+    # The lower extreme of an effort that never changes sign is rest, not a limit.
+    is_limit = (np.abs(levels) > np.abs(levels).max(axis=0) / 2) & (least < greatest)
+    enough = (counts >= max(_CLIPPED_SAMPLES, _CLIPPED_SHARE * len(recording))) & is_limit
+    return [
+        tuple((float(levels[side, j]), int(counts[side, j])) for side in range(2) if enough[side, j])
+        for j in range(recording.joint_count)
+    ]
+
 
 _MEANINGFUL_STEP = 1e-4
 
@@ -127,7 +339,6 @@ def _locate(severity: Severity, text: str) -> Finding:
 
 
 def _about_columns(recording: Recording) -> Iterator[Finding]:
-    """Columns that are there for nothing."""
     currents = [f"i{joint}" for joint in range(1, recording.joint_count + 1)]
     passed_over = [name for name in recording.ignored_columns if name in currents]
     others = [name for name in recording.ignored_columns if name not in currents]
@@ -138,7 +349,6 @@ def _about_columns(recording: Recording) -> Iterator[Finding]:
 
 
 def _about_clock(gaps: Gaps) -> Iterator[Finding]:
-    """Samples that the logger lost."""
     if gaps.count:
         places = "1 gap" if gaps.count == 1 else f"{gaps.count} gaps"
         longest = f"the longest, {gaps.longest:.4g} s, begins at t = {gaps.longest_at:.6g} s"
@@ -146,7 +356,6 @@ def _about_clock(gaps: Gaps) -> Iterator[Finding]:
 
 
 def _about_missed(missed: dict[str, int]) -> Iterator[Finding]:
-    """Samples marked as missed."""
     for name, count in missed.items():
         if name != "period":
             yield Finding(

@@ -5,20 +5,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from tauscope.errors import RecordingError, RecordingMismatchError
-from tauscope.recording.layout.families import BY_NAME, words_of
+from tauscope.recording.layout.families import BY_NAME, role_of, words_of
 from tauscope.recording.layout.guess import guess_layout, is_numbered, layout_text
 from tauscope.recording.layout.presets import PRESET_OF
 from tauscope.recording.layout.rename import NANOSECONDS, rename_columns
-from tauscope.recording.layout.roles import role_of
 from tauscope.recording.samples import EffortKind
 from tauscope.recording.units import Reading
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.messages import listed, printable
 from tauscope.robot.recording_layout import RecordingLayout
 
+# Columns of which a joint may have one, in the order in which a table keeps them.
 OPTIONAL_GROUPS = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt", "kp")
-"""Columns of which a joint may have one, in the order in which a table keeps them."""
-
 _JOINT_COLUMN = re.compile(r"(q|tau|i|qd|qdd|qref|taucmd|temp|qlink|volt|kp)([1-9][0-9]{0,3})")
 
 
@@ -114,7 +112,6 @@ def _is_ours(header: Sequence[str]) -> bool:
 
 
 def _note_command(header: Sequence[str], renamed: Sequence[str]) -> tuple[ResultWarning, ...]:
-    """A warning where the effort is a command and no measurement."""
     column = next((name for name, target in zip(header, renamed, strict=True) if target == "tau1"), "tau1")
     role = None if column == "tau1" else role_of(words_of(column))
     if role is None or role[0] != "taucmd":
@@ -232,7 +229,6 @@ def _joint_count(joints: dict[str, list[int]], effort_kind: EffortKind, header: 
 def _order_names(
     joints: dict[str, list[int]], effort_kind: EffortKind, joint_count: int, where: dict[str, int], file: str
 ) -> tuple[str, ...]:
-    """Columns in the order in which a table keeps them."""
     names = list(table_columns(joint_count, effort_kind))
     for group in OPTIONAL_GROUPS:
         for joint in joints[group] if group != effort_kind.value else ():
@@ -245,5 +241,4 @@ def _order_names(
 
 
 def _joints(count: int) -> str:
-    """A count of joints in words."""
     return f"{count} joint" if count == 1 else f"{count} joints"

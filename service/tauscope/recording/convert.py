@@ -12,8 +12,8 @@ from mcap_ros2.writer import Writer
 
 from tauscope.errors import RecordingError
 from tauscope.recording.csv_format import write_csv
+from tauscope.recording.joint_state import JOINT_STATE_DEFINITION
 from tauscope.recording.joint_state_decoders import JOINT_STATE_TYPES
-from tauscope.recording.joint_state_encoding import JOINT_STATE_DEFINITION
 from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.mcap_format import MCAP_MAGIC, recover_mcap
 from tauscope.recording.parquet_format import write_parquet
@@ -60,7 +60,6 @@ def write_mcap(recording: Recording, file: BinaryIO, joint_names: Sequence[str] 
 
 
 def _stamps(time: Array, previous: int, name: str) -> list[int]:
-    """Times as whole nanoseconds, still strictly increasing."""
     if time[-1] >= _LATEST_STAMP_S:
         raise RecordingError(f"{name}: time {float(time[-1])!r} s is beyond a ROS time stamp; let t start near 0 s")
     stamps = np.rint(time * 1e9).astype(np.int64)
@@ -69,8 +68,7 @@ def _stamps(time: Array, previous: int, name: str) -> list[int]:
     return stamps.tolist()
 
 
-FORMATS = (".csv", ".parquet", ".mcap")
-"""Formats that can be written, by suffix."""
+FORMATS = (".csv", ".parquet", ".mcap")  # formats that can be written, by suffix
 
 
 @dataclass(frozen=True)
@@ -138,7 +136,6 @@ def write_recording(
 def _read(
     path: Path, name: str, joint_names: Sequence[str] | None, reading: Reading, *, recover: bool
 ) -> tuple[Recording, str | None]:
-    """The recording, and the damage that was passed over where that was asked for."""
     if recover and path.is_file() and first_bytes(path, name).startswith(MCAP_MAGIC):
         names = tuple(joint_names) if joint_names is not None else None
         salvage = recover_mcap(path, Choice(name, len(names) if names else None, names, reading=reading))
@@ -147,7 +144,6 @@ def _read(
 
 
 def _require_other(source: Path, target: Path) -> None:
-    """Refuse to write to what is read."""
     if target.exists() and source.exists() and target.samefile(source):
         raise RecordingError(f"{target}: is the source itself; a recording given as input is never written to")
     if source.is_dir() and target.absolute().parent.resolve() == source.resolve():
@@ -155,7 +151,6 @@ def _require_other(source: Path, target: Path) -> None:
 
 
 def _require_writable(path: Path, *, overwrite: bool) -> None:
-    """Refuse unknown formats, and files that are there already."""
     if path.suffix.lower() not in FORMATS:
         raise RecordingError(f"{path}: the suffix names no format that can be written; use {', '.join(FORMATS)}")
     if path.is_dir() or (path.exists() and not overwrite):

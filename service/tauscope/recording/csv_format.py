@@ -9,11 +9,20 @@ from typing import BinaryIO
 import numpy as np
 
 from tauscope.errors import RecordingError
-from tauscope.recording.clocks import SplitClock
 from tauscope.recording.columns import ColumnLayout, find_layout, require_joint_count
-from tauscope.recording.csv_dialect import BLANK, Dialect, find_delimiter, find_first_row, read_units_row
-from tauscope.recording.csv_numbers import Clock, is_number, parse_number, parse_quickly, shown
-from tauscope.recording.intake import RowIntake
+from tauscope.recording.csv_dialect import (
+    BLANK,
+    Clock,
+    Dialect,
+    find_delimiter,
+    find_first_row,
+    is_number,
+    parse_number,
+    parse_quickly,
+    read_units_row,
+    shown,
+)
+from tauscope.recording.intake import RowIntake, SplitClock
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
 from tauscope.recording.units import SI, Reading
@@ -106,7 +115,6 @@ class _Chunk:
 
 
 def _read_header(file: BinaryIO, name: str, reading: Reading) -> _Header:
-    """Read the names of the columns and find those that are wanted."""
     found = _read_names(file, name, reading)
     reading, layout = find_layout(found.names, reading, name)
     at, number, line = file.tell(), found.line, b"\n"
@@ -122,7 +130,6 @@ def _read_header(file: BinaryIO, name: str, reading: Reading) -> _Header:
 
 
 def _find_units(cells: Sequence[bytes], layout: ColumnLayout) -> dict[str, str] | None:
-    """Units in the row below the names, None where it is none."""
     if len(cells) != layout.width or any(map(is_number, cells)):
         return None
     return read_units_row(layout.names, [_decode(cells[index]) for index in layout.source])
@@ -195,7 +202,6 @@ def _name_numbers(comment: bytes, row: Sequence[bytes], dialect: Dialect) -> lis
 
 
 def _decode(field: bytes) -> str:
-    """A column's name, of a file in UTF-8 or in the code page of Windows."""
     try:
         return field.decode("utf-8")
     except UnicodeDecodeError:
@@ -203,7 +209,6 @@ def _decode(field: bytes) -> str:
 
 
 def _chunks(file: BinaryIO, line: int, name: str) -> Iterator[_Chunk]:
-    """The rest of the file in pieces that end with a line."""
     rest = b""
     while data := file.read(_CHUNK_BYTES):
         end = data.rfind(b"\n") + 1
@@ -228,7 +233,6 @@ def _count_lines(text: bytes) -> int:
 
 
 def _parse_chunk(chunk: _Chunk, header: _Header, name: str, *, is_first: bool) -> tuple[Array, Sequence[int]]:
-    """The rows of a chunk and the line on which each stands."""
     layout = header.layout
     source = layout.source if layout.nanoseconds is None else (*layout.source, layout.nanoseconds)
     normal = header.dialect.normalize(chunk.text)
@@ -262,7 +266,6 @@ def _join_time(block: Array, header: _Header) -> Array:
 
 
 def _split_line(line: bytes, number: int, header: _Header, name: str, *, is_truncated: bool) -> list[bytes]:
-    """The fields of a line, as many as the header has."""
     _require_text(line, number, name)
     fields = line.split(header.dialect.separator)
     width = header.layout.width
@@ -291,12 +294,10 @@ def _refuse_units(fields: Sequence[bytes], number: int, header: _Header, name: s
 
 
 def _require_text(line: bytes, number: int, name: str) -> None:
-    """Refuse bytes that no text file has."""
     if b"\0" in line:
         raise RecordingError(f"{name}: line {number} holds a NUL byte; the file is binary, damaged or not UTF-8 text")
 
 
 def _is_empty(line: bytes) -> bool:
-    """Whether a line is blank or a comment."""
     text = line.strip()
     return not text or text.startswith(b"#")

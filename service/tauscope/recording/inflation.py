@@ -6,16 +6,13 @@ import zstandard
 
 from tauscope.errors import RecordingError
 
-ALWAYS_ACCEPTED_BYTES = 2**30
-"""Unpacked size that is never refused: it fits on any disk that holds recordings."""
-
+ALWAYS_ACCEPTED_BYTES = 2**30  # unpacked size that is never refused: it fits on any disk that holds recordings
+# Unpacked over packed size beyond which nothing is a recording: measured motion, with its noise, packs to a third or
+# so, and its text to a twentieth.
 LARGEST_RATIO = 100
-"""Unpacked over packed size beyond which nothing is a recording: measured motion, with its noise, packs to a third or
-so, and its text to a twentieth."""
 
 
-HELD_BYTES = 2**25
-"""Unpacked size that is never refused of data that are held in memory."""
+HELD_BYTES = 2**25  # unpacked size that is never refused of data that are held in memory
 
 
 def require_plausible_inflation(
@@ -32,8 +29,7 @@ def require_plausible_inflation(
         raise RecordingError(f"{name}: unpacks to {unpacked_bytes} bytes, {ratio} times its size; {hint}")
 
 
-ALWAYS_ACCEPTED_RECORDS = 200_000
-"""Records that are never refused: they are walked within a fraction of a second."""
+ALWAYS_ACCEPTED_RECORDS = 200_000  # records that are never refused: they are walked within a fraction of a second
 
 
 def count_plausible_records(packed_bytes: int) -> int:
@@ -41,12 +37,9 @@ def count_plausible_records(packed_bytes: int) -> int:
     return ALWAYS_ACCEPTED_RECORDS + packed_bytes
 
 
+# First bytes of a zstd frame; a CDR message begins with a zero byte, JSON with a bracket.
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-"""First bytes of a zstd frame; a CDR message begins with a zero byte, JSON with a bracket."""
-
-LARGEST_MESSAGE_BYTES = 2**17
-"""Of a message with the states of a thousand joints."""
-
+LARGEST_MESSAGE_BYTES = 2**17  # of a message with the states of a thousand joints
 _COPY_BYTES = 2**20
 
 

@@ -1,4 +1,4 @@
-"""The ROS 2 message sensor_msgs/msg/JointState, from CDR bytes and from JSON to arrays.
+"""The ROS 2 message sensor_msgs/msg/JointState: CDR bytes and JSON to arrays, and arrays to CDR bytes.
 
 std_msgs/Header header {stamp {int32 sec, uint32 nanosec}, string frame_id}; string[] name;
 float64[] position, velocity, effort. In CDR a number is aligned to its own size, counted from behind the four bytes of
@@ -86,7 +86,6 @@ class JointStateLayout:
         return JointStates(seconds * _NANOSECONDS + nanoseconds, self.first.names, *arrays)
 
     def _column(self, raw: NDArray[np.uint8], at: int, kind: str, count: int) -> NDArray[np.generic]:
-        """`count` numbers of every message, found at byte `at`."""
         dtype = np.dtype(self._order + kind)
         block = np.ascontiguousarray(raw[:, at : at + count * dtype.itemsize])
         return block.view(dtype) if count else np.empty((len(raw), 0))
@@ -198,10 +197,81 @@ def _json_array(value: object, field: str) -> Array:
 
 
 def _decode(cursor: CdrCursor) -> JointState:
-    """Read the fields in the order of the message definition."""
     stamp = cursor.stamp()
     cursor.string()  # frame_id
     names = tuple(cursor.string() for _ in range(cursor.length()))
     position, velocity, effort = (cursor.numbers() for _ in range(3))
     cursor.finish()
     return JointState(stamp, names, position, velocity, effort)
+
+
+JOINT_STATE_DEFINITION = """\
+std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+
+_ENCAPSULATION = b"\x00\x01\x00\x00"
+_STAMP = struct.Struct("<iI")
+
+
+class JointStateEncoder:
+    """Writes joint states of the same joints, message after message, into one template."""
+
+    def __init__(self, names: Sequence[str], *, has_velocity: bool = True, has_effort: bool = True) -> None:
+        message = bytearray(_ENCAPSULATION + bytes(_STAMP.size))
+        _append_string(message, "")
+        _append_length(message, len(names))
+        for name in names:
+            _append_string(message, name)
+        counts = (len(names), len(names) if has_velocity else 0, len(names) if has_effort else 0)
+        places = [_append_numbers(message, count) for count in counts]
+        self._message = message
+        self._numbers = [np.frombuffer(message, "<f8", count, at) for count, at in zip(counts, places, strict=True)]
+
+    def encode(self, stamp_ns: int, position: Array, velocity: Array | None, effort: Array | None) -> bytes:
+        """One message.
+
+        `stamp_ns`: time of measurement since 1970 [ns].
+        `position`: (n,) [rad or m].
+        `velocity`: (n,) [rad/s or m/s]; None where the layout has none.
+        `effort`: (n,) [Nm or N]; None where the layout has none.
+        """
+        _STAMP.pack_into(self._message, len(_ENCAPSULATION), stamp_ns // _NANOSECONDS, stamp_ns % _NANOSECONDS)
+        for target, values in zip(self._numbers, (position, velocity, effort), strict=True):
+            if values is not None:
+                target[:] = values
+        return bytes(self._message)
+
+
+def _append_length(message: bytearray, length: int) -> None:
+    """A uint32, aligned to its own size behind the encapsulation header."""
+    message.extend(bytes(-(len(message) - len(_ENCAPSULATION)) % 4))
+    message.extend(struct.pack("<I", length))
+
+
+def _append_string(message: bytearray, text: str) -> None:
+    """Length with the closing NUL, text, NUL."""
+    content = text.encode() + b"\0"
+    _append_length(message, len(content))
+    message.extend(content)
+
+
+def _append_numbers(message: bytearray, count: int) -> int:
+    """Room for a float64 sequence; where its numbers begin."""
+    _append_length(message, count)
+    if count:
+        message.extend(bytes(-(len(message) - len(_ENCAPSULATION)) % 8))
+    place = len(message)
+    message.extend(bytes(8 * count))
+    return place

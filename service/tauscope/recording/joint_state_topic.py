@@ -1,6 +1,6 @@
-"""From the JointState messages of one topic to a recording: which joints, which clock."""
+"""From the topics of a log to a recording: which topic is meant, which joints, which clock."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias, TypeVar
 
@@ -17,7 +17,7 @@ from tauscope.recording.inflation import (
 )
 from tauscope.recording.intake import RowIntake
 from tauscope.recording.joint_state import JointState, JointStateLayout, JointStates, decode_cdr
-from tauscope.recording.joint_state_decoders import Decoder
+from tauscope.recording.joint_state_decoders import Decoder, find_decoder
 from tauscope.recording.recording import EffortKind, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
 from tauscope.recording.units import SI, Reading
@@ -75,20 +75,17 @@ class OtherPublishers:
 
 
 def _messages(count: int) -> str:
-    """A count of messages, up to the verb."""
     return "1 message holds" if count == 1 else f"{count} messages hold"
 
 
 _MESSAGES_AT_ONCE = 4096
 _BYTES_AT_ONCE = 2**24
 
-LONGEST_FROM_ZERO_NS = 10**12
-"""A stamp of zero beside stamps above this is none [ns]; simulated time may begin at zero."""
-
+LONGEST_FROM_ZERO_NS = 10**12  # a stamp of zero beside stamps above this is none [ns]; simulated time may begin at zero
 Decoded = TypeVar("Decoded")
 Rows: TypeAlias = NDArray[np.intp]
+# Messages of one layout, and their places among those that were taken at once.
 Batch: TypeAlias = tuple[Rows, JointStates]
-"""Messages of one layout, and their places among those that were taken at once."""
 
 
 @dataclass(frozen=True)
@@ -206,7 +203,6 @@ class JointStateTopic:
         return batches
 
     def _decode_each(self, messages: Sequence[bytes], rows: Rows, first: int) -> list[Batch]:
-        """Batches of equal layout, decoded message by message."""
         groups: dict[object, list[tuple[int, JointState]]] = {}
         for row, message in zip(rows.tolist(), messages, strict=True):
             state = self._decode_one(self._decoder, message, first + row)
@@ -239,7 +235,6 @@ class JointStateTopic:
         return True
 
     def _arrange(self, states: JointStates) -> JointStates:
-        """Messages with the wanted joints in their order."""
         names = states.names
         if self._wanted is None or not names or names == self._wanted:
             return states
@@ -249,7 +244,6 @@ class JointStateTopic:
         return JointStates(states.stamp, self._wanted, states.position[:, order], velocity, states.effort[:, order])
 
     def _take(self, states: JointStates, log_time: NDArray[np.int64], number: Rows) -> None:
-        """Add messages to the rows."""
         if self._rows is None:
             count, has_velocity = states.position.shape[1], states.velocity.shape[1] > 0
             self._rows = _Rows(self._choice, self.topic, count, has_velocity=has_velocity)
@@ -318,7 +312,6 @@ def _layout_of(state: JointState) -> tuple[tuple[str, ...], int, int, int]:
 
 
 def _stack(states: Sequence[JointState]) -> JointStates:
-    """Messages of one layout as one batch."""
     stamp = np.array([state.stamp for state in states], dtype=np.int64)
     fields = ("position", "velocity", "effort")
     return JointStates(stamp, states[0].names, *(np.array([getattr(s, field) for s in states]) for field in fields))
@@ -354,3 +347,68 @@ def _require_equal(states: JointStates, place: str) -> None:
             raise RecordingError(f"{place}: {joints} positions and {count} {field}")
     if len(set(states.names)) != len(states.names):
         raise RecordingError(f"{place}: a joint is named twice ({listed(states.names)})")
+
+
+_PREFERRED_TOPICS = ("/joint_states", "joint_states")
+
+MessageHandler = Callable[[int, bytes], None]  # takes the log time [ns] and the bytes of a message
+
+
+class JointStateLog:
+    """Joint states of one or several container files that were recorded together."""
+
+    def __init__(self, choice: Choice) -> None:
+        self._choice = choice
+        self._topics: dict[str, JointStateTopic] = {}
+        self._others: list[str] = []
+
+    def handler(self, topic: str, type_name: str, encoding: str, schema: bytes = b"") -> MessageHandler | None:
+        """The taker of a topic's messages, None where they are not joint states, or not the wanted ones."""
+        decoder = find_decoder(type_name, encoding, schema)
+        if decoder is None:
+            self._others.append(f"{topic} ({type_name}, {encoding})" if type_name else topic)
+            return None
+        if topic not in self._topics:
+            self._topics[topic] = JointStateTopic(topic, decoder, self._choice)
+        is_wanted = self._choice.reading.topic in (None, topic)
+        return self._topics[topic].add if is_wanted else None
+
+    @property
+    def samples(self) -> int:
+        """Number of samples that the topic with most of them holds so far."""
+        for topic in self._topics.values():
+            topic.flush()
+        return max((topic.samples for topic in self._topics.values()), default=0)
+
+    def finish(self) -> Recording:
+        """The recording that the log holds; raises `RecordingError` where there is none, or more than one."""
+        wanted = self._choice.reading.topic
+        if wanted is not None and wanted not in self._topics:
+            known = listed(sorted(self._topics)) or "none"
+            raise RecordingError(f"{self._choice.file}: no topic {wanted} carries joint states; those that do: {known}")
+        return choose_topic(self._topics, self._others, self._choice.file).finish()
+
+
+def choose_topic(topics: Mapping[str, JointStateTopic], other_topics: Sequence[str], file: str) -> JointStateTopic:
+    """The one topic with efforts of the wanted joints, or the one of several that ROS itself would take.
+
+    Raises RecordingError where there is none, or more than one and none of them is ``/joint_states``.
+    """
+    filled = {name: topic for name, topic in topics.items() if topic.messages}
+    if not filled:
+        found = f"; it holds the topics {listed(sorted(set(other_topics)))}" if other_topics else ""
+        raise RecordingError(f"{file}: no sensor_msgs/msg/JointState message was recorded{found}")
+    for topic in filled.values():
+        topic.flush()
+    usable = {name: topic for name, topic in filled.items() if topic.has_effort}
+    best = usable or {name: topic for name, topic in filled.items() if topic.samples} or filled
+    for name in _PREFERRED_TOPICS:
+        if name in best:
+            return best[name]
+    plain = {name: topic for name, topic in best.items() if topic.is_plain}  # beside ros2_control's dynamic states
+    best = plain if len(plain) == 1 else best
+    if len(best) > 1:
+        raise RecordingError(
+            f"{file}: several topics carry joint states ({listed(sorted(best))}); choose one with --topic"
+        )
+    return next(iter(best.values()))

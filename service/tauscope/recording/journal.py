@@ -17,8 +17,8 @@ from mcap.writer import Writer
 from numpy.typing import NDArray
 from pydantic_core import to_json
 
+from tauscope.recording.joint_state import JOINT_STATE_DEFINITION, JointStateEncoder
 from tauscope.recording.joint_state_decoders import JOINT_STATE_TYPES
-from tauscope.recording.joint_state_encoding import JOINT_STATE_DEFINITION, JointStateEncoder
 from tauscope.recording.journal_rows import JournalHeader, Phase, journal_row_type
 
 JOINT_STATE_TOPIC = "/joint_states"

@@ -20,9 +20,7 @@ import numpy as np
 from tauscope.recording.journal import JournalWriter
 from tauscope.recording.journal_rows import JournalHeader, journal_row_type
 
-HEADER, ROW, EVENT = b"h", b"r", b"e"
-"""Kinds of frame."""
-
+HEADER, ROW, EVENT = b"h", b"r", b"e"  # kinds of frame
 FRAME = struct.Struct("<Ic")
 EVENT_TIME = struct.Struct("<q")
 
@@ -121,7 +119,6 @@ def wait_for_writer(path: Path, patience_s: float) -> bool:
 
 
 def _say(line: dict[str, Any]) -> None:
-    """One JSON line to whoever started this process; nobody may be there any more."""
     try:
         os.write(sys.stdout.fileno(), json.dumps(line).encode() + b"\n")
     except OSError:

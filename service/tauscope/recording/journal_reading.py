@@ -10,15 +10,14 @@ from pydantic_core import from_json
 
 from tauscope.errors import RecordingError
 from tauscope.recording.joint_state import JointStateLayout, JointStates
-from tauscope.recording.joint_state_log import MessageHandler
+from tauscope.recording.joint_state_topic import MessageHandler
 from tauscope.recording.journal import CYCLE_TOPIC, EVENT_TOPIC, JOINT_STATE_TOPIC, REFERENCE_TOPIC
 from tauscope.recording.journal_rows import JournalHeader, Phase, journal_row_type
 from tauscope.recording.mcap_format import scan_mcap
 from tauscope.recording.recording import Array, EffortKind, Recording
 from tauscope.robot.messages import reason
 
-LONGEST_HOLD = 1.5
-"""Cycles between two samples of which none was missed between them."""
+LONGEST_HOLD = 1.5  # cycles between two samples of which none was missed between them
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +133,6 @@ class _Collector:
 
 
 def _decode(messages: list[bytes]) -> JointStates:
-    """Joint states that were all written with one layout."""
     states = JointStateLayout(messages[0]).decode(messages)
     if states is None:
         raise RecordingError("its joint states change their layout")

@@ -10,19 +10,13 @@ from tauscope.recording.samples import Array, Samples
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.robot import JointType
 
+# Usual deflection over the motion's rms from which a column is in another unit or of another joint: no transmission
+# that carries an arm gives way so far.
 FOLLOWS = 0.2
-"""Usual deflection over the motion's rms from which a column is in another unit or of another joint: no transmission
-that carries an arm gives way so far."""
-
-USUAL = 0.95
-"""Share of the samples whose deflection is usual: glitches of an encoder are rarer than the rest."""
-
+USUAL = 0.95  # share of the samples whose deflection is usual: glitches of an encoder are rarer than the rest
+# Deflection over the usual one from which a sample is a glitch: under a sudden load it is three or four times that.
 GLITCH = 10.0
-"""Deflection over the usual one from which a sample is a glitch: under a sudden load it is three or four times that."""
-
-LEAST_MOTION = 0.05
-"""Motion, rms, below which a joint rests and its two encoders show their noise [rad or m]."""
-
+LEAST_MOTION = 0.05  # motion, rms, below which a joint rests and its two encoders show their noise [rad or m]
 ONE_TURN = 2.0 * np.pi
 
 

@@ -8,32 +8,244 @@ ends. Records and checksums are the mcap library's; the walk over a chunk's mess
 import os
 import struct
 import zlib
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Protocol
 
+import zstandard
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Schema
+from mcap.records import Channel, Chunk, ChunkIndex, Schema, Statistics
+from mcap.stream_reader import get_chunk_data_stream
 
 from tauscope.errors import RecordingError
-from tauscope.recording.inflation import count_plausible_records, require_plausible_inflation
-from tauscope.recording.joint_state_log import JointStateLog, MessageHandler
-from tauscope.recording.joint_state_topic import Choice
-from tauscope.recording.mcap_index import (
-    MESSAGE,
-    RECORD,
-    UNREADABLE,
-    DamageError,
-    MessageSink,
-    find_handler,
-    read_by_index,
-    unpack_chunk,
-)
+from tauscope.recording.inflation import HELD_BYTES, LARGEST_RATIO, count_plausible_records, require_plausible_inflation
+from tauscope.recording.joint_state_topic import Choice, JointStateLog, MessageHandler
 from tauscope.recording.recording import Recording
-from tauscope.recording.row_check import MINIMUM_ROWS
+from tauscope.recording.samples import MINIMUM_ROWS
 from tauscope.robot.messages import reason
+
+RECORD = struct.Struct("<BQ")  # opcode and length of a record
+MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time and publish time, in front of a message's bytes
+
+# Errors that damaged records raise.
+UNREADABLE = (
+    McapError,
+    ValueError,
+    struct.error,
+    RuntimeError,
+    EOFError,
+    MemoryError,
+    OverflowError,
+    zstandard.ZstdError,
+)
+
+_LARGEST_CHUNK_BYTES = 2**28
+
+
+class DamageError(Exception):
+    """The container cannot be read further; the message completes "file: "."""
+
+
+class MessageSink(Protocol):
+    """Receiver of the messages of an MCAP file."""
+
+    def handler(self, topic: str, type_name: str, encoding: str, schema: bytes = b"") -> MessageHandler | None:
+        """The taker of a topic's messages, None where there is none."""
+        ...
+
+
+def find_handler(sink: MessageSink, channel: Channel, schemas: Mapping[int, Schema]) -> MessageHandler | None:
+    """The taker of a channel's messages."""
+    schema = schemas.get(channel.schema_id)
+    name, data = ("", b"") if schema is None else (schema.name, schema.data)
+    return sink.handler(channel.topic, name, channel.message_encoding, data)
+
+
+def unpack_chunk(body: bytes) -> bytes:
+    """Records within a chunk, their checksum compared.
+
+    Raises ValueError where the chunk is damaged or implausibly large, among other errors of `UNREADABLE`.
+    """
+    chunk = Chunk.read(ReadDataStream(BytesIO(body)))
+    if chunk.compression not in ("", "zstd", "lz4"):
+        raise ValueError(f"unknown compression {chunk.compression[:20]!r}")
+    declared = [chunk.uncompressed_size]
+    if chunk.compression == "zstd":
+        # The frame states its own size and the decompressor believes it: look before it allocates.
+        declared.append(max(zstandard.frame_content_size(chunk.data), 0))
+    if max(declared) > min(_LARGEST_CHUNK_BYTES, max(HELD_BYTES, LARGEST_RATIO * len(body))):
+        raise ValueError("implausible chunk size")
+    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
+    return stream.read(size)
+
+
+# Distance of wanted messages above which each is read by itself [bytes]: reading so far takes longer than a seek.
+SEEK_BYTES = 2**15
+MOST_SHARE = 0.5  # share of the file above which it is read as a whole, which compares every checksum
+_MAGIC_BYTES = 8
+_FOOTER = struct.Struct("<BQQQI")
+_CHUNK_HEAD = struct.Struct("<QQQII")
+_INDEX_ENTRY = struct.Struct("<QQ")
+
+
+@dataclass
+class _Summary:
+    """Schemas, channels and chunks, as the end of a file lists them."""
+
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    chunks: list[ChunkIndex] = field(default_factory=list)
+    statistics: Statistics | None = None
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Wanted messages of one chunk: offsets within it, in the order of the file."""
+
+    chunk: ChunkIndex
+    offsets: tuple[int, ...]
+
+    @property
+    def is_sparse(self) -> bool:
+        """Whether each message is read by itself."""
+        is_plain = self.chunk.compression == ""
+        return is_plain and self.chunk.uncompressed_size > SEEK_BYTES * len(self.offsets)
+
+    @property
+    def read_bytes(self) -> int:
+        """About how much is read of the file."""
+        return SEEK_BYTES // 8 * len(self.offsets) if self.is_sparse else self.chunk.chunk_length
+
+
+def read_by_index(file: BinaryIO, size: int, sink: MessageSink) -> bool:
+    """Hand the wanted messages over in the order of the file.
+
+    Raises DamageError where a chunk is not as the index says.
+
+    Returns bool: False, and nothing was handed over, where the file has no sound index or most of it is wanted.
+    """
+    try:
+        summary = _read_summary(file, size)
+        if summary is None:
+            return False
+        handlers = {number: find_handler(sink, each, summary.schemas) for number, each in summary.channels.items()}
+        wanted = {number for number, handler in handlers.items() if handler is not None}
+        parts = [_find_messages(file, size, chunk, wanted) for chunk in _sort_chunks(summary.chunks)]
+    except UNREADABLE:
+        return False
+    counts = summary.statistics.channel_message_counts if summary.statistics else {}
+    found = sum(len(part.offsets) for part in parts)
+    is_whole = found == sum(count for number, count in counts.items() if number in wanted)
+    if not is_whole or sum(part.read_bytes for part in parts if part.offsets) > MOST_SHARE * size:
+        return False
+    unpacked = 0
+    for part in parts:
+        if part.offsets:
+            unpacked += 0 if part.is_sparse else part.chunk.uncompressed_size
+            require_plausible_inflation(size, unpacked, "what was read so far")
+            _read_part(file, part, handlers)
+    return True
+
+
+def _read_summary(file: BinaryIO, size: int) -> _Summary | None:
+    end = size - _MAGIC_BYTES - _FOOTER.size
+    opcode, length, start, _, checksum = _FOOTER.unpack(_read(file, end, _FOOTER.size))
+    if opcode != Opcode.FOOTER or length != _FOOTER.size - RECORD.size or not _MAGIC_BYTES <= start < end:
+        return None
+    data = _read(file, start, end - start)
+    stated = data + _read(file, end, _FOOTER.size - 4)
+    if checksum not in (0, zlib.crc32(stated)):
+        return None
+    summary, at = _Summary(), 0
+    while at < len(data):
+        opcode, length = RECORD.unpack_from(data, at)
+        at += RECORD.size
+        record = ReadDataStream(BytesIO(data[at : at + length]))
+        at += length
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(record)
+            summary.schemas[schema.id] = schema
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(record)
+            summary.channels[channel.id] = channel
+        elif opcode == Opcode.CHUNK_INDEX:
+            summary.chunks.append(ChunkIndex.read(record))
+        elif opcode == Opcode.STATISTICS:
+            summary.statistics = Statistics.read(record)
+    statistics = summary.statistics
+    is_whole = statistics is not None and summary.chunks and statistics.chunk_count == len(summary.chunks)
+    is_named = statistics is not None and set(statistics.channel_message_counts) <= set(summary.channels)
+    return summary if is_whole and is_named else None
+
+
+def _sort_chunks(chunks: Sequence[ChunkIndex]) -> Sequence[ChunkIndex]:
+    return sorted(chunks, key=lambda chunk: chunk.chunk_start_offset)
+
+
+def _find_messages(file: BinaryIO, size: int, chunk: ChunkIndex, wanted: set[int]) -> _Part:
+    offsets: list[int] = []
+    if chunk.chunk_start_offset + chunk.chunk_length > size:
+        raise ValueError("a chunk leaves the file")
+    for channel, at in chunk.message_index_offsets.items():
+        if channel not in wanted:
+            continue
+        opcode, length = RECORD.unpack(_read(file, at, RECORD.size))
+        if opcode != Opcode.MESSAGE_INDEX or length > size - at:
+            raise ValueError("no index of messages where one was stated")
+        body = _read(file, at + RECORD.size, length)
+        number, entries = struct.unpack_from("<HI", body)
+        if number != channel or entries != len(body) - 6:
+            raise ValueError("an index of messages that does not fill its record")
+        offsets += [offset for _, offset in _INDEX_ENTRY.iter_unpack(body[6:])]
+    if len(set(offsets)) < len(offsets):
+        raise ValueError("an index of messages lists one twice")
+    return _Part(chunk, tuple(sorted(offsets)))
+
+
+def _read_part(file: BinaryIO, part: _Part, handlers: Mapping[int, MessageHandler | None]) -> None:
+    start, chunk = part.chunk.chunk_start_offset, part.chunk
+    try:
+        opcode, length = RECORD.unpack(_read(file, start, RECORD.size))
+        if opcode != Opcode.CHUNK or length != chunk.chunk_length - RECORD.size:
+            raise ValueError("no chunk where the index states one")
+        if part.is_sparse:
+            head = _read(file, start + RECORD.size, _CHUNK_HEAD.size)
+            first = start + RECORD.size + _CHUNK_HEAD.size + _CHUNK_HEAD.unpack(head)[-1] + 8
+            for offset in part.offsets:
+                opcode, length = RECORD.unpack(_read(file, first + offset, RECORD.size))
+                if length > chunk.uncompressed_size - offset:
+                    raise ValueError("a record leaves its chunk")
+                _hand_over(opcode, _read(file, first + offset + RECORD.size, length), handlers)
+            return
+        data = unpack_chunk(_read(file, start + RECORD.size, length))
+        for offset in part.offsets:
+            opcode, length = RECORD.unpack_from(data, offset)
+            _hand_over(opcode, data[offset + RECORD.size : offset + RECORD.size + length], handlers)
+    except UNREADABLE as error:
+        raise DamageError(
+            f"the file is damaged: the record at byte {start} cannot be read ({reason(error)})"
+        ) from error
+
+
+def _hand_over(opcode: int, record: bytes, handlers: Mapping[int, MessageHandler | None]) -> None:
+    channel, _, log_time, _ = MESSAGE.unpack_from(record)
+    handler = handlers.get(channel)
+    if opcode != Opcode.MESSAGE or handler is None:
+        raise ValueError("no message of the topic where the index states one")
+    handler(log_time, record[MESSAGE.size :])
+
+
+def _read(file: BinaryIO, at: int, length: int) -> bytes:
+    """Bytes at a place of the file, past its buffer: a seek within a buffer would fill it anew."""
+    data = os.pread(file.fileno(), length, at) if at >= 0 and length >= 0 else b""
+    if len(data) < length:
+        raise ValueError("the file ends early")
+    return data
+
 
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 
@@ -106,7 +318,6 @@ def _read_whole(path: Path, log: JointStateLog) -> str | None:
 
 
 def _count(samples: int) -> str:
-    """A count of samples in words."""
     return {0: "no sample", 1: "1 sample"}.get(samples, f"{samples} samples")
 
 
@@ -157,7 +368,6 @@ class _Scan:
             raise DamageError(f"the file is damaged: it states {stated} messages and holds {self._messages}")
 
     def _walk_chunk(self, body: bytes) -> None:
-        """Walk the records within a chunk."""
         data = unpack_chunk(body)
         self._unpacked_bytes += len(data)
         require_plausible_inflation(self._file.tell(), self._unpacked_bytes, "what was read so far")
@@ -174,7 +384,6 @@ class _Scan:
             at += length
 
     def _take(self, opcode: int, data: bytes, start: int, stop: int) -> None:
-        """Take one record of the data section."""
         if opcode == Opcode.MESSAGE:
             channel, _, log_time, _ = MESSAGE.unpack_from(data, start)
             if stop - start < MESSAGE.size or channel not in self._handlers:

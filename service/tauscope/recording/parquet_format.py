@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from tauscope.errors import RecordingError
-from tauscope.recording.column_batches import ROWS_AT_ONCE, Batch, read_batches
+from tauscope.recording.column_files import ROWS_AT_ONCE, Batch, read_batches
 from tauscope.recording.columns import ColumnLayout
 from tauscope.recording.inflation import require_plausible_inflation
 from tauscope.recording.recording import Array, Recording
@@ -22,8 +22,7 @@ from tauscope.robot.messages import printable, reason
 
 _LARGEST_INFO_BYTES = 2**22
 _MOST_ELEMENTS = 1000
-_FOLDERS_UP = 3
-"""A LeRobot data set keeps ``data/chunk-000/FILE.parquet`` beside ``meta/info.json``."""
+_FOLDERS_UP = 3  # a LeRobot data set keeps ``data/chunk-000/FILE.parquet`` beside ``meta/info.json``
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,6 @@ def take_column(arrow: Any, batch: Any, wanted: FileColumn) -> Any:
 
 
 def _is_list(arrow: Any, kind: Any) -> bool:
-    """Whether a column holds lists of numbers."""
     types = arrow.types
     is_list = types.is_list(kind) or types.is_fixed_size_list(kind) or types.is_large_list(kind)
     return is_list and (types.is_floating(kind.value_type) or types.is_integer(kind.value_type))
@@ -90,7 +88,6 @@ def _element_names(path: Path) -> Mapping[str, Sequence[str]]:
 
 
 def _names(names: Any) -> Sequence[str]:
-    """Names of a feature: a list, or a mapping with one list."""
     while isinstance(names, dict):
         names = next(iter(names.values()), None)
     is_named = isinstance(names, list) and all(isinstance(name, str) for name in names)
@@ -209,7 +206,6 @@ def _arrow_errors(arrow: Any, name: str) -> Iterator[None]:
 
 
 def _require_numbers(schema: Any, wanted: Sequence[FileColumn], layout: ColumnLayout, name: str) -> None:
-    """Refuse columns of text, dates and the like."""
     for target, column in zip(layout.names, wanted, strict=True):
         kind = schema.field(column.column).type
         is_number = column.element is not None or _NUMBER_TYPE.fullmatch(str(kind))
@@ -219,10 +215,8 @@ def _require_numbers(schema: Any, wanted: Sequence[FileColumn], layout: ColumnLa
 
 
 def _is_stamp(kind: Any) -> bool:
-    """Whether a column's type is a date with time."""
     return str(kind).startswith("timestamp[")
 
 
 def _numbers(column: Any) -> Array:
-    """A column as float64, null as NaN."""
     return column.cast("float64", safe=False).to_numpy(zero_copy_only=False)

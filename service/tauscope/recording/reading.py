@@ -1,22 +1,25 @@
-"""Read a recording, whatever its format."""
+"""Read a recording, whatever its format, or tell which of its columns is read as which."""
 
 import errno
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tauscope.errors import RecordingError
-from tauscope.recording.columns import require_joint_count
+from tauscope.recording.column_files import ZIP_MAGIC, read_npz, read_npz_header
+from tauscope.recording.columns import find_layout, is_column, require_joint_count, suggest_layout
 from tauscope.recording.csv_format import read_csv, read_csv_header
 from tauscope.recording.joint_state_topic import Choice
+from tauscope.recording.layout.guess import guess_parts
+from tauscope.recording.layout.rename import rename_columns
 from tauscope.recording.mcap_format import MCAP_MAGIC, read_mcap
-from tauscope.recording.npz_format import ZIP_MAGIC, read_npz, read_npz_header
 from tauscope.recording.parquet_format import PARQUET_MAGIC, read_parquet, read_parquet_header
 from tauscope.recording.recording import Recording
-from tauscope.recording.ros1_bag import ROS1_MAGIC, read_ros1_bag
-from tauscope.recording.rosbag2_format import SQLITE_MAGIC, read_database, read_rosbag2
+from tauscope.recording.ros_bags import ROS1_MAGIC, SQLITE_MAGIC, read_database, read_ros1_bag, read_rosbag2
 from tauscope.recording.units import SI, Reading
 from tauscope.robot.messages import printable
+from tauscope.robot.recording_layout import UNITS
+from tauscope.robot.robot import Robot
 
 _LONGEST_PATH = 4096
 _MAGIC_BYTES = 16
@@ -35,10 +38,7 @@ _FOREIGN = (
 
 
 def read_recording(
-    path: str | Path,
-    joint_count: int | None = None,
-    joint_names: Sequence[str] | None = None,
-    reading: Reading = SI,
+    path: str | Path, joint_count: int | None = None, joint_names: Sequence[str] | None = None, reading: Reading = SI
 ) -> Recording:
     """Read a recording: CSV, Parquet, MCAP, a ROS 1 bag, or a rosbag2 folder or database; told apart by content.
 
@@ -95,12 +95,10 @@ def first_bytes(path: Path, name: str) -> bytes:
 
 
 def _count_bytes(path: Path) -> int:
-    """Size of a file, or of the files of a folder [bytes]."""
     return sum(file.stat().st_size for file in path.iterdir()) if path.is_dir() else path.stat().st_size
 
 
 def _read(path: Path, name: str, joint_count: int | None, choice: Choice) -> Recording:
-    """Hand the file to the reader of its format."""
     if path.is_dir():
         return read_rosbag2(path, choice)
     magic = first_bytes(path, name)
@@ -119,7 +117,6 @@ def _read(path: Path, name: str, joint_count: int | None, choice: Choice) -> Rec
 
 
 def _refuse_foreign(magic: bytes, path: Path, name: str) -> None:
-    """Refuse a file that is no text."""
     for start, words in _FOREIGN:
         if magic.startswith(start):
             raise RecordingError(f"{name}: {words}")
@@ -129,6 +126,56 @@ def _refuse_foreign(magic: bytes, path: Path, name: str) -> None:
 
 
 def _reason(error: OSError) -> str:
-    """What the system said, in words."""
     words = {errno.ENOENT: "no such file", errno.EACCES: "no permission to read it"}
     return words.get(error.errno or 0, f"cannot be read ({error.strerror or error})")
+
+
+@dataclass(frozen=True)
+class ColumnMapping:
+    """A file's columns as they are understood.
+
+    `columns`: column of the file by that of CONTRACT.md, such as ``q1``; only those that were found.
+    `units`: unit of ``t``, ``q``, ``qd`` and ``tau``.
+    `is_guessed`: whether words of the column names suggest it, and no reader accepts the file without it.
+    """
+
+    header: tuple[str, ...]
+    columns: Mapping[str, str]
+    units: Mapping[str, str]
+    is_guessed: bool
+
+
+def find_mapping(path: Path, robot: Robot | None = None, reading: Reading = SI) -> ColumnMapping:
+    """The mapping by which a table is read; where none is, as much as its column names suggest.
+
+    Raises RecordingError where the header cannot be read, or the file is a log, which names its joints itself.
+    """
+    header = tuple(read_header(path))
+    reading = reading.for_robot(robot)
+    try:
+        used, layout = find_layout(header, reading, path.name)
+    except RecordingError:
+        return _suggest(header, reading)
+    places = zip(layout.names, layout.source, strict=True)
+    columns = {name: header[place] for name, place in places if not (name == "t" and layout.counts_rows)}
+    return ColumnMapping(header, columns, _complete_units(used.units, columns), is_guessed=False)
+
+
+def _suggest(header: Sequence[str], reading: Reading) -> ColumnMapping:
+    if reading.columns is None:
+        guess = suggest_layout(header, reading, "") or guess_parts(header, reading.joint_names)
+        reading = replace(reading, columns=guess.columns, units={**guess.units, **reading.units})
+    try:
+        renamed = rename_columns(header, reading, "")
+    except RecordingError:
+        renamed = ()
+    columns = {target: name for target, name in zip(renamed, header, strict=False) if is_column(target)}
+    return ColumnMapping(tuple(header), columns, _complete_units(reading.units, columns), is_guessed=True)
+
+
+def _complete_units(stated: Mapping[str, str], columns: Mapping[str, str]) -> dict[str, str]:
+    """Units of all groups: SI, or the drive's own for currents, where none is stated."""
+    usual = {group: units[0] for group, units in UNITS.items()}
+    if "i1" in columns:
+        usual["tau"] = "A"
+    return usual | {group: unit for group, unit in stated.items() if group in usual}

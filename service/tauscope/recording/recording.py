@@ -1,19 +1,18 @@
 """What was measured: one continuous motion, its positions and its torques."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tauscope.errors import RecordingError, RecordingMismatchError
 from tauscope.recording.columns import OPTIONAL_GROUPS, table_columns
-from tauscope.recording.row_check import RowCheck, require_rising, require_rows
-from tauscope.recording.samples import Array, EffortKind, Samples, Table
+from tauscope.recording.samples import Array, EffortKind, RowCheck, Samples, Table, require_rising, require_rows
 from tauscope.recording.table import MemoryTable
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.robot import Robot
 
-__all__ = ["Array", "EffortKind", "Recording", "Samples", "Table"]
+__all__ = ["Array", "EffortKind", "Recording", "Samples", "Table", "take_commands"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +175,6 @@ _ARGUMENTS = {
 
 
 def _joint_of(name: str, group: str) -> int | None:
-    """Joint number of a column of this group, None for other columns."""
     number = name.removeprefix(group)
     return int(number) if number != name and number.isdecimal() else None
 
@@ -190,7 +188,6 @@ def _from_groups(
     groups: Mapping[str, Array],
     period: Array | None,
 ) -> Recording:
-    """Check the arguments one by one and lay them side by side."""
     time = _check("time", time, name, None)
     position = _check("position", position, name, (len(time), None))
     shape = (len(time), position.shape[1])
@@ -226,3 +223,16 @@ def _check(argument: str, array: Array, name: str, shape: tuple[int | None, ...]
         joint = f", joint {column[0] + 1}" if column else ""
         raise RecordingError(f"{name}: argument {argument}, row {row}{joint}: the value is infinite")
     return checked
+
+
+def take_commands(recording: Recording) -> Recording | None:
+    """The recording with its commands in place of effort; None where a joint has none."""
+    if recording.effort_kind is EffortKind.COMMAND:
+        return recording
+    names, first = recording.table.names, table_columns(recording.joint_count, EffortKind.COMMAND)
+    if not set(first) <= set(names):
+        return None
+    lost = recording.effort_kind.value
+    kept = (*first, *(name for name in names if name not in first and name.rstrip("0123456789") != lost))
+    rows = recording.table.rows(0, len(recording))[:, [names.index(name) for name in kept]]
+    return replace(recording, effort_kind=EffortKind.COMMAND, table=MemoryTable(kept, rows))

@@ -9,9 +9,8 @@ import numpy as np
 from tauscope.errors import RecordingError
 from tauscope.recording.samples import Array, Table
 
+# Tables larger than this go to a temporary file: 1.3 million samples of a six-joint arm still fit into memory.
 SPOOL_ABOVE_BYTES = 128 * 2**20
-"""Tables larger than this go to a temporary file: 1.3 million samples of a six-joint arm still fit into memory."""
-
 _FIRST_ROWS = 4096
 
 
@@ -133,7 +132,6 @@ class TableBuilder:
         self._data = grown
 
     def _start_spool(self) -> None:
-        """Move what is in memory to a temporary file."""
         try:
             self._spool = SpooledTable(self._names)
         except OSError as error:
@@ -143,7 +141,6 @@ class TableBuilder:
 
 
 def _append(spool: SpooledTable, block: Array) -> None:
-    """Write to the temporary file, where there is room."""
     try:
         spool.append(block)
     except OSError as error:
@@ -151,7 +148,6 @@ def _append(spool: SpooledTable, block: Array) -> None:
 
 
 def _no_room(error: OSError) -> RecordingError:
-    """A temporary folder that cannot take the rows, said in one line."""
     return RecordingError(
         f"the temporary folder {tempfile.gettempdir()} cannot hold the recording ({error.strerror}): "
         "make room there or set TMPDIR to a larger folder"

@@ -11,18 +11,12 @@ from tauscope.recording.samples import Array, EffortKind
 from tauscope.robot.recording_layout import DELIMITERS, RecordingLayout, Source, find_fault
 from tauscope.robot.robot import JointType, Robot
 
-SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-"""Units of time [s]."""
-
+SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # units of time [s]
+# Units of angle [rad], and of speed a minute [rad/s].
 RADIANS: Mapping[str, float] = {"rad": 1.0, "deg": np.pi / 180.0, "rpm": 2.0 * np.pi / 60.0}
-"""Units of angle [rad], and of speed a minute [rad/s]."""
-
-METRES: Mapping[str, float] = {"m": 1.0, "mm": 1e-3}
-"""Units of length [m]."""
-
+METRES: Mapping[str, float] = {"m": 1.0, "mm": 1e-3}  # units of length [m]
+# Units that a joint's torque constant turns into torque [A, or the drive's own unit].
 CURRENTS: Mapping[str, float] = {"A": 1.0, "mA": 1e-3, "drive": 1.0}
-"""Units that a joint's torque constant turns into torque [A, or the drive's own unit]."""
-
 _FOLLOWERS: Mapping[str, tuple[str, ...]] = {"q": ("q", "qref", "qlink"), "qd": ("qd", "qdd"), "tau": ("tau", "taucmd")}
 
 
@@ -85,8 +79,7 @@ class Reading:
         return None if self.delimiter is None else DELIMITERS[self.delimiter]
 
 
-SI = Reading()
-"""A file in SI units."""
+SI = Reading()  # a file in SI units
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +138,6 @@ def parse_units(text: str) -> dict[str, str]:
 
 
 def _factor(group: str, number: str, reading: Reading) -> float:
-    """Factor of a joint's column."""
     root = next((root for root, followers in _FOLLOWERS.items() if group in followers), None)
     if root is None:
         return 1.0

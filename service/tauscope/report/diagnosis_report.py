@@ -10,23 +10,11 @@ from tauscope.diagnosis.documents.plots import DiagnosisPlots, diagnosis_plots
 from tauscope.diagnosis.documents.result import FindingEntry
 from tauscope.diagnosis.next_experiment import PlannedExperiment
 from tauscope.number_text import chance, counted, significant
-from tauscope.report.diagnosis_words import (
-    MOST_FINDINGS,
-    cautions,
-    constancy_sentence,
-    effect_title,
-    file_title,
-    finding_facts,
-    location_sentence,
-    noise_ratios,
-    place_title,
-    summary_sentences,
-)
 from tauscope.report.figures import difference_figure, heat_map, heat_table, motion_figure, shift_figure
 from tauscope.report.page import Card, Drawing, Fold, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.provenance import Provenance
-from tauscope.report.table import csv_text
 from tauscope.report.tables import (
+    csv_text,
     detectable_table,
     difference_table,
     headroom_table,
@@ -36,15 +24,25 @@ from tauscope.report.tables import (
     shift_table,
 )
 from tauscope.report.torque_figure import proof_figure
-from tauscope.report.words import noise_words, torque_unit
+from tauscope.report.words import (
+    MOST_FINDINGS,
+    cautions,
+    constancy_sentence,
+    effect_title,
+    file_title,
+    finding_facts,
+    location_sentence,
+    noise_ratios,
+    noise_words,
+    place_title,
+    summary_sentences,
+    torque_unit,
+)
 from tauscope.robot import JointType
 
 
 def diagnosis_report(
-    diagnosis: Diagnosis,
-    document: DiagnosisDocument,
-    provenance: Provenance,
-    planned: PlannedExperiment | None = None,
+    diagnosis: Diagnosis, document: DiagnosisDocument, provenance: Provenance, planned: PlannedExperiment | None = None
 ) -> str:
     """A self-contained HTML page on a diagnosis."""
     plots = diagnosis_plots(diagnosis)
@@ -77,7 +75,6 @@ def diagnosis_report(
 
 
 def _key_figures(document: DiagnosisDocument) -> Iterator[KeyFigure]:
-    """What a reader looks for first."""
     yield KeyFigure("Verdict", document.verdict.replace("_", " "), "computed from tests, not chosen")
     names = ", ".join(dict.fromkeys(effect_title(finding.effect) for finding in document.findings[:3]))
     yield KeyFigure("Findings", str(len(document.findings)), names or "nothing is named")
@@ -93,7 +90,6 @@ def _key_figures(document: DiagnosisDocument) -> Iterator[KeyFigure]:
 
 
 def _where(plots: DiagnosisPlots, document: DiagnosisDocument, types: list[JointType]) -> Section:
-    """Heat maps of joint × state."""
     caption = (
         "Each cell holds as many samples as any other of its row and group; its shade is the rms of the residual in it,"
         " as a multiple of the noise."
@@ -132,7 +128,6 @@ def _what(document: DiagnosisDocument) -> Section:
 
 
 def _cards(entries: Sequence[FindingEntry], joints: Sequence[str]) -> list[Card]:
-    """A card a finding."""
     return [
         Card(
             rank,
@@ -148,7 +143,6 @@ def _cards(entries: Sequence[FindingEntry], joints: Sequence[str]) -> list[Card]
 
 
 def _how_much(document: DiagnosisDocument) -> Section:
-    """Residuals, and what the left-out effects had done to the parameters."""
     parts = [Part(title="Residual rms at the recorded rate", table=residual_table(document))]
     if document.parameter_differences:
         svg = Markup(difference_figure("differences", document))  # noqa: S704 - our own drawing
@@ -166,7 +160,6 @@ def _how_much(document: DiagnosisDocument) -> Section:
 
 
 def _proof(plots: DiagnosisPlots, document: DiagnosisDocument, units: list[str]) -> Section:
-    """Torque of motion that was not seen, before and after."""
     spectra = {spectrum.joint: spectrum for spectrum in plots.spectra}
     held_out = any(overlay.held_out for overlay in plots.overlays)
     parts = []
@@ -195,7 +188,6 @@ def _proof(plots: DiagnosisPlots, document: DiagnosisDocument, units: list[str])
 
 
 def _headroom(document: DiagnosisDocument) -> Iterator[Section]:
-    """What a black box still predicts; nothing where it was not asked for."""
     if document.headroom is None:
         return
     sentence = (
@@ -208,7 +200,6 @@ def _headroom(document: DiagnosisDocument) -> Iterator[Section]:
 
 
 def _next(document: DiagnosisDocument, planned: PlannedExperiment | None) -> Section:
-    """The motion that would decide what is open."""
     wanted = document.next_experiment
     if wanted is None:
         return Section("next", "What next", [], ["Nothing is open that another motion would decide."])
@@ -228,7 +219,6 @@ def _next(document: DiagnosisDocument, planned: PlannedExperiment | None) -> Sec
 
 
 def _detectable(document: DiagnosisDocument) -> Section:
-    """What would have been seen."""
     sentence = (
         "The smallest size of each effect that nine of ten such data sets would have shown. What is smaller may be"
         " there and not be named; – stands where no torque along this motion shows it, or it is one with a parameter."
@@ -238,7 +228,6 @@ def _detectable(document: DiagnosisDocument) -> Section:
 
 
 def _reproduce(provenance: Provenance) -> Section:
-    """How to make it again."""
     parts = [Part(table=input_table(provenance))]
     if provenance.command:
         parts.append(Part(command=shlex.join(provenance.command)))

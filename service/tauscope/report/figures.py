@@ -17,13 +17,12 @@ from tauscope.identification.result import BaseParameterEntry
 from tauscope.number_text import power_of_ten, significant
 from tauscope.report.friction_curve import FrictionCurve
 from tauscope.report.svg import BAND, HELD_OUT, MEASURED, MUTED, PREDICTED, draw_svg
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 from tauscope.report.words import base_parameter_unit, noise_ratio
 from tauscope.trajectory import Trajectory
 
+# Multiples of the noise between the shades: the lightest is nothing but noise.
 LEVELS = (1.1, 1.3, 1.6, 2.0, 3.0, 5.0, 10.0)
-"""Multiples of the noise between the shades: the lightest is nothing but noise."""
-
 VARIABLES = ("velocity", "position", "load", "acceleration", "time")
 
 _WIDTH, _LABELS, _GAP = 920.0, 104.0, 14.0
@@ -86,7 +85,6 @@ def _cells(own: ResidualHistogram, left: float, top: float, width: float, *, aft
 
 
 def _legend(top: float) -> Iterator[str]:
-    """The shades, from noise to far above it."""
     words = ("noise", *(f"> {level:g} ×" for level in LEVELS))
     x = _LABELS
     for level, word in enumerate(words):
@@ -98,9 +96,7 @@ def _legend(top: float) -> Iterator[str]:
 
 
 PARAMETER_ROW_INCHES = 0.19
-DEVIATIONS = 1.96
-"""Standard errors to either side: 95 % of a normal distribution."""
-
+DEVIATIONS = 1.96  # standard errors to either side: 95 % of a normal distribution
 LONGEST_LABEL = 62
 
 
@@ -121,7 +117,6 @@ def parameter_figure(name: str, entries: Sequence[BaseParameterEntry]) -> str:
 
 
 def _draw_panel(axis: Axes, entries: Sequence[BaseParameterEntry]) -> None:
-    """One row a parameter, from the top."""
     places = np.arange(len(entries))
     values = np.array([entry.value for entry in entries])
     reach = DEVIATIONS * np.array([entry.std or 0.0 for entry in entries])
@@ -145,7 +140,6 @@ def _draw_panel(axis: Axes, entries: Sequence[BaseParameterEntry]) -> None:
 
 
 def _shorten(name: str) -> str:
-    """A label that leaves room for the drawing; the table has all of it."""
     return name if len(name) <= LONGEST_LABEL else name[: LONGEST_LABEL - 1] + "…"
 
 
@@ -182,8 +176,8 @@ def residual_figure(name: str, document: IdentificationDocument) -> str:
 MOST = 14
 SHIFT_ROW_INCHES = 0.22
 LONGEST_SHIFT_LABEL = 58
+# Standard errors at the ticks: linear up to the first, logarithmic from there.
 TICKS = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 10000.0)
-"""Standard errors at the ticks: linear up to the first, logarithmic from there."""
 
 
 def shift_figure(name: str, document: DiagnosisDocument) -> str:
@@ -199,7 +193,6 @@ def difference_figure(name: str, document: DiagnosisDocument) -> str:
 
 
 def _bars(name: str, labels: Sequence[str], values: Sequence[float]) -> str:
-    """One bar a parameter, largest first; within the band nothing has moved."""
     places = np.arange(len(labels))
     shown = [label if len(label) <= LONGEST_SHIFT_LABEL else label[: LONGEST_SHIFT_LABEL - 1] + "…" for label in labels]
 

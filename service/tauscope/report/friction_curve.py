@@ -13,11 +13,8 @@ from tauscope.report.series import TorqueSeries
 
 GRID_POINTS = 241
 BINS = 48
-FEWEST_SAMPLES = 12
-"""Samples in a velocity bin before its mean is shown."""
-
-BEYOND = 1.15
-"""The curve is drawn over this many times the largest speed in the recordings."""
+FEWEST_SAMPLES = 12  # samples in a velocity bin before its mean is shown
+BEYOND = 1.15  # the curve is drawn over this many times the largest speed in the recordings
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +66,6 @@ def _columns(identification: Identification, joint: int, velocity: Array) -> tup
 
 
 def _torque(identification: Identification, joint: int, velocity: Array) -> Array:
-    """τ_f of the delivered parameters."""
     columns, rows = _columns(identification, joint, velocity)
     return identification.parameters[columns] @ rows
 

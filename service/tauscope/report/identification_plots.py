@@ -14,11 +14,8 @@ from tauscope.report.series import TorqueSeries, envelope_indices, torque_series
 from tauscope.robot import JointType
 from tauscope.strict_model import ResultModel
 
-MOST_POINTS = 4000
-"""Points of one joint's torque: more than any screen is wide, so that a zoom shows more."""
-
-MOST_SERIES = 6
-"""Recordings that the friction curves are compared with."""
+MOST_POINTS = 4000  # points of one joint's torque: more than any screen is wide, so that a zoom shows more
+MOST_SERIES = 6  # recordings that the friction curves are compared with
 
 
 class TorqueCurve(ResultModel):

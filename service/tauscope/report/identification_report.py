@@ -13,10 +13,10 @@ from tauscope.report.friction_curve import friction_curve
 from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.provenance import Provenance
 from tauscope.report.series import TorqueSeries, torque_series
-from tauscope.report.table import csv_text
 from tauscope.report.tables import (
     base_parameter_table,
     conditioning_table,
+    csv_text,
     fit_table,
     friction_table,
     input_table,
@@ -35,9 +35,7 @@ from tauscope.report.words import (
     velocity_unit,
 )
 
-MOST_SERIES = 6
-"""Recordings that the friction curves are compared with."""
-
+MOST_SERIES = 6  # recordings that the friction curves are compared with
 _FRICTION_EQUATION = "τ_f(q̇) = τ_s A(K_v q̇) + τ_sc A(δ q̇) + τ_v q̇ + offset,  A(x) = (2/π) arctan x"
 
 
@@ -78,7 +76,6 @@ def identification_report(
 
 
 def _subtitle(result: IdentificationDocument, provenance: Provenance) -> str:
-    """One line on what was done."""
     counts = [(len(result.conditioning), ""), (len(result.held_out_conditioning), " held out")]
     recordings = ", ".join(f"{counted(count, 'recording')}{what}" for count, what in counts if count)
     joints = counted(len(result.joints), "joint")
@@ -87,7 +84,6 @@ def _subtitle(result: IdentificationDocument, provenance: Provenance) -> str:
 
 
 def _key_figures(result: IdentificationDocument) -> Iterator[KeyFigure]:
-    """What a reader looks for first."""
     train, held_out = result.fit.train, result.fit.held_out
     if held_out is not None:
         yield KeyFigure("Relative error, held out", percent(held_out.relative_error), "‖τ − τ̂‖ / ‖τ‖ in the band")
@@ -103,7 +99,6 @@ def _key_figures(result: IdentificationDocument) -> Iterator[KeyFigure]:
 
 
 def _fit_section(result: IdentificationDocument, identification: Identification) -> Section:
-    """Residuals of all joints against their noise."""
     figure = Drawing(
         Markup(residual_figure("fit", result)),  # noqa: S704 - our own drawing; its text is escaped
         "Residual of every joint as a multiple of its sensor noise",
@@ -117,7 +112,6 @@ def _fit_section(result: IdentificationDocument, identification: Identification)
 def _torque_section(
     result: IdentificationDocument, identification: Identification, series: TorqueSeries, kind: str
 ) -> Section:
-    """Measured and predicted torque of every joint on one recording."""
     parts = []
     for joint, name in enumerate(result.joints):
         unit = torque_unit(identification.robot.joints[joint].type)
@@ -138,7 +132,6 @@ def _torque_section(
 def _friction_section(
     result: IdentificationDocument, identification: Identification, series: Sequence[TorqueSeries]
 ) -> Section:
-    """Friction curves and their coefficients."""
     types = [joint.type for joint in identification.robot.joints]
     curves = [friction_curve(identification, series, joint) for joint in range(len(types))]
     units = [(velocity_unit(kind), torque_unit(kind)) for kind in types]
@@ -159,7 +152,6 @@ def _friction_section(
 
 
 def _parameter_section(result: IdentificationDocument) -> Section:
-    """Base parameters."""
     undetermined = set(result.undetermined)
     known = [entry for entry in result.base_parameters if entry.name not in undetermined]
     parts = []
@@ -173,7 +165,6 @@ def _parameter_section(result: IdentificationDocument) -> Section:
 
 
 def _link_section(result: IdentificationDocument) -> Section:
-    """The full parameter set."""
     sentence = (
         "The most probable full parameter set: every pseudo-inertia positive definite, friction not negative."
         " Data determine their base parameters; the prior determines the rest of each."
@@ -182,12 +173,10 @@ def _link_section(result: IdentificationDocument) -> Section:
 
 
 def _data_section(result: IdentificationDocument) -> Section:
-    """What was done to the recordings."""
     return Section("data", "Recordings", [Part(table=conditioning_table(result))])
 
 
 def _source_section(provenance: Provenance) -> Section:
-    """How to make it again."""
     parts = [Part(table=input_table(provenance))]
     if provenance.command:
         parts.append(Part(command=shlex.join(provenance.command)))

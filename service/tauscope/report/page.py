@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from tauscope.report.table import Table
+from tauscope.report.tables import Table
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,6 @@ def render(page: Page) -> str:
 
 
 def _printable(value: object) -> object:
-    """Text without characters that are no text."""
     if not isinstance(value, str) or isinstance(value, Markup):
         return value
     return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode("ascii") for c in value)

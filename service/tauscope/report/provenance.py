@@ -10,8 +10,7 @@ from pathlib import Path
 
 from tauscope.errors import RecordingError
 
-LIBRARIES = ("tauscope", "numpy", "scipy", "clarabel")
-"""Packages whose version can change a figure."""
+LIBRARIES = ("tauscope", "numpy", "scipy", "clarabel")  # packages whose version can change a figure
 
 
 @dataclass(frozen=True)

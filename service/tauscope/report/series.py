@@ -35,8 +35,7 @@ def envelope_indices(values: Array, most: int) -> NDArray[np.intp]:
     return np.array(kept, dtype=np.intp)
 
 
-MOST_PIECES = 8
-"""Pieces of a recording that are conditioned in search of the longest."""
+MOST_PIECES = 8  # pieces of a recording that are conditioned in search of the longest
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +78,6 @@ def torque_series(identification: Identification, recording: Recording) -> Torqu
 
 
 def _pieces(identification: Identification, recording: Recording) -> Iterator[PreparedMotion]:
-    """Pieces in the band of the estimate."""
     conditioner = Conditioner.survey(recording, identification.robot)
     structure = identification.structure
     return iter(Dataset([conditioner], identification.robot, structure.base, identification.cutoff_hz))

@@ -17,8 +17,8 @@ MEASURED = "#8f969f"
 PREDICTED = "#0072b2"
 RESIDUAL = "#d55e00"
 HELD_OUT = "#009e73"
+# Colours to draw with, Okabe and Ito's; on the page each stands for a CSS variable (see `VARIABLES`).
 BAND = "#cfe3f1"
-"""Colours to draw with, Okabe and Ito's; on the page each stands for a CSS variable (see `VARIABLES`)."""
 
 VARIABLES = {
     INK: "--ink",
@@ -31,8 +31,7 @@ VARIABLES = {
     BAND: "--band",
 }
 
-WIDTH_INCHES = 9.2
-"""Width of every figure: text of 8 pt is then as large as the page's small print."""
+WIDTH_INCHES = 9.2  # width of every figure: text of 8 pt is then as large as the page's small print
 
 _STYLE: Any = {
     "svg.fonttype": "none",
@@ -70,8 +69,7 @@ _STYLE: Any = {
     "savefig.facecolor": "none",
 }
 
-_DRAWING = Lock()
-"""Matplotlib's settings belong to the whole process; one figure at a time has them."""
+_DRAWING = Lock()  # matplotlib's settings belong to the whole process; one figure at a time has them
 
 
 def draw_svg(name: str, height_inches: float, draw: Callable[[Figure], None]) -> str:
@@ -104,6 +102,5 @@ def _adapt_to_page(svg: str, name: str) -> str:
 
 
 def _shorten(path: str) -> str:
-    """Path data to a hundredth of a point, white space folded."""
     rounded = re.sub(r"-?\d+\.\d+", lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), path)
     return " ".join(rounded.split())

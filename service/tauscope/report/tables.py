@@ -1,16 +1,32 @@
-"""The numbers behind the figures."""
+"""Tables of words and numbers, wherever they are shown."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.identification import IdentificationDocument
 from tauscope.number_text import ABSENT, percent, significant, with_uncertainty
-from tauscope.report.diagnosis_words import effect_title
 from tauscope.report.provenance import Provenance
-from tauscope.report.table import Table
-from tauscope.report.words import base_parameter_unit, noise_ratio, torque_unit
+from tauscope.report.words import base_parameter_unit, effect_title, noise_ratio, torque_unit
 from tauscope.robot import Robot
 
-MOST_SHIFTS = 12
-"""Rows of the parameters that findings have moved most."""
+
+def csv_text(columns: Mapping[str, Sequence[float]]) -> str:
+    """A heading line, then a line a sample."""
+    rows = zip(*columns.values(), strict=True)
+    return "\n".join([",".join(columns), *(",".join(f"{value:.5g}" for value in row) for row in rows)])
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells as text."""
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    words: int = 1
+
+
+MOST_SHIFTS = 12  # rows of the parameters that findings have moved most
 
 
 def located_table(document: DiagnosisDocument) -> Table:

@@ -46,7 +46,6 @@ def proof_figure(name: str, overlay: TorqueOverlay, spectrum: ResidualSpectrum |
 
 
 def _draw_spectrum(axis: Axes, spectrum: ResidualSpectrum | None, unit: str) -> None:
-    """Residual's density without and with the findings, and the noise's."""
     axis.set_title("residual spectrum", color=INK)
     if spectrum is None:
         axis.text(0.5, 0.5, "motion too short", ha="center", va="center", transform=axis.transAxes, color=MUTED)
@@ -65,12 +64,9 @@ def _draw_spectrum(axis: Axes, spectrum: ResidualSpectrum | None, unit: str) -> 
 
 
 HEIGHT_INCHES = 3.5
-MOST_POINTS = 1400
-"""Points a curve over the whole width; two a pixel."""
-
+MOST_POINTS = 1400  # points a curve over the whole width; two a pixel
 MOST_POINTS_ENLARGED = 700
-ENLARGED_SHARE = 0.1
-"""Part of the time that is enlarged: where the residual's mean square is greatest."""
+ENLARGED_SHARE = 0.1  # part of the time that is enlarged: where the residual's mean square is greatest
 
 
 def torque_figure(name: str, series: TorqueSeries, joint: int, noise_std: float, unit: str) -> str:
@@ -119,7 +115,6 @@ def worst_part(residual: Array, share: float) -> slice:
 
 
 def _draw_torque(axis: Axes, series: TorqueSeries, joint: int, rows: slice, most: int) -> None:
-    """Measured below, predicted above."""
     time = series.time[rows]
     measured, predicted = series.measured[rows, joint], series.predicted[rows, joint]
     kept = envelope_indices(measured, most)
@@ -130,7 +125,6 @@ def _draw_torque(axis: Axes, series: TorqueSeries, joint: int, rows: slice, most
 
 
 def _draw_residual(axis: Axes, series: TorqueSeries, joint: int, rows: slice, most: int, noise_std: float) -> None:
-    """The residual within twice the noise, were there nothing else in it."""
     time, residual = series.time[rows], series.residual[rows, joint]
     kept = envelope_indices(residual, most)
     axis.axhspan(-2.0 * noise_std, 2.0 * noise_std, color=BAND, linewidth=0, label="± 2 σ of the noise")

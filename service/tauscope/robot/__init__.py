@@ -3,10 +3,15 @@
 from tauscope.robot.actuator import SERVOS, Actuator, Servo
 from tauscope.robot.chain import Chain
 from tauscope.robot.check import JointSummary, RobotReport, check_robot
-from tauscope.robot.kinematics import homogeneous, link_placements
+from tauscope.robot.kinematics import (
+    DenavitHartenbergRow,
+    homogeneous,
+    link_placements,
+    modified_segments,
+    standard_segments,
+)
 from tauscope.robot.messages import Finding, Severity
 from tauscope.robot.physical import find_defect, nearest_body, pseudo_inertia
-from tauscope.robot.placement import DenavitHartenbergRow, modified_segments, standard_segments
 from tauscope.robot.recording_layout import (
     PRESETS,
     RecordingLayout,
@@ -14,7 +19,6 @@ from tauscope.robot.recording_layout import (
     find_fault,
     find_separator_fault,
 )
-from tauscope.robot.recording_layout_file import layout_from_dict, read_layout
 from tauscope.robot.robot import (
     STANDARD_PARAMETERS,
     Coupling,
@@ -31,7 +35,7 @@ from tauscope.robot.robot import (
     Segment,
 )
 from tauscope.robot.robot_data import robot_from_dict, robot_from_yaml, robot_to_dict
-from tauscope.robot.robot_file import read_robot
+from tauscope.robot.robot_file import layout_from_dict, read_layout, read_robot
 from tauscope.robot.urdf import read_urdf_chain
 
 __all__ = [

@@ -29,9 +29,9 @@ class Servo:
     torque_per_volt: float | None = None
 
 
-COUNT = 2.0 * np.pi / 4096
-"""One encoder count of all these servos but XL-320 [rad]."""
+COUNT = 2.0 * np.pi / 4096  # one encoder count of all these servos but XL-320 [rad]
 
+# Servos by name.
 SERVOS = {
     "dynamixel-x": Servo(1.0 / COUNT / 128 / 885),  # e-manual: K_P = register / 128; 885 is full duty
     "dynamixel-xl330": Servo(1.0 / COUNT / 256 / 885, torque_per_volt=0.52 / 5.0),  # measured: 0.99 to 1.01 of it
@@ -39,16 +39,11 @@ SERVOS = {
     "dynamixel-xl320": Servo(0.0505, torque_per_volt=0.39 / 7.4),  # likewise
     "feetech-sts3215": Servo(0.166, max_duty=0.97, dead_band=COUNT, torque_per_volt=1.91 / 7.4),  # likewise
 }
-"""Servos by name."""
 
-ASSUMED_SERVO = "dynamixel-xl330"
-"""Servo of register gains without a name."""
-
-ROOM_C = 25.0
-"""Temperature at which torque per volt is stated [°C]."""
-
+ASSUMED_SERVO = "dynamixel-xl330"  # servo of register gains without a name
+ROOM_C = 25.0  # temperature at which torque per volt is stated [°C]
+# Relative standard error of torque per volt from a data sheet: stall torque includes friction and a warm winding.
 DATA_SHEET_STD = 0.2
-"""Relative standard error of torque per volt from a data sheet: stall torque includes friction and a warm winding."""
 
 
 @dataclass(frozen=True)

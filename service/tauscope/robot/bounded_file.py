@@ -34,7 +34,6 @@ def read_bounded(path: Path, limit: int) -> bytes:
 
 
 def _first_bytes(path: Path, count: int) -> bytes:
-    """The first bytes of a file."""
     with path.open("rb") as file:
         return file.read(count)
 

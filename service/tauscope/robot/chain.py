@@ -12,8 +12,7 @@ from tauscope.robot.actuator import Actuator
 from tauscope.robot.messages import Finding, one_line, shown
 from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Repair, Segment
 
-MOST_NAMES = 4
-"""Names that a note lists."""
+MOST_NAMES = 4  # names that a note lists
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,7 @@ from tauscope.robot.messages import Finding, Severity
 from tauscope.robot.robot import Joint, JointLimits, JointType, Robot, Segment
 from tauscope.robot.robot_file import read_robot
 
-EARTH = (9.7, 9.9)
-"""Acceleration of gravity on the ground, with room for altitude and latitude [m/s²]."""
+EARTH = (9.7, 9.9)  # acceleration of gravity on the ground, with room for altitude and latitude [m/s²]
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,6 @@ def check_robot(path: Path | str) -> RobotReport:
 
 
 def _summary(number: int, joint: Joint, segment: Segment, mass: float | None) -> JointSummary:
-    """The row of one joint."""
     before, after = segment.before, segment.after
     return JointSummary(
         number=number,
@@ -124,6 +122,5 @@ def _remarks(robot: Robot, source: str) -> Iterator[Finding]:
 
 
 def _triple(vector: np.ndarray) -> tuple[float, float, float]:
-    """Three numbers as a tuple."""
     x, y, z = (float(value) for value in vector)
     return (x, y, z)

@@ -1,9 +1,13 @@
-"""The robot file as CONTRACT.md defines it, one class a mapping; what the fields mean stands there."""
+"""The robot file as CONTRACT.md defines it, one class a mapping, and where each entry came from, for its errors."""
 
-from typing import Annotated, Self, get_args
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Self, TypeVar, get_args
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
+from pydantic_core import ErrorDetails
 
+from tauscope.errors import RobotFileError
 from tauscope.robot.actuator import SERVOS, ActuatorKind, GainUnit
 from tauscope.robot.document_fields import (
     Document,
@@ -24,9 +28,88 @@ from tauscope.robot.document_fields import (
     choice,
     refusal,
 )
-from tauscope.robot.messages import shown
+from tauscope.robot.messages import one_line, shown
 from tauscope.robot.recording_layout import RecordingLayout, Source, find_column_fault, find_fault, find_separator_fault
 from tauscope.robot.robot import JointType
+from tauscope.robot.yaml_text import Place
+
+DocumentType = TypeVar("DocumentType", bound=Document)
+
+# Our words for pydantic's kinds of error.
+WORDING: Mapping[str, Callable[[ErrorDetails], str]] = {
+    "refused": lambda e: e.get("ctx", {})["text"],
+    "missing": lambda e: f"the key {shown(e['loc'][-1])} is missing; add it",
+    "model_type": lambda e: f"must be a mapping, but is {shown(e['input'])}",
+    "list_type": lambda e: f"must be a list, but is {shown(e['input'])}",
+    "too_short": lambda e: "must not be an empty list; leave the key out instead",
+    "too_long": lambda e: f"holds more than {e.get('ctx', {})['max_length']} entries",
+}
+
+
+@dataclass(frozen=True)
+class DocumentOrigin:
+    """The label of a document (its path), its data as read, and the line of every entry where it has lines."""
+
+    label: str
+    data: Any
+    lines: Mapping[Place, int] = field(default_factory=dict)
+
+    def where(self, place: Place) -> str:
+        """Where an entry stands, as ``arm.yaml:12: joints[2].limits.position (joint 3, 'wrist')``."""
+        line = self._line(place)
+        path = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in place).lstrip(".")
+        parts = [self.label if line is None else f"{self.label}:{line}"]
+        if path:
+            parts.append(path + self._joint(place))
+        return ": ".join(parts)
+
+    def error(self, place: Place, text: str) -> RobotFileError:
+        """The error of an entry."""
+        return RobotFileError(one_line(f"{self.where(place)}: {text}"))
+
+    def validated(self, kind: type[DocumentType]) -> DocumentType:
+        """The data as a validated document. Raises RobotFileError naming the first entry that is not valid."""
+        if not isinstance(self.data, Mapping):
+            raise self.error((), f"must be a mapping with name and kinematics, but is {shown(self.data)}")
+        try:
+            return kind.model_validate(self.data)
+        except ValidationError as error:
+            details = error.errors(include_url=False)
+        place, text = self._word(details[0])
+        more = f" (the first of {len(details)} errors)" if len(details) > 1 else ""
+        raise self.error(place, text + more)
+
+    def _word(self, detail: ErrorDetails) -> tuple[Place, str]:
+        place: Place = tuple(detail["loc"])
+        key = detail.get("ctx", {}).get("key")
+        if key is not None:
+            place = (*place, key)
+        word = WORDING.get(detail["type"])
+        return place, word(detail) if word else detail["msg"]
+
+    def _line(self, place: Place) -> int | None:
+        """Line of an entry, or of the nearest mapping that should hold it."""
+        for length in range(len(place), -1, -1):
+            if place[:length] in self.lines:
+                return self.lines[place[:length]]
+        return None
+
+    def _joint(self, place: Place) -> str:
+        """The joint or link that an entry is about, numbered from 1, with its name where the document gives one."""
+        for index, step in enumerate(place):
+            if isinstance(step, int) and place[index - 1] in ("joints", "dh", "mdh", "friction", "segments", "links"):
+                number, noun = step + 1, "link" if place[index - 1] == "links" else "joint"
+                name = self._joint_name(step)
+                return f" ({noun} {number})" if name is None else f" ({noun} {number}, {shown(name)})"
+        return ""
+
+    def _joint_name(self, index: int) -> str | None:
+        joints = self.data.get("joints") if isinstance(self.data, Mapping) else None
+        if not isinstance(joints, list) or index >= len(joints) or not isinstance(joints[index], Mapping):
+            return None
+        name = joints[index].get("name")
+        return name if isinstance(name, str) else None
+
 
 MOST_JOINTS = 100
 
@@ -82,7 +165,6 @@ class KinematicsDocument(Document):
 
     @model_validator(mode="after")
     def _check_one(self) -> Self:
-        """Exactly one description."""
         known = type(self).model_fields
         given = [name for name in known if getattr(self, name) is not None]
         if len(given) != 1:
@@ -150,7 +232,6 @@ class ActuatorDocument(Document):
 
     @model_validator(mode="after")
     def _check_loop(self) -> Self:
-        """A loop has a gain."""
         if self.kind != "torque" and self.kp is None:
             raise refusal(f"a {self.kind} loop needs kp, in the unit of `unit`: register or Nm_per_rad")
         if self.servo is not None and self.unit == "Nm_per_rad":
@@ -237,7 +318,6 @@ class RecordingDocument(Document):
 
     @model_validator(mode="after")
     def _check_layout(self) -> Self:
-        """Columns, units and separators that are known."""
         columns = find_column_fault(self.columns)
         if columns is not None:
             raise refusal(columns, "columns")
@@ -272,7 +352,6 @@ class RobotDocument(Document):
 
     @model_validator(mode="after")
     def _check_names(self) -> Self:
-        """A joint name may stand once."""
         names = [joint.name for joint in self.joints or ()]
         for index, name in enumerate(names):
             if name in names[:index]:
@@ -282,7 +361,6 @@ class RobotDocument(Document):
 
     @model_validator(mode="after")
     def _check_locked(self) -> Self:
-        """Rows of dh or mdh hold moving joints only."""
         if self.locked and self.kinematics.urdf is None and self.kinematics.mjcf is None:
             raise refusal("needs kinematics from a URDF or MJCF; put the fixed joint into the rows instead", "locked")
         return self

@@ -38,7 +38,6 @@ class Document(StrictModel):
 
 
 def _number(value: Any) -> float:
-    """A finite number of a size that SI quantities of an arm have."""
     if isinstance(value, str):
         raise refusal(f"{shown(value)} is text; write a number without quotes and without a unit")
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -51,21 +50,18 @@ def _number(value: Any) -> float:
 
 
 def _positive(value: float) -> float:
-    """A number above zero."""
     if value <= 0.0:
         raise refusal(f"must be above zero, but is {value:g}; leave it out where it is not known")
     return value
 
 
 def _not_negative(value: float) -> float:
-    """A number of zero or more."""
     if value < 0.0:
         raise refusal(f"must not be below zero, but is {value:g}; write its size")
     return value
 
 
 def _nonzero(value: float) -> float:
-    """A number other than zero."""
     if value == 0.0:
         raise refusal("must not be zero; leave it out where it is not known")
     return value
@@ -83,7 +79,6 @@ def _name(value: Any) -> str:
 
 
 def _share(value: float) -> float:
-    """A number above 0, up to 1."""
     if not 0.0 < value <= 1.0:
         raise refusal(f"must be a share above 0 and up to 1, but is {value:g}")
     return value
@@ -102,7 +97,6 @@ def choice(key: str, known: Iterable[str]) -> BeforeValidator:
 
 
 def _text(value: Any) -> str:
-    """Text that may be blank."""
     if not isinstance(value, str) or not value:
         raise refusal(f"must be text, but is {shown(value)}; put it in quotes")
     return value
@@ -121,21 +115,18 @@ def check_source(value: Any) -> Any:
 
 
 def _sign(value: Any) -> int:
-    """1 or -1."""
     if isinstance(value, bool) or not isinstance(value, int) or value not in (1, -1):
         raise refusal(f"must be 1 or -1, but is {shown(value)}")
     return int(value)
 
 
 def _motion(value: Any) -> JointType:
-    """How a joint moves."""
     if not isinstance(value, str) or value not in set(JointType):
         raise refusal(f"{shown(value)} is not a joint type; write revolute or prismatic")
     return JointType(value)
 
 
 def _range(value: list[float]) -> list[float]:
-    """A lower and an upper bound, in this order."""
     if len(value) != 2:
         raise refusal(f"must be two numbers [lower, upper], but holds {len(value)}")
     lower, upper = value
@@ -147,14 +138,12 @@ def _range(value: list[float]) -> list[float]:
 
 
 def _vector(value: list[float]) -> list[float]:
-    """Three numbers."""
     if len(value) != 3:
         raise refusal(f"must be three numbers [x, y, z], but holds {len(value)}")
     return value
 
 
 def _rotation(value: list[list[float]]) -> list[list[float]]:
-    """A right-handed orthonormal matrix, row by row."""
     if [len(row) for row in value] != [3, 3, 3]:
         raise refusal("must be three rows of three numbers")
     gram = [[sum(a * b for a, b in zip(p, q, strict=True)) for q in value] for p in value]
@@ -167,7 +156,6 @@ def _rotation(value: list[list[float]]) -> list[list[float]]:
 
 
 def _plain(value: Any, depth: int = 0) -> Any:
-    """Data that JSON can hold, in plain containers."""
     if depth > DEEPEST_DRIVE:
         raise refusal(f"is nested deeper than {DEEPEST_DRIVE} levels")
     if isinstance(value, float) and not math.isfinite(value):
@@ -182,7 +170,6 @@ def _plain(value: Any, depth: int = 0) -> Any:
 
 
 def _plain_mapping(value: Any) -> dict[str, Any]:
-    """A mapping of plain data."""
     if not isinstance(value, Mapping):
         raise refusal(f"must be a mapping, but is {shown(value)}")
     return _plain(value)

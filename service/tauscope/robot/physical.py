@@ -14,12 +14,11 @@ from tauscope.robot.robot import LinkInertia
 
 Array = NDArray[np.float64]
 
+# Violation, relative to the moments of inertia, that rounding to four digits can cause: repaired without a word.
 ROUNDING = 1e-3
-"""Violation, relative to the moments of inertia, that rounding to four digits can cause: repaired without a word."""
-ROUND_OFF = 1e-9
-"""Violation that is float64 arithmetic on numbers of full length: left as it is."""
+ROUND_OFF = 1e-9  # violation that is float64 arithmetic on numbers of full length: left as it is
+# Below this float64 loses digits, and so does any comparison of moments [kg m²].
 SMALLEST = float(np.finfo(np.float64).tiny)
-"""Below this float64 loses digits, and so does any comparison of moments [kg m²]."""
 
 
 def pseudo_inertia(link: LinkInertia) -> Array:
@@ -138,5 +137,4 @@ def _principal_moments(inertia: Array) -> Array:
 
 
 def _list(vector: Array) -> str:
-    """A vector as text."""
     return "[" + ", ".join(f"{value:g}" for value in vector) + "]"

@@ -4,23 +4,21 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+# Units that a column may be in, SI first; ``index`` counts samples, ``drive`` is any unit of a drive.
 UNITS: Mapping[str, tuple[str, ...]] = {
     "t": ("s", "ms", "us", "ns", "index"),
     "q": ("rad", "deg", "m", "mm"),
     "qd": ("rad", "deg", "rpm", "m", "mm"),
     "tau": ("Nm", "N", "A", "mA", "drive"),
 }
-"""Units that a column may be in, SI first; ``index`` counts samples, ``drive`` is any unit of a drive."""
 
-PRESETS = ("rtde", "libfranka", "plotjuggler", "lerobot", "mujoco", "isaac")
-"""Names of the layouts that are known."""
-
+PRESETS = ("rtde", "libfranka", "plotjuggler", "lerobot", "mujoco", "isaac")  # names of the layouts that are known
 DECIMALS = (".", ",")
+# Delimiters, as signs and by name; a blank stands for any number of blanks and tabs.
 DELIMITERS: Mapping[str, str] = {
     **{sign: sign for sign in (",", ";", "\t", " ", "|")},
     **{"comma": ",", "semicolon": ";", "tab": "\t", "\\t": "\t", "blank": " "},
 }
-"""Delimiters, as signs and by name; a blank stands for any number of blanks and tabs."""
 
 Source = str | int | Sequence[str | int]
 """A column by name or by number from 1, one of them a joint, or a name with ``{0}``, ``{1}`` or ``{name}`` in it.

@@ -14,8 +14,8 @@ from tauscope.robot.actuator import Actuator
 from tauscope.robot.messages import Finding
 from tauscope.robot.recording_layout import RecordingLayout
 
+# Names of a link's ten standard parameters, in the order of the seed paper's equation (3).
 STANDARD_PARAMETERS = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "m", "msx", "msy", "msz")
-"""Names of a link's ten standard parameters, in the order of the seed paper's equation (3)."""
 
 
 class JointType(StrEnum):

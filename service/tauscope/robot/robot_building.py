@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Protocol, cast
+from typing import cast
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from tauscope.robot.actuator import Actuator
 from tauscope.robot.chain import Chain
 from tauscope.robot.document import (
     ActuatorDocument,
+    DocumentOrigin,
     JointDocument,
     LinkDocument,
     ModelDocument,
@@ -23,10 +24,9 @@ from tauscope.robot.document import (
     Rows,
     SegmentDocument,
 )
-from tauscope.robot.document_origin import DocumentOrigin
+from tauscope.robot.kinematics import DenavitHartenbergRow, modified_segments, standard_segments
 from tauscope.robot.messages import Finding, Severity, shown
 from tauscope.robot.physical import nearest_body, repair_text
-from tauscope.robot.placement import DenavitHartenbergRow, modified_segments, standard_segments
 from tauscope.robot.recording_layout import RecordingLayout
 from tauscope.robot.robot import (
     Coupling,
@@ -48,23 +48,8 @@ from tauscope.robot.urdf import read_urdf_chain
 ENTRY_POINT_GROUP = "tauscope.mjcf"
 
 
-class MjcfReader(Protocol):
-    """Compiles an MJCF and reads the chain between two of its bodies."""
-
-    def __call__(
-        self,
-        data: bytes,
-        label: str,
-        path: Path | None,
-        base: str | None,
-        tip: str | None,
-        locked: Mapping[str, float],
-    ) -> Chain:
-        """The chain from body `base` to body `tip`.
-
-        Raises RobotFileError if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip.
-        """
-        ...
+# Compiles an MJCF and reads the chain between two of its bodies, as `read_mjcf_chain` does.
+MjcfReader = Callable[[bytes, str, Path | None, str | None, str | None, Mapping[str, float]], Chain]
 
 
 def read_mjcf_chain(
@@ -90,9 +75,7 @@ def read_mjcf_chain(
     raise RobotFileError(f"{label}: no reader of MJCF is registered; install tauscope again")
 
 
-EARTH = np.array([0.0, 0.0, -9.81])
-"""Gravity in the base frame where nothing is stated [m/s²]."""
-
+EARTH = np.array([0.0, 0.0, -9.81])  # gravity in the base frame where nothing is stated [m/s²]
 REPAIR_REMEDY = "correct the link (inertia is about the link frame's origin, not about the centre of mass)"
 
 
@@ -105,8 +88,8 @@ class SourceFile:
     path: Path | None = None
 
 
+# Looks up a file by the kind of kinematics and the name that a document gives.
 FileSource = Callable[[str, str], SourceFile]
-"""Looks up a file by the kind of kinematics and the name that a document gives."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +147,6 @@ def _gravity(document: RobotDocument, chain: Chain | None) -> np.ndarray:
 
 
 def _kinematics(document: RobotDocument, origin: DocumentOrigin, file_source: FileSource) -> _Kinematics:
-    """Segments of whichever description the document holds."""
     kinematics = document.kinematics
     if kinematics.dh is not None:
         return _Kinematics(standard_segments(_rows(kinematics.dh)), "dh")
@@ -184,19 +166,16 @@ def _kinematics(document: RobotDocument, origin: DocumentOrigin, file_source: Fi
 
 
 def _segment(document: SegmentDocument) -> Segment:
-    """A segment of plain data."""
     coupling = document.coupling
     follows = None if coupling is None else Coupling(coupling.joint, coupling.multiplier, coupling.offset)
     return Segment(document.type, _placement(document.before), _placement(document.after), follows)
 
 
 def _rows(rows: Rows) -> list[DenavitHartenbergRow]:
-    """Rows of the document as rows of the convention."""
     return [DenavitHartenbergRow(r.theta, r.d, r.a, r.alpha, r.type) for r in rows]
 
 
 def _placement(document: PlacementDocument) -> Placement:
-    """A placement as arrays."""
     return Placement(np.array(document.rotation), np.array(document.translation))
 
 
@@ -245,7 +224,6 @@ def _joint(document: JointDocument, kind: JointType, own: JointLimits, actuator:
 
 
 def _actuator(document: ActuatorDocument) -> Actuator:
-    """The drive of a joint."""
     values = document.model_dump()
     values["kp"] = document.kp or 0.0
     values["unit"] = document.unit or ("Nm_per_rad" if document.servo is None else "register")
@@ -276,7 +254,6 @@ def _model(
 def _links(
     documents: list[LinkDocument], origin: DocumentOrigin, findings: list[Finding]
 ) -> tuple[tuple[LinkInertia, ...], tuple[Repair, ...]]:
-    """Links of the model block as bodies, and which of them were none."""
     links, repairs = [], []
     for index, document in enumerate(documents):
         stated, place = _link(document), origin.where(("model", "links", index))
@@ -289,14 +266,13 @@ def _links(
 
 
 def _link(document: LinkDocument) -> LinkInertia:
-    """A link of the model block."""
     i = document.inertia
-    inertia = np.array([[i.xx, i.xy, i.xz], [i.xy, i.yy, i.yz], [i.xz, i.yz, i.zz]])
-    return LinkInertia(document.mass, np.array(document.first_moment), inertia)
+    return LinkInertia.from_vector(
+        np.array([i.xx, i.yy, i.zz, i.xy, i.xz, i.yz, document.mass, *document.first_moment])
+    )
 
 
 def _check_count(origin: DocumentOrigin, place: tuple[str, ...], found: int, count: int, key: str) -> None:
-    """One entry a joint."""
     if found != count:
         text = f"number of entries is {found}, of joints in kinematics.{key} {count}; write one entry a joint"
         raise origin.error(place, text)

@@ -7,8 +7,7 @@ from typing import Any
 
 from tauscope.errors import RobotFileError
 from tauscope.robot.actuator import Actuator
-from tauscope.robot.document import PlainRobotDocument
-from tauscope.robot.document_origin import DocumentOrigin
+from tauscope.robot.document import DocumentOrigin, PlainRobotDocument
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot import Joint, LinkInertia, Model, Placement, Robot, Segment
 from tauscope.robot.robot_building import FileSource, SourceFile, build_robot
@@ -56,7 +55,6 @@ def robot_to_dict(robot: Robot) -> dict[str, Any]:
 
 
 def _find_given(origin: DocumentOrigin, files: Mapping[str, bytes]) -> FileSource:
-    """Looks a file up among the given ones."""
 
     def look_up(kind: str, file: str) -> SourceFile:
         if file not in files:
@@ -73,19 +71,16 @@ def _find_given(origin: DocumentOrigin, files: Mapping[str, bytes]) -> FileSourc
 
 
 def _segment(segment: Segment) -> dict[str, Any]:
-    """A segment as a mapping."""
     coupling = None if segment.coupling is None else asdict(segment.coupling)
     placements = {"before": _placement(segment.before), "after": _placement(segment.after)}
     return _drop_none({"type": segment.type.value, **placements, "coupling": coupling})
 
 
 def _placement(placement: Placement) -> dict[str, Any]:
-    """A placement as lists."""
     return {"rotation": placement.rotation.tolist(), "translation": placement.translation.tolist()}
 
 
 def _joint(joint: Joint) -> dict[str, Any]:
-    """A joint as a mapping, without what is not stated."""
     limits = {
         "position": None if joint.limits.position is None else list(joint.limits.position),
         "velocity": joint.limits.velocity,
@@ -109,12 +104,10 @@ def _joint(joint: Joint) -> dict[str, Any]:
 
 
 def _actuator(actuator: Actuator) -> dict[str, Any]:
-    """An actuator as a mapping."""
     return _drop_none(asdict(actuator) | ({} if actuator.has_loop else {"kp": None}))
 
 
 def _model(model: Model) -> dict[str, Any]:
-    """The model block as mappings."""
     links = None if model.links is None else [_link(link) for link in model.links]
     friction = None
     if model.friction is not None:
@@ -124,12 +117,10 @@ def _model(model: Model) -> dict[str, Any]:
 
 
 def _link(link: LinkInertia) -> dict[str, Any]:
-    """A link's inertial parameters as a mapping."""
     xx, yy, zz, xy, xz, yz = (float(value) for value in link.to_vector()[:6])
     inertia = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "xz": xz, "yz": yz}
     return {"mass": float(link.mass), "first_moment": link.first_moment.tolist(), "inertia": inertia}
 
 
 def _drop_none(mapping: Mapping[str, Any]) -> dict[str, Any]:
-    """The entries that are not None."""
     return {key: value for key, value in mapping.items() if value is not None}

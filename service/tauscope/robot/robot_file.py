@@ -1,25 +1,25 @@
-"""The robot file, read: YAML and perhaps the URDF or MJCF that it names, or such a file by itself, to a Robot."""
+"""Read a robot file, or a file with the layout of recordings."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from tauscope.errors import RobotFileError
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
-from tauscope.robot.document import RobotDocument
+from tauscope.robot.document import DocumentOrigin, RecordingDocument, RobotDocument
 from tauscope.robot.document_fields import LONGEST_NAME
-from tauscope.robot.document_origin import DocumentOrigin
 from tauscope.robot.messages import one_line
+from tauscope.robot.recording_layout import PRESETS, RecordingLayout
 from tauscope.robot.robot import Robot
 from tauscope.robot.robot_building import SourceFile, build_robot
 from tauscope.robot.urdf_element import local_name
 from tauscope.robot.xml_text import LARGEST_XML, is_xml, parse_xml
-from tauscope.robot.yaml_text import read_yaml
+from tauscope.robot.yaml_text import Place, read_yaml
 
 LARGEST_ROBOT_FILE = 1024 * 1024
 
-KINEMATICS_OF_ROOT = {"robot": "urdf", "mujoco": "mjcf"}
-"""Kinds of kinematics by the root element of a file."""
+KINEMATICS_OF_ROOT = {"robot": "urdf", "mujoco": "mjcf"}  # kinds of kinematics by the root element of a file
 
 
 def read_robot(path: Path | str) -> Robot:
@@ -73,3 +73,45 @@ def describe_bare_file(data: bytes, label: str) -> dict[str, Any]:
     stated = root.get("name") or root.get("model") or ""
     is_name = bool(stated.strip()) and stated.isprintable() and len(stated) <= LONGEST_NAME
     return {"name": stated if is_name else Path(label).stem, "kinematics": {kind: {"file": file}}}
+
+
+LARGEST_LAYOUT_FILE = 64 * 1024
+INLINE = "{"  # first sign of a mapping that stands in place of a file's name
+
+
+def read_layout(text: str) -> RecordingLayout:
+    """The layout that a preset, a file or a mapping in YAML's flow style names.
+
+    A file holds the block, with or without the key ``recording``, or the columns alone. Raises RobotFileError where it
+    is neither a preset nor a file, or not valid.
+    """
+    if text in PRESETS:
+        return RecordingLayout(columns=text)
+    if text.startswith(INLINE):
+        return parse_layout(text, "columns")
+    path = Path(text)
+    if not path.exists():
+        presets = ", ".join(PRESETS)
+        raise RobotFileError(one_line(f"{text}: neither a preset ({presets}) nor a file; check the name"))
+    return parse_layout(decode_utf8(read_bounded(path, LARGEST_LAYOUT_FILE), text), text)
+
+
+def parse_layout(text: str, label: str) -> RecordingLayout:
+    """The layout of YAML text. Raises RobotFileError where it is not valid; the message names line and key."""
+    content = read_yaml(text, label)
+    return layout_from_dict(content.data, label, content.lines)
+
+
+def layout_from_dict(data: Any, label: str = "columns", lines: Mapping[Place, int] | None = None) -> RecordingLayout:
+    """The layout of plain data: the block ``recording``, that block in a mapping, or its columns alone.
+
+    Raises RobotFileError where it is not valid.
+    """
+    lines = lines or {}
+    if not isinstance(data, Mapping):
+        raise RobotFileError(one_line(f"{label}: must be a mapping, as {{t: time, q: 'position_{{1}}', …}}"))
+    if set(data) == {"recording"}:
+        data, lines = data["recording"], {place[1:]: line for place, line in lines.items() if place}
+    elif not set(data) & set(RecordingDocument.model_fields):
+        data, lines = {"columns": data}, {("columns", *place): line for place, line in lines.items()}
+    return DocumentOrigin(label, data, lines).validated(RecordingDocument).layout

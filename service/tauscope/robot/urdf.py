@@ -1,13 +1,16 @@
-"""The chain between two links of a URDF: segments, limits, lumped inertias, friction.
+"""The chain between two links of a URDF: segments, limits, lumped inertias, friction, and dependent joints.
+
+A joint beside the chain is rigid at the value that ``locked`` states, else at 0, and the bodies that it carries count.
+A mimic joint is at multiplier · master + offset (URDF's own definition), wherever its master is.
 
 Fixed joints are merged. A link's frame stays the frame of the URDF link that its joint carries, so a segment is
 ``origin · R | motion along z | Rᵀ`` where R carries z to the joint's axis. Bodies beside the chain are added to the
-link that they move with, those on moving joints where these joints rest (`tauscope.robot.urdf_branches`). Limits that
+link that they move with, those on moving joints where these joints rest (`tauscope.robot.urdf`). Limits that
 exporters write for "not known" (zero, negative, reversed, or beyond 1e9) count as not stated.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,13 +20,126 @@ from tauscope.result_warning import ResultWarning
 from tauscope.robot.chain import Chain, default_ends_note, rigid_branch_note
 from tauscope.robot.document import MOST_JOINTS
 from tauscope.robot.document_fields import LARGEST_NUMBER
+from tauscope.robot.kinematics import compose, rotation_about_z, rotation_of_z_to
 from tauscope.robot.messages import Finding, Severity, nearest, one_line, shown
-from tauscope.robot.placement import compose, rotation_of_z_to
-from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
-from tauscope.robot.urdf_branches import MOVING, JointMotions, Master, joint_axis
-from tauscope.robot.urdf_element import Element, number, only_child, origin, urdf_error, where
+from tauscope.robot.robot import Coupling, FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
+from tauscope.robot.urdf_element import Element, number, only_child, origin, urdf_error, vector, where
 from tauscope.robot.urdf_inertia import lumped_inertia, stated_mass
 from tauscope.robot.urdf_xml import UrdfJoint, UrdfTree, parse_urdf
+
+MOVING = frozenset({"revolute", "continuous", "prismatic"})
+
+
+@dataclass(frozen=True)
+class Master:
+    """The joint that another one follows in the end, with multiplier and offset."""
+
+    joint: UrdfJoint
+    multiplier: float
+    offset: float
+
+
+class JointMotions:
+    """How the joints of a URDF move, where some of them are locked.
+
+    `locked`: position by the name of a joint [rad or m].
+    """
+
+    def __init__(self, tree: UrdfTree, locked: Mapping[str, float], path: Iterable[UrdfJoint]) -> None:
+        self._tree, self._locked = tree, locked
+        self._joints = {joint.name: joint for joint in tree.parent_joint.values()}
+        for name in locked:
+            if name not in self._joints:
+                hint = nearest(name, self._joints)
+                raise RobotFileError(one_line(f"{tree.label}: locked: joint {shown(name)} is not in the file; {hint}"))
+        free = [joint for joint in path if joint.type in MOVING and joint.name not in locked]
+        masters = {joint.name: self.master(joint) for joint in free}
+        own = {name for name, master in masters.items() if master is None}
+        moving = [joint for joint in free if (masters[joint.name] or Master(joint, 1.0, 0.0)).joint.name in own]
+        self.moving = tuple(joint.name for joint in moving)
+        """Joints of the path that move, base first: their own masters, and those that follow one of them."""
+        names = list(dict.fromkeys((master.joint.name if (master := masters[name]) else name) for name in self.moving))
+        self.independent = tuple(self._joints[name] for name in names)
+        """Joints that the others follow, in the order in which they first move the chain."""
+        self._couplings: dict[str, Coupling | None] = {}
+        met: set[str] = set()
+        for name in self.moving:
+            master = masters[name] or Master(self._joints[name], 1.0, 0.0)
+            is_next = master.joint.name not in met and (master.multiplier, master.offset) == (1.0, 0.0)
+            place = names.index(master.joint.name)
+            self._couplings[name] = None if is_next else Coupling(place, master.multiplier, master.offset)
+            met.add(master.joint.name)
+
+    def coupling(self, joint: UrdfJoint) -> Coupling | None:
+        """The joint that a joint of the chain follows; None where it is the next one itself."""
+        return self._couplings[joint.name]
+
+    def master(self, joint: UrdfJoint) -> Master | None:
+        """The joint that a mimic joint follows; None where it follows none."""
+        multiplier, offset, met = 1.0, 0.0, [joint.name]
+        while (mimic := only_child(self._tree.label, joint.element, "mimic", [])) is not None:
+            name = mimic.get("joint") or ""
+            if name not in self._joints:
+                return None  # `remark_on_masters` warns
+            if name in met:
+                raise urdf_error(self._tree.label, joint.element, "mimics itself; name another joint in <mimic>")
+            met.append(name)
+            offset += multiplier * number(self._tree.label, mimic, "offset", 0.0)
+            multiplier *= number(self._tree.label, mimic, "multiplier", 1.0)
+            joint = self._joints[name]
+            if joint.name in self._locked:
+                break
+        return None if len(met) == 1 else Master(joint, multiplier, offset)
+
+    def remark_on_masters(self, findings: list[Finding]) -> None:
+        """Say which mimic joints follow a joint that is not in the file; as in ROS, they move by themselves."""
+        for joint in self._joints.values():
+            mimic = only_child(self._tree.label, joint.element, "mimic", findings)
+            if mimic is not None and (name := mimic.get("joint") or "") not in self._joints:
+                text = f"mimics joint {shown(name)}, which is not in the file, and counts as free; "
+                place = one_line(where(self._tree.label, joint.element))
+                findings.append(Finding(Severity.WARNING, place, text + nearest(name, self._joints)))
+
+    def rigid_position(self, joint: UrdfJoint) -> float:
+        """Position of a joint that does not move with the chain [rad or m]."""
+        if joint.name in self._locked:
+            return self._locked[joint.name]
+        master = self.master(joint)
+        return 0.0 if master is None else master.multiplier * self._locked.get(master.joint.name, 0.0) + master.offset
+
+    def is_locked(self, joint: UrdfJoint) -> bool:
+        """Whether the robot file states where a joint stands, or where the one stands that it follows."""
+        master = self.master(joint)
+        return joint.name in self._locked or (master is not None and master.joint.name in self._locked)
+
+    def follows_chain(self, joint: UrdfJoint) -> str | None:
+        """Name of the chain's joint that a joint beside the chain follows."""
+        master = None if joint.name in self._locked else self.master(joint)
+        return master.joint.name if master and master.joint in self.independent and master.multiplier else None
+
+    def rigid_motion(self, joint: UrdfJoint, findings: list[Finding]) -> Placement:
+        """Displacement along or about a joint's axis that does not move with the chain."""
+        position = self.rigid_position(joint) if joint.type in MOVING else 0.0
+        if position == 0.0:
+            return Placement()
+        axis = joint_axis(self._tree, joint, findings)
+        if joint.type == "prismatic":
+            return Placement(np.eye(3), position * axis)
+        align = rotation_of_z_to(axis)
+        return Placement(align @ rotation_about_z(position) @ align.T)
+
+
+def joint_axis(tree: UrdfTree, joint: UrdfJoint, findings: list[Finding]) -> np.ndarray:
+    """Unit vector of a joint's axis, (3,); x where none is given, as URDF defines."""
+    element = only_child(tree.label, joint.element, "axis", findings)
+    axis = vector(tree.label, element, "xyz", (1.0, 0.0, 0.0))
+    length = float(np.linalg.norm(axis))
+    if length < 1e-9:
+        raise urdf_error(tree.label, joint.element, "its axis is zero; give the direction, as xyz='0 0 1'")
+    if abs(length - 1.0) > 1e-3:
+        text = f"its axis has length {length:g}; its direction is used"
+        findings.append(Finding(Severity.INFO, one_line(where(tree.label, joint.element)), text))
+    return axis / length
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +152,7 @@ class _Body:
 
 
 def read_urdf_chain(
-    data: bytes,
-    label: str,
-    base: str | None = None,
-    tip: str | None = None,
-    locked: Mapping[str, float] | None = None,
+    data: bytes, label: str, base: str | None = None, tip: str | None = None, locked: Mapping[str, float] | None = None
 ) -> Chain:
     """The chain from link `base` to link `tip`; by default from the root to the deepest leaf.
 
@@ -137,7 +249,6 @@ def _up(tree: UrdfTree, link: str, base: str | None) -> list[UrdfJoint] | None:
 
 
 def _path(tree: UrdfTree, base: str, tip: str) -> list[UrdfJoint]:
-    """Joints from base to tip, base first."""
     path: list[UrdfJoint] = []
     link = tip
     while link != base:
@@ -155,7 +266,6 @@ def _path(tree: UrdfTree, base: str, tip: str) -> list[UrdfJoint]:
 
 
 def _remark_on_base(tree: UrdfTree, base: str, findings: list[Finding]) -> None:
-    """Say so where the base itself could move."""
     link = base
     while (joint := tree.parent_joint.get(link)) is not None:
         if joint.type != "fixed":
@@ -165,13 +275,11 @@ def _remark_on_base(tree: UrdfTree, base: str, findings: list[Finding]) -> None:
 
 
 def _follower(tree: UrdfTree, joint: UrdfJoint, master: Master) -> Finding:
-    """Which joint another one follows."""
     text = f"follows {shown(master.joint.name)}: {master.multiplier:g} times its position, plus {master.offset:g}"
     return Finding(Severity.INFO, one_line(where(tree.label, joint.element)), text)
 
 
 def _joint_type(joint: UrdfJoint) -> JointType:
-    """How a joint moves."""
     return JointType.PRISMATIC if joint.type == "prismatic" else JointType.REVOLUTE
 
 
@@ -201,7 +309,6 @@ def _bodies(
     branches: list[UrdfJoint],
     findings: list[Finding],
 ) -> list[_Body]:
-    """Bodies that move with a joint's child link; notes moving branches."""
     bodies: list[_Body] = []
     waiting = [(joint.child, Placement(), False)]
     while waiting:
@@ -220,13 +327,11 @@ def _bodies(
 
 
 def _branch(label: str, members: list[_Body]) -> LinkInertia:
-    """Bodies of a link on joints beside the chain."""
     carried = [(body.element, body.placement) for body in members if body.on_branch]
     return lumped_inertia(label, 0, carried, [])[0] or LinkInertia.from_vector(np.zeros(10))
 
 
 def _branch_notes(tree: UrdfTree, branches: list[UrdfJoint], motions: JointMotions) -> list[ResultWarning]:
-    """The note on joints beside the chain, which count as rigid."""
     assumed = [joint for joint in branches if not motions.is_locked(joint)]
     mass = sum(stated_mass(tree, joint.child) for joint in _outermost(tree, assumed))
     if not mass > 0.0:
@@ -236,7 +341,6 @@ def _branch_notes(tree: UrdfTree, branches: list[UrdfJoint], motions: JointMotio
 
 
 def _outermost(tree: UrdfTree, joints: list[UrdfJoint]) -> list[UrdfJoint]:
-    """Joints that hang on none of the others."""
     names = {joint.name for joint in joints}
     return [joint for joint in joints if not any(above.name in names for above in _up(tree, joint.parent, None) or ())]
 
@@ -259,7 +363,6 @@ def _limits(tree: UrdfTree, joint: UrdfJoint, findings: list[Finding]) -> JointL
 
 
 def _largest(tree: UrdfTree, element: Element, key: str) -> float | None:
-    """The size of a velocity or an effort limit, None where it is not stated."""
     value = _limit(tree, element, key)
     return value if 0.0 < value <= LARGEST_NUMBER else None
 

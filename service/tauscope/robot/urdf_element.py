@@ -9,17 +9,15 @@ from numpy.typing import NDArray
 
 from tauscope.errors import RobotFileError
 from tauscope.robot.document_fields import LARGEST_NUMBER
+from tauscope.robot.kinematics import rotation_of_roll_pitch_yaw
 from tauscope.robot.messages import Finding, Severity, one_line, shown
-from tauscope.robot.placement import rotation_of_roll_pitch_yaw
 from tauscope.robot.robot import Placement
 
 NUMBER = re.compile(r"[-+]?([0-9]+(?:\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
+# What to do with a file that xacro has not processed.
 EXPAND = "expand the file first: pip install xacro; xacro FILE > arm.urdf"
-"""What to do with a file that xacro has not processed."""
-
-Element = Any
-"""lxml's `_Element`, which carries no types."""
+Element = Any  # lxml's `_Element`, which carries no types
 
 
 def local_name(element: Element) -> str:
@@ -110,7 +108,6 @@ def _real(label: str, element: Element, key: str, text: str) -> float:
 
 
 def _require_bounded(label: str, element: Element, key: str, value: float) -> float:
-    """A number of a size that SI quantities of an arm have."""
     if abs(value) > LARGEST_NUMBER:
         raise urdf_error(label, element, f"{key}={value:g} is beyond {LARGEST_NUMBER:g}; check the unit (SI)")
     return value

@@ -4,9 +4,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from tauscope.robot.kinematics import compose
 from tauscope.robot.messages import Finding, Severity, one_line, shown
 from tauscope.robot.physical import nearest_body, repair_text
-from tauscope.robot.placement import compose
 from tauscope.robot.robot import LinkInertia, Placement, Repair
 from tauscope.robot.urdf_element import Element, bounded_number, number, only_child, origin, where
 from tauscope.robot.urdf_xml import UrdfTree
@@ -80,7 +80,6 @@ def _read_inertia(label: str, body: Element, element: Element, findings: list[Fi
 
 
 def _remark(place: str, stated: LinkInertia, findings: list[Finding]) -> None:
-    """Add what is doubtful about one body."""
     if stated.mass == 0.0 and np.any(stated.inertia):
         findings.append(Finding(Severity.WARNING, place, "has inertia but no mass, as no body has; add the mass"))
     elif stated.mass > 0.0 and not np.any(stated.inertia):

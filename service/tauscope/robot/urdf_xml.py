@@ -9,8 +9,7 @@ from tauscope.robot.urdf_element import EXPAND, Element, children, local_name, u
 from tauscope.robot.xml_text import parse_xml
 
 JOINT_TYPES = frozenset({"revolute", "continuous", "prismatic", "fixed", "floating", "planar"})
-XACRO_DEFINITIONS = frozenset({"arg", "macro", "property"})
-"""Elements of xacro that stand for no link or joint."""
+XACRO_DEFINITIONS = frozenset({"arg", "macro", "property"})  # elements of xacro that stand for no link or joint
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,6 @@ def _is_xacro(element: Element) -> bool:
 
 
 def _joint(label: str, element: Element, links: Mapping[str, Element]) -> UrdfJoint:
-    """A joint element with checked names."""
     name = _name(label, element)
     kind = element.get("type")
     if kind not in JOINT_TYPES:
@@ -128,7 +126,6 @@ def _refuse_loops(tree: UrdfTree) -> None:
 
 
 def _name(label: str, element: Element) -> str:
-    """The name of a link or joint."""
     name = element.get("name")
     if not name or not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
         raise urdf_error(label, element, f"needs a printable name of at most {LONGEST_NAME} characters")

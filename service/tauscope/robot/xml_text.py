@@ -16,14 +16,13 @@ from tauscope.robot.urdf_element import Element
 LARGEST_XML = 16 * 1024 * 1024
 
 _DECLARATION = re.compile(rb"""^\s*<\?xml[^>]*encoding\s*=\s*["']([A-Za-z0-9._-]{1,40})["']""")
-_DECLARATION_TEXT = re.compile(r"^\s*<\?xml[^>]*\?>")
+# Byte order marks; that of UTF-32 begins with that of UTF-16.
 _MARKS = (
     (codecs.BOM_UTF32_LE, "utf-32"),
     (codecs.BOM_UTF32_BE, "utf-32"),
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-"""Byte order marks; that of UTF-32 begins with that of UTF-16."""
 
 
 def is_xml(data: bytes) -> bool:

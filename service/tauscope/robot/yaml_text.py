@@ -20,8 +20,7 @@ TAG = "tag:yaml.org,2002:"
 TRUE = frozenset({"true", "yes", "on", "y"})
 FALSE = frozenset({"false", "no", "off", "n"})
 
-Place = tuple[str | int, ...]
-"""Keys and indices that lead from the document's root to an entry."""
+Place = tuple[str | int, ...]  # keys and indices that lead from the document's root to an entry
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,6 @@ def read_yaml(text: str, label: str) -> YamlContent:
 
 
 def _compose(text: str, label: str) -> Any:
-    """The node graph of the text."""
     yaml = YAML(typ="safe", pure=True)
     yaml.Composer = _BoundedComposer
     try:
@@ -120,7 +118,6 @@ class _PlainBuilder:
         raise self._error(line, f"the tag {shown(str(node.tag))} is not accepted; write plain data")
 
     def _mapping(self, node: MappingNode, place: Place) -> dict[str, Any]:
-        """Plain dict of a mapping node; a key may stand once."""
         result: dict[str, Any] = {}
         for key_node, value_node in node.value:
             line = key_node.start_mark.line + 1
@@ -136,7 +133,6 @@ class _PlainBuilder:
         return result
 
     def _scalar(self, node: ScalarNode, line: int) -> Any:
-        """Plain data of a scalar node, by the tag that YAML resolved."""
         kind, text = str(node.tag).removeprefix(TAG), str(node.value)
         if kind in {"str", "timestamp", "value"}:
             return text
@@ -154,7 +150,6 @@ class _PlainBuilder:
         raise self._error(line, f"the tag {shown(str(node.tag))} is not accepted; write plain data")
 
     def _error(self, line: int, text: str) -> RobotFileError:
-        """The error that names the line."""
         return RobotFileError(one_line(f"{self.label}:{line}: {text}"))
 
 

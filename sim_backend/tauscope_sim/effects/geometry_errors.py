@@ -8,7 +8,7 @@ from pydantic import Field
 from scipy.spatial.transform import Rotation
 
 from tauscope.robot.document_fields import Number, Vector
-from tauscope.robot.placement import rotation_about_x, rotation_about_y
+from tauscope.robot.kinematics import rotation_about_x, rotation_about_y
 from tauscope.robot.robot import Placement, Robot
 from tauscope_sim.effects.effect import Effect, JointNumber, zero_vector
 

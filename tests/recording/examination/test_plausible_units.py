@@ -92,6 +92,13 @@ def test_a_velocity_of_the_motor_is_no_unit() -> None:
     assert find_implausible(change(samples, velocity=samples.velocity * 101.0)) is None
 
 
+def test_velocities_that_differ_by_joint_or_from_row_to_row_are_no_unit() -> None:
+    samples = swing()
+    assert samples.velocity is not None
+    for factor in ([50.0, 57.0, 80.0], np.random.default_rng(2).uniform(35.0, 80.0, samples.velocity.shape)):
+        assert find_implausible(change(samples, velocity=samples.velocity * factor)) is None
+
+
 def test_degrees_of_a_single_pendulum_show_in_its_torque() -> None:
     samples = swing(joints=1)
     turned = change(samples, position=100 * samples.position, velocity=None, effort=20 * np.sin(100 * samples.position))
@@ -122,6 +129,12 @@ def test_a_slow_friction_sweep_is_not_refused() -> None:
     samples = swing(rate_hz=2000.0)
     slow = change(samples, time=samples.time * 200.0, velocity=None)  # 10 Hz, and 240 s for a sweep
     assert find_implausible(slow) is None
+
+
+def test_recorded_velocity_vouches_for_a_slow_clock() -> None:
+    samples = swing()
+    assert samples.velocity is not None
+    assert find_implausible(change(samples, time=samples.time * 100.0, velocity=samples.velocity / 100.0)) is None
 
 
 def test_encoder_counts_are_no_angles() -> None:

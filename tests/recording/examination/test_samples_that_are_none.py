@@ -187,6 +187,25 @@ def test_steps_of_torque_are_no_held_samples() -> None:
     assert read_text(channels.csv()).warnings == ()
 
 
+def test_a_held_spike_is_a_spike_and_a_long_hold_is_not_stuck() -> None:
+    channels = Channels.of(BASE)
+    channels.effort = channels.effort[np.arange(len(channels.time)) // 16 * 16]
+    assert {warning.code for warning in read_text(channels.csv()).warnings} == {"held-samples"}
+    channels = Channels.of(BASE)
+    spike_efforts(channels, np.random.default_rng(0))
+    hold_efforts(channels, np.random.default_rng(0))
+    assert {warning.code for warning in read_text(channels.csv()).warnings} == {"spikes", "held-samples"}
+
+
+def test_one_joint_by_itself_may_drop_out() -> None:
+    channels = Channels.of(BASE)
+    row = int(np.argmax(np.abs(channels.effort[20:-20, 1]))) + 20
+    channels.effort[row : row + 5, 1] = 0.0
+    recording = read_text(channels.csv())
+    assert [warning.code for warning in recording.warnings] == ["effort-dropouts"]
+    assert np.flatnonzero(np.isnan(recording.samples().effort[:, 1])).tolist() == list(range(row, row + 5))
+
+
 def test_a_held_position_is_masked_and_a_rest_is_not() -> None:
     channels, rng = Channels.of(BASE), np.random.default_rng(0)
     channels.position = np.rint(channels.position / 1e-3) * 1e-3

@@ -1,13 +1,16 @@
 """Friction compensation: each joint's coefficients, ready for a controller, in joint torque and in drive units."""
 
-from tauscope.export.compensation.document import to_document, to_json, to_yaml
-from tauscope.export.compensation.drive_units import DriveUnits, drive_units
 from tauscope.export.compensation.model import (
     CompensationModel,
+    DriveUnits,
     JointCompensation,
     JointFriction,
     RecordingSource,
+    drive_units,
     friction_torque,
+    to_document,
+    to_json,
+    to_yaml,
 )
 from tauscope.export.compensation.source_code import to_c_header, to_python
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from tauscope.export.compensation.model import EQUATION, CompensationModel, JointCompensation
 from tauscope.robot import JointType
 
+# Characters that end no comment and no string, and start no trigraph, in C, C++ or Python.
 _PLAIN = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789 ._,:;()+=@#%/-")
-"""Characters that end no comment and no string, and start no trigraph, in C, C++ or Python."""
 
 
 def identifier(name: str) -> str:
@@ -87,13 +87,11 @@ def row(joint: JointCompensation) -> tuple[float, ...]:
 
 
 def _joint_line(number: int, joint: JointCompensation) -> str:
-    """A joint's number, name and units in one line."""
     kind = "prismatic" if joint.type is JointType.PRISMATIC else "revolute"
     return f"Joint {number}: {joint.name} ({kind}). " + " ".join(f"{remark}." for remark in joint.units.remarks)
 
 
-_TWO_OVER_PI = "0.6366197723675814"
-"""The shortest decimal that reads back as 2/π rounded to float64."""
+_TWO_OVER_PI = "0.6366197723675814"  # the shortest decimal that reads back as 2/π rounded to float64
 
 
 def to_c_header(model: CompensationModel) -> str:
@@ -121,7 +119,6 @@ def to_c_header(model: CompensationModel) -> str:
 
 
 def _joint_name_function(name: str, model: CompensationModel) -> str:
-    """The function that names a joint."""
     names = ",\n        ".join(c_string(joint.name) for joint in model.joints)
     return f"""static inline const char *{name}_joint_name(int joint)
 {{
@@ -136,7 +133,6 @@ def _joint_name_function(name: str, model: CompensationModel) -> str:
 
 
 def _c_torque_function(name: str, model: CompensationModel) -> str:
-    """The function that gives the joint torque."""
     rows = ",\n        ".join("{" + ", ".join(map(repr, row(joint))) + "}" for joint in model.joints)
     return f"""/* Torque in Nm (force in N) that compensates the friction of a joint moving at the given velocity. */
 static inline double {name}_friction_torque(int joint, double velocity)
@@ -157,7 +153,6 @@ static inline double {name}_friction_torque(int joint, double velocity)
 
 
 def _c_unit_function(name: str, function: UnitFunction) -> str:
-    """A function that gives the friction in a drive unit."""
     values = ", ".join(map(repr, function.torque_per_unit))
     return f"""/* The same as {function.meaning}. */
 static inline double {name}_{function.suffix}(int joint, double velocity)
@@ -191,14 +186,12 @@ def to_python(model: CompensationModel) -> str:
 
 
 def _table(model: CompensationModel) -> str:
-    """Names and coefficients of the joints."""
     names = "".join(f"    {joint.name!a},\n" for joint in model.joints)
     rows = "".join(f"    {row(joint)!r},\n" for joint in model.joints)
     return f"JOINT_NAMES = (\n{names})\n\n# {', '.join(COEFFICIENTS)}\nCOEFFICIENTS = (\n{rows})"
 
 
 def _python_torque_function(name: str) -> str:
-    """The function that gives the joint torque."""
     return f'''
 def {name}_friction_torque(joint, velocity):
     """Torque in Nm (force in N) that compensates the friction of a joint moving at the given velocity."""
@@ -211,7 +204,6 @@ def {name}_friction_torque(joint, velocity):
 
 
 def _python_unit_function(name: str, function: UnitFunction) -> str:
-    """A function that gives the friction in a drive unit."""
     return f'''
 def {name}_{function.suffix}(joint, velocity):
     """The same as {function.meaning}."""

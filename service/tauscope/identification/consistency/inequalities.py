@@ -11,19 +11,13 @@ from tauscope.robot import STANDARD_PARAMETERS
 Array = NDArray[np.float64]
 
 
+# Share of the stiction that Coulomb friction is at least: dry friction falls by half with speed, hardly by more.
 LEAST_COULOMB = 1 / 3
-"""Share of the stiction that Coulomb friction is at least: dry friction falls by half with speed, hardly by more."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinearInequalities:
-    """Rows of G x ≤ h.
-
-    matrix : (k, p) float64
-        G
-    bound : (k,) float64
-        h
-    """
+    """Rows of G x ≤ h. `matrix`: (k, p), G; `bound`: (k,), h."""
 
     matrix: Array
     bound: Array
@@ -32,9 +26,7 @@ class LinearInequalities:
     def __add__(self, other: "LinearInequalities") -> "LinearInequalities":
         """Both sets of rows together."""
         return LinearInequalities(
-            np.vstack([self.matrix, other.matrix]),
-            np.concatenate([self.bound, other.bound]),
-            self.names + other.names,
+            np.vstack([self.matrix, other.matrix]), np.concatenate([self.bound, other.bound]), self.names + other.names
         )
 
     @staticmethod
@@ -79,13 +71,7 @@ def friction_inequalities(columns: FrictionColumns, size: int, joints: Sequence[
 
 
 def mass_inequalities(least: Array, size: int) -> LinearInequalities:
-    """No link weighs less than this.
-
-    Parameters
-    ----------
-    least : (n,) float64
-        smallest mass of every link [kg]
-    """
+    """No link weighs less than this. `least`: (n,), smallest mass of every link [kg]."""
     matrix = np.zeros((len(least), size))
     matrix[np.arange(len(least)), 10 * np.arange(len(least)) + STANDARD_PARAMETERS.index("m")] = -1.0
     names = tuple(f"mass of link {link + 1} ≥ {mass:.3g} kg" for link, mass in enumerate(least))

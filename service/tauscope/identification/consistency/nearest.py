@@ -21,23 +21,17 @@ from tauscope.robot import LinkInertia
 
 Array = NDArray[np.float64]
 
-MARGIN = 1e-8
-"""ε: smallest eigenvalue of a scaled pseudo-inertia. A link of 0.3 m keeps 0.03 mm of thickness."""
-
-_ACTIVE = 100.0
-"""A constraint counts as active where less than this many margins are left."""
+MARGIN = 1e-8  # ε: smallest eigenvalue of a scaled pseudo-inertia. A link of 0.3 m keeps 0.03 mm of thickness.
+_ACTIVE = 100.0  # a constraint counts as active where less than this many margins are left
 
 
 @dataclass(frozen=True, eq=False)
 class ConsistentParameters:
     """A full parameter set of a robot that can exist.
 
-    parameters : (p,) float64
-        x: standard parameters of all links, then friction coefficients
-    squared_residual : float
-        ‖R x - z‖² [noise variances]
-    free_squared_residual : float
-        the least that any x, consistent or not, reaches [noise variances]
+    `parameters`: (p,), x: standard parameters of all links, then friction coefficients.
+    `squared_residual`: ‖R x - z‖² [noise variances].
+    `free_squared_residual`: the least that any x, consistent or not, reaches [noise variances].
     """
 
     links: tuple[LinkInertia, ...]
@@ -77,13 +71,9 @@ def nearest_consistent_parameters(
     finite, where the inequalities contradict each other or leave no link that can exist, or where the solver does not
     reach the accuracy that is asked for.
 
-    Parameters
-    ----------
-    factor : (r, p) float64
-        R, any factor of the weighted normal matrix RᵀR, whitened: a unit of R x is one standard deviation of the noise.
-        Columns: ten standard parameters for each link, then friction coefficients. Rank may be deficient.
-    target : (r,) float64
-        z
+    `factor`: (r, p), R, any factor of the weighted normal matrix RᵀR, whitened: a unit of R x is one standard deviation
+    of the noise. Columns: ten standard parameters for each link, then friction coefficients. Rank may be deficient.
+    `target`: (r,), z.
     """
     inequalities = inequalities or LinearInequalities.none(prior.mean.size)
     _check_input(factor, target, prior, inequalities)
@@ -109,7 +99,6 @@ def nearest_consistent_parameters(
 
 
 def _check_input(factor: Array, target: Array, prior: Prior, inequalities: LinearInequalities) -> None:
-    """Refuse shapes that do not fit and numbers that are not finite."""
     size = prior.mean.size
     if factor.shape != (target.size, size) or inequalities.matrix.shape[1] != size:
         raise IdentificationError(

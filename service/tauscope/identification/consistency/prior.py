@@ -13,38 +13,28 @@ from tauscope.robot import JointType, LinkInertia, Robot
 
 Array = NDArray[np.float64]
 
+# Radius of gyration of a default link over its length: between a slender rod (0.29) and a compact housing.
 _GYRATION = 0.25
-"""Radius of gyration of a default link over its length: between a slender rod (0.29) and a compact housing."""
-
+# Radius of gyration, over the link's length, of the body that deviations are measured by, at least: a link's mass may
+# lie anywhere along it and as far beside it.
 _REACH = 1.0
-"""Radius of gyration, over the link's length, of the body that deviations are measured by, at least: a link's mass may
-lie anywhere along it and as far beside it."""
-
+# Speed that a joint is made for where its file does not say [rad/s or m/s].
 _ORDINARY_SPEED = {JointType.REVOLUTE: 1.0, JointType.PRISMATIC: 0.3}
-"""Speed that a joint is made for where its file does not say [rad/s or m/s]."""
-
+# Lengths of the whole arm beyond which no mass of it lies: a reflected rotor seems to reach a few, g mm² thousands.
 _FAR = 100.0
-"""Lengths of the whole arm beyond which no mass of it lies: a reflected rotor seems to reach a few, g mm² thousands."""
-
-_LIGHTEST = 0.1
-"""A link is believed to weigh at least this share of the heaviest."""
-
+_LIGHTEST = 0.1  # a link is believed to weigh at least this share of the heaviest
+# Size of a link whose frames coincide in a chain that has no length at all, such as one joint by itself [m].
 _SMALLEST_LENGTH = 0.05
-"""Size of a link whose frames coincide in a chain that has no length at all, such as one joint by itself [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prior:
     """A normal distribution of all parameters: ‖W (x - μ)‖² is χ² of as many degrees of freedom.
 
-    mean : (p,) float64
-        μ: standard parameters of all links, then friction coefficients
-    root : (p, p) float64
-        W
-    scale : (p,) float64
-        expected magnitudes, positive; the conic program is scaled by them
-    masses : (n,) float64
-        mass that each link may be expected to have [kg]
+    `mean`: (p,), μ: standard parameters of all links, then friction coefficients.
+    `root`: (p, p), W.
+    `scale`: (p,), expected magnitudes, positive; the conic program is scaled by them.
+    `masses`: (n,), mass that each link may be expected to have [kg].
     """
 
     mean: Array
@@ -58,24 +48,12 @@ class Prior:
         return len(self.masses)
 
     def widen(self, width: float) -> "Prior":
-        """The same bodies, believed so many times less.
-
-        Parameters
-        ----------
-        width : float
-            factor of the links' standard deviations
-        """
+        """The same bodies, believed so many times less. `width`: factor of the links' standard deviations."""
         links = np.arange(len(self.mean)) < 10 * self.link_count
         return replace(self, root=np.where(links[:, None], self.root / width, self.root))
 
     def squared_distance(self, parameters: Array) -> float:
-        """‖W (x - μ)‖².
-
-        Parameters
-        ----------
-        parameters : (p,) float64
-            x
-        """
+        """‖W (x - μ)‖². `parameters`: (p,), x."""
         return float(np.sum((self.root @ (parameters - self.mean)) ** 2))
 
 
@@ -93,12 +71,7 @@ def plausible_prior(robot: Robot, factor: Array, target: Array, friction: Fricti
     that a motion that cannot tell τ_sc from τ_s (never slow enough) credits τ_s, and what cannot be told from the
     link's own inertia is credited to the link.
 
-    Parameters
-    ----------
-    factor : (r, p) float64
-        R of the whitened least-squares problem ‖R x - z‖²
-    target : (r,) float64
-        z
+    `factor`: (r, p), R of the whitened least-squares problem ‖R x - z‖²; `target`: (r,), z.
     """
     count = robot.link_count
     lengths = link_lengths(robot)
@@ -158,12 +131,7 @@ def _measure_repair(robot: Robot, index: int) -> Array:
 def _deviation(link: LinkInertia, mass: float, length: float) -> Array:
     """W of one link: svec(A⁻¹ J A⁻ᵀ) as a linear map of its parameters, (10, 10).
 
-    Parameters
-    ----------
-    mass : float
-        mass of the body that measures it, at least the link's own [kg]
-    length : float
-        size of the link [m]
+    `mass`: mass of the body that measures it, at least the link's own [kg]; `length`: size of the link [m].
     """
     centre = link.first_moment / link.mass if link.mass > 0.0 else np.zeros(3)
     second_moment = np.zeros((3, 3))
@@ -182,10 +150,7 @@ def link_lengths(robot: Robot) -> Array:
 
     Housings are as large where axes meet.
 
-    Returns
-    -------
-    (n,) float64
-        lengths [m], positive
+    Returns (n,), lengths [m], positive.
     """
     spans = np.array([np.linalg.norm(np.subtract(*_joint_positions(robot, j))) for j in range(robot.link_count)])
     apart = spans[spans > 0.0]

@@ -22,9 +22,7 @@ from tauscope.robot import LinkInertia, pseudo_inertia
 
 Array = NDArray[np.float64]
 
-_TOLERANCE = 1e-10
-"""Feasibility and duality gap asked of the solver."""
-
+_TOLERANCE = 1e-10  # feasibility and duality gap asked of the solver
 _ATTEMPTS = ((1.0, True), (1.0, False), (1e2, True), (1e4, True), (1e6, True), (1e2, False), (1e4, False), (1e6, False))
 """Unit of y in standard deviations, and whether the solver equilibrates, in the order tried.
 
@@ -33,28 +31,20 @@ consistent optimum may lie thousands of standard deviations from the free one, a
 most programs take fewer iterations.
 """
 
-_GAP = 1e-6
-"""Largest duality gap, relative to the criterion or to 1, with which an inexact solution is accepted."""
-
+_GAP = 1e-6  # largest duality gap, relative to the criterion or to 1, with which an inexact solution is accepted
+# Largest violation of a scaled inequality that rounding in the solver may leave; it is removed afterwards.
 _SLACK = 1e-7
-"""Largest violation of a scaled inequality that rounding in the solver may leave; it is removed afterwards."""
-
-_EXACT = 1e-9
-"""Largest violation of a scaled constraint in a result."""
+_EXACT = 1e-9  # largest violation of a scaled constraint in a result
 
 
 @dataclass(frozen=True, eq=False)
 class ConicProgram:
     """Minimise ½ ‖T u - c‖² subject to A u + s = b, s in the non-negative orthant and one 4x4 PSD cone a link.
 
-    triangle : (p, p) float64
-        T
-    centre : (p,) float64
-        c
-    matrix : (k + 10 n, p) float64
-        A, the k inequalities first, each of unit length
-    bound : (k + 10 n,) float64
-        b
+    `triangle`: (p, p), T.
+    `centre`: (p,), c.
+    `matrix`: (k + 10 n, p), A, the k inequalities first, each of unit length.
+    `bound`: (k + 10 n,), b.
     """
 
     triangle: Array
@@ -68,15 +58,7 @@ class ConicProgram:
     def slacks(self, scaled: Array) -> Array:
         """What is left of each inequality, in scaled parameters.
 
-        Parameters
-        ----------
-        scaled : (p,) float64
-            u
-
-        Returns
-        -------
-        (k,) float64
-            negative where an inequality is violated
+        `scaled`: (p,), u. Returns (k,), negative where an inequality is violated.
         """
         count = len(self.names)
         return self.bound[:count] - self.matrix[:count] @ scaled
@@ -84,47 +66,23 @@ class ConicProgram:
     def smallest_eigenvalues(self, scaled: Array) -> Array:
         """Smallest eigenvalue of each link's scaled pseudo-inertia.
 
-        Parameters
-        ----------
-        scaled : (p,) float64
-            u
-
-        Returns
-        -------
-        (n,) float64
-            ε on the boundary
+        `scaled`: (p,), u. Returns (n,), ε on the boundary.
         """
         links = (LinkInertia.from_vector(scaled[10 * j : 10 * j + 10]) for j in range(self.link_count))
         return np.array([np.linalg.eigvalsh(pseudo_inertia(link))[0] for link in links])
 
     def admits(self, scaled: Array) -> bool:
-        """Whether u keeps every inequality, and every link half of its margin at least.
-
-        Parameters
-        ----------
-        scaled : (p,) float64
-            u
-        """
+        """Whether u keeps every inequality, and every link half of its margin at least. `scaled`: (p,), u."""
         kept = np.all(self.slacks(scaled) >= -_EXACT)
         return bool(kept and np.all(self.smallest_eigenvalues(scaled) >= 0.5 * self.margin - _EXACT))
 
 
 def assemble(
-    factor: Array,
-    target: Array,
-    prior: Prior,
-    inequalities: LinearInequalities,
-    *,
-    margin: float,
+    factor: Array, target: Array, prior: Prior, inequalities: LinearInequalities, *, margin: float
 ) -> ConicProgram:
     """Put information, prior and constraints together, in parameters scaled by the prior's magnitudes.
 
-    Parameters
-    ----------
-    factor : (r, p) float64
-        R, whitened
-    target : (r,) float64
-        z
+    `factor`: (r, p), R, whitened; `target`: (r,), z.
     """
     size, link_count = prior.mean.size, prior.link_count
     information = np.column_stack([factor * prior.scale, target])
@@ -152,21 +110,15 @@ def solve(program: ConicProgram) -> tuple[Array, str, float]:
     Raises IdentificationError where the inequalities contradict each other, or the solver does not reach the accuracy
     asked for.
 
-    Returns
-    -------
-    scaled : (p,) float64
-        u at the optimum
-    status : str
-        "interior" where no constraint is felt, else the solver's word
-    gap : float
-        duality gap, relative to the criterion or to 1
+    Returns u at the optimum, (p,); "interior" where no constraint is felt, else the solver's word; and the duality gap,
+    relative to the criterion or to 1.
     """
     interior = solve_triangular(program.triangle, program.centre)
     if program.admits(interior):
         return interior, "interior", 0.0
     status = clarabel.SolverStatus.Unsolved
     for candidate, status, gap in _attempts(program, interior):
-        settled = _settled(program, candidate)
+        settled = _settle(program, candidate)
         if gap <= _GAP and program.admits(settled):
             return settled, str(status), gap
     _require_feasible(program)
@@ -234,7 +186,7 @@ def _require_feasible(program: ConicProgram) -> None:
         )
 
 
-def _settled(program: ConicProgram, scaled: Array) -> Array:
+def _settle(program: ConicProgram, scaled: Array) -> Array:
     """Project onto the inequalities that the solver's rounding missed, so that a viscous friction of -1e-12 reads 0."""
     settled = scaled.copy()
     for row, bound in zip(program.matrix, program.bound[: len(program.names)], strict=False):

@@ -12,9 +12,8 @@ from tauscope.robot import LinkInertia, pseudo_inertia
 
 Array = NDArray[np.float64]
 
+# Entries of a symmetric 4x4 matrix, upper triangle column by column: the order of clarabel's PSDTriangleConeT.
 UPPER_TRIANGLE = tuple((row, column) for column in range(4) for row in range(column + 1))
-"""Entries of a symmetric 4x4 matrix, upper triangle column by column: the order of clarabel's PSDTriangleConeT."""
-
 _ROWS, _COLUMNS = np.array(UPPER_TRIANGLE).T
 
 
@@ -23,10 +22,7 @@ def triangle_of_parameters() -> Array:
 
     Off-diagonal entries carry √2, so that ⟨svec(X), svec(Y)⟩ = tr(X Y), as clarabel's PSDTriangleConeT wants it.
 
-    Returns
-    -------
-    (10, 10) float64
-        B; rows in the order of `UPPER_TRIANGLE`, columns in the order of `STANDARD_PARAMETERS`
+    Returns (10, 10), B; rows in the order of `UPPER_TRIANGLE`, columns in the order of `STANDARD_PARAMETERS`.
     """
     weight = np.where(_ROWS == _COLUMNS, 1.0, np.sqrt(2.0))
     units = (pseudo_inertia(LinkInertia.from_vector(unit)) for unit in np.eye(10))
@@ -36,15 +32,7 @@ def triangle_of_parameters() -> Array:
 def congruence(transform: Array) -> Array:
     """Matrix K with svec(T X Tᵀ) = K svec(X).
 
-    Parameters
-    ----------
-    transform : (4, 4) float64
-        T
-
-    Returns
-    -------
-    (10, 10) float64
-        K; rows and columns in the order of `UPPER_TRIANGLE`
+    `transform`: (4, 4), T. Returns (10, 10), K; rows and columns in the order of `UPPER_TRIANGLE`.
     """
     weight = np.where(_ROWS == _COLUMNS, 1.0, np.sqrt(2.0))
     both = transform[_ROWS][:, _ROWS] * transform[_COLUMNS][:, _COLUMNS]
@@ -53,29 +41,13 @@ def congruence(transform: Array) -> Array:
 
 
 def identity_triangle() -> Array:
-    """Scaled upper triangle of the 4x4 identity.
-
-    Returns
-    -------
-    (10,) float64
-        in the order of `UPPER_TRIANGLE`
-    """
+    """Scaled upper triangle of the 4x4 identity. Returns (10,), in the order of `UPPER_TRIANGLE`."""
     return np.eye(4)[_ROWS, _COLUMNS]
 
 
 def parameter_scale(mass: float, length: float) -> Array:
     """Magnitude of each standard parameter of a link of the given mass and size: m ℓ², m and m ℓ.
 
-    Parameters
-    ----------
-    mass : float
-        m [kg]
-    length : float
-        ℓ [m]
-
-    Returns
-    -------
-    (10,) float64
-        in the order of `STANDARD_PARAMETERS`
+    `mass`: m [kg]; `length`: ℓ [m]. Returns (10,), in the order of `STANDARD_PARAMETERS`.
     """
     return mass * np.array([length**2] * 6 + [1.0] + [length] * 3)

@@ -14,19 +14,14 @@ from scipy import signal
 
 from tauscope.recording.recording import Array
 
-OPEN_BAND_FRACTION = 0.45
-"""A cut-off above this part of the sampling rate filters nothing."""
-
+OPEN_BAND_FRACTION = 0.45  # a cut-off above this part of the sampling rate filters nothing
 STOP_BAND_DB = 60.0
 
+# A filtered row is not used where more than this share of the filter's weight fell on samples never measured.
 MASKED_FRACTION = 0.02
-"""A filtered row is not used where more than this share of the filter's weight fell on samples never measured."""
-
+# The same where no gap is longer than a quarter of the time from row to row: a straight line across is the signal.
 BRIDGED_FRACTION = 0.2
-"""The same where no gap is longer than a quarter of the time from row to row: a straight line across is the signal."""
-
-BLOCK_VALUES = 1 << 19
-"""Numbers in the intermediate result of a decimation: bounds memory, and stays in the cache."""
+BLOCK_VALUES = 1 << 19  # numbers in the intermediate result of a decimation: bounds memory, and stays in the cache
 
 
 class BandFilter(Protocol):

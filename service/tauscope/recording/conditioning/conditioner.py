@@ -10,7 +10,6 @@ import numpy as np
 from tauscope.errors import RecordingError
 from tauscope.recording.conditioning.motion import Motion, Trim, average_motion, transient_motion
 from tauscope.recording.conditioning.motion_source import MotionSource, choose_sources
-from tauscope.recording.conditioning.period_runs import PeriodRun
 from tauscope.recording.conditioning.periods import Periods, repeats, split_periods, with_turns_removed
 from tauscope.recording.conditioning.position_noise import (
     STANDING_STILL,
@@ -19,7 +18,7 @@ from tauscope.recording.conditioning.position_noise import (
     lowest_limit,
     position_noise,
 )
-from tauscope.recording.conditioning.timing import Timing, find_stretches, row_at
+from tauscope.recording.conditioning.timing import PeriodRun, Timing, find_stretches, row_at
 from tauscope.recording.conditioning.uniform import Mask, Stretch, read_stretch, uniform_grid
 from tauscope.recording.recording import Array, Recording, Samples
 from tauscope.robot.robot import Robot
@@ -46,30 +45,19 @@ class ConditioningSummary:
     velocity_source: tuple[str, ...]
 
 
-WINDOW_ROWS = 1 << 15
-"""Rows conditioned at once: bounds memory whatever the recording's length."""
-
+WINDOW_ROWS = 1 << 15  # rows conditioned at once: bounds memory whatever the recording's length
+# Windows, spread over the recording, from which noise is estimated: it may begin with the arm at rest.
 SURVEYED_WINDOWS = 4
-"""Windows, spread over the recording, from which noise is estimated: it may begin with the arm at rest."""
-
+# Samples of a period up to which periods are averaged: the regressor of one period is held in memory.
 LONGEST_PERIOD = 2 * WINDOW_ROWS
-"""Samples of a period up to which periods are averaged: the regressor of one period is held in memory."""
-
-AVERAGED_ROWS = 8 * WINDOW_ROWS
-"""Rows that are averaged into one period at most, for the same reason."""
-
+AVERAGED_ROWS = 8 * WINDOW_ROWS  # rows that are averaged into one period at most, for the same reason
+# A joint moves where its range exceeds `STANDING_STILL` standard deviations of its noise, and this [rad or m].
 SMALLEST_MOTION = 1e-5
-"""A joint moves where its range exceeds `STANDING_STILL` standard deviations of its noise, and this [rad or m]."""
-
-PERIOD_SPARE = 4
-"""Rows read beyond the periods on either side, so that interpolation has neighbours."""
+PERIOD_SPARE = 4  # rows read beyond the periods on either side, so that interpolation has neighbours
 
 
-RESOLVED_STEPS = 2.0
-"""Steps of an encoder that are motion."""
-
-RESOLVED_STD = 4.0
-"""Standard deviations of a position's noise that are motion."""
+RESOLVED_STEPS = 2.0  # steps of an encoder that are motion
+RESOLVED_STD = 4.0  # standard deviations of a position's noise that are motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +169,6 @@ class Conditioner:
         )
 
     def _stretch_motions(self, rows: tuple[int, int], cutoff_hz: float | None) -> Iterator[Motion]:
-        """Averaged periods where there are any, and what lies between them, in order of time."""
         cursor = rows[0]
         half = 0.5 / self.timing.rate_hz
         for group in self._groups(rows):
@@ -194,7 +181,6 @@ class Conditioner:
         yield from self._transients(cursor, rows[1], rows, cutoff_hz)
 
     def _groups(self, rows: tuple[int, int]) -> Iterator[PeriodRun]:
-        """Parts of a stretch with as many whole periods as are averaged at once."""
         begin, end = (float(self.recording.samples(row, row + 1).time[0]) for row in (rows[0], rows[1] - 1))
         interval = 1.0 / self.timing.rate_hz
         for run in (run.within(rows, begin, end + interval, interval) for run in self.timing.runs):

@@ -7,17 +7,13 @@ from scipy import signal
 
 from tauscope.recording.recording import Array
 
+# First derivative of eighth order on nine points: error (2πf/fs)⁸/630: 2e-7 at a tenth of Nyquist, 4e-5 at a fifth.
 CENTRAL_DIFFERENCE = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
-"""First derivative of eighth order on nine points: error (2πf/fs)⁸/630: 2e-7 at a tenth of Nyquist, 4e-5 at a
-fifth."""
-
 DIFFERENCE_MARGIN = len(CENTRAL_DIFFERENCE) // 2
 
+# Cut-off of the motion's smoothing filter over that of the common band: it must not bend what the band passes.
 STATE_BAND_RATIO = 2.0
-"""Cut-off of the motion's smoothing filter over that of the common band: it must not bend what the band passes."""
-
-SMOOTHED_FRACTION = 0.45
-"""A cut-off at or above this part of the sampling rate smooths nothing."""
+SMOOTHED_FRACTION = 0.45  # a cut-off at or above this part of the sampling rate smooths nothing
 
 
 @lru_cache(maxsize=64)

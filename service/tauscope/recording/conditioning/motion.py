@@ -179,7 +179,6 @@ def average_motion(periods: Periods, cutoff_hz: float | None, source: MotionSour
 
 
 def _usable(recorded: Array | None, wanted: Mask) -> Mask:
-    """Joints whose recorded signal is wanted and complete."""
     if recorded is None:
         return np.zeros_like(wanted)
     return wanted & np.isfinite(recorded).all(axis=tuple(range(recorded.ndim - 1)))

@@ -30,42 +30,24 @@ from tauscope.recording.conditioning.position_noise import (
 from tauscope.recording.conditioning.uniform import Stretch
 from tauscope.recording.recording import Array
 
-GAIN_TOLERANCE = 0.01
-"""Largest error of the recorded signal's gain."""
-
+GAIN_TOLERANCE = 0.01  # largest error of the recorded signal's gain
+# Largest phase [rad] by which the recorded signal may lag or lead at the edge of the band that it would open.
 PHASE_TOLERANCE = 0.02
-"""Largest phase [rad] by which the recorded signal may lag or lead at the edge of the band that it would open."""
-
-DELAY_TOLERANCE = 0.25
-"""Largest delay, in sample intervals."""
-
-OFFSET_TOLERANCE = 0.01
-"""Largest offset, relative to the rms of the signal."""
-
-MISFIT_TOLERANCE = 0.02
-"""Largest rms of what neither gain, delay nor noise explains, relative to q̈."""
-
+DELAY_TOLERANCE = 0.25  # largest delay, in sample intervals
+OFFSET_TOLERANCE = 0.01  # largest offset, relative to the rms of the signal
+MISFIT_TOLERANCE = 0.02  # largest rms of what neither gain, delay nor noise explains, relative to q̈
+# Least share of the positions' noise that must show in the difference between the two: where it does not, the recorded
+# signal carries that same noise and was made from the positions.
 OWN_NOISE = 0.5
-"""Least share of the positions' noise that must show in the difference between the two: where it does not, the recorded
-signal carries that same noise and was made from the positions."""
-
+# A measurement's noise is white; where the lower half of its plateau lies this much over the upper one, it was
+# filtered, and its plateau tells nothing about its band.
 FLATNESS = 2.0
-"""A measurement's noise is white; where the lower half of its plateau lies this much over the upper one, it was
-filtered, and its plateau tells nothing about its band."""
-
+# Largest standard error of a gain, and largest offset, that is fitted to velocity: beyond the band of the positions
+# their own noise is more.
 RESOLVED = 0.03
-"""Largest standard error of a gain, and largest offset, that is fitted to velocity: beyond the band of the positions
-their own noise is more."""
-
-WORTHWHILE = 1.25
-"""Least widening of the band for which another source is used."""
-
-CLEAR_PART = 0.5
-"""Part of the positions' band in which gain and delay are compared."""
-
-WIDEST = 3.0
-"""Multiple of the positions' band up to which another source widens it: that far its phase can be foretold."""
-
+WORTHWHILE = 1.25  # least widening of the band for which another source is used
+CLEAR_PART = 0.5  # part of the positions' band in which gain and delay are compared
+WIDEST = 3.0  # multiple of the positions' band up to which another source widens it: that far its phase can be foretold
 LOWER_PLATEAU = (0.35, 0.6)
 
 

@@ -14,36 +14,24 @@ from tauscope.recording.conditioning.uniform import Mask, Stretch
 from tauscope.recording.recording import Array
 from tauscope.robot.robot import JointType
 
+# Largest rms of what differs in q̈ between periods, relative to q̈ itself, at which an average is still the motion:
+# what is lost is of second order, a quarter of a percent.
 REPEATABILITY = 0.05
-"""Largest rms of what differs in q̈ between periods, relative to q̈ itself, at which an average is still the motion:
-what is lost is of second order, a quarter of a percent."""
-
+# What differs may be this many times the noise that the positions are known to have: averaging is for noise.
 NOISE_ALLOWANCE = 3.0
-"""What differs may be this many times the noise that the positions are known to have: averaging is for noise."""
-
+# A joint need not repeat better than if its q̈ were this share of the liveliest joint's: some stand nearly still.
 LIVELIEST_SHARE = 0.1
-"""A joint need not repeat better than if its q̈ were this share of the liveliest joint's: some stand nearly still."""
-
+# Largest misfit of the periods to the sampling grid, in samples over all periods, that needs no interpolation.
 WHOLE_SAMPLES = 5e-3
-"""Largest misfit of the periods to the sampling grid, in samples over all periods, that needs no interpolation."""
-
+# Lag from period to period, in samples, beyond which the labels, not the positions, must be wrong about a length that
+# is a whole number of samples.
 MISLABELLED = 0.05
-"""Lag from period to period, in samples, beyond which the labels, not the positions, must be wrong about a length that
-is a whole number of samples."""
-
-ALIGNED = 1e-4
-"""Lag from period to period, in samples, at which periods lie on one another."""
-
-REFINEMENTS = 4
-"""Newton steps towards the length at which the positions repeat best; it settles in two."""
-
-LATE_SAMPLES = 1.0
-"""Samples that the last period may lack."""
-
+ALIGNED = 1e-4  # lag from period to period, in samples, at which periods lie on one another
+REFINEMENTS = 4  # Newton steps towards the length at which the positions repeat best; it settles in two
+LATE_SAMPLES = 1.0  # samples that the last period may lack
 SPLINE_DEGREE = 3
 
-LEAST_WIDTH = 1e-15
-"""Scatter below which a joint stands still [rad or m]."""
+LEAST_WIDTH = 1e-15  # scatter below which a joint stands still [rad or m]
 
 
 @dataclass(frozen=True)
@@ -102,7 +90,6 @@ def split_periods(stretch: Stretch, refine: bool = False) -> Periods | None:
 
 
 def _align(stretch: Stretch, first: int, length: float, count: int) -> Periods | None:
-    """The periods by their samples where both fit, else by interpolation."""
     samples = round(length)
     fits = first + count * samples <= len(stretch.position)
     if fits and abs(length - samples) * count <= WHOLE_SAMPLES:
@@ -188,7 +175,6 @@ def _longest_steady(progress: Array) -> tuple[int, int] | None:
 
 
 def _whole(stretch: Stretch, first: int, samples: int, count: int) -> Periods:
-    """Periods that are a whole number of samples long."""
     index = first + np.arange(count)[:, None] * samples + np.arange(samples)
     return Periods(
         rate_hz=stretch.rate_hz,

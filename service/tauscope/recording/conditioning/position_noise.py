@@ -14,35 +14,23 @@ from scipy import signal, stats
 from tauscope.recording.conditioning.uniform import Stretch
 from tauscope.recording.recording import Array
 
+# Largest rms of noise in q̈, relative to the motion's own q̈, inside the band: a bias of its square, 0.16 %.
 NOISE_SHARE = 0.04
-"""Largest rms of noise in q̈, relative to the motion's own q̈, inside the band: a bias of its square, 0.16 %."""
-
-PLATEAU = (0.6, 0.9)
-"""Part of the spectrum, relative to Nyquist, that no arm moves in: what is there is noise."""
-
+PLATEAU = (0.6, 0.9)  # part of the spectrum, relative to Nyquist, that no arm moves in: what is there is noise
+# A joint whose range is below this many noise standard deviations does not move, and sets no band.
 STANDING_STILL = 10.0
-"""A joint whose range is below this many noise standard deviations does not move, and sets no band."""
-
-SEGMENT = 1024
-"""Samples in one segment of the averaged spectra."""
-
-LOOK = 128
-"""Samples in one look at the plateau."""
-
+SEGMENT = 1024  # samples in one segment of the averaged spectra
+LOOK = 128  # samples in one look at the plateau
+# Looks that hold more than this many times their median are of a joint that shakes, as one that sticks and slips does:
+# that is motion, and does not count.
 SHAKING = 3.0
-"""Looks that hold more than this many times their median are of a joint that shakes, as one that sticks and slips does:
-that is motion, and does not count."""
-
-BRIEF = 1.0 / 3.0
-"""Where more than this share of all looks is such, the rest is of a joint at rest, and all count."""
-
+BRIEF = 1.0 / 3.0  # where more than this share of all looks is such, the rest is of a joint at rest, and all count
+# Independent segments among half-overlapping ones under a Hann window, relative to their number.
 SEGMENT_OVERLAP_LOSS = 0.9
-"""Independent segments among half-overlapping ones under a Hann window, relative to their number."""
-
 TINY = np.finfo(float).tiny
 
+# The second difference of q is nearly white where q itself is not: its spectrum's leakage stays below the noise.
 DIFFERENCE_ORDER = 2
-"""The second difference of q is nearly white where q itself is not: its spectrum's leakage stays below the noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +179,6 @@ def encoder_step(positions: Sequence[Array]) -> Array:
 
 
 def _smallest_difference(values: Array) -> float:
-    """Smallest difference within one joint's positions."""
     differences = np.diff(np.sort(values))
     differences = differences[differences > 8.0 * np.spacing(np.abs(values).max(initial=0.0))]
     return float(differences.min(initial=np.inf)) if len(differences) else 0.0

@@ -17,17 +17,13 @@ from tauscope.robot.robot import Robot
 
 Mask = NDArray[np.bool_]
 
+# Largest deviation of a stamp from the uniform grid, in sample intervals, that is not worth resampling.
 UNIFORM_TOLERANCE = 0.02
-"""Largest deviation of a stamp from the uniform grid, in sample intervals, that is not worth resampling."""
-
+# Stamps rounded to so many decimals or fewer are recognised: they may be off the grid by half their last digit.
 STAMP_DECIMALS = 5
-"""Stamps rounded to so many decimals or fewer are recognised: they may be off the grid by half their last digit."""
-
+# Samples in a row that a recorded velocity or acceleration may lack without being given up for the stretch.
 BRIDGED_VALUES = 2
-"""Samples in a row that a recorded velocity or acceleration may lack without being given up for the stretch."""
-
-NEARBY = 0.75
-"""A grid point further than this, in sample intervals, from every sample was not measured."""
+NEARBY = 0.75  # a grid point further than this, in sample intervals, from every sample was not measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +177,6 @@ def _spline(knots: Array | NDArray[np.int_], at: Array | NDArray[np.int_]) -> Ca
 
 
 def _spread(values: Array, index: NDArray[np.int_], count: int) -> Array:
-    """Samples at their grid points, NaN where there is none."""
     if count == len(index):
         return values
     spread = np.full((count, values.shape[1]), np.nan)

@@ -1,4 +1,4 @@
-"""Efforts that no drive measured: stuck values, and spikes."""
+"""Efforts that no drive measured: stuck values, spikes, and stretches of exactly zero."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -6,30 +6,26 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.recording.examination.edits import NO_NUMBERS, Numbers, find_runs, row_numbers
-from tauscope.recording.examination.scales import NEIGHBOURS, EffortScale, distance_beyond, is_new, neighbour_windows
+from tauscope.recording.examination.edits import NO_NUMBERS, Numbers, Rows, find_runs, row_numbers
+from tauscope.recording.examination.scales import (
+    BLOCK_ROWS,
+    NEIGHBOURS,
+    EffortScale,
+    distance_beyond,
+    is_new,
+    neighbour_windows,
+)
+from tauscope.recording.recording import Recording, Samples
 from tauscope.recording.samples import Array
 
-SURPRISE = 20.0
-"""Multiple of the usual distance beyond the neighbours' range above which a sample is a spike."""
-
-SPAN = 0.15
-"""Share of the effort's usual range that this distance exceeds, too."""
-
-STUCK_ROWS = 10
-"""Rows for which a stuck value is repeated, at least."""
-
-STUCK_RUNS = 5
-"""Multiple of the rows for which values usually are."""
-
+SURPRISE = 20.0  # multiple of the usual distance beyond the neighbours' range above which a sample is a spike
+SPAN = 0.15  # share of the effort's usual range that this distance exceeds, too
+STUCK_ROWS = 10  # rows for which a stuck value is repeated, at least
+STUCK_RUNS = 5  # multiple of the rows for which values usually are
+# Rows for which noise lets no value be repeated: where it does, the effort comes in coarse steps and may rest.
 USUAL_RUN = 3
-"""Rows for which noise lets no value be repeated: where it does, the effort comes in coarse steps and may rest."""
-
-ONE_STEP = 1.5
-"""Smallest steps of the effort below which a change is one of them."""
-
-LEAST_MOVE = 0.01
-"""Distance above which a joint moves within some rows [rad or m]."""
+ONE_STEP = 1.5  # smallest steps of the effort below which a change is one of them
+LEAST_MOVE = 0.01  # distance above which a joint moves within some rows [rad or m]
 
 
 def find_stuck(rows: Numbers, effort: Array, position: Array, scale: EffortScale) -> Numbers:
@@ -110,3 +106,77 @@ def is_moving(position: Array) -> bool:
     """Whether any joint moves within some rows. `position`: (N, n), q [rad or m]."""
     low, high = np.fmin.reduce(position, axis=0), np.fmax.reduce(position, axis=0)
     return bool((high - low > LEAST_MOVE).any())
+
+
+DROP = 10.0  # multiple of the usual change from row to row by which one joint's effort falls to zero, and comes back
+COMMON_DROP = 2.0  # the same of at least one joint, where the efforts of all joints are exactly zero at once
+COMMON_ROWS = 3  # rows, at least, in which noisy efforts of all joints are exactly zero by no accident
+MOST_RUNS = 100_000  # runs of zero of one joint beyond which zero is a value like any other
+
+
+class ZeroRuns:
+    """Collects runs of zero, block by block: of every joint, and of all at once."""
+
+    def __init__(self, scales: Sequence[EffortScale]) -> None:
+        self._scales = scales
+        self._runs: list[list[tuple[int, int]]] = [[] for _ in range(len(scales) + 1)]
+
+    def add(self, samples: Samples, first: int) -> None:
+        """Take the next rows. `first`: row of the first of them."""
+        zero = samples.effort == 0.0
+        if not zero.any():
+            return
+        for joint, runs in enumerate(self._runs):
+            is_zero = zero[:, joint] if joint < len(self._scales) else zero.all(axis=1)
+            if not is_zero.any() or len(runs) > MOST_RUNS:
+                continue
+            for start, stop in (find_runs(is_zero) + first).tolist():
+                if runs and runs[-1][1] == start:
+                    runs[-1] = (runs[-1][0], stop)
+                else:
+                    runs.append((start, stop))
+
+    @property
+    def _is_noisy(self) -> bool:
+        """Whether noise lets no effort stay at one value."""
+        return any(0 < scale.run <= USUAL_RUN * scale.hold and scale.change > 0.0 for scale in self._scales)
+
+    def find_dropouts(self, recording: Recording) -> list[Rows]:
+        """Ranges of rows that are dropouts, of every joint, (k, 2); they may overlap."""
+        change = np.array([scale.change for scale in self._scales])
+        *own, common = ([] if len(runs) > MOST_RUNS else runs for runs in self._runs)
+        shared = [
+            run
+            for run in (common if len(own) > 1 else ())
+            if (self._is_noisy and run[1] - run[0] >= COMMON_ROWS and _is_gap(recording, run))
+            or (_measure_drops(recording, run) > COMMON_DROP * change).any()
+        ]
+        lost = [set(shared) for _ in own]
+        for joint, runs in enumerate(own):
+            lost[joint].update(run for run in runs if _measure_drops(recording, run)[joint] > DROP * change[joint])
+        return [np.array(sorted(ranges), dtype=np.int64).reshape(-1, 2) for ranges in lost]
+
+
+def _is_gap(recording: Recording, run: tuple[int, int]) -> bool:
+    """Whether a run has efforts on both sides, or the arm stands still in it, as on its brakes.
+
+    An arm that moves without effort at the beginning or the end swings freely.
+    """
+    start, stop = run
+    if start > 0 and stop < len(recording):
+        return True
+    return stop - start < len(recording) and not _moves(recording, run)
+
+
+def _moves(recording: Recording, run: tuple[int, int]) -> bool:
+    blocks = (recording.samples(row, min(row + BLOCK_ROWS, run[1])) for row in range(*run, BLOCK_ROWS))
+    return any(is_moving(block.position) for block in blocks)
+
+
+def _measure_drops(recording: Recording, run: tuple[int, int]) -> Array:
+    """Distance of zero beyond the range of every joint's efforts before and after a run, (n,); at most 0 within it."""
+    if not _is_gap(recording, run):
+        return np.zeros(recording.joint_count)
+    sides = [row for row in (run[0] - 1, run[1]) if 0 <= row < len(recording)]
+    efforts = np.array([recording.samples(row, row + 1).effort[0] for row in sides])
+    return np.nan_to_num(np.maximum(efforts.min(axis=0), -efforts.max(axis=0)), nan=0.0)

@@ -8,22 +8,18 @@ from typing import Literal
 import numpy as np
 
 from tauscope.errors import RecordingError
-from tauscope.recording.columns import table_columns
 from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, EditedTable, Numbers
 from tauscope.recording.examination.plausibility import find_implausible
+from tauscope.recording.examination.scales import BLOCK_ROWS, joint_types
 from tauscope.recording.examination.scan import Defects, JointDefects, find_defects
-from tauscope.recording.examination.sketch import BLOCK_ROWS, joint_types
 from tauscope.recording.link_encoders import link_warnings
 from tauscope.recording.reading import read_recording
-from tauscope.recording.recording import EffortKind, Recording
-from tauscope.recording.table import MemoryTable
+from tauscope.recording.recording import EffortKind, Recording, take_commands
 from tauscope.recording.units import SI, Reading
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.robot import Robot
 
-FILLED_ROWS = 4
-"""Rows without an effort that are filled in where positions and efforts come in rows of their own."""
-
+FILLED_ROWS = 4  # rows without an effort that are filled in where positions and efforts come in rows of their own
 BUS = "check the bus for lost reads and damaged frames"
 
 
@@ -39,7 +35,6 @@ def mend_recording(recording: Recording, robot: Robot | None = None) -> Recordin
 
 
 def _build_edits(recording: Recording, defects: Defects) -> dict[int, ColumnEdit]:
-    """Edits by column."""
     edits: dict[int, ColumnEdit] = {}
     n = recording.joint_count
     for joint, found in enumerate(defects.joints):
@@ -57,7 +52,6 @@ def _build_edits(recording: Recording, defects: Defects) -> dict[int, ColumnEdit
 
 
 def _describe_defects(recording: Recording, defects: Defects, joints: Sequence[str | None]) -> Iterator[ResultWarning]:
-    """A warning about each kind of defect of each joint."""
 
     def begin(row: int) -> str:
         return f"first at t = {recording.samples(row, row + 1).time[0]:.6g} s"
@@ -89,7 +83,6 @@ def _describe_defects(recording: Recording, defects: Defects, joints: Sequence[s
 def _describe_joint(
     joint: JointDefects, begin: Callable[[int], str]
 ) -> Iterator[tuple[Literal["q", "effort"], str, str, str | None]]:
-    """Column, code, text and remedy of each kind of defect of one joint."""
     if joint.wraps:
         first, times = min(joint.wraps)[0], "once" if len(joint.wraps) == 1 else f"{len(joint.wraps)} times"
         yield "q", "wrapped-angle", f"wraps by 2π {times}, {begin(first)}; unwrapped", None
@@ -118,7 +111,6 @@ def _describe_joint(
 
 
 def _count(rows: Numbers) -> str:
-    """A count of rows in words."""
     return "1 row" if len(rows) == 1 else f"{len(rows)} rows"
 
 
@@ -143,8 +135,10 @@ def examine_recording(recording: Recording, robot: Robot | None = None, *, trust
     if recording.is_examined:
         return recording
     missing = find_missing_effort(recording)
-    if robot is not None and _has_commands(recording, robot) and (missing is not None or _is_zero(recording)):
-        recording, missing = _take_commands(recording), None
+    if robot is not None and all(joint.actuator is not None and joint.actuator.has_loop for joint in robot.joints):
+        commanded = take_commands(recording) if missing is not None or _is_zero(recording) else None
+        if commanded is not None:
+            recording, missing = commanded, None
     if missing is not None:
         raise RecordingError(f"{recording.name}: {missing}")
     doubt = find_implausible(recording, robot)
@@ -160,26 +154,10 @@ def examine_recording(recording: Recording, robot: Robot | None = None, *, trust
     return replace(mended, notes=(*mended.notes, *links), is_examined=True)
 
 
-def _has_commands(recording: Recording, robot: Robot) -> bool:
-    """Whether loops of the robot can make torque of the commands."""
-    loops = [joint.actuator for joint in robot.joints]
-    named = all(f"qref{joint}" in recording.table.names for joint in range(1, recording.joint_count + 1))
-    return named and all(loop is not None and loop.has_loop for loop in loops)
-
-
 def _is_zero(recording: Recording) -> bool:
     """Whether the effort is exactly zero throughout, as position servos report what they do not measure."""
     blocks = (recording.samples(start, start + BLOCK_ROWS) for start in range(0, len(recording), BLOCK_ROWS))
     return not any(np.nan_to_num(block.effort).any() for block in blocks)
-
-
-def _take_commands(recording: Recording) -> Recording:
-    """The recording without its column of effort, which is NaN for a joint."""
-    names, lost = recording.table.names, recording.effort_kind.value
-    first = table_columns(recording.joint_count, EffortKind.COMMAND)
-    kept = (*first, *(name for name in names if name not in first and name.rstrip("0123456789") != lost))
-    rows = recording.table.rows(0, len(recording))[:, [names.index(name) for name in kept]]
-    return replace(recording, effort_kind=EffortKind.COMMAND, table=MemoryTable(kept, rows))
 
 
 def find_missing_effort(recording: Recording) -> str | None:

@@ -9,32 +9,18 @@ from tauscope.recording.examination.edits import Numbers
 from tauscope.recording.examination.scales import ONE_TURN, PositionScale, neighbours_median, unwrap_steps
 from tauscope.recording.samples import Array
 
-SURPRISE = 20.0
-"""Multiple of the usual surprise above which a step is looked at: 26 standard deviations of noise."""
-
+SURPRISE = 20.0  # multiple of the usual surprise above which a step is looked at: 26 standard deviations of noise
+# Share of the largest usual step above which it is: motion has small surprises where noise has none.
 SHARE_OF_MOVE = 0.1
-"""Share of the largest usual step above which it is: motion has small surprises where noise has none."""
-
-STEPS = 5.0
-"""Encoder steps above which it is: one or two are its rounding."""
-
+STEPS = 5.0  # encoder steps above which it is: one or two are its rounding
+# Rows after which a position is back, where it was a spike; the second where it went as far as a jump.
 LONGEST_SPIKE, LONGEST_GLITCH = 5, 32
-"""Rows after which a position is back, where it was a spike; the second where it went as far as a jump."""
-
-RETURN = 0.3
-"""Largest difference between the way out and the way back of a spike, relative to them."""
-
-JUMP = 5.0
-"""Multiple of the way at the largest usual speed that a jump exceeds; a joint that hits an end stop does not."""
-
-LEAST_JUMP = 0.01
-"""Smallest jump that is called one [rad or m]."""
-
+RETURN = 0.3  # largest difference between the way out and the way back of a spike, relative to them
+JUMP = 5.0  # multiple of the way at the largest usual speed that a jump exceeds; a joint that hits an end stop does not
+LEAST_JUMP = 0.01  # smallest jump that is called one [rad or m]
+# Largest error of the step after frozen rows, relative to the motion by the lower speed: a rest hides none.
 MAKES_UP = 0.6
-"""Largest error of the step after frozen rows, relative to the motion by the lower speed: a rest hides none."""
-
-CHANGES = 3
-"""Changes on either side of frozen rows from which the speed is taken."""
+CHANGES = 3  # changes on either side of frozen rows from which the speed is taken
 
 
 class PositionDefect(NamedTuple):
@@ -91,7 +77,6 @@ def scan_position(
 
 
 def _returns(surprise: Array, a: int, b: int) -> bool:
-    """Whether a second step takes a first one back."""
     out, back = float(surprise[a]), float(surprise[b])
     return abs(out + back) < RETURN * max(abs(out), abs(back))
 

@@ -1,39 +1,133 @@
-"""Typical sizes of a recording's steps, joint by joint, against which a sample is judged."""
+"""Typical figures of a recording, from windows of it: by them a sample is judged, in memory that does not grow."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.recording.examination.sketch import Sketch
-from tauscope.recording.samples import Array
-from tauscope.robot.robot import JointType
+from tauscope.recording.recording import Recording
+from tauscope.recording.samples import Array, Samples
+from tauscope.robot.robot import JointType, Robot
+
+BLOCK_ROWS = 1 << 15  # rows that are read at once
+WINDOWS = 8
+WINDOW_ROWS = 1 << 13  # rows of one window; a recording of at most `WINDOWS` of them is looked at whole
+RANKED_ROWS = 4096  # rows of which a percentile is taken
+BURST = 0.1  # share of the mean step below which the usual step is one within a burst, as buffers are emptied
+
+
+@dataclass(frozen=True, eq=False)
+class Sketch:
+    """Windows spread over a recording."""
+
+    windows: tuple[Samples, ...]
+
+    @staticmethod
+    def of(recording: Recording) -> "Sketch":
+        """The windows of a recording."""
+        count = len(recording)
+        if count <= WINDOWS * WINDOW_ROWS:
+            return Sketch((recording.samples(),))
+        starts = np.linspace(0, count - WINDOW_ROWS, WINDOWS).astype(int)
+        return Sketch(tuple(recording.samples(int(start), int(start) + WINDOW_ROWS) for start in starts))
+
+    @cached_property
+    def _steps(self) -> Array:
+        return np.concatenate([np.diff(window.time) for window in self.windows])
+
+    @cached_property
+    def longest_interval(self) -> float:
+        """Longest usual time from row to row [s]: their 99th percentile."""
+        return float(np.percentile(self._steps, 99.0))
+
+    @cached_property
+    def interval(self) -> float:
+        """Usual time from row to row [s]: the median, or where rows come in bursts the mean without gaps."""
+        median = float(np.median(self._steps))
+        mean = float(np.mean(self._steps[self._steps <= self.longest_interval]))
+        return mean if median < BURST * mean else median
+
+    @cached_property
+    def position(self) -> Array:
+        """Positions of all windows, (N, n)."""
+        return np.concatenate([window.position for window in self.windows])
+
+    @cached_property
+    def effort(self) -> Array:
+        """Efforts of all windows, (N, n)."""
+        return np.concatenate([window.effort for window in self.windows])
+
+    @cached_property
+    def velocity(self) -> Array | None:
+        """Recorded velocity of the rows of `slope`, (N, n)."""
+        given = [window.velocity[1:-1] for window in self.windows if window.velocity is not None]
+        return np.concatenate(given) if given else None
+
+    @cached_property
+    def slope(self) -> Array:
+        """Δq/Δt over two steps about every inner row of the windows, NaN within bursts, (N, n)."""
+        parts = []
+        for window in self.windows:
+            elapsed = window.time[2:] - window.time[:-2]
+            elapsed = np.where(elapsed > self.interval, elapsed, np.nan)
+            parts.append((window.position[2:] - window.position[:-2]) / elapsed[:, None])
+        return np.concatenate(parts)
+
+    @cached_property
+    def effort_at_slope(self) -> Array:
+        """Effort of the rows of `slope`, (N, n)."""
+        return np.concatenate([window.effort[1:-1] for window in self.windows])
+
+    @cached_property
+    def position_at_slope(self) -> Array:
+        """Position of the rows of `slope`, (N, n)."""
+        return np.concatenate([window.position[1:-1] for window in self.windows])
+
+    @cached_property
+    def top_speed(self) -> Array:
+        """Largest |Δq/Δt| of every joint, (n,) [rad/s or m/s]; 0 where it is not known."""
+        return np.fmax.reduce(np.abs(self.slope), axis=0, initial=0.0)
+
+    @cached_property
+    def reach(self) -> Array:
+        """99th percentile of |q| of every joint, (n,) [rad or m]; 0 where it is not known. Spikes reach beyond."""
+        return percentile(np.abs(self.position), 99.0)
+
+    @cached_property
+    def span(self) -> Array:
+        """Range of every joint's position, (n,) [rad or m]; 0 where it is not known."""
+        low = np.fmin.reduce(self.position, axis=0, initial=np.inf)
+        high = np.fmax.reduce(self.position, axis=0, initial=-np.inf)
+        return np.maximum(high - low, 0.0)
+
+
+def joint_types(recording: Recording, robot: Robot | None) -> list[JointType]:
+    """Types of the joints, revolute where no robot says otherwise."""
+    return [JointType.REVOLUTE] * recording.joint_count if robot is None else [joint.type for joint in robot.joints]
+
+
+def percentile(values: Array, share: float) -> Array:
+    """Percentile of every column's finite values, (n,); 0 where there are none.
+
+    `values`: (N, n), columns; `share`: percentile, 0 to 100.
+    """
+    few = values[:: max(1, len(values) // RANKED_ROWS)]
+    known = [column[np.isfinite(column)] for column in few.T]
+    return np.array([float(np.percentile(column, share)) if len(column) else 0.0 for column in known])
+
 
 ONE_TURN = 2.0 * np.pi
 
-TURN_SPARE = 0.01
-"""Beyond one turn by this, an angle is not wrapped [rad]."""
-
-LARGEST_STEP = np.pi / 2.0
-"""Turn between two samples up to which it can be told which way [rad]."""
-
+TURN_SPARE = 0.01  # beyond one turn by this, an angle is not wrapped [rad]
+LARGEST_STEP = np.pi / 2.0  # turn between two samples up to which it can be told which way [rad]
+# A value that moves by so many of its own steps in one row is sampled too coarsely to rest in the next.
 STEPS_OF_A_MOVE = 4.0
-"""A value that moves by so many of its own steps in one row is sampled too coarsely to rest in the next."""
-
-HELD_SHARE = 0.5
-"""Share of such moves followed by a rest above which the source holds its values."""
-
-FEWEST_MOVES = 30
-"""Least number of such moves: noise makes some now and then."""
-
-LONGEST_HOLD = 64
-"""Rows of the longest hold: a source of 30 Hz on a topic of 2 kHz."""
-
-JUDGED_ROWS = 2048
-"""Rows whose neighbours are looked at for a typical size."""
-
-NEIGHBOURS = 3
-"""Rows on either side that a row is judged by."""
+HELD_SHARE = 0.5  # share of such moves followed by a rest above which the source holds its values
+FEWEST_MOVES = 30  # least number of such moves: noise makes some now and then
+LONGEST_HOLD = 64  # rows of the longest hold: a source of 30 Hz on a topic of 2 kHz
+JUDGED_ROWS = 2048  # rows whose neighbours are looked at for a typical size
+NEIGHBOURS = 3  # rows on either side that a row is judged by
 
 
 @dataclass(frozen=True)
@@ -151,7 +245,6 @@ def distance_beyond(windows: Array) -> Array:
 
 
 def _leave_stops_out(time: Array, values: Array, interval: float) -> Array:
-    """A joint's known values without the rows before which the clock stands."""
     known = np.isfinite(values)
     time, values = time[known], values[known]
     return values[np.diff(time, prepend=-np.inf) > 0.1 * interval]
@@ -178,5 +271,4 @@ def _measure_holds(pieces: list[Array]) -> tuple[float, int, int]:
 
 
 def _percentile(values: Array, share: float) -> float:
-    """A percentile, 0 of nothing."""
     return float(np.percentile(values, share)) if len(values) else 0.0

@@ -6,34 +6,27 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.recording.examination.dropouts import ZeroRuns
-from tauscope.recording.examination.edits import (
-    NO_NUMBERS,
-    ColumnEdit,
-    Numbers,
-    Rows,
-    join_ranges,
-    row_numbers,
-)
-from tauscope.recording.examination.effort_defects import find_all_stuck, find_spikes, find_stuck
+from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, Numbers, Rows, join_ranges, row_numbers
+from tauscope.recording.examination.effort_defects import ZeroRuns, find_all_stuck, find_spikes, find_stuck
 from tauscope.recording.examination.position_defects import scan_position
-from tauscope.recording.examination.scales import EffortScale, PositionScale, is_new, measure_efforts, measure_positions
-from tauscope.recording.examination.sketch import BLOCK_ROWS, Sketch
+from tauscope.recording.examination.scales import (
+    BLOCK_ROWS,
+    EffortScale,
+    PositionScale,
+    Sketch,
+    is_new,
+    measure_efforts,
+    measure_positions,
+)
 from tauscope.recording.recording import Recording, Samples
 from tauscope.recording.samples import Array
 from tauscope.robot.robot import JointType
 
-SPARE_ROWS = 512
-"""Rows read beyond a block on either side: a run of one value that is longer is taken to end there."""
-
-BUNCHED = 0.1
-"""Share of the usual interval below which two stamps belong to one instant: a buffer was emptied."""
-
+SPARE_ROWS = 512  # rows read beyond a block on either side: a run of one value that is longer is taken to end there
+BUNCHED = 0.1  # share of the usual interval below which two stamps belong to one instant: a buffer was emptied
+# Share of bunched stamps above which the source always sends in bursts: the conditioning counts its rows.
 MOST_BUNCHED = 0.1
-"""Share of bunched stamps above which the source always sends in bursts: the conditioning counts its rows."""
-
-REST_HOLDS = 4
-"""Holds of one value after which it is a rest, and no update that was lost."""
+REST_HOLDS = 4  # holds of one value after which it is a rest, and no update that was lost
 
 
 @dataclass(eq=False)
@@ -160,11 +153,10 @@ class _Scan:
         if len(defects.bunched) > MOST_BUNCHED * len(recording):
             defects.bunched = NO_NUMBERS
         for joint, ranges in zip(defects.joints, self.zeros.find_dropouts(recording), strict=True):
-            joint.rows["zeros"] = row_numbers(ranges)
+            joint.rows["zeros"] = np.unique(row_numbers(ranges))
         return defects
 
     def _keep(self, joint: int, name: str, rows: Numbers, core: tuple[int, int]) -> None:
-        """Keep the rows that are a block's own."""
         own = rows[(rows >= core[0]) & (rows < core[1])]
         if len(own):
             self.found.setdefault((joint, name), []).append(own)

@@ -4,17 +4,16 @@ import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 
-from tauscope.recording.layout.families import Family, find_families, words_of
+from tauscope.recording.layout.families import Family, find_families, role_of, time_rank, time_unit, unit_of, words_of
 from tauscope.recording.layout.presets import PRESET_OF, Preset
-from tauscope.recording.layout.roles import role_of, time_rank, time_unit, unit_of
 from tauscope.robot.recording_layout import RecordingLayout, Source
 
 _COMMON_JOINT_COUNTS = (6, 7)
 _PLAIN = re.compile(r"(?!(?:y|n|yes|no|on|off|true|false|null)$)[A-Za-z_][A-Za-z0-9_./-]*", re.IGNORECASE)
 _OPTIONAL = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt")
 
+# The group that words of a column mean, and how far they are from the first choice.
 Ranking = Callable[[Sequence[str]], tuple[str, int] | None]
-"""The group that words of a column mean, and how far they are from the first choice."""
 
 
 def guess_layout(
@@ -90,7 +89,6 @@ def is_numbered(header: Sequence[str]) -> bool:
 
 
 def _guess_by_place(width: int, joint_count: int | None) -> RecordingLayout:
-    """Time, positions, perhaps velocities, and efforts, side by side."""
     counts = [joint_count] if joint_count else [*_COMMON_JOINT_COUNTS, (width - 1) // 2]
     for n in counts:
         for groups in (("q", "tau"), ("q", "qd", "tau")):
@@ -146,5 +144,4 @@ def _source(family: Family, count: int | None) -> Source:
 
 
 def _unit(current: Family | None) -> str | None:
-    """The unit of currents, where their name states one."""
     return None if current is None else unit_of(current.template)

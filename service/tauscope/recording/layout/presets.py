@@ -16,6 +16,7 @@ class Preset:
     units: Mapping[str, str] = field(default_factory=dict)
 
 
+# By the names of `tauscope.robot.recording_layout.PRESETS`.
 PRESET_OF: Mapping[str, Preset] = {
     "rtde": Preset(
         {
@@ -81,4 +82,3 @@ PRESET_OF: Mapping[str, Preset] = {
         }
     ),
 }
-"""By the names of `tauscope.robot.recording_layout.PRESETS`."""

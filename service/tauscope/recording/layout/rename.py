@@ -14,9 +14,7 @@ from tauscope.robot.messages import listed, printable
 from tauscope.robot.recording_layout import RecordingLayout, Source
 
 _TARGET = re.compile(r"([a-z]+)([0-9]*)")
-NANOSECONDS = "t nanoseconds"
-"""Name of the column with the nanoseconds of each second."""
-
+NANOSECONDS = "t nanoseconds"  # name of the column with the nanoseconds of each second
 _EFFORTS = ("tau", "i")
 
 
@@ -44,7 +42,6 @@ def rename_columns(header: Sequence[str], reading: Reading, file: str) -> list[s
 
 
 def _preset_columns(header: Sequence[str], preset: str, reading: Reading, file: str) -> Mapping[str, Source]:
-    """The mapping of a preset for this header."""
     layout = guess_layout(header, reading.joint_names, preset=preset, prefers_torque=reading.prefers_torque)
     _require_as_many(header, preset, layout, reading, file)
     if layout is None:
@@ -119,7 +116,6 @@ class _Mapping:
         raise RecordingError(f"{self._file}: columns: {target}: {self._absence(name)}")
 
     def _group(self, group: str, source: Source) -> Sequence[str | int]:
-        """One column a joint."""
         if not isinstance(source, str | int):
             return source
         template = str(source)
@@ -146,7 +142,6 @@ class _Mapping:
         return found or [fill_template(template, 0, None)]
 
     def _match_by_name(self, template: str) -> Sequence[str]:
-        """One column a joint of the robot; of the file, in its order, where no robot is known."""
         found = names_in(self._header, template)
         if self._names is None:
             self._names = found
@@ -160,18 +155,15 @@ class _Mapping:
         return [fill_template(template, 0, name) for name in self._names]
 
     def _fits(self, template: str) -> bool:
-        """Whether a list column of this name was unfolded."""
         return bool(names_in(self._header, template.replace("{0}", BY_NAME)))
 
     def _absence(self, name: str) -> str:
-        """A column that is not there, and those that are."""
         near = difflib.get_close_matches(name, self._header, 1)
         hint = f"did you mean {printable(near[0])}?" if near else f"the columns are {listed(self._header)}"
         return f"no column is named {printable(name)}; {hint}"
 
 
 def _split(target: str) -> tuple[str, str]:
-    """Group and number of a column of CONTRACT.md."""
     match = _TARGET.fullmatch(target)
     return (match[1], match[2]) if match else (target, "")
 
