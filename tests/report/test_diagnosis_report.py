@@ -1,5 +1,6 @@
 """The page of a diagnosis: the story in its order, every number where it belongs, deaf to hostile names."""
 
+import html
 import re
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -17,7 +18,7 @@ from tauscope.diagnosis.next_experiment import PlannedExperiment, plan_experimen
 from tauscope.recording import read_recording
 from tauscope.report.diagnosis_report import diagnosis_report
 from tauscope.report.provenance import InputFile, Provenance
-from tauscope.report.words import summary_sentences
+from tauscope.report.words import doubts, summary_sentences
 from tauscope.robot import Model, read_robot
 from tauscope_sim.examples import example_robot
 
@@ -159,6 +160,18 @@ def test_joints_that_held_out_motion_shows_worse_are_named(told: DiagnosisDocume
     )
     text = " ".join(summary_sentences(told.model_copy(update={"fit": told.fit.model_copy(update={"held_out": worse})})))
     assert f"It is predicted worse: the residual of {JOINTS[1]} goes from" in text
+
+
+def test_what_a_reader_must_know_stands_first(told: DiagnosisDocument, page: str) -> None:
+    alike = told.findings[0].model_copy(update={"equivalent": ["cable_force"]})
+    fit = told.fit.model_copy(update={"held_out": None})
+    sentences = list(doubts(told.model_copy(update={"findings": [alike], "fit": fit})))
+    assert any(each.startswith("No recording was held out") for each in sentences)
+    assert any("these data cannot tell it from cable_force" in each for each in sentences)
+    assert not any(each.startswith("No recording was held out") for each in doubts(told))
+    plain = [each for each in doubts(told) if each == html.escape(each)]
+    assert plain
+    assert all(each in page for each in plain)
 
 
 @pytest.mark.slow

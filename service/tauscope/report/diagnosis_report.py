@@ -26,8 +26,8 @@ from tauscope.report.tables import (
 from tauscope.report.torque_figure import proof_figure
 from tauscope.report.words import (
     MOST_FINDINGS,
-    cautions,
     constancy_sentence,
+    doubts,
     effect_title,
     file_title,
     finding_facts,
@@ -67,7 +67,7 @@ def diagnosis_report(
             subtitle=f"{joints} · band {significant(document.cutoff_hz, 3)} Hz · {created}",
             key_figures=list(_key_figures(document)),
             sentences=list(summary_sentences(document)),
-            cautions=list(cautions(document)),
+            cautions=list(doubts(document)),
             sections=sections,
             footer=", ".join(f"{name} {version}" for name, version in provenance.versions),
         )

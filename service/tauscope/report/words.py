@@ -192,6 +192,10 @@ def refutations(document: DiagnosisDocument) -> Iterator[str]:
     """Joints at which a black box predicts what the verdict calls noise."""
     yield from (entry.statement for entry in document.headroom or () if entry.refuted)
 
+
+def doubts(document: DiagnosisDocument) -> Iterator[str]:
+    """What a reader has to know before acting on a diagnosis."""
+    yield from cautions(document)
     yield from refutations(document)
     if document.fit.held_out is None:
         yield "No recording was held out: nothing here was tested on motion that the model has not seen."
