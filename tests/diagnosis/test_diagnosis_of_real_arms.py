@@ -61,8 +61,12 @@ def test_the_cogging_of_a_bare_motor_is_named_first_with_its_orders() -> None:
     entries = {entry.name: entry.value for entry in found.findings[0].parameters}
     orders = {round(value) for name, value in entries.items() if name.startswith("order")}
     assert {7, 28, 14, 12, 36} <= orders
-    # 0.80 A by the README, of the harmonic as a whole: friction's lag, told beside it, takes a part.
-    assert entries["amplitude"] == pytest.approx(0.80, abs=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="0.763 A: a lag of friction's torque, named beside it, takes a part")
+def test_the_first_order_of_a_bare_motor_has_the_size_that_its_readme_states() -> None:
+    assert values(told("odrive-cogging"), "cogging")["amplitude"] == pytest.approx(0.80, abs=0.03)
 
 
 @pytest.mark.slow
@@ -110,3 +114,13 @@ def test_what_training_leaves_open_leaves_the_verdict_open_and_predicts_no_joint
     assert "lwr_1_joint: it moves from -0.85 to 0.85 rad, in training from -0.57 to 0.57" in found.next_experiment.why
     # 4.3 % is the README's best, 8.4 % what its free parameters leave.
     assert relative_error(diagnosed("kuka-lwr4"), recordings("kuka-lwr4", "held-out"), 8.0) < 0.035
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(
+    strict=True, reason="held-out motion shows cogging and bristles at two joints that training leaves open"
+)
+def test_where_training_leaves_torque_open_nothing_is_named() -> None:
+    found = told("kuka-lwr4")
+    open_joints = {each.joint for each in found.warnings if each.code == "extrapolation" and "uncertain" in each.text}
+    assert open_joints.isdisjoint(each.joint for each in found.findings)

@@ -151,7 +151,7 @@ def test_what_takes_the_place_of_a_nominal_effect_is_added_and_what_stands_besid
     asked = deciding(odds, RotorInertia(0))
     at, _, exchanges = asked._exchange(holding(RotorInertia(0)), 1)
     assert exchanges == 1
-    assert asked._added(at) == [0]
+    assert asked._find_added(at) == [0]
 
 
 class Wavering(Deciding):

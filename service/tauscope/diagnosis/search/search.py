@@ -71,7 +71,7 @@ class Search:
             exchanges += exchanged
             at = self._drop_superfluous(at)
 
-    def _added(self, at: Hypothesis) -> list[int]:
+    def _find_added(self, at: Hypothesis) -> list[int]:
         """Places of the terms that the nominal model has not."""
         known = _places(self.nominal)
         return [place for place, term in enumerate(at.model.terms) if term.place not in known]
@@ -82,7 +82,7 @@ class Search:
         What was refused is tried again after something else was found at its joints.
         """
         steps: list[Step] = []
-        while len(self._added(at)) < MOST_EFFECTS:
+        while len(self._find_added(at)) < MOST_EFFECTS:
             proposals = self.proposer.propose(at, _Wanted(_places(at), refused))
             tried, found = self._best(at, proposals)
             steps += tried
@@ -99,7 +99,7 @@ class Search:
         """Farther forms in the place of effects that they refine, where they are more probable."""
         for effect in self.farther:
             terms = at.model.terms
-            own = (place for place in self._added(at) if terms[place].effect.joint == effect.joint)
+            own = (place for place in self._find_added(at) if terms[place].effect.joint == effect.joint)
             refined = next((place for place in own if terms[place].effect.id in effect.refines), None)
             if refined is not None:
                 at = self._refine_by(effect, refined, at)
@@ -203,7 +203,7 @@ class Search:
 
     def _drop_harmful(self, at: Hypothesis) -> Hypothesis:
         """The same without the effects at whose cost joints are predicted worse than by the nominal model."""
-        while self.held_out is not None and (added := self._added(at)):
+        while self.held_out is not None and (added := self._find_added(at)):
             if self.held_out.trained_change(self.nominal, at).harm <= 0.0:
                 break
             others = [self._settle_without(at, place) for place in added]
@@ -340,7 +340,7 @@ class Search:
     def _drop_superfluous(self, at: Hypothesis) -> Hypothesis:
         """The same without effects that the later ones made superfluous."""
         while True:
-            places = [place for place in self._added(at) if place < len(at.model.terms) - 1]
+            places = [place for place in self._find_added(at) if place < len(at.model.terms) - 1]
             gains = side_by_side(lambda place, at=at: self._weigh_absence(at, place), places)
             pairs = sorted(zip(gains, places, strict=True), reverse=True)
             others = (self._leave_out(at, place, gain) for gain, place in pairs if gain > CATALOGUED)
