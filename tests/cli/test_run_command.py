@@ -15,7 +15,7 @@ from cli.conftest import Ended
 from server.queue.paper_files import PAPER_ROBOT
 from server.queue.waiting import wait_until
 from shared_data import REPOSITORY
-from tauscope.cli.run_command import why_unfinished
+from tauscope.cli.run_command import explain_unfinished
 from tauscope.recording import read_recording
 from tauscope.runtime.record import RunProblem, new_record
 from tauscope.runtime.states import RunState
@@ -178,4 +178,4 @@ def test_a_failed_run_says_what_the_arm_does_and_where_the_journal_is(holds: boo
             "problem": RunProblem(code="acquisition", detail="the disk is full"),
         }
     )
-    assert words in why_unfinished(record, None, Path("/runs/journal.mcap"))
+    assert words in explain_unfinished(record, None, Path("/runs/journal.mcap"))

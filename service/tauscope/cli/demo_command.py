@@ -20,7 +20,7 @@ from tauscope.cli.demo_campaign import run_campaign
 from tauscope.cli.demo_page import DATA, LEFT_FOR_S, PORT, PageShown, leave_page, prepare_folder, show_page
 from tauscope.cli.identify_command import show_identification
 from tauscope.cli.output_files import write_file
-from tauscope.cli.run_command import keep_recording, why_unfinished
+from tauscope.cli.run_command import explain_unfinished, keep_recording
 from tauscope.cli.task_run import write_outputs
 from tauscope.cli.terminal import Told, output, plain, show_progress, table
 from tauscope.diagnosis import DiagnosisDocument
@@ -163,7 +163,7 @@ def run_motion(folder: Path, trajectory: Path, out: Path, seed: int, told: Told)
     )
     result = run.perform(request, LocalFiles({"run": folder}), told)
     if result.record.state is not RunState.FINISHED:
-        raise AcquisitionError(why_unfinished(result.record, None))
+        raise AcquisitionError(explain_unfinished(result.record, None))
     keep_recording(result, out)
 
 

@@ -124,7 +124,7 @@ def _run_arm(request: task.Request, asked: Path | None) -> None:
     if made:
         output().print(plain(f"wrote {out}"), soft_wrap=True)
     if result.record.state is not RunState.FINISHED:
-        raise AcquisitionError(why_unfinished(result.record, out if made else None, journal))
+        raise AcquisitionError(explain_unfinished(result.record, out if made else None, journal))
 
 
 def keep_recording(result: task.Result, out: Path) -> bool:
@@ -147,7 +147,7 @@ def _unsaved_journal(result: task.Result) -> Path | None:
     return None if is_empty or not journal.exists() else journal
 
 
-def why_unfinished(record: RunRecord, recording: Path | None, journal: Path | None = None) -> str:
+def explain_unfinished(record: RunRecord, recording: Path | None, journal: Path | None = None) -> str:
     """One line on a run that did not finish."""
     reason = record.stop if record.problem is None else record.problem.detail
     until = "" if record.state is RunState.DEGRADED else " until then"

@@ -67,7 +67,7 @@ class DocumentOrigin:
         """The error of an entry."""
         return RobotFileError(one_line(f"{self.where(place)}: {text}"))
 
-    def validated(self, kind: type[DocumentType]) -> DocumentType:
+    def validate(self, kind: type[DocumentType]) -> DocumentType:
         """The data as a validated document. Raises RobotFileError naming the first entry that is not valid."""
         if not isinstance(self.data, Mapping):
             raise self.error((), f"must be a mapping with name and kinematics, but is {shown(self.data)}")

@@ -24,7 +24,7 @@ def robot_from_dict(
     valid; one line naming the JSON path and joint.
     """
     origin = DocumentOrigin(label, data)
-    document = origin.validated(PlainRobotDocument)
+    document = origin.validate(PlainRobotDocument)
     return build_robot(document, origin, _find_given(origin, urdf_files or {}))
 
 

@@ -52,12 +52,12 @@ def parse_robot_file(data: bytes, label: str) -> tuple[RobotDocument, DocumentOr
     """
     if is_xml(data):
         origin = DocumentOrigin(label, describe_bare_file(data, label))
-        return origin.validated(RobotDocument), origin
+        return origin.validate(RobotDocument), origin
     if len(data) > LARGEST_ROBOT_FILE:
         raise RobotFileError(one_line(f"{label}: the file is larger than {LARGEST_ROBOT_FILE // 1024} KiB"))
     content = read_yaml(decode_utf8(data, label), label)
     origin = DocumentOrigin(label, content.data, content.lines)
-    return origin.validated(RobotDocument), origin
+    return origin.validate(RobotDocument), origin
 
 
 def describe_bare_file(data: bytes, label: str) -> dict[str, Any]:
@@ -114,4 +114,4 @@ def layout_from_dict(data: Any, label: str = "columns", lines: Mapping[Place, in
         data, lines = data["recording"], {place[1:]: line for place, line in lines.items() if place}
     elif not set(data) & set(RecordingDocument.model_fields):
         data, lines = {"columns": data}, {("columns", *place): line for place, line in lines.items()}
-    return DocumentOrigin(label, data, lines).validated(RecordingDocument).layout
+    return DocumentOrigin(label, data, lines).validate(RecordingDocument).layout

@@ -79,7 +79,7 @@ class CanEmulator(Emulator):
     def due(self, now_s: float) -> bytes:
         """Text that has reached the host by now. `now_s`: present instant [s]."""
         text, self._answers = self._answers, b""
-        return text + b"".join(map(self._line.text, self._wire.arrived(now_s)))
+        return text + b"".join(map(self._line.text, self._wire.take_arrived(now_s)))
 
     def describe(self) -> dict[str, Any]:
         """Where the arm is and what its drives do."""

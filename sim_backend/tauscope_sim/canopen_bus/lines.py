@@ -173,7 +173,7 @@ class Wire:
         """Let a frame of the master take its time. `now_s`: present instant [s]."""
         self._free_s = max(now_s, self._free_s) + self.duration_s(frame)
 
-    def arrived(self, now_s: float) -> list[Frame]:
+    def take_arrived(self, now_s: float) -> list[Frame]:
         """Frames that have reached the adapter. `now_s`: present instant [s]."""
         frames = []
         while self._arriving and self._arriving[0][0] <= now_s:

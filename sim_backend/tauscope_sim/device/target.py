@@ -69,7 +69,7 @@ class SetpointSpline:
             self._points[3] = before + cycle * slope + (cycle * cycle) * bend
         self._points[3] = position
 
-    def starved(self, time: float) -> bool:
+    def is_starved(self, time: float) -> bool:
         """Whether setpoints have failed to come for so long that the target should come to rest.
 
         `time`: instant [ticks].
@@ -257,7 +257,7 @@ class Target:
 
     def advance(self, tick: int) -> None:
         """Move on by one tick."""
-        if not self._braking and self._spline.starved(tick):
+        if not self._braking and self._spline.is_starved(tick):
             self.brake()
         if not self._braking:
             self._follow_spline(tick)

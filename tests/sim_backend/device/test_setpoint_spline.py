@@ -80,8 +80,8 @@ def test_a_change_of_pace_is_found_out() -> None:
 def test_it_starves_five_cycles_after_the_last_setpoint() -> None:
     spline = SetpointSpline(np.zeros(1))
     feed(spline, float, [(4.0 * k, 0.0) for k in range(50)], range(197))
-    assert not spline.starved(196.0 + 4.9 * 4.0)
-    assert spline.starved(196.0 + 5.1 * 4.0)
+    assert not spline.is_starved(196.0 + 4.9 * 4.0)
+    assert spline.is_starved(196.0 + 5.1 * 4.0)
 
 
 def test_a_period_that_was_told_is_kept_from_the_first_setpoint_on() -> None:
