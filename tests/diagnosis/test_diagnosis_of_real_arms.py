@@ -77,6 +77,17 @@ def test_a_bare_motor_is_predicted_as_by_forty_harmonics() -> None:
 
 
 @pytest.mark.slow
+def test_load_dependent_friction_of_the_double_pendulum_is_named() -> None:
+    """Its curators' own finding."""
+    found = told("double-pendulum")
+    finding = next(each for each in found.findings if each.effect == "load_dependent_friction")
+    assert (finding.joint, finding.probability) == ("elbow", pytest.approx(1.0, abs=0.1))
+    assert found.fit.held_out is not None
+    pairs = zip(found.fit.held_out.rms_before, found.fit.held_out.rms_after, strict=True)
+    assert all(after < 0.9 * before for before, after in pairs)
+
+
+@pytest.mark.slow
 def test_the_coupled_wrist_of_the_tx40_is_named_first() -> None:
     found = told("staubli-tx40")
     first = found.findings[0]

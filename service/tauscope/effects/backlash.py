@@ -153,9 +153,11 @@ class Backlash(Deflection):
     def claim(self, found: Sizes, context: ArmContext) -> str:
         return f"the transmission has {size_text(found['b'])} of backlash"
 
-    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
-        """Whether the gap that the link flies over is the one by which it moves."""
-        return bool(shape[0] <= SAME * coefficients[0])
+    def limits(self, coefficients: Array, shape: Array) -> tuple[Array, Array]:
+        """The gap that the link flies over is no more than the one by which it moves."""
+        lower, upper = super().limits(coefficients, shape)
+        upper[0] = SAME * coefficients[0]
+        return lower, upper
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
         return place_between_teeth(load, inertia, float(shape[0]), rate_hz)
@@ -191,9 +193,11 @@ class SpringyTeeth(Backlash):
     def farther_forms(cls, context: ArmContext) -> Sequence[Effect]:
         return ()
 
-    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
-        """Whether the gap that the link crosses is the one by which it moves."""
-        return bool(1.0 / SAME < coefficients[0] / shape[0] < SAME)
+    def limits(self, coefficients: Array, shape: Array) -> tuple[Array, Array]:
+        """The gap that the link crosses is the one by which it moves."""
+        lower, upper = super().limits(coefficients, shape)
+        lower[0] = coefficients[0] / SAME
+        return lower, upper
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
         """Place between and on the teeth; where no inertia is known that could swing, as on stiff ones."""

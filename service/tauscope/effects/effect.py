@@ -192,12 +192,20 @@ class Effect(ABC):
         """
         return True
 
-    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
-        """Whether coefficients and shape, each fitted freely, can belong to one thing.
+    def limits(self, coefficients: Array, shape: Array) -> tuple[Array, Array]:
+        """Shapes between which both belong to one thing, (k,) each: a quantity that enters twice is estimated twice.
 
         `coefficients`: (c,), values of the coefficients; `shape`: (k,), values of the shape parameters.
         """
-        return True
+        return np.full(len(shape), -np.inf), np.full(len(shape), np.inf)
+
+    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
+        """Whether coefficients and shape belong to one thing, and are not merely held at its limits.
+
+        `coefficients`: (c,), values of the coefficients; `shape`: (k,), values of the shape parameters.
+        """
+        lower, upper = self.limits(coefficients, shape)
+        return bool(np.all((lower < shape) & (shape < upper)))
 
     def touched(self, joint_count: int) -> tuple[int, ...]:
         """Joints whose torque the effect changes: its own one, or all."""

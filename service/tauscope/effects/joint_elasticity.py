@@ -72,9 +72,12 @@ class JointElasticity(Deflection):
             made.append(cls(joint, grid, grid.min(axis=0), grid.max(axis=0)))
         return made
 
-    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
-        """Whether what gives way is what the link swings on."""
-        return bool(shape[1] == 0.0 or 1.0 / SAME < coefficients[0] / shape[1] < SAME)
+    def limits(self, coefficients: Array, shape: Array) -> tuple[Array, Array]:
+        """What gives way is what the link swings on."""
+        lower, upper = super().limits(coefficients, shape)
+        if shape[1]:
+            lower[1], upper[1] = coefficients[0] / SAME, coefficients[0] * SAME
+        return lower, upper
 
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array

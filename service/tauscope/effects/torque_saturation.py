@@ -68,9 +68,11 @@ class TorqueSaturation(Saturation):
         """A soft curve, c tanh(τ/c), (g, N)."""
         return levels * np.tanh(torque / levels)
 
-    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
-        """Whether a curve with a = 1 that is bent as much has a level that a sensor may have."""
-        return bool(shape[0] >= self.lower[0] * np.sqrt(coefficients[0]))
+    def limits(self, coefficients: Array, shape: Array) -> tuple[Array, Array]:
+        """A curve with a = 1 that is bent as much has a level that a sensor may have."""
+        lower, upper = super().limits(coefficients, shape)
+        lower[0] = self.lower[0] * np.sqrt(coefficients[0])
+        return lower, upper
 
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array

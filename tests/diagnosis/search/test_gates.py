@@ -11,6 +11,7 @@ from tauscope.diagnosis.model.held_out_change import HeldOutChange
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.search.search import Search
 from tauscope.effects.joint_spring import JointSpring
+from tauscope.effects.time_delay import Shift
 
 NOTHING: Any = None
 JOINTS = 2
@@ -25,6 +26,7 @@ class Trial:
     beside_friction: float = 0.0
     predicted: float = 10.0
     harm: float = 0.0
+    lost: float | None = None
 
 
 def change(log_odds: float, harm: float = 0.0) -> HeldOutChange:
@@ -37,11 +39,26 @@ def change(log_odds: float, harm: float = 0.0) -> HeldOutChange:
     )
 
 
+@dataclass(frozen=True, eq=False)
 class Asking(Search):
-    """A search whose odds are given."""
+    """A search whose odds are given, those among them that are lost with a lag of which the spring leaves too little."""
+
+    lost: float | None = None
 
     def _add(self, at: Any, proposal: Any) -> Any:
+        found = holding("found")
+        if self.lost is not None:
+            found.model.terms.insert(0, Term(Shift(0), np.array([0.01]), np.array([0.4])))
+        return found
+
+    def _settle_without(self, at: Any, place: int) -> Any:
+        assert place == 0
         return holding("found")
+
+    def _log_odds_of(self, lost: Any, *_: Any) -> float:
+        assert [each.id for each in lost] == ["time_delay"]
+        assert self.lost is not None
+        return self.lost
 
     def _settle(self, at: Any, touched: Any) -> Any:
         return at
@@ -70,7 +87,10 @@ def is_named(trial: Trial) -> bool:
         trained_change=lambda before, after: change(trial.predicted, trial.harm),
     )
     proposal: Any = SimpleNamespace(term=holding("found").model.terms[0], log_factor=trial.training)
-    step, _ = Asking(NOTHING, NOTHING, NOTHING, held_out)._try(holding("at"), proposal, [proposal])
+    nominal: Any = SimpleNamespace(model=SimpleNamespace(terms=[]))
+    search = Asking(nominal, NOTHING, NOTHING, held_out, lost=trial.lost)
+    step, found = search._try(holding("at"), proposal, [proposal])
+    assert len(found.model.terms) == 1
     return step.is_confirmed
 
 
@@ -87,6 +107,8 @@ UNASKED = Trial(training=2.0, held_out=20.0)
         (replace(ASKED, held_out=0.5, beside_friction=1.5), True),  # where friction's slopes take its place
         (replace(ASKED, predicted=-1.0), False),  # by training alone no worse
         (replace(ASKED, harm=0.5), False),  # at no other joint's cost
+        (replace(ASKED, lost=0.5), True),  # without what it makes impossible
+        (replace(ASKED, lost=5.0), False),  # but what is lost with that counts
         (UNASKED, True),
         (replace(UNASKED, held_out=16.0), False),  # three standard errors
         (replace(UNASKED, training=-20.0), False),  # what training is sure is not there

@@ -85,8 +85,8 @@ class Finding:
 
 
 def in_order(found: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Findings, most explained energy first."""
-    return tuple(sorted(found, key=lambda each: -each.gain))
+    """Findings, most explained energy first; what every arm has comes after what only this one has."""
+    return tuple(sorted(found, key=lambda each: (each.terms[0].effect.is_expected, -each.gain)))
 
 
 def equivalent(log_odds: float, rivals: Sequence[Rival]) -> tuple[Rival, ...]:

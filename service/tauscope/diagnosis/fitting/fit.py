@@ -224,7 +224,7 @@ def _room(model: ExtendedModel, limits: Array) -> tuple[NDArray[np.intp], Array,
 
 
 def stepped(model: ExtendedModel, step: Array) -> ExtendedModel:
-    """The model moved by a step; rounding leads no shape out of its bounds.
+    """The model moved by a step, each shape within its bounds and what its coefficients let it be.
 
     Parameters
     ----------
@@ -238,11 +238,12 @@ def stepped(model: ExtendedModel, step: Array) -> ExtendedModel:
             terms[joint] = replace(terms[joint], **{name: model.constant(place) * float(np.exp(step[size + place]))})
     moved = []
     for term, place in zip(model.terms, model.term_places(), strict=True):
-        count = len(term.coefficients)
-        shape = term.shape.copy()
-        free = list(term.free_shapes)
-        shape[free] = np.clip(shape[free] + step[place][count:], term.effect.lower[free], term.effect.upper[free])
-        moved.append(replace(term, shape=shape, coefficients=term.coefficients + step[place][:count]))
+        count, effect, shape, free = len(term.coefficients), term.effect, term.shape.copy(), list(term.free_shapes)
+        coefficients = term.coefficients + step[place][:count]
+        shape[free] += step[place][count:]
+        for lower, upper in (effect.limits(coefficients, shape), (effect.lower, effect.upper)):
+            shape[free] = np.clip(shape[free], lower[free], upper[free])
+        moved.append(replace(term, shape=shape, coefficients=coefficients))
     stepped = replace(
         model, structure=model.structure.with_terms(tuple(terms)), parameters=model.parameters + step[:size]
     )

@@ -111,7 +111,7 @@ class Search:
         for proposal in Proposer(self.laboratory, [effect]).propose(without, lambda _: True):
             found = self._settle(self._add(without, proposal), touched)
             found = self._drop_superfluous(found)
-            if self._compare(at, found, touched) > 0.0 and _is_possible(found.model):
+            if self._compare(at, found, touched) > 0.0 and _stands(found.model):
                 return found
         return at
 
@@ -220,7 +220,7 @@ class Search:
         refusals: list[Step] = []
         for proposal in self._rank(at, [each for each in proposals if self._log_odds(each) > 0.0]):
             step, found = self._try(at, proposal, proposals)
-            forms = [] if step.is_confirmed or _is_possible(found.model) else self._forms_beyond(at, proposal)
+            forms = [] if step.is_confirmed or _stands(found.model) else self._forms_beyond(at, proposal)
             for form in forms:  # where its own law cannot be
                 step, found = self._try(at, form, proposals)
                 if step.is_confirmed:
@@ -256,21 +256,34 @@ class Search:
     def _try(self, at: Hypothesis, proposal: Proposal, proposals: Sequence[Proposal]) -> tuple[Step, Hypothesis]:
         """A proposal in the model, and what held-out motion says of it."""
         touched = proposal.term.effect.touched(len(at.scales))
-        found = self._settle(self._add(at, proposal), touched)
+        found, lost = self._drop_impossible(self._settle(self._add(at, proposal), touched))
+        trained = self._log_odds(proposal) - (self._log_odds_of(lost, at, found, proposal) if lost else 0.0)
         change = None if self.held_out is None else self.held_out.change(at, found)
         rivals = tuple(each for each in proposals if each is not proposal)
-        trained = self._log_odds(proposal)
         passes = isinstance(proposal.term.effect, TimeLocalEffect)
         if passes:
             trained = min(trained, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
         log_odds = trained + (0.0 if change is None else change.log_odds())
-        confirmed = log_odds > (UNASKED if passes else NAMED) and _is_possible(found.model)
+        confirmed = log_odds > (UNASKED if passes else NAMED) and _stands(found.model)
         least = SHOWN if trained > NAMED else UNASKED
         if self.held_out is not None:
             confirmed &= self.held_out.trained_change(at, found).harm <= 0.0
         confirmed = confirmed and self._agrees(at, found, [len(found.model.terms) - 1], least)
         covariance = found.posterior.covariance
         return Step(proposal, log_odds, rivals, change, confirmed, at.model, found.model, covariance, trained), found
+
+    def _drop_impossible(self, at: Hypothesis) -> tuple[Hypothesis, list[Effect]]:
+        """The same without what was found before its last effect and cannot be beside it, and what that is."""
+        lost: list[Effect] = []
+        while broken := [place for place in self._find_added(at)[:-1] if not _is_possible(at.model, place)]:
+            lost.append(at.model.terms[broken[0]].effect)
+            at = self._settle_without(at, broken[0])
+        return at, lost
+
+    def _log_odds_of(self, lost: Sequence[Effect], at: Hypothesis, found: Hypothesis, proposal: Proposal) -> float:
+        """Log odds that are lost with effects that a proposal makes impossible."""
+        gained = self.laboratory.under(found, at.dependence, range(len(at.scales))).log_evidence - at.log_evidence
+        return proposal.log_factor - gained + sum(self._prior_odds(effect, 0.0) for effect in lost)
 
     def _agrees(self, without: Hypothesis, at: Hypothesis, places: Sequence[int], least: float) -> bool:
         """Whether held-out motion shows an effect by some log odds, and training predicts its joints no worse.
@@ -365,14 +378,16 @@ class Search:
         return replace(at, linear=reduced, scales=scales).log_evidence - at.log_evidence - self._prior_odds(effect, 0.0)
 
 
-def _is_possible(model: ExtendedModel) -> bool:
-    """Whether every coefficient is within the bounds of its law, and agrees with its shape."""
-    pairs = ((term, term.effect.joint) for term in model.terms)
-    return all(
-        term.is_possible(None if joint is None else model.structure.terms[joint].k_v)
-        and term.effect.is_consistent(term.coefficients, term.shape)
-        for term, joint in pairs
-    )
+def _is_possible(model: ExtendedModel, place: int) -> bool:
+    """Whether a term is still what its effect means."""
+    term, joint = model.terms[place], model.terms[place].effect.joint
+    return term.is_possible(None if joint is None else model.structure.terms[joint].k_v)
+
+
+def _stands(model: ExtendedModel) -> bool:
+    """Whether the last term is what its effect means, without being held there."""
+    term = model.terms[-1]
+    return _is_possible(model, -1) and term.effect.is_consistent(term.coefficients, term.shape)
 
 
 @dataclass(frozen=True)
