@@ -72,6 +72,21 @@ def test_columns_are_the_differences_of_the_residual_in_every_parameter_of_the_l
             assert np.linalg.norm(found - expected) <= 1e-4 * np.linalg.norm(expected) + 1e-6
 
 
+@pytest.mark.parametrize("form", ["TorqueSaturation", "Clipping"])
+def test_a_curve_that_bends_the_torque_bends_the_columns_of_the_links(diagnosis: Diagnosis, form: str) -> None:
+    """Row by row: whitening mixes neighbours, so they are nearly the differences."""
+    white = WhiteColumns(diagnosis.fitter.observations)
+    effect = next(each for each in possible_effects(diagnosis.setting) if type(each).__name__ == form)
+    assert effect.joint is not None
+    model = with_terms(full(diagnosis), [Term(effect, effect.grid[1], np.ones(1))])
+    residual, columns = white.residual(model)[effect.joint], white.all(model)[effect.joint]
+    for place in columns.index[columns.index < model.structure.base_count]:
+        step = 1e-3 * np.eye(model.structure.size)[place]
+        moved = white.residual(replace(model, parameters=model.parameters + step))[effect.joint]
+        found, expected = (residual - moved) / 1e-3, columns.rows[columns.index == place].sum(axis=0)
+        assert np.linalg.norm(found - expected) <= 0.25 * np.linalg.norm(found) + 1e-6
+
+
 def columns_of(effect: Effect, model: ExtendedModel, diagnosis: Diagnosis, *, as_term: bool) -> list[Array]:
     found = []
     for piece in diagnosis.fitter.observations:

@@ -184,6 +184,13 @@ class Effect(ABC):
         """
         return 1.0
 
+    def slope(self, torque: Array, coefficients: Array, shape: Array) -> Array:
+        """∂τ_recorded/∂τ at its joint, (N,), τ what the plain model makes there.
+
+        `torque`: (N,), τ [Nm or N]; `coefficients`: (c,); `shape`: (k,).
+        """
+        return np.full(len(torque), self.factor(coefficients))
+
     def is_possible(self, shape: Array, k_v: float | None) -> bool:
         """Whether this shape is still what the effect means, beside the joint's friction as it was fitted with it.
 

@@ -46,6 +46,14 @@ class Saturation(Effect):
         `torque`: (N,), as it is [Nm or N]; `levels`: (g, 1), c [Nm or N].
         """
 
+    @abstractmethod
+    def _derivative(self, torque: Array, level: float) -> Array:
+        """r'(τ), (N,)."""
+
+    def slope(self, torque: Array, coefficients: Array, shape: Array) -> Array:
+        """1 - a (1 - r'(τ))."""
+        return 1.0 - coefficients[0] * (1.0 - self._derivative(torque, float(shape[0])))
+
     def claim(self, found: Sizes, context: ArmContext) -> str:
         return f"the recorded torque saturates near {size_text(found['c'])}"
 
@@ -67,6 +75,9 @@ class TorqueSaturation(Saturation):
     def recorded(self, torque: Array, levels: Array) -> Array:
         """A soft curve, c tanh(τ/c), (g, N)."""
         return levels * np.tanh(torque / levels)
+
+    def _derivative(self, torque: Array, level: float) -> Array:
+        return 1.0 - np.tanh(torque / level) ** 2
 
     def limits(self, coefficients: Array, shape: Array) -> tuple[Array, Array]:
         """A curve with a = 1 that is bent as much has a level that a sensor may have."""
@@ -102,6 +113,9 @@ class Clipping(Saturation):
     def recorded(self, torque: Array, levels: Array) -> Array:
         """A hard curve, clip(τ, ±c), (g, N)."""
         return np.clip(torque, -levels, levels)
+
+    def _derivative(self, torque: Array, level: float) -> Array:
+        return (np.abs(torque) < level).astype(np.float64)
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
         return [{"level": shape[0], "shape": "clip"}] if coefficients[0] > 0.0 else []

@@ -41,7 +41,7 @@ def change(log_odds: float, harm: float = 0.0) -> HeldOutChange:
 
 @dataclass(frozen=True, eq=False)
 class Asking(Search):
-    """A search whose odds are given, those among them that are lost with a lag of which the spring leaves too little."""
+    """A search whose odds are given, among them those that are lost with a lag where the spring leaves none."""
 
     lost: float | None = None
 

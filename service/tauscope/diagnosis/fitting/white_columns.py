@@ -16,6 +16,7 @@ from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.effects import Effect, Signals
 from tauscope.effects.computation import THREADS, LastFew
+from tauscope.effects.torque_saturation import Saturation
 from tauscope.recording.recording import Array
 
 FRICTION_KEPT = 2 * THREADS
@@ -65,7 +66,7 @@ class WhiteColumns:
         index, rows = self._linear(model)
         for joint in self._joints:
             places, amplitudes = model.slope_amplitudes(joint)
-            slopes = model.factor(joint) * amplitudes[:, None] * self._white_friction_slopes(model, joint)
+            slopes = self._scale(model, joint) * amplitudes[:, None] * self._white_friction_slopes(model, joint)
             index[joint] += places
             rows[joint].append(slopes + self._of_steps(model, joint, places))
         for term, place in zip(model.terms, model.term_places(), strict=True):
@@ -79,7 +80,7 @@ class WhiteColumns:
         """Places and columns of Θ and of the terms' coefficients, a list a joint."""
         index, rows = [], []
         for joint in self._joints:
-            factor = model.factor(joint)
+            factor = self._scale(model, joint)
             index.append([int(place) for place in model.structure.joint_columns(joint)])
             rows.append([factor * self._white_rigid(joint), factor * self._white_friction(model, joint)])
         for term, place in zip(model.terms, model.term_places(), strict=True):
@@ -87,6 +88,18 @@ class WhiteColumns:
                 index[joint] += range(place.start, place.start + len(columns))
                 rows[joint].append(columns)
         return index, rows
+
+    def _scale(self, model: ExtendedModel, joint: int) -> Array | float:
+        """∂τ_recorded/∂τ of every row, (R,), or of all; whitening mixes neighbours, for which it is nearly the same."""
+        if not any(isinstance(term.effect, Saturation) for term in model.terms if term.effect.joint == joint):
+            return model.factor(joint)
+        observations = self._observations
+        order = observations.noise[joint].order if observations.noise else 0
+        rows = [
+            piece.repeated(piece.prepared.motion.band.reduce(model.slope(joint, model.signals(piece))[None]))[0, order:]
+            for piece in observations
+        ]
+        return np.concatenate(rows)[observations.kept(joint)]
 
     def _white_term(self, model: ExtendedModel, term: Term) -> OfJoints:
         """Columns of a term, (c, R_j) at every joint that it touches."""

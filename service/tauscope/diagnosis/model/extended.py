@@ -196,6 +196,17 @@ class ExtendedModel:
             np.prod([term.effect.factor(term.coefficients) for term in self.terms if term.effect.joint == joint])
         )
 
+    def slope(self, joint: int, signals: Signals) -> Array:
+        """∂τ_recorded/∂τ of a joint under all its terms, (N,).
+
+        Parameters
+        ----------
+        joint : int
+            index, from 0
+        """
+        torque, terms = signals.torque[joint], [term for term in self.terms if term.effect.joint == joint]
+        return np.prod([term.effect.slope(torque, term.coefficients, term.shape) for term in terms], axis=0)
+
     def step_sensitivity(self, term: Term, signals: Signals) -> Array:
         """∂τ/∂log K_v of a term whose torque has friction's step in it, K_v of its own joint, (1, N) or (1, P, N)."""
         own = np.arange(len(signals.steepness)) == term.effect.joint

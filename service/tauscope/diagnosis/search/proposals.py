@@ -78,19 +78,14 @@ class Proposer:
         for kind in (0, 1):
             seen = set[Place]()
             for place in sorted(range(len(scored)), key=lambda place: -scored[place][kind].log_evidence):
-                if len(seen) == most or scored[place][kind].log_evidence < WORTH_A_LOOK:
+                if scored[place][kind].log_evidence < WORTH_A_LOOK:
                     break
-                if _place(scored[place]) not in seen:
+                if len(seen) < most or _place(scored[place]) in seen:  # with all forms of one effect
                     if place not in looked:
                         looked[place] = self._look_at(scored[place], scorer, at, signals)
                     if looked[place] is not None:
                         seen.add(_place(scored[place]))
-        best: dict[Place, Proposal] = {}
-        for proposal in sorted(
-            (each for each in looked.values() if each is not None), key=lambda each: -each.log_factor
-        ):
-            best.setdefault(proposal.place, proposal)
-        return list(best.values())
+        return sorted((each for each in looked.values() if each is not None), key=lambda each: -each.log_factor)
 
     def _on_grid(
         self, effect: Effect, scorer: Scorer, signals: Sequence[Signals], at: Hypothesis

@@ -194,9 +194,14 @@ class Search:
         proposals = self.proposer.propose(without, competes, WEIGHED)
         rivals = []
         for proposal in (each for each in proposals if self._log_odds(each) > 0.0):
-            nearer = self.laboratory.approach(self._add(without, proposal))
-            odds = log_odds - trained + self._log_odds(proposal) - (CATALOGUED if proposal.place == own else 0.0)
-            odds += 0.0 if self.held_out is None else self.held_out.change(at, nearer).log_odds()
+            nearer = self._add(without, proposal)
+            if proposal.place == own:  # two shapes of one law compare only where each is at its best
+                nearer = self._settle(nearer, touched)
+                odds = log_odds + self._compare(at, nearer, touched) - CATALOGUED
+            else:
+                nearer = self.laboratory.approach(nearer)
+                odds = log_odds - trained + self._log_odds(proposal)
+                odds += 0.0 if self.held_out is None else self.held_out.change(at, nearer).log_odds()
             rivals.append(Rival(nearer.model.terms[-1], nearer.model, odds))
         rivals.sort(key=lambda each: -each.log_odds)
         return Weighed(places, without, log_odds, tuple(rivals), tuple(proposals))
