@@ -22,6 +22,9 @@ LOOKED_AT = 5
 WORTH_A_LOOK = 2.0
 """Log Bayes factor on the grid below which nothing comes of a closer look."""
 
+A_RIVAL = 0.5
+"""…relative to that of the effect in whose place it may be."""
+
 MOST_SHAPES = 600
 """Shapes of a grid of thousands that are looked at first."""
 
@@ -67,8 +70,16 @@ class Proposer:
     def __init__(self, laboratory: Laboratory, effects: Sequence[Effect]) -> None:
         self.laboratory, self.rows, self.effects = laboratory, laboratory.rows, tuple(effects)
 
-    def propose(self, at: Hypothesis, is_wanted: Callable[[Effect], bool], most: int = LOOKED_AT) -> list[Proposal]:
-        """Effects that make the data more probable, the most probable first."""
+    def propose(
+        self, at: Hypothesis, is_wanted: Callable[[Effect], bool], most: int = LOOKED_AT, instead: Place | None = None
+    ) -> list[Proposal]:
+        """Effects that make the data more probable, the most probable first.
+
+        Parameters
+        ----------
+        instead : Place or None
+            effect in whose place they are looked for; None where they are to be added
+        """
         independent = self.laboratory.under(at, [1.0] * len(at.scales), range(len(at.scales)))
         scorer = Scorer(self.rows, independent)
         signals = [at.model.signals(piece) for piece in self.rows.observations]
@@ -77,8 +88,10 @@ class Proposer:
         looked: dict[int, Proposal | None] = {}
         for kind in (0, 1):
             seen = set[Place]()
+            own = (each[kind].log_evidence for each in scored if _place(each) == instead)
+            least = max(A_RIVAL * max(own, default=0.0), WORTH_A_LOOK)
             for place in sorted(range(len(scored)), key=lambda place: -scored[place][kind].log_evidence):
-                if scored[place][kind].log_evidence < WORTH_A_LOOK:
+                if scored[place][kind].log_evidence < least:
                     break
                 if len(seen) < most or _place(scored[place]) in seen:  # with all forms of one effect
                     if place not in looked:

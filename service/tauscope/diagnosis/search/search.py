@@ -61,15 +61,17 @@ class Search:
         at, steps, refused, exchanges = self.nominal, list[Step](), dict[Place, frozenset[int]](), 0
         if before is not None:
             at, steps = before.hypothesis, list(before.steps)
-        while True:
+        exchanged, weighed, made = None, tuple[Weighed, ...](), MOST_EXCHANGES
+        while made:
             at, tried = self._grow(at, refused)
             steps += tried
             at = self._refine(self._drop_harmful(at))
-            at, weighed, exchanged = self._exchange(at, MOST_EXCHANGES - exchanges)
-            if not exchanged:
-                return Found(self.nominal, at, tuple(steps), weighed)
-            exchanges += exchanged
-            at = self._drop_superfluous(at)
+            if at is exchanged:
+                break
+            exchanged, weighed, made = self._exchange(at, MOST_EXCHANGES - exchanges)
+            exchanges += made
+            at = self._drop_superfluous(exchanged) if made else exchanged
+        return Found(self.nominal, at, tuple(steps), weighed)
 
     def _find_added(self, at: Hypothesis) -> list[int]:
         """Places of the terms that the nominal model has not."""
@@ -191,7 +193,7 @@ class Search:
             is_known = known is None or place in known
             return is_known and is_new and is_like and not shared.isdisjoint(each.touched(len(at.scales)))
 
-        proposals = self.proposer.propose(without, competes, WEIGHED)
+        proposals = self.proposer.propose(without, competes, WEIGHED, own)
         rivals = []
         for proposal in (each for each in proposals if self._log_odds(each) > 0.0):
             nearer = self._add(without, proposal)
@@ -222,10 +224,12 @@ class Search:
 
     def _best(self, at: Hypothesis, proposals: list[Proposal]) -> tuple[list[Step], Hypothesis | None]:
         """The most probable proposal that held-out motion does not contradict, after those that it does."""
-        refusals: list[Step] = []
+        refusals, beyond = list[Step](), set[Place]()
         for proposal in self._rank(at, [each for each in proposals if self._log_odds(each) > 0.0]):
             step, found = self._try(at, proposal, proposals)
-            forms = [] if step.is_confirmed or _stands(found.model) else self._forms_beyond(at, proposal)
+            is_enough = step.is_confirmed or _stands(found.model)
+            forms = [] if is_enough else [each for each in self._forms_beyond(at, proposal) if each.place not in beyond]
+            beyond |= {each.place for each in forms}
             for form in forms:  # where its own law cannot be
                 step, found = self._try(at, form, proposals)
                 if step.is_confirmed:
