@@ -42,18 +42,12 @@ MOST_MOVES = 100
 class Explanation:
     """One change of a link with its most probable values.
 
-    values : (k,) float64
-        β
-    covariance : (k, k) float64
-        of β, beside all other changes
-    effect : (m,) float64
-        what it changes of the base parameters
-    gain : float
-        what it takes off the surplus [variances]
-    log_odds : float
-        posterior, that it is there
-    equivalent : tuple of LinkChange
-        changes that explain as much in its place
+    `values`: (k,), β.
+    `covariance`: (k, k), of β, beside all other changes.
+    `effect`: (m,), what it changes of the base parameters.
+    `gain`: what it takes off the surplus [variances].
+    `log_odds`: posterior, that it is there.
+    `equivalent`: changes that explain as much in its place.
     """
 
     change: LinkChange
@@ -161,18 +155,11 @@ class _Set:
 class Attribution:
     """A surplus of base parameters that is to be explained by links.
 
-    Parameters
-    ----------
-    base : BaseParameters
-        of the arm
-    surplus : (m,) float64
-        real less stated base parameters
-    covariance : (m, m) float64
-        C
-    links : (10 n,) float64 or None
-        stated standard parameters; None where only their base parameters are known
-    believed : (10 n, 10 n) float64
-        covariance believed of them
+    `base`: of the arm.
+    `surplus`: (m,), real less stated base parameters.
+    `covariance`: (m, m), C.
+    `links`: (10 n,), stated standard parameters; None where only their base parameters are known.
+    `believed`: (10 n, 10 n), covariance believed of them.
     """
 
     def __init__(
@@ -210,10 +197,7 @@ class Attribution:
     def explain(self, first: LinkChange | None = None) -> tuple[Explanation, ...]:
         """The most probable set of changes, the one that explains most first.
 
-        Parameters
-        ----------
-        first : LinkChange or None
-            a change that is one of them in any case, and the first
+        `first`: a change that is one of them in any case, and the first.
         """
         start = _Set(self, ())
         start = start if first is None else start.with_change(first)
@@ -261,10 +245,7 @@ class Attribution:
     def part(self, change: LinkChange, values: Array) -> _Part:
         """A change at its values.
 
-        Parameters
-        ----------
-        values : (k,) float64
-            β
+        `values`: (k,), β.
         """
         columns = self.columns[change.link]
         return _Part(change, values, columns @ change.change(values), columns @ change.slope(values))
@@ -318,12 +299,8 @@ def _columns_of(base: BaseParameters, link: int, count: int) -> Array:
 def _most_probable(change: LinkChange, columns: Array, target: Array) -> Array:
     """β of the largest probability.
 
-    Parameters
-    ----------
-    columns : (r, 10) float64
-        what each standard parameter of the link does to the whitened surplus
-    target : (r,) float64
-        that surplus
+    `columns`: (r, 10), what each standard parameter of the link does to the whitened surplus.
+    `target`: (r,), that surplus.
     """
     if change.is_linear:
         return _ridge(columns @ change.slope(np.zeros(len(change.spread))), change.spread, target)

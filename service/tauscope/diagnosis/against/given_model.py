@@ -67,12 +67,9 @@ TERMS = ("stiction", "stribeck", "viscous", "offset")
 class Given:
     """A model that recordings are compared with.
 
-    lacking : tuple of (int, str)
-        joint indices and nominal terms that it does not have
-    covariance : (p, p) float64 or None
-        of the values, in the columns of the diagnosed model; None where they are exact
-    links : (10 n,) float64 or None
-        standard parameters of its links; None where only their base parameters are known
+    `lacking`: joint indices and nominal terms that it does not have.
+    `covariance`: (p, p), of the values, in the columns of the diagnosed model; None where they are exact.
+    `links`: (10 n,), standard parameters of its links; None where only their base parameters are known.
     """
 
     values: Mapping[str, float]

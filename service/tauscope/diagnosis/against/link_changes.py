@@ -38,18 +38,11 @@ USUAL_M = 0.3
 class LinkChange:
     """One way in which the parameters of a link can be wrong.
 
-    link : int
-        index, from 0
-    quantities : tuple of str
-        names of the changed quantities
-    spread : (k,) float64
-        standard deviations believed of β
-    change : callable
-        x, the change (10,) of the standard parameters, from β (k,)
-    is_linear : bool
-        whether x is linear in β
-    stated_mass : float or None
-        mass of the link before the change [kg]; None where it is not known
+    `quantities`: names of the changed quantities.
+    `spread`: (k,), standard deviations believed of β.
+    `change`: x, the change (10,) of the standard parameters, from β (k,).
+    `is_linear`: whether x is linear in β.
+    `stated_mass`: mass of the link before the change [kg]; None where it is not known.
     """
 
     link: int
@@ -68,20 +61,14 @@ class LinkChange:
     def is_possible(self, values: Array) -> bool:
         """Whether the link keeps a positive mass; ten free numbers do not all mean what they say.
 
-        Parameters
-        ----------
-        values : (k,) float64
-            β
+        `values`: (k,), β.
         """
         return self.is_whole or self.stated_mass is None or self.stated_mass + self.change(values)[MASS] >= 0.0
 
     def slope(self, values: Array) -> Array:
         """∂x/∂β, (10, k), exact for polynomials of second degree.
 
-        Parameters
-        ----------
-        values : (k,) float64
-            β
+        `values`: (k,), β.
         """
         steps = 1e-3 * np.diag(self.spread)
         pairs = [self.change(values + step) - self.change(values - step) for step in steps]
@@ -97,14 +84,8 @@ class LinkChange:
 def link_changes(link: int, stated: Array | None, spread: Array) -> Iterator[LinkChange]:
     """All ways in which one link can be wrong.
 
-    Parameters
-    ----------
-    link : int
-        index, from 0
-    stated : (10,) float64 or None
-        stated standard parameters; None where only changes are known
-    spread : (10, 10) float64
-        covariance believed of the link's standard parameters
+    `stated`: (10,), stated standard parameters; None where only changes are known.
+    `spread`: (10, 10), covariance believed of the link's standard parameters.
     """
     mass = None if stated is None else float(stated[MASS])
     return (replace(each, stated_mass=mass) for each in _changes(link, stated, spread))

@@ -32,12 +32,9 @@ Place = tuple[str, int | None]
 class SimulatedFit:
     """What the simulator has.
 
-    values : (p,) float64
-        nominal parameters in the columns of the final model
-    covariance : (p, p) float64
-        of these
-    shared : mapping of (str, int or None) to tuple of ParameterDifference
-        effects and places that the simulator shows too, with their coefficients in the simulator and on the arm
+    `values`: (p,), nominal parameters in the columns of the final model.
+    `covariance`: (p, p), of these.
+    `shared`: effects and places that the simulator shows too, with their coefficients in the simulator and on the arm.
     """
 
     values: Array

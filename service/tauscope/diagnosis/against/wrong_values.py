@@ -36,14 +36,9 @@ def attribute(
 ) -> tuple[ParameterDifference, ...]:
     """The differences, each with what explains it.
 
-    Parameters
-    ----------
-    names : sequence of str
-        of the base parameters
-    links : (10 n,) float64 or None
-        stated standard parameters; None where only their base parameters are known
-    several : float
-        standard errors within which a difference is explained
+    `names`: of the base parameters.
+    `links`: (10 n,), stated standard parameters; None where only their base parameters are known.
+    `several`: standard errors within which a difference is explained.
     """
     places = {name: place for place, name in enumerate(names)}
     values = [

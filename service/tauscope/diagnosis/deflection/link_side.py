@@ -25,24 +25,15 @@ LIGHT = 0.2
 class LinkRows:
     """One joint's deflection and the states that may explain it, in the common band, (M,) each.
 
-    deflection : (M,) float64
-        q - q_link [rad or m]
-    load : (M,) float64
-        torque of the rigid body [Nm or N]
-    side : (M,) float64
-        side of the teeth on which that load presses, -1 … 1
-    position, velocity, acceleration : (M,) float64
-        of the link
-    direction : (M,) float64
-        A(q̇), the smooth sign of the velocity
-    rigid : (m, M) float64
-        columns of the base parameters that make the load
-    inertia : float
-        mean inertia of the link and all that it carries [kg m² or kg]
-    resolution : float
-        step or noise of the encoders [rad or m]
-    rate_hz : float
-        of the rows [Hz]
+    `deflection`: (M,), q - q_link [rad or m].
+    `load`: (M,), torque of the rigid body [Nm or N].
+    `side`: (M,), side of the teeth on which that load presses, -1 … 1.
+    `position`, `velocity`, `acceleration`: (M,), of the link.
+    `direction`: (M,), A(q̇), the smooth sign of the velocity.
+    `rigid`: (m, M), columns of the base parameters that make the load.
+    `inertia`: mean inertia of the link and all that it carries [kg m² or kg].
+    `resolution`: step or noise of the encoders [rad or m].
+    `rate_hz`: of the rows [Hz].
     """
 
     recording: int
@@ -61,10 +52,7 @@ class LinkRows:
     def stretches(self, length_s: float) -> NDArray[np.intp]:
         """Number of the stretch of so many seconds that each row belongs to, (M,).
 
-        Parameters
-        ----------
-        length_s : float
-            of a stretch [s]
+        `length_s`: of a stretch [s].
         """
         return (np.arange(len(self.load)) / (self.rate_hz * length_s)).astype(np.intp)
 
@@ -73,8 +61,7 @@ class LinkRows:
 class _LinkTable:
     """Rows of a recording's table with the links' positions in the place of the motors', without what derives from q.
 
-    lag : (N, n) float64
-        by how much each link lags its motor; zero at joints without an encoder on the link [rad or m]
+    `lag`: (N, n), by how much each link lags its motor; zero at joints without an encoder on the link [rad or m].
     """
 
     source: Table
@@ -112,12 +99,8 @@ def link_rows(
 ) -> Iterator[tuple[int, LinkRows]]:
     """Joints that have an encoder on the link, with the rows of one recording, piece by piece.
 
-    Parameters
-    ----------
-    number : int
-        index of the recording, from 0
-    cutoff_hz : float or None
-        of the common band [Hz]; None for no filter
+    `number`: index of the recording, from 0.
+    `cutoff_hz`: of the common band [Hz]; None for no filter.
     """
     robot, structure = model.structure.robot, model.structure
     if not recording.has("qlink"):

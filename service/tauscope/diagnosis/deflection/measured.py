@@ -68,18 +68,11 @@ not what repeats with the angle."""
 class MeasuredDeflection:
     """What the encoder on a link says of its transmission.
 
-    joint : int
-        index, from 0
-    compliance, compliance_std : float
-        c [rad/Nm or m/N]
-    compliance_noise : float
-        standard error of c as far as it decides whether there is any: what scales with c does not
-    play, play_std : float
-        b [rad or m]; the error is infinite where the load does not change its side often enough
-    largest_load : float
-        largest torque that was transmitted [Nm or N]
-    resolution : float
-        step or noise of the encoders: less is theirs and not the transmission's [rad or m]
+    `compliance`, `compliance_std`: c [rad/Nm or m/N].
+    `compliance_noise`: standard error of c as far as it decides whether there is any: what scales with c does not.
+    `play`, `play_std`: b [rad or m]; the error is infinite where the load does not change its side often enough.
+    `largest_load`: largest torque that was transmitted [Nm or N].
+    `resolution`: step or noise of the encoders: less is theirs and not the transmission's [rad or m].
     """
 
     joint: int
@@ -128,12 +121,8 @@ def measure_deflection(
 ) -> tuple[MeasuredDeflection, ...]:
     """Compliance and play of every joint that has an encoder on its link, by joint.
 
-    Parameters
-    ----------
-    model : ExtendedModel
-        nominal one of the identification, which tells the load
-    cutoff_hz : float or None
-        of the band of the comparison [Hz]; None for no filter
+    `model`: nominal one of the identification, which tells the load.
+    `cutoff_hz`: of the band of the comparison [Hz]; None for no filter.
     """
     rows: dict[int, list[LinkRows]] = {}
     for number, recording in enumerate(recordings):
@@ -228,12 +217,9 @@ def _columns(pieces: Sequence[LinkRows], *, is_revolute: bool) -> tuple[Array, A
 class _Regression:
     """A robust fit.
 
-    values : (k,) float64
-        coefficients
-    covariance : (k, k) float64
-        of the coefficients, from the scores of stretches
-    solver : (k, M) float64
-        change of the coefficients for a change of each row
+    `values`: (k,), coefficients.
+    `covariance`: (k, k), of the coefficients, from the scores of stretches.
+    `solver`: (k, M), change of the coefficients for a change of each row.
     """
 
     values: Array
@@ -244,16 +230,10 @@ class _Regression:
 def _regress(columns: Array, rows: Array, spreads: Array, stretch: NDArray[np.intp]) -> _Regression:
     """Huber's regression.
 
-    Parameters
-    ----------
-    columns : (M, k) float64
-        of the regression
-    rows : (M,) float64
-        what they explain
-    spreads : (k,) float64
-        standard deviations believed of the coefficients
-    stretch : (M,) int
-        number of the stretch that each row belongs to
+    `columns`: (M, k), of the regression.
+    `rows`: (M,), what they explain.
+    `spreads`: (k,), standard deviations believed of the coefficients.
+    `stretch`: (M,), number of the stretch that each row belongs to.
     """
     prior, tiny = np.diag(spreads**-2.0), np.finfo(float).tiny
     weights, variance = np.ones(len(rows)), max(float(rows.var()), tiny)

@@ -15,8 +15,7 @@ from tauscope.effects.measured_deflection import MeasuredElasticity, MeasuredPla
 class DirectTerm:
     """A deflection that is certain.
 
-    value, std : float
-        of its coefficient [rad/Nm, rad, m/N or m]
+    `value`, `std`: of its coefficient [rad/Nm, rad, m/N or m].
     """
 
     term: Term

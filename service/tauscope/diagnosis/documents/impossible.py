@@ -22,10 +22,7 @@ CLEARLY = 2.0
 def impossible_places(structure: ModelStructure, parameters: Array) -> list[int]:
     """Places of parameters below zero that must not be.
 
-    Parameters
-    ----------
-    parameters : (p,) float64
-        Θ
+    `parameters`: (p,), Θ.
     """
     places = [place for place, terms in enumerate(structure.base.terms) if _is_positive(terms)]
     joints = range(structure.robot.joint_count)

@@ -36,8 +36,7 @@ MOST_RIVALS = 2
 class Statement:
     """A finding in sentences.
 
-    headline : str
-        the first of them, without its full stop
+    `headline`: the first of them, without its full stop.
     """
 
     headline: str
@@ -54,10 +53,7 @@ def state_finding(
 ) -> Statement:
     """The statement of a finding; a tentative one advises nothing.
 
-    Parameters
-    ----------
-    quantities : sequence of Quantity
-        its parameters, those of its first term first
+    `quantities`: its parameters, those of its first term first.
     """
     names = [joint.name for joint in diagnosis.robot.joints]
     found = {each.name: each for each in quantities}
@@ -152,10 +148,7 @@ def change_text(relative: float, error: float | None) -> str:
 def state_unknown(joint: str, rms: float, unit: str) -> Statement:
     """The statement of a mismatch without a name.
 
-    Parameters
-    ----------
-    rms : float
-        beyond the noise [Nm or N]
+    `rms`: beyond the noise [Nm or N].
     """
     headline = f"A mismatch of {significant(rms, 2)} {unit} rms at {joint} has no known cause ({chance(1.0)})"
     return Statement(headline, ("Look at the residual where it concentrates",))

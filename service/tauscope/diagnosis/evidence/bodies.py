@@ -35,16 +35,11 @@ _TRIANGLE = triangle_of_parameters()
 class NormalBodies:
     """The prior about one body, as normal distribution of the base parameters Θ_L = M x.
 
-    centre : (10 n,) float64
-        of the links' standard parameters
-    gain : (10 n, m) float64
-        dx/dΘ_L of the most probable links
-    mean, precision : (m,), (m, m) float64
-        of the base parameters
-    energy : float
-        -2 log p of the body, but for a constant
-    log_mass : float
-        log of the probability that the normal distribution stands for, alike: expanded elsewhere it is another
+    `centre`: (10 n,), of the links' standard parameters.
+    `gain`: (10 n, m), dx/dΘ_L of the most probable links.
+    `mean`, `precision`: (m,), (m, m), of the base parameters.
+    `energy`: -2 log p of the body, but for a constant.
+    `log_mass`: log of the probability that the normal distribution stands for, alike: expanded elsewhere it is another.
     """
 
     centre: Array
@@ -57,10 +52,7 @@ class NormalBodies:
     def links(self, base: Array) -> Array:
         """Most probable standard parameters of links with these base parameters, (10 n,).
 
-        Parameters
-        ----------
-        base : (m,) float64
-            Θ_L
+        `base`: (m,), Θ_L.
         """
         return self.centre + self.gain @ (base - self.mean)
 
@@ -69,12 +61,9 @@ class NormalBodies:
 class BodyPrior:
     """The prior itself.
 
-    base : (m, 10 n) float64
-        M
-    mean : (10 n,) float64
-        μ
-    precision : (10 n, 10 n) float64
-        WᵀW
+    `base`: (m, 10 n), M.
+    `mean`: (10 n,), μ.
+    `precision`: (10 n, 10 n), WᵀW.
     """
 
     base: Array
@@ -92,10 +81,7 @@ class BodyPrior:
     def start(self, links: Array) -> Array:
         """Bodies with some volume near given ones, which may have none.
 
-        Parameters
-        ----------
-        links : (10 n,) float64
-            standard parameters
+        `links`: (10 n,), standard parameters.
         """
         near = WITHIN * links + (1.0 - WITHIN) * self.mean
         for own in _each(near):
@@ -106,10 +92,7 @@ class BodyPrior:
     def about(self, links: Array) -> NormalBodies:
         """The prior to second order about bodies.
 
-        Parameters
-        ----------
-        links : (10 n,) float64
-            standard parameters of bodies with volume
+        `links`: (10 n,), standard parameters of bodies with volume.
         """
         precision, slope = self.precision.copy(), self.precision @ (links - self.mean)
         for own in _each(links):
@@ -134,10 +117,7 @@ class BodyPrior:
     def share(self, links: Array, step: Array) -> float:
         """Part of a step that leaves every link its volume, at most 1.
 
-        Parameters
-        ----------
-        links, step : (10 n,) float64
-            standard parameters and their change
+        `links`, `step`: (10 n,), standard parameters and their change.
         """
         share = 1.0
         for own in _each(links):
@@ -151,10 +131,7 @@ class BodyPrior:
 def pseudo_inertia(parameters: Array) -> Array:
     """J of one link, (4, 4).
 
-    Parameters
-    ----------
-    parameters : (10,) float64
-        its standard parameters
+    `parameters`: (10,), its standard parameters.
     """
     values = (_TRIANGLE @ parameters) / _WEIGHT
     found = np.empty((4, 4))

@@ -30,8 +30,7 @@ BROKEN = 1.5
 class Succession:
     """Which rows of a joint follow one another.
 
-    bounds : tuple of (int, int)
-        first row of each unbroken stretch, and the row after its last
+    `bounds`: first row of each unbroken stretch, and the row after its last.
     """
 
     bounds: tuple[tuple[int, int], ...]

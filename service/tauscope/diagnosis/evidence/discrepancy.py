@@ -40,10 +40,8 @@ SEED = 20
 class Reach:
     """Range of every joint's motion.
 
-    middle, half : (n,) float64
-        middle and half width of the positions [rad or m]
-    top : (n,) float64
-        speed that one row in fifty exceeds [rad/s or m/s]
+    `middle`, `half`: (n,), middle and half width of the positions [rad or m].
+    `top`: (n,), speed that one row in fifty exceeds [rad/s or m/s].
     """
 
     middle: Array
@@ -65,10 +63,7 @@ class Reach:
 def smooth_features(observations: Observations, model: ExtendedModel, joint: int, reach: Reach) -> Array:
     """White rows of the features of one joint, (b, R).
 
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
+    `joint`: joint index, from 0.
     """
     draws = np.random.default_rng(SEED)
     frequency = draws.standard_normal((len(GROUP), 3)) * COORDINATES[GROUP] / LENGTH
@@ -94,12 +89,8 @@ def smooth_features(observations: Observations, model: ExtendedModel, joint: int
 def beyond(columns: Array, features: Array) -> Array:
     """Features without what columns can make, (b, R).
 
-    Parameters
-    ----------
-    columns : (k, R) float64
-        white columns of the nominal model
-    features : (b, R) float64
-        white rows
+    `columns`: (k, R), white columns of the nominal model.
+    `features`: (b, R), white rows.
     """
     length = np.linalg.norm(columns, axis=1, keepdims=True)
     unit = columns / np.where(length > 0.0, length, 1.0)

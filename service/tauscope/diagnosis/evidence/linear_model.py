@@ -34,12 +34,9 @@ CERTAIN = 1e6
 class Posterior:
     """Mean and covariance of the parameters, and the log evidence.
 
-    mean : (p,) float64
-        of Θ
-    factor : (p, p) float64
-        lower Cholesky factor of A / (s sᵀ)
-    scale : (p,) float64
-        s
+    `mean`: (p,), of Θ.
+    `factor`: (p, p), lower Cholesky factor of A / (s sᵀ).
+    `scale`: (p,), s.
     """
 
     mean: Array
@@ -50,10 +47,7 @@ class Posterior:
     def solve(self, right: Array) -> Array:
         """A⁻¹ r.
 
-        Parameters
-        ----------
-        right : (p,) or (p, k) float64
-            r
+        `right`: (p,) or (p, k), r.
         """
         scale = self.scale if right.ndim == 1 else self.scale[:, None]
         return np.asarray(cho_solve((self.factor, True), right / scale) / scale)
@@ -75,10 +69,8 @@ class Posterior:
 class LinearModel:
     """Rows of all joints, and what is believed of the parameters.
 
-    mean : (p,) float64
-        μ
-    precision : (p, p) float64
-        P
+    `mean`: (p,), μ.
+    `precision`: (p, p), P.
     """
 
     joints: tuple[JointMoments, ...]
@@ -93,12 +85,8 @@ class LinearModel:
     def extend(self, columns: Mapping[int, Array], mean: Array, std: Array) -> "LinearModel":
         """The same with more parameters.
 
-        Parameters
-        ----------
-        columns : mapping of int to (c, R_j) float64
-            their white columns at every joint that they act on
-        mean, std : (c,) float64
-            of what is believed of them
+        `columns`: mapping of int to (c, R_j), their white columns at every joint that they act on.
+        `mean`, `std`: (c,), of what is believed of them.
         """
         index = np.arange(self.size, self.size + len(mean))
         joints = tuple(
@@ -111,12 +99,8 @@ class LinearModel:
     def hold(self, places: Index, values: Array) -> "LinearModel":
         """The same with some parameters believed to have a value.
 
-        Parameters
-        ----------
-        places : (c,) int
-            their places among all
-        values : (c,) float64
-            those values
+        `places`: (c,), their places among all.
+        `values`: (c,), those values.
         """
         precision, right = self.precision.copy(), self.precision @ self.mean
         certain = CERTAIN * np.diag(self.precision)[places]
@@ -127,12 +111,8 @@ class LinearModel:
     def without(self, places: Index, values: Array) -> "LinearModel":
         """The same with some parameters held at a value; their places stay, with no column.
 
-        Parameters
-        ----------
-        places : (c,) int
-            their places among all
-        values : (c,) float64
-            what they are held at
+        `places`: (c,), their places among all.
+        `values`: (c,), what they are held at.
         """
         return replace(self, joints=tuple(own.without(places, values) for own in self.joints))
 
@@ -149,12 +129,8 @@ class LinearModel:
     ) -> tuple[Scales, ...]:
         """The scales of highest evidence at some joints, one joint after the other.
 
-        Parameters
-        ----------
-        joints : collection of int
-            joint indices, from 0
-        anew : bool
-            whether to look also from a covariance without discrepancy: one optimum has what another has not
+        `joints`: joint indices, from 0.
+        `anew`: whether to look also from a covariance without discrepancy: one optimum has what another has not.
         """
         found = list(scales)
         for joint in joints:

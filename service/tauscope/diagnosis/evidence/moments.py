@@ -24,12 +24,8 @@ KEPT = 2
 def factor(matrix: Array, scale: Array) -> Array:
     """Lower Cholesky factor of a matrix whose rows are divided by their scale, (p, p).
 
-    Parameters
-    ----------
-    matrix : (p, p) float64
-        positive definite but for rounding
-    scale : (p,) float64
-        root of its diagonal
+    `matrix`: (p, p), positive definite but for rounding.
+    `scale`: (p,), root of its diagonal.
     """
     correlation = matrix / np.outer(scale, scale) + ROUNDING * np.eye(len(scale))
     return np.asarray(np.linalg.cholesky(correlation), dtype=np.float64)
@@ -39,16 +35,11 @@ def factor(matrix: Array, scale: Array) -> Array:
 class Weighted:
     """A joint's rows under scales.
 
-    products : (1 + k, 1 + k) float64
-        Zᵀ C⁻¹ Z of target and columns
-    log_determinant : float
-        log det C
-    whole : (1 + k + b, 1 + k + b) float64
-        Zᵀ W Z with W = 1 / σ² D
-    half : (b, 1 + k) float64
-        K^(-1/2) A Bᵀ W Z of target and columns, K = 1 + A Bᵀ W B A
-    root : (b, b) float64
-        K^(1/2)
+    `products`: (1 + k, 1 + k), Zᵀ C⁻¹ Z of target and columns.
+    `log_determinant`: log det C.
+    `whole`: (1 + k + b, 1 + k + b), Zᵀ W Z with W = 1 / σ² D.
+    `half`: (b, 1 + k), K^(-1/2) A Bᵀ W Z of target and columns, K = 1 + A Bᵀ W B A.
+    `root`: (b, b), K^(1/2).
     """
 
     products: Array
@@ -62,18 +53,12 @@ class Weighted:
 class JointMoments:
     """Rows Z = [target; columns; features] of one joint, in classes of rest, and their products in each class.
 
-    index : (k,) int
-        places of the columns among all parameters
-    rows : (1 + k + b, R) float64
-        white rows
-    bounds : (K + 1,) int
-        where each class begins
-    products : (K, 1 + k + b, 1 + k + b) float64
-        Z Zᵀ of each class
-    counts : (K,) float64
-        independent rows of each class; one that tells less than a whole one counts as a part
-    groups : (b,) int
-        group of each feature; -1 for a column error of known size
+    `index`: (k,), places of the columns among all parameters.
+    `rows`: (1 + k + b, R), white rows.
+    `bounds`: (K + 1,), where each class begins.
+    `products`: (K, 1 + k + b, 1 + k + b), Z Zᵀ of each class.
+    `counts`: (K,), independent rows of each class; one that tells less than a whole one counts as a part.
+    `groups`: (b,), group of each feature; -1 for a column error of known size.
     """
 
     index: Index
@@ -107,10 +92,7 @@ class JointMoments:
     def against(self, columns: Array) -> tuple[Array, Array]:
         """Products of other columns with Z, (K, g, 1 + k + b), and of each with itself and its fellows, (K, s, c, c).
 
-        Parameters
-        ----------
-        columns : (s, c, R) float64
-            c columns for each of s shapes, g = s c
+        `columns`: (s, c, R), c columns for each of s shapes, g = s c.
         """
         flat = columns.reshape(-1, columns.shape[-1])
         parts = list(zip(_split(flat, self.bounds), _split(self.rows, self.bounds), strict=True))
@@ -120,12 +102,8 @@ class JointMoments:
     def extend(self, index: Index, columns: Array) -> "JointMoments":
         """The same with columns of more parameters.
 
-        Parameters
-        ----------
-        index : (c,) int
-            their places among all parameters
-        columns : (c, R) float64
-            white rows
+        `index`: (c,), their places among all parameters.
+        `columns`: (c, R), white rows.
         """
         crossed, mutual = self.against(columns[None])
         at, count = self.visible, len(columns)
@@ -152,12 +130,8 @@ class JointMoments:
     def without(self, places: Index, values: Array) -> "JointMoments":
         """The same with some parameters held at a value.
 
-        Parameters
-        ----------
-        places : (c,) int
-            their places among all parameters
-        values : (c,) float64
-            what they are held at
+        `places`: (c,), their places among all parameters.
+        `values`: (c,), what they are held at.
         """
         held = np.isin(self.index, places)
         value_of = dict(zip(places.tolist(), values.tolist(), strict=True))
@@ -188,10 +162,7 @@ class JointMoments:
     def discrepancy(self, scales: Scales, direction: Array) -> Array:
         """Most probable torque without a name, (R,).
 
-        Parameters
-        ----------
-        direction : (1 + k,) float64
-            1, then minus the columns' parameters
+        `direction`: (1 + k,), 1, then minus the columns' parameters.
         """
         known = self.weighted(scales)
         seen = solve_triangular(known.root, known.half @ direction, lower=True, trans="T")
@@ -200,10 +171,7 @@ class JointMoments:
     def reduced(self, scales: Scales, crossed: Array, mutual: Array) -> tuple[Array, Array]:
         """Products of other columns with target and columns, (g, 1 + k), and of their fellows, (s, c, c), after C⁻¹.
 
-        Parameters
-        ----------
-        crossed, mutual : (K, g, 1 + k + b), (K, s, c, c) float64
-            as of `against`
+        `crossed`, `mutual`: (K, g, 1 + k + b), (K, s, c, c), as of `against`.
         """
         visible, weights = self.visible, scales.weights()
         known = self.weighted(scales)
@@ -216,12 +184,8 @@ class JointMoments:
     def slopes(self, scales: Scales, direction: Array, covariance: Array) -> Array:
         """Slopes of uᵀ Z C⁻¹ Zᵀ u + tr(V X C⁻¹ Xᵀ) + log det C in each of the scales, (s,).
 
-        Parameters
-        ----------
-        direction : (1 + k,) float64
-            u
-        covariance : (k, k) float64
-            V, of the columns' parameters
+        `direction`: (1 + k,), u.
+        `covariance`: (k, k), V, of the columns' parameters.
         """
         visible, weights, counts = self.visible, scales.weights(), self.counts
         amplitudes = scales.amplitudes(self.groups)

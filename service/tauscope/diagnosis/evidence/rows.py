@@ -39,14 +39,11 @@ AROUND_STOP = 1
 class EvidenceRows:
     """White rows of every joint in order of their class of rest.
 
-    order : tuple of (R_j,) int
-        which of the white rows count, class by class
-    certain : tuple of (R_j,) float64
-        weight of each of them beside friction's step, whose place the velocity's noise leaves open
-    bounds : tuple of (K + 1,) int
-        where each class begins
-    features : tuple of (b, R) float64
-        discrepancy, then errors that all reversals share, in order of time
+    `order`: tuple of (R_j,), which of the white rows count, class by class.
+    `certain`: tuple of (R_j,), weight of each of them beside friction's step, whose place the velocity's noise leaves
+    open.
+    `bounds`: tuple of (K + 1,), where each class begins.
+    `features`: tuple of (b, R), discrepancy, then errors that all reversals share, in order of time.
     """
 
     observations: Observations
@@ -91,14 +88,9 @@ class EvidenceRows:
     def take(self, joint: int, rows: Array, dependence: float) -> Array:
         """The rows of a joint that count, as much as they tell, in order of their class, (…, R_j).
 
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        rows : (…, R) float64
-            white rows
-        dependence : float
-            κ
+        `joint`: joint index, from 0.
+        `rows`: (…, R), white rows.
+        `dependence`: κ.
         """
         return rows[..., self.order[joint]] * (self.certain[joint] / np.sqrt(dependence))
 
@@ -118,16 +110,10 @@ class EvidenceRows:
     ) -> JointMoments:
         """Those of one joint, with a discrepancy beyond the columns of the first parameters.
 
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        residual : (R,) float64
-            white rows
-        dependence : float
-            κ
-        plain : int
-            number of parameters that the discrepancy leaves alone
+        `joint`: joint index, from 0.
+        `residual`: (R,), white rows.
+        `dependence`: κ.
+        `plain`: number of parameters that the discrepancy leaves alone.
         """
         columns, smooth = self.take(joint, linear.rows, dependence), self.groups >= 0
         features = self.take(joint, self.features[joint], dependence)
@@ -142,12 +128,8 @@ class EvidenceRows:
     def dependence(self, joint: int, left: Array) -> float:
         """κ of what a model leaves beside its discrepancy.
 
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        left : (R_j,) float64
-            in order of class
+        `joint`: joint index, from 0.
+        `left`: (R_j,), in order of class.
         """
         rows, moving = np.zeros(self.features[joint].shape[1]), self.bounds[joint][1]
         rows[self.order[joint][:moving]] = left[:moving]
@@ -156,10 +138,7 @@ class EvidenceRows:
     def columns(self, effect: Effect, shapes: Array, signals: Sequence[Signals]) -> dict[int, Array]:
         """White rows of an effect at every joint that it touches, in order of time, (s, c, R).
 
-        Parameters
-        ----------
-        shapes : (s, k) float64
-            values of its shape parameters
+        `shapes`: (s, k), values of its shape parameters.
         """
         return white_columns(self.observations, effect, shapes, signals)
 
@@ -178,10 +157,7 @@ class EvidenceRows:
 def find_rest(observations: Observations, model: ExtendedModel, joint: int) -> tuple[Array, NDArray[np.intp]]:
     """Share of every white row's samples near rest, (R,), and which stop it is of, from 1, or 0 for none, (R,).
 
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
+    `joint`: joint index, from 0.
     """
     order = observations.noise[joint].order if observations.noise else 0
     kept = observations.kept(joint)
@@ -197,10 +173,7 @@ def find_rest(observations: Observations, model: ExtendedModel, joint: int) -> t
 def weigh_rows(observations: Observations, model: ExtendedModel, joint: int) -> Array:
     """How much every white row of a joint tells beside friction's step and at stops, (R,).
 
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
+    `joint`: joint index, from 0.
     """
     _, stops = find_rest(observations, model, joint)
     return certainty(observations, model, joint, OPEN) * _weigh_stops(observations, model, joint, stops)

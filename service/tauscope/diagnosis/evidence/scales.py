@@ -39,12 +39,9 @@ LIMIT = 9.0
 class Scales:
     """Logarithms of the scales of one joint's covariance C = σ² (1 + r² c²) + Σ_g a_g² B_g B_gᵀ.
 
-    values : (2 + G,) float64
-        log σ, log a_g of every group, log r; in units of white noise
-    level : float
-        rms of what the plain model leaves, white
-    noise_spread : float
-        standard deviation of log σ about the noise that was estimated before
+    `values`: (2 + G,), log σ, log a_g of every group, log r; in units of white noise.
+    `level`: rms of what the plain model leaves, white.
+    `noise_spread`: standard deviation of log σ about the noise that was estimated before.
     """
 
     values: Array
@@ -55,10 +52,7 @@ class Scales:
     def start(level: float, *, repeated: bool = False) -> "Scales":
         """Noise as it was estimated, and a discrepancy of a tenth of what is left.
 
-        Parameters
-        ----------
-        repeated : bool
-            whether repetitions of the motion tell the noise
+        `repeated`: whether repetitions of the motion tell the noise.
         """
         values = np.array([0.0, *[np.log(0.1 * level)] * GROUPS, REST])
         return Scales(values, level, REPEATED_SPREAD if repeated else NOISE_SPREAD)
@@ -75,29 +69,18 @@ class Scales:
     def amplitudes(self, groups: NDArray[np.intp]) -> Array:
         """Amplitude of each feature; 1 for an error of known size, group -1.
 
-        Parameters
-        ----------
-        groups : (b,) int
-            group of each feature
+        `groups`: (b,), group of each feature.
 
-        Returns
-        -------
-        (b,) float64
-            amplitudes
+        Returns (b,), amplitudes.
         """
         return np.where(groups < 0, 1.0, np.exp(self.values[1:-1])[groups])
 
     def collect(self, by_class: Array, by_feature: Array, groups: NDArray[np.intp]) -> Array:
         """Slopes in the logarithms, (2 + G,).
 
-        Parameters
-        ----------
-        by_class : (K,) float64
-            slope in the variance of each class
-        by_feature : (b,) float64
-            slope in log a of each feature
-        groups : (b,) int
-            group of each feature
+        `by_class`: (K,), slope in the variance of each class.
+        `by_feature`: (b,), slope in log a of each feature.
+        `groups`: (b,), group of each feature.
         """
         rest = np.exp(2.0 * self.values[-1]) * REST_SHARES**2
         variance = np.exp(2.0 * self.values[0])
@@ -118,10 +101,7 @@ class Scales:
     def without_discrepancy(self, noise: float) -> "Scales":
         """The same with no discrepancy and another noise.
 
-        Parameters
-        ----------
-        noise : float
-            σ
+        `noise`: σ.
         """
         values = self.values.copy()
         values[0], values[1:-1] = np.log(noise), np.log(LEAST * self.level)

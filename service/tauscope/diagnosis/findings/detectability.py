@@ -23,10 +23,8 @@ POWER = 0.9
 class Detectable:
     """The smallest effect that would have been named.
 
-    joint : int or None
-        joint index, from 0
-    minimum : float or None
-        size of the first coefficient [unit]; None where nothing shows it
+    `joint`: joint index, from 0.
+    `minimum`: size of the first coefficient [unit]; None where nothing shows it.
     """
 
     effect: str
@@ -40,10 +38,9 @@ class Detectable:
 class Visibility:
     """How much a form of an effect shows beside a fitted model.
 
-    information : float
-        energy of its first column for a size of one, at a usual shape; zero where it does not show [noise variances]
-    shapes_tried : float
-        effective number of shapes among which chance may choose
+    `information`: energy of its first column for a size of one, at a usual shape; zero where it does not show [noise
+    variances].
+    `shapes_tried`: effective number of shapes among which chance may choose.
     """
 
     effect: Effect

@@ -29,10 +29,8 @@ EXPLAINED = 20.0
 class ParameterDifference:
     """One parameter that a simulation has wrong.
 
-    simulation, real : float
-        its values [SI]
-    explained_by : tuple of WrongValue
-        quantities of links or joints that explain the difference
+    `simulation`, `real`: its values [SI].
+    `explained_by`: quantities of links or joints that explain the difference.
     """
 
     parameter: str
@@ -59,12 +57,9 @@ class Selection:
 class Diagnosis:
     """What was found.
 
-    tentative : tuple of Finding
-        what held-out motion refutes; no part of the model, and it turns no verdict
-    noise_std : (n,) float64
-        torque noise a sample at the recorded rate [Nm or N]
-    cutoff_hz : float
-        band of the comparison [Hz]
+    `tentative`: what held-out motion refutes; no part of the model, and it turns no verdict.
+    `noise_std`: (n,), torque noise a sample at the recorded rate [Nm or N].
+    `cutoff_hz`: band of the comparison [Hz].
     """
 
     identification: Identification

@@ -25,10 +25,7 @@ def with_direct_findings(
 ) -> Diagnosis:
     """The diagnosis with every deflection that is certain, and what smaller ones would have been seen.
 
-    Parameters
-    ----------
-    again : sequence of MeasuredDeflection
-        the same on held-out recordings
+    `again`: the same on held-out recordings.
     """
     findings = {finding.place: finding for finding in diagnosis.findings}
     unseen = {each.joint: each for each in again}

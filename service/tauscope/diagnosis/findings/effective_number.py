@@ -23,10 +23,7 @@ TAIL = 0.05
 def effective_number(found: Moments, columns: Mapping[int, Array], rng: np.random.Generator) -> float:
     """Effective number of shapes, at least 1.
 
-    Parameters
-    ----------
-    columns : mapping of int to (g, c, R_j) float64
-        the same shapes' whitened columns at every joint
+    `columns`: mapping of int to (g, c, R_j), the same shapes' whitened columns at every joint.
     """
     shapes, count = found.target.shape
     inner = found.inner.reshape(shapes * count, -1)

@@ -24,12 +24,9 @@ FORMULA_ERROR = 0.05
 class FitSizes:
     """Rms of the torque residual at the recorded rate, no filter.
 
-    train : (n,) float64
-        on the recordings that the model was made from [Nm or N]
-    held_out : (n,) float64 or None
-        on recordings that were not used
-    stretches : (n, S) float64 or None
-        squared errors there, summed over stretches of motion [Nm² or N²]
+    `train`: (n,), on the recordings that the model was made from [Nm or N].
+    `held_out`: (n,), on recordings that were not used.
+    `stretches`: (n, S), squared errors there, summed over stretches of motion [Nm² or N²].
     """
 
     train: Array
@@ -51,14 +48,11 @@ class FitSizes:
 class Finding:
     """Effects of one kind at one place: one term, or several orders of a periodic torque.
 
-    covariances : tuple of (k, k) float64
-        of each term's coefficients and shapes, in the arm's own torque (`model.torque_scale`)
-    gain : float
-        energy of the residual that they explain beside all other findings [noise variances]
-    alternatives : tuple of Rival
-        effects that these data cannot tell from it
-    confirmed : bool or None
-        by motion that was not used; None where there was none
+    `covariances`: tuple of (k, k), of each term's coefficients and shapes, in the arm's own torque
+    (`model.torque_scale`).
+    `gain`: energy of the residual that they explain beside all other findings [noise variances].
+    `alternatives`: effects that these data cannot tell from it.
+    `confirmed`: by motion that was not used; None where there was none.
     """
 
     terms: tuple[Term, ...]

@@ -30,8 +30,7 @@ THERMAL = "temperature"
 class Place:
     """A range of a variable in which excess residual concentrates.
 
-    low, high : float
-        the range [SI]
+    `low`, `high`: the range [SI].
     """
 
     variable: str
@@ -45,12 +44,9 @@ class Place:
 class JointMismatch:
     """Excess residual of one joint.
 
-    joint : int
-        joint index, from 0
-    excess_rms : float
-        root of what the residual's power exceeds the noise's by, in the common band [Nm or N]
-    explained : float
-        what the findings take off the whitened residual's energy [noise variances]
+    `joint`: joint index, from 0.
+    `excess_rms`: root of what the residual's power exceeds the noise's by, in the common band [Nm or N].
+    `explained`: what the findings take off the whitened residual's energy [noise variances].
     """
 
     joint: int
@@ -118,10 +114,7 @@ def _energy(fit: Fit, joint: int) -> float:
 def _concentration(variable: str, values: Array, power: Array, least: float = CONCENTRATED) -> Place | None:
     """The window of neighbouring bins that holds most of the excess.
 
-    Parameters
-    ----------
-    least : float
-        share of the excess from which it is one
+    `least`: share of the excess from which it is one.
     """
     total = float(power.sum())
     edges = np.quantile(values, np.linspace(0.0, 1.0, BINS + 1))

@@ -42,10 +42,7 @@ def states_friction(robot: Robot) -> bool:
 def with_plain_terms(diagnosis: Diagnosis, lacking: Lacking) -> Diagnosis:
     """The diagnosis with a finding for every nominal term that is there and that the given model lacks.
 
-    Parameters
-    ----------
-    lacking : collection of (int, str)
-        what the given model does not have
+    `lacking`: what the given model does not have.
     """
     named = {finding.place for finding in diagnosis.findings}
     constants = {each.terms[0].effect.joint for each in diagnosis.findings if each.terms[0].effect.has_constant}

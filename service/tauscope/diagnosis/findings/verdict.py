@@ -23,12 +23,9 @@ OPEN = frozenset({Verdict.PARTLY_EXPLAINED, Verdict.UNEXPLAINED, Verdict.INCONCL
 class Evidence:
     """What the verdict rests on.
 
-    extrapolates : bool
-        whether held-out motion is beyond what training excites
-    undetermined : bool
-        whether training leaves a part of its torque open
-    wrong_values : bool
-        whether a model that the recordings are compared with states wrong values
+    `extrapolates`: whether held-out motion is beyond what training excites.
+    `undetermined`: whether training leaves a part of its torque open.
+    `wrong_values`: whether a model that the recordings are compared with states wrong values.
     """
 
     findings: int

@@ -20,10 +20,7 @@ OPPOSITE = np.array([-2.0])
 def with_wrong_signs(diagnosis: Diagnosis, joints: Sequence[int]) -> Diagnosis:
     """The diagnosis with a finding for each joint whose torque has the wrong sign, or one for all.
 
-    Parameters
-    ----------
-    joints : sequence of int
-        joint indices, from 0; their torque already has the right sign in the diagnosis
+    `joints`: joint indices, from 0; their torque already has the right sign in the diagnosis.
     """
     if not joints:
         return diagnosis

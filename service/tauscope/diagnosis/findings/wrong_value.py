@@ -13,10 +13,8 @@ NEVER_NEGATIVE = frozenset({"mass", "inertia_xx", "inertia_yy", "inertia_zz", "s
 class WrongQuantity:
     """One number of a link or a joint.
 
-    simulation : float or None
-        stated value [SI]; None where only a difference is known
-    value : float
-        value on the arm, or the difference [SI]
+    `simulation`: stated value [SI]; None where only a difference is known.
+    `value`: value on the arm, or the difference [SI].
     """
 
     name: str
@@ -43,14 +41,10 @@ class WrongQuantity:
 class WrongValue:
     """Numbers of one link or one joint that explain differences of parameters.
 
-    link, joint : int or None
-        index, from 0; one of them is None
-    explains : int
-        differences that it explains, alone or with others
-    among : int
-        all differences
-    equivalent : tuple of str
-        other quantities that explain as much
+    `link`, `joint`: index, from 0; one of them is None.
+    `explains`: differences that it explains, alone or with others.
+    `among`: all differences.
+    `equivalent`: other quantities that explain as much.
     """
 
     link: int | None
@@ -63,10 +57,7 @@ class WrongValue:
     def statement(self, joints: Sequence[str]) -> str:
         """One sentence.
 
-        Parameters
-        ----------
-        joints : sequence of str
-            names of the joints
+        `joints`: names of the joints.
         """
         place = f"link {self.link + 1}" if self.link is not None else joints[self.joint or 0]
         first, *others = self.quantities

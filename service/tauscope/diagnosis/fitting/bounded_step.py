@@ -27,18 +27,11 @@ def bounded_step(
 ) -> Array:
     """The step that takes most off the energy within its limits, (p,).
 
-    Parameters
-    ----------
-    step : (p,) float64
-        without limits
-    spread : (p, r) float64
-        S with S Sᵀ the parameters' covariance
-    curved : (k,) int
-        places of the parameters that are limited
-    lower, upper : (k,) float64
-        how far they may go, lower ≤ 0 ≤ upper
-    reach : (k,) float64
-        how far of the same order each may go, above zero
+    `step`: (p,), without limits.
+    `spread`: (p, r), S with S Sᵀ the parameters' covariance.
+    `curved`: (k,), places of the parameters that are limited.
+    `lower`, `upper`: (k,), how far they may go, lower ≤ 0 ≤ upper.
+    `reach`: (k,), how far of the same order each may go, above zero.
     """
     wanted = step[curved] / reach
     low, high = lower / reach, upper / reach

@@ -38,10 +38,8 @@ AT_LIMIT = 1e-6
 class Fit:
     """An extended model at its optimum.
 
-    energy : float
-        Σ r² that the model leaves, the prior's included [noise variances]
-    spread : (p, r) float64
-        square root of the covariance; a shape at its bound is as uncertain as if there were none
+    `energy`: Σ r² that the model leaves, the prior's included [noise variances].
+    `spread`: (p, r), square root of the covariance; a shape at its bound is as uncertain as if there were none.
     """
 
     model: ExtendedModel
@@ -73,8 +71,7 @@ class Fit:
 class Tried:
     """A model as it is.
 
-    residual : list of (R_j,) float64
-        what it leaves, whitened
+    `residual`: list of (R_j,), what it leaves, whitened.
     """
 
     model: ExtendedModel
@@ -226,10 +223,7 @@ def _room(model: ExtendedModel, limits: Array) -> tuple[NDArray[np.intp], Array,
 def stepped(model: ExtendedModel, step: Array) -> ExtendedModel:
     """The model moved by a step, each shape within its bounds and what its coefficients let it be.
 
-    Parameters
-    ----------
-    step : (p,) float64
-        change of every parameter, of slopes their logarithm's
+    `step`: (p,), change of every parameter, of slopes their logarithm's.
     """
     size = model.structure.size
     terms = list(model.structure.terms)

@@ -35,12 +35,9 @@ LEVEL = 1e-3
 class LackOfFit:
     """What is left.
 
-    omnibus, pure_error : (n,) float64
-        p-values; 1 where the test could not be made
-    excess : (n,) float64
-        Σ r² beyond the noise's, in noise variances, never negative
-    measurable : (n,) float64
-        the excess from which it exceeds what the noise's own power is uncertain by [noise variances]
+    `omnibus`, `pure_error`: (n,), p-values; 1 where the test could not be made.
+    `excess`: (n,), Σ r² beyond the noise's, in noise variances, never negative.
+    `measurable`: (n,), the excess from which it exceeds what the noise's own power is uncertain by [noise variances].
     """
 
     omnibus: Array
@@ -70,10 +67,7 @@ def lack_of_fit(
 ) -> LackOfFit:
     """Test what a model leaves.
 
-    Parameters
-    ----------
-    dependence : sequence of float or None
-        number of rows of each joint that count as one; None where each does
+    `dependence`: number of rows of each joint that count as one; None where each does.
     """
     joints = observations.robot.joint_count
     pure = np.ones(joints)

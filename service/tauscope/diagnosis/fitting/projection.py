@@ -28,10 +28,8 @@ INVISIBLE = 1e-7
 class JointColumns:
     """Whitened columns of one joint's rows.
 
-    index : (k,) int
-        places among all parameters
-    rows : (k, R) float64
-        columns, time last
+    `index`: (k,), places among all parameters.
+    `rows`: (k, R), columns, time last.
     """
 
     index: NDArray[np.intp]
@@ -42,14 +40,10 @@ class JointColumns:
 class Projection:
     """A linear model fitted to whitened rows.
 
-    spread : (p, r) float64
-        S with S Sᵀ = (WᵀW)⁺: the parameters' covariance
-    basis : tuple of (r, R_j) float64
-        Qᵀ, joint by joint
-    residual : tuple of (R_j,) float64
-        what the model leaves
-    step : (p,) float64
-        the fitted parameters
+    `spread`: (p, r), S with S Sᵀ = (WᵀW)⁺: the parameters' covariance.
+    `basis`: tuple of (r, R_j), Qᵀ, joint by joint.
+    `residual`: tuple of (R_j,), what the model leaves.
+    `step`: (p,), the fitted parameters.
     """
 
     spread: Array
@@ -75,14 +69,10 @@ class Projection:
 class Moments:
     """What is needed of a candidate's columns, for g shapes of c columns each.
 
-    target : (g, c) float64
-        Xᵀ r
-    gram : (g, c, c) float64
-        Xᵀ X after projection
-    shares : (g, c) float64
-        share of each column's energy that lies outside the nominal columns
-    inner : (g, c, r) float64
-        Xᵀ Q
+    `target`: (g, c), Xᵀ r.
+    `gram`: (g, c, c), Xᵀ X after projection.
+    `shares`: (g, c), share of each column's energy that lies outside the nominal columns.
+    `inner`: (g, c, r), Xᵀ Q.
     """
 
     target: Array
@@ -96,12 +86,8 @@ def project(
 ) -> Projection:
     """Fit a linear model to whitened rows.
 
-    Parameters
-    ----------
-    target : sequence of (R_j,) float64
-        what is fitted, one a joint
-    prior : tuple of (s, p) float64 and (s,) float64, optional
-        rows of what is known beforehand, of unit variance, and their right-hand side
+    `target`: sequence of (R_j,), what is fitted, one a joint.
+    `prior`: tuple of (s, p) and (s,), rows of what is known beforehand, of unit variance, and their right-hand side.
     """
     known_rows, known_values = (np.zeros((0, size)), np.zeros(0)) if prior is None else prior
     spread = _spread(columns, known_rows)
@@ -116,10 +102,7 @@ def project(
 def fitted_parameters(columns: Sequence[JointColumns], target: Sequence[Array], size: int) -> Array:
     """The fitted parameters alone, (p,): with no basis and no residual, a fraction of what `project` costs.
 
-    Parameters
-    ----------
-    target : sequence of (R_j,) float64
-        what is fitted, one a joint
+    `target`: sequence of (R_j,), what is fitted, one a joint.
     """
     spread = _spread(columns, np.zeros((0, size)))
     inner = np.zeros(size)
@@ -147,10 +130,7 @@ def _spread(columns: Sequence[JointColumns], known_rows: Array) -> Array:
 def moments(projection: Projection, columns: Mapping[int, Array]) -> Moments:
     """Moments of a candidate's columns beside a fitted model.
 
-    Parameters
-    ----------
-    columns : mapping of int to (g, c, R_j) float64
-        whitened columns at every joint that the candidate touches
+    `columns`: mapping of int to (g, c, R_j), whitened columns at every joint that the candidate touches.
     """
     target, inner, gram = 0.0, 0.0, 0.0
     for joint, rows in columns.items():

@@ -63,12 +63,8 @@ def weightings_of_motion(observations: Observations, model: ExtendedModel) -> tu
 def certainty(observations: Observations, model: ExtendedModel, joint: int, share: float) -> Array:
     """1 / √(1 + s u² / σ²) of every white row, (R,): how much it counts beside a step that is known to u.
 
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    share : float
-        s, part of u² that a row is held to be off by
+    `joint`: joint index, from 0.
+    `share`: s, part of u² that a row is held to be off by.
     """
     noise = observations.noise[joint]
     parts = [_uncertain_power(piece, model, joint)[noise.order :] / noise.model.variance for piece in observations]
@@ -78,12 +74,8 @@ def certainty(observations: Observations, model: ExtendedModel, joint: int, shar
 def shared_errors(observations: Observations, model: ExtendedModel, joint: int, weights: Array) -> Array:
     """What the band may have made of all reversals alike, rounded and moved, among weighted rows, (2, R).
 
-    Parameters
-    ----------
-    joint : int
-        joint index, from 0
-    weights : (R,) float64
-        of the white rows
+    `joint`: joint index, from 0.
+    `weights`: (R,), of the white rows.
     """
     changes, slopes = [], []
     for piece in observations:

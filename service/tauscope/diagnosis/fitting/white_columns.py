@@ -214,10 +214,7 @@ def white_columns(
 ) -> dict[int, Array]:
     """Whitened columns (g, c, R_j) of an effect at every joint that it touches.
 
-    Parameters
-    ----------
-    shapes : (g, k) float64
-        shapes
+    `shapes`: (g, k), shapes.
     """
     touched = effect.touched(observations.robot.joint_count)
     rows: dict[int, list[Array]] = {joint: [] for joint in touched}

@@ -28,16 +28,12 @@ STATED_ERROR = 0.15
 class ExtendedModel:
     """τ = W(K_v, δ) Θ + Σ effects.
 
-    parameters : (p,) float64
-        Θ
-    links : (10 n,) float64
-        standard parameters of the nearest physically consistent links, for effects that need a whole body
-    constants : tuple of (int, str)
-        shape constants of the friction curve that are estimated along, as logarithms
-    stated : tuple of float or None
-        for each of these the value that the robot file states, None where it states none
-    covariance : (p, p) float64 or None
-        of Θ in a model that was saved; None where a fit has it, or nothing does
+    `parameters`: (p,), Θ.
+    `links`: (10 n,), standard parameters of the nearest physically consistent links, for effects that need a whole
+    body.
+    `constants`: shape constants of the friction curve that are estimated along, as logarithms.
+    `stated`: for each of these the value that the robot file states, None where it states none.
+    `covariance`: (p, p), of Θ in a model that was saved; None where a fit has it, or nothing does.
     """
 
     structure: ModelStructure
@@ -94,10 +90,7 @@ class ExtendedModel:
     def slope_amplitudes(self, joint: int) -> tuple[list[int], Array]:
         """Places of a joint's own estimated constants among all parameters, and the coefficients beside them, (k,).
 
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
+        `joint`: joint index, from 0.
         """
         places, amplitudes = [], []
         for place, (owner, name) in enumerate(self.constants):
@@ -110,10 +103,7 @@ class ExtendedModel:
     def slope_columns(self, piece: Piece, joint: int) -> Array:
         """∂τ/∂log K of a joint's own estimated constants for coefficients of one, in the common band, (k, M).
 
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
+        `joint`: joint index, from 0.
         """
         velocity = piece.prepared.motion.velocity[:, joint]
         values = [self.constant(place) for place, (owner, _) in enumerate(self.constants) if owner == joint]
@@ -185,25 +175,13 @@ class ExtendedModel:
         return np.asarray(np.tensordot(term.coefficients, term_columns(term, signals), axes=1), dtype=np.float64)
 
     def factor(self, joint: int) -> float:
-        """By how much the terms of a joint multiply what the plain model's parameters make there.
-
-        Parameters
-        ----------
-        joint : int
-            index, from 0
-        """
+        """By how much the terms of a joint multiply what the plain model's parameters make there."""
         return float(
             np.prod([term.effect.factor(term.coefficients) for term in self.terms if term.effect.joint == joint])
         )
 
     def slope(self, joint: int, signals: Signals) -> Array:
-        """∂τ_recorded/∂τ of a joint under all its terms, (N,).
-
-        Parameters
-        ----------
-        joint : int
-            index, from 0
-        """
+        """∂τ_recorded/∂τ of a joint under all its terms, (N,)."""
         torque, terms = signals.torque[joint], [term for term in self.terms if term.effect.joint == joint]
         return np.prod([term.effect.slope(torque, term.coefficients, term.shape) for term in terms], axis=0)
 

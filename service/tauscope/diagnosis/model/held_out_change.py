@@ -39,10 +39,7 @@ def stretches(count: int) -> list[slice]:
 def sum_stretches(squares: Array) -> Array:
     """Sums over stretches of motion, (n, S).
 
-    Parameters
-    ----------
-    squares : (n, N) float64
-        squared errors in the order of time
+    `squares`: (n, N), squared errors in the order of time.
     """
     return np.stack([squares[:, rows].sum(axis=1) for rows in stretches(squares.shape[1])], axis=1)
 
@@ -51,12 +48,9 @@ def sum_stretches(squares: Array) -> Array:
 class HeldOutChange:
     """Change of what a model leaves of held-out motion.
 
-    relative : (n,) float64
-        of every joint's rms; below zero is better
-    error : (n,) float64
-        its standard error; infinite where the motion is too short to tell it
-    expected : (n,) float64, optional
-        magnitude of the change in standard errors if all that the models differ in is there
+    `relative`: (n,), of every joint's rms; below zero is better.
+    `error`: (n,), its standard error; infinite where the motion is too short to tell it.
+    `expected`: (n,), magnitude of the change in standard errors if all that the models differ in is there.
     """
 
     relative: Array
@@ -67,10 +61,7 @@ class HeldOutChange:
     def between(before: Array, after: Array, difference: Array | None = None) -> "HeldOutChange":
         """From squared errors of two models, and what they differ in.
 
-        Parameters
-        ----------
-        before, after, difference : (n, S) float64
-            summed over the same stretches
+        `before`, `after`, `difference`: (n, S), summed over the same stretches.
         """
         stretches = before.shape[1]
         whole = before.sum(axis=1)
@@ -113,10 +104,7 @@ class HeldOutChange:
         the change expected is z_e = √(Σ f²/κ) / 2σ, and a change z has the likelihood ratio exp(2 z z_e). So the noise
         need not be known, and luck that exceeds what the torque can do says no more than the torque would.
 
-        Parameters
-        ----------
-        joints : sequence of int, optional
-            that count, from 0
+        `joints`: that count, from 0.
         """
         size = np.abs(self.standard) if self.expected is None else np.minimum(np.abs(self.standard), self.expected)
         own = -2.0 * self.standard * size

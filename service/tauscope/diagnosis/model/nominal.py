@@ -101,12 +101,8 @@ def setting_of(
 def mean_inertia(robot: Robot, bodies: Array, position: Array) -> Array:
     """Mean of the mass matrix's diagonal along a motion, not below zero, (n,) [kg m² or kg].
 
-    Parameters
-    ----------
-    bodies : (10 n,) float64
-        standard parameters
-    position : (N, n) float64
-        of the motion [rad or m]
+    `bodies`: (10 n,), standard parameters.
+    `position`: (N, n), of the motion [rad or m].
     """
     poses = position[:: max(len(position) // POSES, 1)]
     diagonal = np.diagonal(mass_matrix(robot, bodies, poses), axis1=1, axis2=2)

@@ -17,10 +17,8 @@ Place = tuple[str, int | None]
 class Term:
     """An effect in the model.
 
-    shape : (k,) float64
-        values of its shape parameters
-    coefficients : (c,) float64
-        values of its coefficients
+    `shape`: (k,), values of its shape parameters.
+    `coefficients`: (c,), values of its coefficients.
     """
 
     effect: Effect
@@ -40,10 +38,7 @@ class Term:
     def is_possible(self, k_v: float | None) -> bool:
         """Whether an effect can have these coefficients and this shape.
 
-        Parameters
-        ----------
-        k_v : float or None
-            of the effect's joint; None where there is none [s/rad or s/m]
+        `k_v`: of the effect's joint; None where there is none [s/rad or s/m].
         """
         signs = zip(self.effect.coefficients, self.coefficients, strict=True)
         possible = all(

@@ -31,10 +31,7 @@ def covariance_on_the_arm(model: ExtendedModel, place: int, covariance: Array) -
 
     J C Jᵀ with J = ∂(c/f, shapes)/∂(all parameters): 1/f in c, -c/f² in f.
 
-    Parameters
-    ----------
-    covariance : (p, p) float64
-        of all its parameters
+    `covariance`: (p, p), of all its parameters.
     """
     places, term = model.term_places(), model.terms[place]
     slopes = np.eye(model.size)[places[place]]

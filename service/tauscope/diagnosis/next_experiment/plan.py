@@ -36,8 +36,7 @@ MOST_OPTIONS = 4
 class PlannedExperiment:
     """The next motion.
 
-    separates : tuple of (str, int or None)
-        effects and places that it tells apart; empty where it is to show more of everything
+    `separates`: effects and places that it tells apart; empty where it is to show more of everything.
     """
 
     trajectory: Trajectory
@@ -136,12 +135,9 @@ class _Task:
 class _Judge:
     """What a motion is worth beside the recordings that there are.
 
-    separates : tuple of (str, int or None)
-        what is told apart
-    known : tuple of (r, p + o) float64
-        the same of the recordings
-    wanted : (k,) int
-        parameters that are to be known better
+    `separates`: what is told apart.
+    `known`: tuple of (r, p + o), the same of the recordings.
+    `wanted`: (k,), parameters that are to be known better.
     """
 
     separates: tuple[tuple[str, int | None], ...]

@@ -36,10 +36,7 @@ class Played:
 def played(trajectory: Trajectory, observations: Observations, model: ExtendedModel, cutoff_hz: float) -> Played:
     """Sample a motion as the recordings were, and condition it as they were.
 
-    Parameters
-    ----------
-    cutoff_hz : float
-        band of the comparison [Hz]
+    `cutoff_hz`: band of the comparison [Hz].
     """
     robot, rate = observations.robot, observations.pieces[0].prepared.motion.rate_hz
     samples = trajectory.samples(rate)
@@ -69,10 +66,7 @@ def equations(
 ) -> Array:
     """A model's whitened columns, and beside them the differences to other models' torque, as few rows, (r, p + o).
 
-    Parameters
-    ----------
-    absent : int, optional
-        a parameter that the model does not have; its column is zero
+    `absent`: a parameter that the model does not have; its column is zero.
     """
     own = fitter.white_residual(model)
     differences = [
@@ -95,10 +89,7 @@ def equations(
 def separations(model: ExtendedModel, stacked: Array) -> Array:
     """λ of each other model: what of the differences is left outside the model's columns, (o,).
 
-    Parameters
-    ----------
-    stacked : (r, p + o) float64
-        its `equations` of all recordings
+    `stacked`: (r, p + o), its `equations` of all recordings.
     """
     prior, _ = model.prior()
     columns = np.concatenate([stacked[:, : model.size], prior])
@@ -113,10 +104,7 @@ def separations(model: ExtendedModel, stacked: Array) -> Array:
 def log_variances(model: ExtendedModel, stacked: Array) -> Array:
     """Logarithm of the variance of every parameter, (p,); large where nothing is known of it.
 
-    Parameters
-    ----------
-    stacked : (r, p) float64
-        its `equations` of all recordings
+    `stacked`: (r, p), its `equations` of all recordings.
     """
     prior, _ = model.prior()
     columns = np.concatenate([stacked, prior])

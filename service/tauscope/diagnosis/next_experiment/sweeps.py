@@ -27,10 +27,7 @@ LONGEST_TURN = 0.1
 def sweep(limits: MotionLimits, share: float, duration_s: float) -> SampledSegment:
     """All joints at ± a part of their top speed, turning smoothly, from rest to rest where they began.
 
-    Parameters
-    ----------
-    duration_s : float
-        how long [s]
+    `duration_s`: how long [s].
     """
     time = np.arange(round(duration_s * RATE_HZ) + 1) / RATE_HZ
     count = len(limits.velocity)

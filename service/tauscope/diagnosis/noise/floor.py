@@ -62,10 +62,7 @@ def repeated_differences(
 def white_noise(observations: Observations, model: ExtendedModel, share: float = 1.0) -> list[JointNoise]:
     """White noise as large as all that a model leaves.
 
-    Parameters
-    ----------
-    share : float
-        independent rows among all
+    `share`: independent rows among all.
     """
     found = []
     for pieces in residual_rows(model, observations):

@@ -35,10 +35,8 @@ LEFT_OUT = 100.0
 class Repetition:
     """Where the motion of a recording repeats.
 
-    start_s : float
-        since the beginning of the recording [s]
-    length_s : float
-        of one period [s]
+    `start_s`: since the beginning of the recording [s].
+    `length_s`: of one period [s].
     """
 
     start_s: float
@@ -50,20 +48,13 @@ class Repetition:
 class Piece:
     """One piece of motion with the torque of every repetition in the common band.
 
-    torque : (n, P, M) float64
-        measured torque in the common band
-    used : (n, P, M) bool
-        rows that rest on measured torque
-    time : (P, N) float64
-        instants at the recorded rate, from the beginning of the recording [s]
-    state_hz : (n,) float64
-        band of each joint's own motion [Hz]
-    quiet_hz : (n,) float64 or None
-        bands in which the velocities say most of single samples [Hz]; None for no filter
-    rigid_hz : float or None
-        band in which the accelerations do [Hz]; None for no filter
-    temperature : (n, P, N) float64 or None
-        at these instants [°C]; NaN at joints without a sensor, None where there is none
+    `torque`: (n, P, M), measured torque in the common band.
+    `used`: (n, P, M), rows that rest on measured torque.
+    `time`: (P, N), instants at the recorded rate, from the beginning of the recording [s].
+    `state_hz`: (n,), band of each joint's own motion [Hz].
+    `quiet_hz`: (n,), bands in which the velocities say most of single samples [Hz]; None for no filter.
+    `rigid_hz`: band in which the accelerations do [Hz]; None for no filter.
+    `temperature`: (n, P, N), at these instants [°C]; NaN at joints without a sensor, None where there is none.
     """
 
     prepared: PreparedMotion
@@ -95,10 +86,7 @@ class Piece:
     def reduced(self, values: Array) -> Array:
         """Signals (k, N) or (k, P, N) in the common band, all repetitions one after another, (k, P M).
 
-        Parameters
-        ----------
-        values : (k, N) or (k, P, N) float64
-            at the recorded rate
+        `values`: (k, N) or (k, P, N), at the recorded rate.
         """
         rows = self.prepared.motion.band.reduce(values)
         return self.repeated(rows) if rows.ndim == 2 else rows.reshape(len(rows), -1)
@@ -106,10 +94,7 @@ class Piece:
     def repeated(self, rows: Array) -> Array:
         """Rows (k, M) that are the same in every repetition, (k, P M).
 
-        Parameters
-        ----------
-        rows : (k, M) float64
-            in the common band
+        `rows`: (k, M), in the common band.
         """
         return rows if self.repetitions == 1 else np.tile(rows, (1, self.repetitions))
 
@@ -119,10 +104,7 @@ class Piece:
         Friction's step needs the motion's whole band; inertia does not, and multiplies that band's noise by the square
         of its frequency, which a column that is not linear in it would fold back.
 
-        Parameters
-        ----------
-        values : (n, N) float64
-            at the recorded rate
+        `values`: (n, N), at the recorded rate.
         """
         if self.rigid_hz is None:
             return np.ascontiguousarray(values)
@@ -170,12 +152,8 @@ class Observations:
     ) -> "Observations":
         """Condition recordings in a band.
 
-        Parameters
-        ----------
-        cutoff_hz : float or None
-            the common band [Hz]; None for no filter
-        steepness : (n,) float64
-            K_v of every joint's friction, for the band of the motion itself [s/rad or s/m]
+        `cutoff_hz`: the common band [Hz]; None for no filter.
+        `steepness`: (n,), K_v of every joint's friction, for the band of the motion itself [s/rad or s/m].
         """
         starts = [float(c.recording.samples(0, 1).time[0]) for c in conditioners]
         bands = [state_cutoffs(c, cutoff_hz, steepness) for c in conditioners]
@@ -210,10 +188,7 @@ class Observations:
     def without_joints(self, joints: Collection[int]) -> "Observations":
         """The same rows, those of some joints as good as left out: what no other joint tells stays what it is.
 
-        Parameters
-        ----------
-        joints : collection of int
-            indices, from 0
+        `joints`: indices, from 0.
         """
         noise = [own.times(LEFT_OUT) if joint in joints else own for joint, own in enumerate(self.noise)]
         return replace(self, noise=tuple(noise))
@@ -228,22 +203,15 @@ class Observations:
     def torque(self, joint: int) -> list[Array]:
         """Measured torque of one joint in the common band, piece by piece, (1, P M) each.
 
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
+        `joint`: joint index, from 0.
         """
         return [piece.torque[joint].reshape(1, -1) for piece in self.pieces]
 
     def white(self, joint: int, rows: Sequence[Array]) -> Array:
         """Rows of all pieces, whitened, those that were not measured left out, (k, R).
 
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        rows : sequence of (k, P M) float64
-            a piece each
+        `joint`: joint index, from 0.
+        `rows`: sequence of (k, P M), a piece each.
         """
         whitened = np.concatenate([self.noise[joint].whitened(each) for each in rows], axis=-1)
         kept = self.kept(joint)
@@ -253,12 +221,8 @@ class Observations:
     def independent_rows(self, joint: int, rows: Array) -> float:
         """Number of independent rows of a joint; one that tells less than a whole one counts as a part.
 
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        rows : (R,) float64
-            its white rows
+        `joint`: joint index, from 0.
+        `rows`: (R,), its white rows.
         """
         told = float(np.sum(self.weightings[joint].weights ** 2)) if self.weightings else float(len(rows))
         return self.noise[joint].share * told
@@ -266,10 +230,7 @@ class Observations:
     def kept(self, joint: int) -> BoolArray:
         """Mask of the whitened rows that count, (rows,).
 
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
+        `joint`: joint index, from 0.
         """
         if joint not in self._kept:
             self._kept[joint] = np.concatenate(
@@ -280,10 +241,7 @@ class Observations:
     def row_labels(self, joint: int) -> tuple[NDArray[np.intp], Array]:
         """Recording and instant of every whitened row that counts, (R,) each.
 
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
+        `joint`: joint index, from 0.
         """
         order = self.noise[joint].order
         recording = [np.full(piece.repetitions * piece.rows - order, piece.prepared.recording) for piece in self.pieces]

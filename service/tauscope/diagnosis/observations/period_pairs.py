@@ -31,10 +31,7 @@ class PeriodPair:
     def later(self, values: Array) -> Array:
         """Signals a period later, (k, L).
 
-        Parameters
-        ----------
-        values : (k, N) float64
-            signals of the piece at all its samples
+        `values`: (k, N), signals of the piece at all its samples.
         """
         return (1.0 - self.part) * values[:, self.near] + self.part * values[:, self.far]
 

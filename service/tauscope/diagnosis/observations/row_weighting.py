@@ -19,12 +19,9 @@ from tauscope.recording.recording import Array
 class RowWeighting:
     """What the rows of one joint are multiplied by.
 
-    weights : (R,) float64
-        W: 1 where the columns are certain
-    directions : (k, R) float64
-        orthonormal, those of the shared errors among weighted rows
-    shrinkage : (k,) float64
-        share that is taken off along each: 0 where nothing is shared, 1 where nothing is left
+    `weights`: (R,), W: 1 where the columns are certain.
+    `directions`: (k, R), orthonormal, those of the shared errors among weighted rows.
+    `shrinkage`: (k,), share that is taken off along each: 0 where nothing is shared, 1 where nothing is left.
     """
 
     weights: Array
@@ -35,12 +32,8 @@ class RowWeighting:
     def of(weights: Array, shared: Array) -> "RowWeighting":
         """From the errors themselves.
 
-        Parameters
-        ----------
-        weights : (R,) float64
-            W
-        shared : (k, R) float64
-            S: each error at one standard deviation, among weighted rows
+        `weights`: (R,), W.
+        `shared`: (k, R), S: each error at one standard deviation, among weighted rows.
         """
         _, sizes, directions = np.linalg.svd(shared, full_matrices=False)
         return RowWeighting(weights, directions, 1.0 - 1.0 / np.sqrt(1.0 + sizes**2))
@@ -48,10 +41,7 @@ class RowWeighting:
     def applied(self, rows: Array) -> Array:
         """Whitened rows as they count, (k, R).
 
-        Parameters
-        ----------
-        rows : (k, R) float64
-            whitened rows
+        `rows`: (k, R), whitened rows.
         """
         weighted = rows * self.weights
         return weighted - ((weighted @ self.directions.T) * self.shrinkage) @ self.directions

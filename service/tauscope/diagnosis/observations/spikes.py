@@ -26,10 +26,7 @@ OF_MEDIAN = 1.4826
 def without_spikes(torque: Array) -> Array:
     """Torque whose single samples stay within reach of their neighbours.
 
-    Parameters
-    ----------
-    torque : (n, N) float64
-        as recorded, a row a joint [Nm or N]
+    `torque`: (n, N), as recorded, a row a joint [Nm or N].
     """
     if torque.shape[1] < SURROUNDINGS:
         return torque

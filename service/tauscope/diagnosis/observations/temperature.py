@@ -16,15 +16,9 @@ GRID_HZ = 10.0
 def read_temperature(conditioner: Conditioner, time: Array) -> Array | None:
     """Temperature of every joint.
 
-    Parameters
-    ----------
-    time : (P, N) float64
-        instants on the recording's clock [s]
+    `time`: (P, N), instants on the recording's clock [s].
 
-    Returns
-    -------
-    (n, P, N) float64 or None
-        [°C]; NaN at joints without a sensor, None where there is none
+    Returns (n, P, N), [°C]; NaN at joints without a sensor, None where there is none.
     """
     if not conditioner.recording.has("temp"):
         return None

@@ -51,10 +51,7 @@ class JointNoise:
     def whitened(self, rows: Array) -> Array:
         """Rows (..., T) made white with unit variance, (..., T - p).
 
-        Parameters
-        ----------
-        rows : (..., T) float64
-            consecutive rows, time last
+        `rows`: (..., T), consecutive rows, time last.
         """
         if not self.order:
             return rows / self.std
@@ -64,10 +61,7 @@ class JointNoise:
     def kept(self, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Whitened rows (T - p,) of which all that went in was measured.
 
-        Parameters
-        ----------
-        used : (T,) bool
-            which rows rest on measured torque
+        `used`: (T,), which rows rest on measured torque.
         """
         if used.all():
             return used[self.order :]
@@ -80,10 +74,8 @@ def fitted_noise(pieces: Iterable[tuple[Array, NDArray[np.bool_], float]], band_
 
     Within the band the whitened noise has unit density: its mean power is `JointNoise.share`.
 
-    Parameters
-    ----------
-    pieces : iterable of ((T,) float64, (T,) bool, float)
-        consecutive rows, which of them count, and the factor that turns their power into the noise's
+    `pieces`: iterable of ((T,) , (T,) , float), consecutive rows, which of them count, and the factor that turns their
+    power into the noise's.
     """
     pieces = list(pieces)
     total = AutocovarianceSum()

@@ -16,14 +16,10 @@ from tauscope.recording.recording import Array
 class Step:
     """An effect that was added or refused.
 
-    log_odds, trained_log_odds : float
-        posterior, that it is there, after all motion and after training
-    rivals : tuple of Proposal
-        other effects that were as good as looked at in its place
-    change : HeldOutChange or None
-        on held-out motion; None where there is none
-    covariance : (p, p) float64
-        of the parameters with it
+    `log_odds`, `trained_log_odds`: posterior, that it is there, after all motion and after training.
+    `rivals`: other effects that were as good as looked at in its place.
+    `change`: on held-out motion; None where there is none.
+    `covariance`: (p, p), of the parameters with it.
     """
 
     proposal: Proposal
@@ -47,10 +43,8 @@ class Step:
 class Rival:
     """What may be in the place of a finding.
 
-    log_odds : float
-        posterior, against neither
-    absent : int or None
-        parameter of the nominal model in whose place it is
+    `log_odds`: posterior, against neither.
+    `absent`: parameter of the nominal model in whose place it is.
     """
 
     term: Term
@@ -63,14 +57,10 @@ class Rival:
 class Weighed:
     """Effects of one kind at one place beside all others.
 
-    places : tuple of int
-        of their terms in the model
-    without : Hypothesis
-        all others, at their most probable parameters
-    log_odds : float
-        posterior, that it is there
-    rivals : tuple of Rival
-        the most probable first
+    `places`: of their terms in the model.
+    `without`: all others, at their most probable parameters.
+    `log_odds`: posterior, that it is there.
+    `rivals`: the most probable first.
     """
 
     places: tuple[int, ...]
@@ -99,10 +89,8 @@ class Weighed:
 class Found:
     """Result of a search.
 
-    steps : tuple of Step
-        every effect that was tried, in the order of trial
-    weighed : tuple of Weighed
-        every effect of the hypothesis
+    `steps`: every effect that was tried, in the order of trial.
+    `weighed`: every effect of the hypothesis.
     """
 
     nominal: Hypothesis

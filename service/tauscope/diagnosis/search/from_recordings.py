@@ -33,14 +33,10 @@ KNOWN_SPREAD = 2.0
 class Searched:
     """A search and what it rests on.
 
-    unseen : Observations or None
-        held-out rows in the same band
-    deflections : tuple of MeasuredDeflection
-        of joints with an encoder on the link
-    cutoff_hz : float
-        of the band [Hz]
-    pure_error : bool
-        whether repetitions tell the noise
+    `unseen`: held-out rows in the same band.
+    `deflections`: of joints with an encoder on the link.
+    `cutoff_hz`: of the band [Hz].
+    `pure_error`: whether repetitions tell the noise.
     """
 
     found: Found

@@ -64,12 +64,9 @@ PROGRESS = 0.1
 class Hypothesis:
     """A model and what the data say of it.
 
-    sizes : tuple of (c,) float64
-        standard deviation believed of every term's coefficients
-    scales : tuple of Scales
-        one entry a joint
-    dependence : tuple of float
-        κ of every joint
+    `sizes`: tuple of (c,), standard deviation believed of every term's coefficients.
+    `scales`: one entry a joint.
+    `dependence`: κ of every joint.
     """
 
     model: ExtendedModel
@@ -103,10 +100,8 @@ class Hypothesis:
 class Prior:
     """What is believed of a nominal model's parameters.
 
-    friction : (f, f) float64
-        precision of the friction coefficients about zero
-    slopes, slope_spreads : (s,) float64
-        logarithms of friction's slopes, and their standard deviations
+    `friction`: (f, f), precision of the friction coefficients about zero.
+    `slopes`, `slope_spreads`: (s,), logarithms of friction's slopes, and their standard deviations.
     """
 
     bodies: BodyPrior
@@ -131,8 +126,7 @@ class Prior:
 class Laboratory:
     """Makes hypotheses about the same rows.
 
-    repeated : bool
-        whether repetitions of the motion tell the noise
+    `repeated`: whether repetitions of the motion tell the noise.
     """
 
     rows: EvidenceRows
@@ -286,20 +280,14 @@ class Laboratory:
     def with_term(self, at: Hypothesis, term: Term, size: Array) -> Hypothesis:
         """A model with one effect more, as it is.
 
-        Parameters
-        ----------
-        size : (c,) float64
-            standard deviation believed of its coefficients
+        `size`: (c,), standard deviation believed of its coefficients.
         """
         return self.at(with_terms(at.model, [*at.model.terms, term]), [*at.sizes, size], at.scales, at.dependence)
 
     def without_term(self, at: Hypothesis, place: int) -> Hypothesis:
         """A model with one effect less, as it is.
 
-        Parameters
-        ----------
-        place : int
-            of the effect among the model's terms
+        `place`: of the effect among the model's terms.
         """
         terms = [term for at_place, term in enumerate(at.model.terms) if at_place != place]
         sizes = [size for at_place, size in enumerate(at.sizes) if at_place != place]

@@ -12,12 +12,8 @@ POINTS = 7
 def neighbours(effect: Effect, shape: Array, place: int) -> tuple[float, float]:
     """The grid's values of a shape parameter below and above, or its bounds.
 
-    Parameters
-    ----------
-    shape : (k,) float64
-        values of all shape parameters
-    place : int
-        of the one among them
+    `shape`: (k,), values of all shape parameters.
+    `place`: of the one among them.
     """
     values = np.unique(effect.grid[:, place])
     at = int(np.argmin(np.abs(values - shape[place])))

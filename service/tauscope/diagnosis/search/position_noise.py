@@ -36,10 +36,7 @@ def is_position_noise(
 ) -> bool:
     """Whether noise of the positions accounts for more than `MOST` of what an effect that swings explains.
 
-    Parameters
-    ----------
-    shape : (k,) float64
-        values of its shape parameters
+    `shape`: (k,), values of its shape parameters.
     """
     white = WhiteColumns(observations)
     beside = project(white.all(model), white.residual(model), model.size)

@@ -42,14 +42,11 @@ ZOOMS = 2
 class Proposal:
     """An effect at its most probable shape.
 
-    log_factor : float
-        log Bayes factor of the effect beside the hypothesis, its shape and size averaged over what is believed
-    size : (c,) float64
-        standard deviation believed of its coefficients
-    unnamed : float
-        log Bayes factor of torque without a name in its place
-    found : Hypothesis
-        with it, its coefficients at zero
+    `log_factor`: log Bayes factor of the effect beside the hypothesis, its shape and size averaged over what is
+    believed.
+    `size`: (c,), standard deviation believed of its coefficients.
+    `unnamed`: log Bayes factor of torque without a name in its place.
+    `found`: with it, its coefficients at zero.
     """
 
     term: Term
@@ -75,10 +72,7 @@ class Proposer:
     ) -> list[Proposal]:
         """Effects that make the data more probable, the most probable first.
 
-        Parameters
-        ----------
-        instead : Place or None
-            effect in whose place they are looked for; None where they are to be added
+        `instead`: effect in whose place they are looked for; None where they are to be added.
         """
         independent = self.laboratory.under(at, [1.0] * len(at.scales), range(len(at.scales)))
         scorer = Scorer(self.rows, independent)
@@ -173,12 +167,8 @@ class Proposer:
     ) -> tuple[Array, Array]:
         """One shape parameter after the other: a free one between neighbours on the grid, a window's kind in turn.
 
-        Parameters
-        ----------
-        shape : (k,) float64
-            where it begins
-        size : (c,) float64
-            standard deviation believed of the coefficients there
+        `shape`: (k,), where it begins.
+        `size`: (c,), standard deviation believed of the coefficients there.
         """
         scorer = Scorer(self.rows, at)
 
@@ -215,10 +205,7 @@ class Proposer:
     ) -> dict[int, Array]:
         """White rows of an effect at every joint that it touches, (s, c, R_j).
 
-        Parameters
-        ----------
-        shapes : (s, k) float64
-            values of its shape parameters
+        `shapes`: (s, k), values of its shape parameters.
         """
         white = self.rows.columns(effect, shapes, signals)
         return {joint: self.rows.take(joint, rows, dependence[joint]) for joint, rows in white.items()}

@@ -31,10 +31,8 @@ INVISIBLE = 1e-7
 class Scored:
     """Shapes of an effect.
 
-    log_factors : (s,) float64
-        log Bayes factor against the hypothesis without it; -inf where no such effect can be
-    coefficients, sizes : (s, c) float64
-        most probable values, and the standard deviation under which they are
+    `log_factors`: (s,), log Bayes factor against the hypothesis without it; -inf where no such effect can be.
+    `coefficients`, `sizes`: (s, c), most probable values, and the standard deviation under which they are.
     """
 
     effect: Effect
@@ -76,12 +74,8 @@ class Scorer:
     def score(self, effect: Effect, shapes: Array, columns: Mapping[int, Array]) -> tuple[Scored, Scored]:
         """Shapes of an effect beside the discrepancy, and as if there were none.
 
-        Parameters
-        ----------
-        shapes : (s, k) float64
-            values of its shape parameters
-        columns : mapping of int to (s, c, R_j) float64
-            its white rows at every joint that it touches, in order of their class of rest
+        `shapes`: (s, k), values of its shape parameters.
+        `columns`: mapping of int to (s, c, R_j), its white rows at every joint that it touches, by class of rest.
         """
         joints = self._at.linear.joints
         crossed = {joint: joints[joint].against(own) for joint, own in columns.items()}

@@ -44,10 +44,8 @@ CATALOGUED = 3.0
 class Search:
     """A search among effects on the same rows.
 
-    nominal : Hypothesis
-        model without what is looked for
-    farther : sequence of Effect
-        forms that say more than what they refine
+    `nominal`: model without what is looked for.
+    `farther`: forms that say more than what they refine.
     """
 
     nominal: Hypothesis
