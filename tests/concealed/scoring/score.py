@@ -106,7 +106,7 @@ def scored(trial: Trial, found: DiagnosisDocument, seconds: float) -> Score:
 def compared(truth: Truth, found: DiagnosisDocument, seconds: float) -> Score:
     """What was said beside what was concealed."""
     right = [set(hidden.labels) for hidden in truth.hidden]
-    also = {each for hidden in truth.hidden for each in hidden.also}
+    also = {*truth.own, *(each for hidden in truth.hidden for each in hidden.also)}
     findings = [finding for finding in found.findings if finding.effect != UNKNOWN]
     firsts = [label(finding.effect, finding.joint) for finding in findings]
     sets = [{first, *finding.equivalent} for first, finding in zip(firsts, findings, strict=True)]
@@ -117,7 +117,7 @@ def compared(truth: Truth, found: DiagnosisDocument, seconds: float) -> Score:
         strength=truth.strength,
         verdict=found.verdict,
         detected=found.verdict != "consistent",
-        claimed=bool(findings),
+        claimed=any(first not in truth.own for first in firsts),
         located=all(_located(hidden.joints, found, truth) for hidden in truth.hidden),
         placed=all(any(finding.joint in hidden.joints for finding in findings) for hidden in truth.hidden),
         named=all(any(labels & members for members in sets) for labels in right),

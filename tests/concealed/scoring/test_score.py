@@ -84,6 +84,12 @@ def test_what_comes_with_an_effect_is_right_and_not_extra() -> None:
     assert not alone.named
 
 
+def test_friction_that_the_robot_file_does_not_state_is_no_false_alarm() -> None:
+    sound = Truth({}, [], 0.0, [1.0, 1.0], ["stribeck_friction@joint1"])
+    assert not compared(sound, diagnosis(finding("stribeck_friction", "joint1")), 1.0).claimed
+    assert compared(sound, diagnosis(finding("stribeck_friction", "joint2")), 1.0).claimed
+
+
 def test_of_two_both_have_to_be_named() -> None:
     both = truth(COGGING, hidden("backlash@joint2"))
     assert not compared(both, diagnosis(finding("cogging", "joint1")), 1.0).named

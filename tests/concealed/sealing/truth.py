@@ -3,12 +3,13 @@
 import hashlib
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from concealed.generator.arms import arm_named
 from concealed.generator.case import Case
 from concealed.generator.effects import Drawn
 from concealed.generator.forward import Entry
@@ -87,12 +88,15 @@ class Truth:
         s that was reached
     torque_std : list of float
         noise of the torque [Nm or N]
+    own : list of str
+        labels of the arm's own friction that its robot file does not state: no error
     """
 
     case: dict[str, Any]
     hidden: list[Hidden]
     strength: float
     torque_std: list[float]
+    own: list[str] = field(default_factory=list)
 
     def seal(self, path: Path) -> str:
         """Write it, and give the SHA-256 of what was written."""
@@ -117,7 +121,20 @@ def truth_of(trial: Trial, case: Case | None = None) -> Truth:
     # Signs of all joints are several entries and one truth.
     hidden = [_hidden(drawn, entry, names) for drawn, entry in zip(trial.truth, entries, strict=False)]
     told = {} if case is None else case.as_dict()
-    return Truth(told, hidden, float(trial.strength), [float(each) for each in trial.noise.torque_std])
+    noise = [float(each) for each in trial.noise.torque_std]
+    return Truth(told, hidden, float(trial.strength), noise, _unstated(trial))
+
+
+def _unstated(trial: Trial) -> list[str]:
+    """Joints whose friction falls with speed, by a constant that no robot file states: τ_sc atan(δ q̇) with τ_sc < 0."""
+    friction = arm_named(trial.arm).model.friction
+    assert friction is not None
+    pairs = zip(trial.robot.joints, friction, strict=True)
+    return [
+        label("stribeck_friction", joint.name)
+        for joint, own in pairs
+        if joint.friction_shape.delta is None and own.stribeck < 0.0
+    ]
 
 
 def _hidden(drawn: Drawn, entry: Entry, names: list[str]) -> Hidden:
