@@ -16,6 +16,7 @@ from tauscope.recording.inflation import (
     require_plausible_inflation,
 )
 from tauscope.recording.intake import RowIntake
+from tauscope.recording.joint_parts import JointParts, merge_parts
 from tauscope.recording.joint_state import JointState, JointStateLayout, JointStates, decode_cdr
 from tauscope.recording.joint_state_decoders import Decoder, find_decoder
 from tauscope.recording.recording import EffortKind, Recording
@@ -64,13 +65,15 @@ class OtherPublishers:
         if self._incomplete:
             missing, _ = next(iter(self._incomplete))
             return RecordingError(f"{place}: carries no {missing}; record position and effort of every joint")
-        found = max((*self._partial.items(), *self._foreign.items()), key=lambda entry: entry[1], default=((), 0))[0]
         names = wanted or ()
+        found = tuple(dict.fromkeys(name for part in self._partial for name in part))
+        found = found or max(self._foreign, key=lambda foreign: self._foreign[foreign], default=())
         missing = [name for name in names if name not in found]
-        lacks = f": {listed(missing)} is missing" if self._partial else ""
+        verb = "is" if len(missing) == 1 else "are"
+        lacks = f": {listed(missing)} {verb} missing; record them too, or" if self._partial else ";"
         return RecordingMismatchError(
             f"{place} carries {len(found)} joints ({listed(found)}), the robot has {len(names)} ({listed(names)})"
-            f"{lacks}; name the joints in the robot file as the recording does"
+            f"{lacks} name the joints in the robot file as the recording does"
         )
 
 
@@ -120,6 +123,8 @@ class JointStateTopic:
         self._rows: _Rows | None = None
         self._others = OtherPublishers()
         self._wanted = choice.joint_names
+        self.parts: JointParts | None = JointParts(topic)
+        """Messages that lack joints, or their positions or efforts; None once a message has all."""
 
     def add(self, log_time: int, message: bytes) -> None:
         """Take the next message. `log_time`: when it was logged [ns]."""
@@ -151,7 +156,12 @@ class JointStateTopic:
                 name = f"{self._choice.file}: topic {self.topic}"
                 require_plausible_inflation(self._choice.packed_bytes, self._unpacked_bytes, name, HELD_BYTES)
             batches = sorted(self._decode(messages, first), key=lambda batch: batch[0][0])
-            own = [(rows, self._arrange(states)) for rows, states in batches if self._is_own(states, first + rows[0])]
+            own: list[Batch] = []
+            for at, states in batches:
+                if self._is_own(states, first + at[0]):
+                    own.append((at, self._arrange(states)))
+                elif self.parts is not None:
+                    self.parts.add(states, log_time[at], self._wanted or ())
             if own:
                 rows, states = _merge(own)
                 self._take(states, log_time[rows], first + rows)
@@ -245,6 +255,7 @@ class JointStateTopic:
 
     def _take(self, states: JointStates, log_time: NDArray[np.int64], number: Rows) -> None:
         if self._rows is None:
+            self.parts = None
             count, has_velocity = states.position.shape[1], states.velocity.shape[1] > 0
             self._rows = _Rows(self._choice, self.topic, count, has_velocity=has_velocity)
         self._rows.append(states, log_time, number)
@@ -386,6 +397,11 @@ class JointStateLog:
         if wanted is not None and wanted not in self._topics:
             known = listed(sorted(self._topics)) or "none"
             raise RecordingError(f"{self._choice.file}: no topic {wanted} carries joint states; those that do: {known}")
+        parts = [topic.parts for topic in self._topics.values() if topic.fault is None and topic.parts is not None]
+        if self._choice.joint_names and not self.samples:
+            merged = merge_parts(parts, self._choice.joint_names, self._choice.file, self._choice.reading)
+            if merged is not None:
+                return merged
         return choose_topic(self._topics, self._others, self._choice.file).finish()
 
 
@@ -402,9 +418,10 @@ def choose_topic(topics: Mapping[str, JointStateTopic], other_topics: Sequence[s
         topic.flush()
     usable = {name: topic for name, topic in filled.items() if topic.has_effort}
     best = usable or {name: topic for name, topic in filled.items() if topic.samples} or filled
-    for name in _PREFERRED_TOPICS:
-        if name in best:
-            return best[name]
+    named = [name for name in _PREFERRED_TOPICS if name in best][:1]
+    named = named or [name for name in best if name.endswith("/joint_states")]  # beside commands
+    if len(named) == 1:
+        return best[named[0]]
     plain = {name: topic for name, topic in best.items() if topic.is_plain}  # beside ros2_control's dynamic states
     best = plain if len(plain) == 1 else best
     if len(best) > 1:
