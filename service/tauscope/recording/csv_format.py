@@ -180,6 +180,11 @@ def _parse_names(
         fields = dialect.name_fields(sample[index], row)
         start += sum(len(each) + 1 for each in raw[:index])
         number += index
+        cells = rows.split(row)
+        if len(cells) == len(fields) + 1 and not cells[-1]:  # a delimiter ends the rows, and not the header
+            fields.append(b"")
+        elif len(fields) == len(cells) + 1 and not fields[-1]:
+            fields.pop()
     file.seek(start)
     return _Names(number, rows, [_decode(field) for field in fields])
 

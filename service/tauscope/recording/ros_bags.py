@@ -168,7 +168,8 @@ def _files(folder: Path, name: str) -> list[str]:
     """The bag's files, by bare name: a bag never reaches out of its folder."""
     metadata = folder / METADATA
     if not metadata.is_file():
-        raise RecordingError(f"{name}: a folder without {METADATA} is no rosbag2 recording; give the file itself")
+        way_out = "give the file itself, or run `ros2 bag reindex`"
+        raise RecordingError(f"{name}: a folder without {METADATA} is no rosbag2 recording; {way_out}")
     try:
         content: Any = YAML(typ="safe", pure=True).load(metadata.read_text(encoding="utf-8"))
     except (YAMLError, ValueError, RecursionError) as error:
