@@ -5,7 +5,6 @@ record from the front, so that a file without an index (the writer was killed) d
 ends. Records and checksums are the mcap library's; the walk over a chunk's messages is our own, which is much quicker.
 """
 
-import os
 import struct
 import zlib
 from collections.abc import Mapping, Sequence
@@ -26,6 +25,7 @@ from tauscope.recording.inflation import HELD_BYTES, LARGEST_RATIO, count_plausi
 from tauscope.recording.joint_state_topic import Choice, JointStateLog, MessageHandler
 from tauscope.recording.recording import Recording
 from tauscope.recording.samples import MINIMUM_ROWS
+from tauscope.remote_files import open_ranges, read_range
 from tauscope.robot.messages import reason
 
 RECORD = struct.Struct("<BQ")  # opcode and length of a record
@@ -240,8 +240,7 @@ def _hand_over(opcode: int, record: bytes, handlers: Mapping[int, MessageHandler
 
 
 def _read(file: BinaryIO, at: int, length: int) -> bytes:
-    """Bytes at a place of the file, past its buffer: a seek within a buffer would fill it anew."""
-    data = os.pread(file.fileno(), length, at) if at >= 0 and length >= 0 else b""
+    data = read_range(file, at, length) if at >= 0 and length >= 0 else b""
     if len(data) < length:
         raise ValueError("the file ends early")
     return data
@@ -300,7 +299,7 @@ def scan_mcap(path: Path, sink: MessageSink) -> str | None:
     """
     with path.open("rb") as file:
         try:
-            _Scan(file, os.fstat(file.fileno()).st_size, sink).run()
+            _Scan(file, path.stat().st_size, sink).run()
         except DamageError as damage:
             return str(damage)
     return None
@@ -309,8 +308,8 @@ def scan_mcap(path: Path, sink: MessageSink) -> str | None:
 def _read_whole(path: Path, log: JointStateLog) -> str | None:
     """Read by the index, else from the front; the damage, None where there is none."""
     try:
-        with path.open("rb") as file:
-            if read_by_index(file, os.fstat(file.fileno()).st_size, log):
+        with open_ranges(path) as file:
+            if read_by_index(file, path.stat().st_size, log):
                 return None
     except DamageError as damage:
         return str(damage)

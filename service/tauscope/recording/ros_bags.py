@@ -19,6 +19,7 @@ from tauscope.recording.inflation import HELD_BYTES, LARGEST_RATIO, decompress_f
 from tauscope.recording.joint_state_topic import Choice, JointStateLog
 from tauscope.recording.mcap_format import add_mcap
 from tauscope.recording.recording import Recording
+from tauscope.remote_files import copy_locally
 from tauscope.robot.messages import printable, reason
 
 ROS1_MAGIC = b"#ROSBAG V2.0"
@@ -138,8 +139,8 @@ def read_rosbag2(folder: Path, choice: Choice) -> Recording:
         if not path.is_file():
             raise RecordingError(f"{choice.file}: {METADATA} names {printable(file)}, which is not there")
         if path.suffix == ".zstd":
-            with TemporaryDirectory(prefix="tauscope-") as temporary:
-                _add_file(decompress_file(path, Path(temporary) / path.stem, name), name, log)
+            with copy_locally(path) as copy, TemporaryDirectory(prefix="tauscope-") as temporary:
+                _add_file(decompress_file(copy, Path(temporary) / path.stem, name), name, log)
         else:
             _add_file(path, name, log)
     return log.finish()
@@ -149,7 +150,8 @@ def _add_file(path: Path, name: str, log: JointStateLog) -> None:
     if path.suffix == ".mcap":
         add_mcap(path, name, log)
     elif path.suffix == ".db3":
-        _add_database(path, name, log)
+        with copy_locally(path) as copy:
+            _add_database(copy, name, log)
     else:
         raise RecordingError(f"{name}: neither .mcap nor .db3; convert the bag with `ros2 bag convert` first")
 

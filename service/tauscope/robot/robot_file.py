@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tauscope.errors import RobotFileError
+from tauscope.remote_files import find_path
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.document import DocumentOrigin, RecordingDocument, RobotDocument
 from tauscope.robot.document_fields import LONGEST_NAME
@@ -28,7 +29,7 @@ def read_robot(path: Path | str) -> Robot:
     Raises RobotFileError if the file or the one that it names cannot be read or is not valid; one line naming file,
     line, place and joint.
     """
-    source = Path(path)
+    source = find_path(path)
     data = read_bounded(source, LARGEST_XML)
     document, origin = parse_robot_file(data, str(path))
 
