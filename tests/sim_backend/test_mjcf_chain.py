@@ -232,7 +232,7 @@ def test_what_is_no_arm_is_refused_in_one_line(tmp_path: Path, old: str, new: st
 def test_a_scene_without_an_arm_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "scene.xml"
     path.write_text('<mujoco><worldbody><geom size="1 1 1" type="plane"/></worldbody></mujoco>', encoding="utf-8")
-    with pytest.raises(RobotFileError, match="no hinge or slide lies between .*; give the file of the whole arm$"):
+    with pytest.raises(RobotFileError, match=r"no hinge or slide lies between .*; give the file of the whole arm$"):
         read_robot(path)
 
 

@@ -8,7 +8,7 @@ ends. Records and checksums are the mcap library's; the walk over a chunk's mess
 import struct
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO, Protocol
@@ -18,7 +18,8 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, ChunkIndex, Schema, Statistics
-from mcap.stream_reader import get_chunk_data_stream
+from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.summary import Summary
 
 from tauscope.errors import RecordingError
 from tauscope.recording.inflation import HELD_BYTES, LARGEST_RATIO, count_plausible_records, require_plausible_inflation
@@ -92,16 +93,6 @@ _CHUNK_HEAD = struct.Struct("<QQQII")
 _INDEX_ENTRY = struct.Struct("<QQ")
 
 
-@dataclass
-class _Summary:
-    """Schemas, channels and chunks, as the end of a file lists them."""
-
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
-    chunks: list[ChunkIndex] = field(default_factory=list)
-    statistics: Statistics | None = None
-
-
 @dataclass(frozen=True)
 class _Part:
     """Wanted messages of one chunk: offsets within it, in the order of the file."""
@@ -134,7 +125,7 @@ def read_by_index(file: BinaryIO, size: int, sink: MessageSink) -> bool:
             return False
         handlers = {number: find_handler(sink, each, summary.schemas) for number, each in summary.channels.items()}
         wanted = {number for number, handler in handlers.items() if handler is not None}
-        parts = [_find_messages(file, size, chunk, wanted) for chunk in _sort_chunks(summary.chunks)]
+        parts = [_find_messages(file, size, chunk, wanted) for chunk in _sort_chunks(summary.chunk_indexes)]
     except UNREADABLE:
         return False
     counts = summary.statistics.channel_message_counts if summary.statistics else {}
@@ -151,33 +142,26 @@ def read_by_index(file: BinaryIO, size: int, sink: MessageSink) -> bool:
     return True
 
 
-def _read_summary(file: BinaryIO, size: int) -> _Summary | None:
+def _read_summary(file: BinaryIO, size: int) -> Summary | None:
     end = size - _MAGIC_BYTES - _FOOTER.size
     opcode, length, start, _, checksum = _FOOTER.unpack(_read(file, end, _FOOTER.size))
     if opcode != Opcode.FOOTER or length != _FOOTER.size - RECORD.size or not _MAGIC_BYTES <= start < end:
         return None
-    data = _read(file, start, end - start)
-    stated = data + _read(file, end, _FOOTER.size - 4)
-    if checksum not in (0, zlib.crc32(stated)):
+    data = _read(file, start, size - start)
+    if checksum not in (0, zlib.crc32(data[: -4 - _MAGIC_BYTES])):
         return None
-    summary, at = _Summary(), 0
-    while at < len(data):
-        opcode, length = RECORD.unpack_from(data, at)
-        at += RECORD.size
-        record = ReadDataStream(BytesIO(data[at : at + length]))
-        at += length
-        if opcode == Opcode.SCHEMA:
-            schema = Schema.read(record)
-            summary.schemas[schema.id] = schema
-        elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(record)
-            summary.channels[channel.id] = channel
-        elif opcode == Opcode.CHUNK_INDEX:
-            summary.chunks.append(ChunkIndex.read(record))
-        elif opcode == Opcode.STATISTICS:
-            summary.statistics = Statistics.read(record)
-    statistics = summary.statistics
-    is_whole = statistics is not None and summary.chunks and statistics.chunk_count == len(summary.chunks)
+    summary = Summary()
+    for record in StreamReader(BytesIO(data), skip_magic=True).records:
+        if isinstance(record, Schema):
+            summary.schemas[record.id] = record
+        elif isinstance(record, Channel):
+            summary.channels[record.id] = record
+        elif isinstance(record, ChunkIndex):
+            summary.chunk_indexes.append(record)
+        elif isinstance(record, Statistics):
+            summary.statistics = record
+    statistics, chunks = summary.statistics, summary.chunk_indexes
+    is_whole = statistics is not None and chunks and statistics.chunk_count == len(chunks)
     is_named = statistics is not None and set(statistics.channel_message_counts) <= set(summary.channels)
     return summary if is_whole and is_named else None
 
