@@ -216,7 +216,8 @@ class JointStateTopic:
         groups: dict[object, list[tuple[int, JointState]]] = {}
         for row, message in zip(rows.tolist(), messages, strict=True):
             state = self._decode_one(self._decoder, message, first + row)
-            groups.setdefault(_layout_of(state), []).append((row, state))
+            lengths = (len(array) for array in (state.position, state.velocity, state.effort))
+            groups.setdefault((state.names, *lengths), []).append((row, state))
         return [(np.array([row for row, _ in g]), _stack([state for _, state in g])) for g in groups.values()]
 
     def _decode_one(self, decode: Callable[[bytes], Decoded], message: bytes, number: int) -> Decoded:
@@ -315,11 +316,6 @@ class _Rows:
             remedy="stamp every message",
         )
         return replace(recording, notes=(*recording.notes, note))
-
-
-def _layout_of(state: JointState) -> tuple[tuple[str, ...], int, int, int]:
-    """Messages that agree in this can be stacked."""
-    return state.names, len(state.position), len(state.velocity), len(state.effort)
 
 
 def _stack(states: Sequence[JointState]) -> JointStates:

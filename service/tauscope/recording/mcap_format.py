@@ -7,7 +7,7 @@ ends. Records and checksums are the mcap library's; the walk over a chunk's mess
 
 import struct
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -125,7 +125,8 @@ def read_by_index(file: BinaryIO, size: int, sink: MessageSink) -> bool:
             return False
         handlers = {number: find_handler(sink, each, summary.schemas) for number, each in summary.channels.items()}
         wanted = {number for number, handler in handlers.items() if handler is not None}
-        parts = [_find_messages(file, size, chunk, wanted) for chunk in _sort_chunks(summary.chunk_indexes)]
+        chunks = sorted(summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset)
+        parts = [_find_messages(file, size, chunk, wanted) for chunk in chunks]
     except UNREADABLE:
         return False
     counts = summary.statistics.channel_message_counts if summary.statistics else {}
@@ -164,10 +165,6 @@ def _read_summary(file: BinaryIO, size: int) -> Summary | None:
     is_whole = statistics is not None and chunks and statistics.chunk_count == len(chunks)
     is_named = statistics is not None and set(statistics.channel_message_counts) <= set(summary.channels)
     return summary if is_whole and is_named else None
-
-
-def _sort_chunks(chunks: Sequence[ChunkIndex]) -> Sequence[ChunkIndex]:
-    return sorted(chunks, key=lambda chunk: chunk.chunk_start_offset)
 
 
 def _find_messages(file: BinaryIO, size: int, chunk: ChunkIndex, wanted: set[int]) -> _Part:

@@ -159,7 +159,8 @@ def _take_batches(
             stamps = arrow.compute.multiply(since.cast("float64"), 1e-9)
 
         def take(column: str, batch: Any = batch, stamps: Any = stamps) -> Array:
-            return _numbers(stamps if found[column] == time else take_column(arrow, batch, found[column]))
+            values = stamps if found[column] == time else take_column(arrow, batch, found[column])
+            return values.cast("float64", safe=False).to_numpy(zero_copy_only=False)
 
         yield take
 
@@ -223,7 +224,3 @@ def _require_numbers(schema: Any, wanted: Sequence[FileColumn], layout: ColumnLa
 
 def _is_stamp(kind: Any) -> bool:
     return str(kind).startswith("timestamp[")
-
-
-def _numbers(column: Any) -> Array:
-    return column.cast("float64", safe=False).to_numpy(zero_copy_only=False)

@@ -56,7 +56,8 @@ def read_recording(
         joint_count = len(names)
     try:
         with name_failures(path):
-            choice = Choice(name, joint_count, names, reading=reading, packed_bytes=_count_bytes(path))
+            packed_bytes = sum(file.stat().st_size for file in (path.iterdir() if is_folder(path) else [path]))
+            choice = Choice(name, joint_count, names, reading=reading, packed_bytes=packed_bytes)
             recording = _read(path, name, joint_count, choice)
     except OSError as error:
         raise RecordingError(f"{name}: {_reason(error)}") from error
@@ -99,10 +100,6 @@ def first_bytes(path: Path, name: str) -> bytes:
         raise RecordingError(f"{name}: not a regular file; save the data to a file first")
     with open_ranges(path) as file:
         return file.read(_MAGIC_BYTES)
-
-
-def _count_bytes(path: Path) -> int:
-    return sum(file.stat().st_size for file in path.iterdir()) if is_folder(path) else path.stat().st_size
 
 
 def _read(path: Path, name: str, joint_count: int | None, choice: Choice) -> Recording:

@@ -48,7 +48,8 @@ def read_ros1_bag(path: Path, choice: Choice) -> Recording:
         _require_plausible_chunks(path, name)
         with reader_type(path) as reader:
             handlers = {
-                each.id: log.handler(each.topic, _ros1_name(each.msgtype), "ros1") for each in reader.connections
+                each.id: log.handler(each.topic, each.msgtype.replace("/msg/", "/"), "ros1")
+                for each in reader.connections
             }
             wanted = [each for each in reader.connections if handlers[each.id] is not None]
             for connection, time, message in reader.messages(connections=wanted) if wanted else ():
@@ -72,10 +73,6 @@ def read_ros1_bag(path: Path, choice: Choice) -> Recording:
             f"{name}: not a readable ROS 1 bag ({reason(error)}); run `rosbag reindex` on it"
         ) from error
     return log.finish()
-
-
-def _ros1_name(type_name: str) -> str:
-    return type_name.replace("/msg/", "/")
 
 
 def _require_plausible_chunks(path: Path, name: str) -> None:

@@ -60,10 +60,11 @@ def guess_parts(
     groups |= {group: _choose(families, group, count) for group in _OPTIONAL if group != effort}
     columns: dict[str, Source] = {} if time is None else {"t": _with_nanoseconds(header, time)}
     columns |= {group: _source(family, count) for group, family in groups.items() if family is not None}
+    torque = groups.get("i") or groups.get("tau")
     units = {
         "t": None if time is None else time_unit(words_of(time)),
         "q": None if q is None else unit_of(q.template),
-        "tau": _unit(groups.get("i") or groups.get("tau")),
+        "tau": None if torque is None else unit_of(torque.template),
     }
     return RecordingLayout({column: unit for column, unit in units.items() if unit}, columns=columns)
 
@@ -152,7 +153,3 @@ def _source(family: Family, count: int | None) -> Source:
     """The family as a template, or as the columns of the first joints where it has more than the robot."""
     is_whole = family.is_regular and count in (None, len(family.columns))
     return family.template if is_whole else list(family.columns[:count])
-
-
-def _unit(current: Family | None) -> str | None:
-    return None if current is None else unit_of(current.template)
