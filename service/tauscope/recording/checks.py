@@ -206,7 +206,9 @@ def _find_clipped(recording: Recording, least: Array, greatest: Array) -> list[t
         effort = recording.samples(start, start + _ROWS_AT_ONCE).effort
         for side in range(2):
             # Every sample that a run of five covers counts once.
-            counts[side] += ndimage.binary_opening(effort == levels[side], np.ones((_CLIPPED_RUN, 1))).sum(axis=0)
+            counts[side] += ndimage.binary_opening(effort == levels[side], np.ones((_CLIPPED_RUN, 1), dtype=int)).sum(
+                axis=0
+            )
     # The lower extreme of an effort that never changes sign is rest, not a limit.
     is_limit = (np.abs(levels) > np.abs(levels).max(axis=0) / 2) & (least < greatest)
     enough = (counts >= max(_CLIPPED_SAMPLES, _CLIPPED_SHARE * len(recording))) & is_limit
@@ -282,7 +284,10 @@ def report_recording(recording: Recording, robot: Robot | None = None, *, trust_
     runs = measures.period_lengths
     findings = [*_about_units(recording, robot, trust_units=trust_units)]
     findings += [_locate(Severity.WARNING, note.text) for note in mend_recording(recording, robot).notes]
-    findings += [*_about_columns(recording), *_about_clock(gaps), *_about_missed(measures.missed)]
+    findings += [*_about_columns(recording), *_about_clock(gaps)]
+    for name, count in measures.missed.items():
+        text = "1 sample missed (NaN)" if count == 1 else f"{count} samples missed (NaN)"
+        findings += [Finding(Severity.INFO, name, text)] if name != "period" else []
     for joint, measure in enumerate(measures.joints, 1):
         findings += _about_position(f"q{joint}", measure)
         if recording.effort_kind is EffortKind.COMMAND:  # a target may rest
@@ -337,14 +342,6 @@ def _about_clock(gaps: Gaps) -> Iterator[Finding]:
         places = "1 gap" if gaps.count == 1 else f"{gaps.count} gaps"
         longest = f"the longest, {gaps.longest:.4g} s, begins at t = {gaps.longest_at:.6g} s"
         yield Finding(Severity.WARNING, "t", f"{places} in the clock; {longest}")
-
-
-def _about_missed(missed: dict[str, int]) -> Iterator[Finding]:
-    for name, count in missed.items():
-        if name != "period":
-            yield Finding(
-                Severity.INFO, name, "1 sample missed (NaN)" if count == 1 else f"{count} samples missed (NaN)"
-            )
 
 
 def _about_position(q: str, measure: JointMeasures) -> Iterator[Finding]:

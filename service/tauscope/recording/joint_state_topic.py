@@ -1,5 +1,6 @@
 """From the topics of a log to a recording: which topic is meant, which joints, which clock."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias, TypeVar
@@ -29,32 +30,21 @@ _REMEDY = "record with one publisher on the topic, or choose another topic with 
 
 
 class OtherPublishers:
-    """Counts a topic's messages of others."""
+    """Counts a topic's messages of others, by what they lack, and their names; "" where they lack joints."""
 
     def __init__(self) -> None:
-        self._foreign: dict[tuple[str, ...], int] = {}
-        self._partial: dict[tuple[str, ...], int] = {}
-        self._incomplete: dict[tuple[str, tuple[str, ...]], int] = {}
+        self._counts: Counter[tuple[str, tuple[str, ...]]] = Counter()
 
-    def add(self, names: Sequence[str], wanted: Sequence[str], count: int) -> None:
-        """Messages that lack some of the wanted joints, or all of them."""
-        kind = self._partial if set(names) & set(wanted) else self._foreign
-        kind[tuple(names)] = kind.get(tuple(names), 0) + count
-
-    def add_incomplete(self, names: Sequence[str], missing: str, count: int) -> None:
-        """Messages without positions, or without efforts."""
-        key = missing, tuple(names)
-        self._incomplete[key] = self._incomplete.get(key, 0) + count
+    def add(self, names: Sequence[str], missing: str, count: int) -> None:
+        """Messages without joints that are wanted (""), without positions, or without efforts."""
+        self._counts[missing, tuple(names)] += count
 
     def notes(self, topic: str, wanted: Sequence[str]) -> tuple[ResultWarning, ...]:
         """Warnings about messages that name wanted joints; a gripper's own messages are none of the arm's business."""
         texts = [
-            f"{_messages(count)} no {missing}; left out"
-            for (missing, names), count in self._incomplete.items()
-            if not names or set(names) & set(wanted)
-        ]
-        texts += [
-            f"{_messages(count)} only the joints {listed(names)}; left out" for names, count in self._partial.items()
+            f"{_messages(count)} {f'no {missing}' if missing else f'only the joints {listed(names)}'}; left out"
+            for (missing, names), count in sorted(self._counts.items(), key=lambda entry: not entry[0][0])
+            if (missing and not names) or set(names) & set(wanted)
         ]
         return tuple(
             ResultWarning(code="other-publisher", text=f"topic {topic}: {text}", remedy=_REMEDY) for text in texts
@@ -62,17 +52,17 @@ class OtherPublishers:
 
     def error(self, place: str, wanted: Sequence[str] | None) -> RecordingError:
         """The reason why no message was of use."""
-        if self._incomplete:
-            missing, _ = next(iter(self._incomplete))
-            return RecordingError(f"{place}: carries no {missing}; record position and effort of every joint")
-        names = wanted or ()
-        found = tuple(dict.fromkeys(name for part in self._partial for name in part))
-        found = found or max(self._foreign, key=lambda foreign: self._foreign[foreign], default=())
-        missing = [name for name in names if name not in found]
-        verb = "is" if len(missing) == 1 else "are"
-        lacks = f": {listed(missing)} {verb} missing; record them too, or" if self._partial else ";"
+        for missing, _ in self._counts:
+            if missing:
+                return RecordingError(f"{place}: carries no {missing}; record position and effort of every joint")
+        known = wanted or ()
+        partial = dict.fromkeys(name for _, names in self._counts if set(names) & set(known) for name in names)
+        found = tuple(partial) or max(self._counts, key=lambda entry: self._counts[entry], default=("", ()))[1]
+        missed = [name for name in known if name not in found]
+        verb = "is" if len(missed) == 1 else "are"
+        lacks = f": {listed(missed)} {verb} missing; record them too, or" if partial else ";"
         return RecordingMismatchError(
-            f"{place} carries {len(found)} joints ({listed(found)}), the robot has {len(names)} ({listed(names)})"
+            f"{place} carries {len(found)} joints ({listed(found)}), the robot has {len(known)} ({listed(known)})"
             f"{lacks} name the joints in the robot file as the recording does"
         )
 
@@ -236,10 +226,10 @@ class JointStateTopic:
         if wanted is not None:
             is_own = set(wanted) <= set(names) if names else count == len(wanted)
             if not is_own:
-                self._others.add(names or (f"{count} joints without names",), wanted, len(states.stamp))
+                self._others.add(names or (f"{count} joints without names",), "", len(states.stamp))
                 return False
         if not (count and states.effort.shape[1]):
-            self._others.add_incomplete(names, "effort" if count else "positions", len(states.stamp))
+            self._others.add(names, "effort" if count else "positions", len(states.stamp))
             return False
         _require_equal(states, f"{self._choice.file}: topic {self.topic}, message {number}")
         self._wanted = wanted or names or None
