@@ -34,13 +34,20 @@ def _find_input(name: str) -> Path:
     return path
 
 
+def _find_file(name: str) -> Path:
+    path = _find_input(name)
+    if isinstance(path, Path) and path.is_dir():
+        raise typer.BadParameter(f"File {name!r} is a directory.")
+    return path
+
+
 def name_recordings(words: str) -> Any:
     """An argument that names recordings, or their URLs."""
     return name_input(words, "RECORDING", typer.Argument, parser=_find_input)
 
 
 RobotFile = Annotated[
-    Path, name_input("Robot file (YAML), or a URDF or MJCF by itself.", "ROBOT", typer.Argument, parser=_find_input)
+    Path, name_input("Robot file (YAML), or a URDF or MJCF by itself.", "ROBOT", typer.Argument, parser=_find_file)
 ]
 RecordingFile = Annotated[
     Path,
