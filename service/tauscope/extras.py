@@ -25,6 +25,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "fleet": ("distributed",),
     "parquet": ("pyarrow",),
     "ros1": ("rosbags",),
+    "cloud": ("aiohttp", "gcsfs", "s3fs", "upath"),
     "pandas": ("pandas",),
     "headroom": ("sklearn",),
 }

@@ -99,7 +99,9 @@ class _Reader:
         moving = [joint for joint in free if (joint.master or (joint.index,))[0] in indices]
         if not moving:
             names = f"base {shown(self._body_names[first])} and tip {shown(self._body_names[last])}"
-            raise self._error(f"no hinge or slide lies between {names}; name the last body as tip")
+            has_none = not any(joint.kind in (HINGE, SLIDE) for joint in self._joints)
+            remedy = "give the file of the whole arm" if has_none else "name the last body as tip"
+            raise self._error(f"no hinge or slide lies between {names}; {remedy}")
         own = list(dict.fromkeys((joint.master or (joint.index,))[0] for joint in moving))
         independent = [self._joints[index] for index in own]
         segments, members = self._segments(bodies, moving, own)

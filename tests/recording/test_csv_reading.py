@@ -163,6 +163,7 @@ BAD = {
     "time infinite": (field_changed(17, "t", "inf"), "line 17, column t: 'inf' is not a number"),
     "time repeats": ("t,q1,tau1\n" + "".join(f"{k // 2},0,0\n" for k in range(40)), "20 of 40 rows repeat the time"),
     "time decreases": (field_changed(17, "t", "0.01"), "line 17, column t: time runs backwards: 0.01 s after 0.056 s"),
+    "foreign date": (field_changed(2, "t", "31.01.2024 10:00:00"), "is not a number; write a date as 2026-01-31T12:34"),
     "date": (field_changed(2, "t", "2024-15-01 10:00"), "line 2, column t: '2024-15-01 10:00' is no date of ISO 8601"),
     "few fields": (changed(17, "0.06,1,2"), "line 17 has 3 fields where the header has 5 columns"),
     "many fields": (changed(17, "0.06,1,2,3,4,5"), "line 17 has 6 fields where the header has 5 columns"),
@@ -220,8 +221,9 @@ def test_a_repeated_and_a_late_row_are_put_right(tmp_path):
     assert "column t: 1 row has the time of the row before, first at t = 0.06 s; left out" in repeated
 
 
-def test_dates_become_seconds_from_the_first_row(tmp_path):
-    rows = (f"2026-11-28T23:59:{59 + k // 10 if k < 10 else k // 10 - 1:02d}.{k % 10}00Z,{k},0" for k in range(10))
+@pytest.mark.parametrize("date", ["2026-11-28T", "2026-11-28 ", ""])
+def test_dates_become_seconds_from_the_first_row(tmp_path, date):
+    rows = (f"{date}23:59:{59 + k // 10 if k < 10 else k // 10 - 1:02d}.{k % 10}00Z,{k},0" for k in range(10))
     recording = read(tmp_path, "\n".join(["t,q1,tau1", *rows]))
     np.testing.assert_allclose(recording.samples().time, np.arange(10) / 10, atol=1e-9)
 

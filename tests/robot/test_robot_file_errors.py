@@ -192,7 +192,7 @@ def test_first_of_several_errors_is_said_to_be_so(tmp_path: Path) -> None:
         (b"- a\n- b\n", ":1: must be a mapping with name and kinematics, but is a list of 2"),
         (
             b"<sdf version='1.7'/>",
-            ":1: its root element is <sdf>; give a URDF (<robot>), an MJCF (<mujoco>) or a robot file",
+            ":1: its root element is <sdf>; give the URDF or xacro that it was made from, or an MJCF: pip install",
         ),
         (b'a: "\\UFFFFFFFF"', "not valid YAML"),
         (b"[" * 5000, ":1: nested deeper than 24 levels"),
@@ -282,3 +282,27 @@ def test_impossible_inertial_of_a_urdf_is_repaired(tmp_path: Path) -> None:
     assert "arm.urdf:5: inertial of link 'upper': inertia breaks the triangle inequality: 0.02 + 0.03" in warning.text
     assert "the nearest body is used: principal moments [0.02, 0.03, 0.4] → [0.195, 0.205, 0.4] kg m²" in warning.text
     assert warning.remedy == "correct the <inertial>"
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_an_installed_xacro_expands_what_needs_it(named: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = tmp_path / "bin" / "xacro"
+    program.parent.mkdir()
+    program.write_text('#!/bin/sh\nsed -e "s/\\${2 \\* 1.0}/2.0/" "$1" | grep -v fails || { echo no >&2; exit 2; }\n')
+    program.chmod(0o755)
+    text = URDF.replace('value="2.0"', 'value="${2 * 1.0}"', 1)
+    assert text != URDF
+    for path, content in ((tmp_path / "arm.urdf", text), (tmp_path / "robot.yaml", URDF_ROBOT_YAML)):
+        path.write_text(content, encoding="utf-8")
+    path = tmp_path / ("robot.yaml" if named else "arm.urdf")
+    monkeypatch.setenv("PATH", "/nowhere")
+    with pytest.raises(RobotFileError, match="is an expression of xacro; expand the file first"):
+        read_robot(path)
+    monkeypatch.setenv("PATH", f"{program.parent}:/usr/bin:/bin")
+    robot = read_robot(path)
+    (tmp_path / "arm.urdf").write_text(URDF, encoding="utf-8")
+    links = robot.model.links, read_robot(path).model.links
+    assert [link.mass for link in links[0] or ()] == [link.mass for link in links[1] or ()]
+    (tmp_path / "arm.urdf").write_text(text.replace("\n", "<!-- fails -->\n"), encoding="utf-8")
+    with pytest.raises(RobotFileError, match=r"arm\.urdf: xacro cannot expand the file \(no\)$"):
+        read_robot(path)

@@ -292,6 +292,10 @@ def test_text_of_any_encoding_is_read(encoding: str, declared: str) -> None:
     assert ["Latin-1" in finding.text for finding in chain.findings] == [True] * (not declared)
 
 
+def test_a_closing_nul_ends_the_text() -> None:
+    assert _chain(URDF + "\0").joint_names == _chain(URDF).joint_names
+
+
 def test_definitions_left_over_from_xacro_are_ignored_and_named() -> None:
     left = '<xacro:macro name="m"><link name="no"/></xacro:macro></robot>'
     chain = _chain(replaced(URDF, "</robot>", left))

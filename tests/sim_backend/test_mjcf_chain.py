@@ -229,6 +229,13 @@ def test_what_is_no_arm_is_refused_in_one_line(tmp_path: Path, old: str, new: st
     assert "\n" not in str(caught.value)
 
 
+def test_a_scene_without_an_arm_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "scene.xml"
+    path.write_text('<mujoco><worldbody><geom size="1 1 1" type="plane"/></worldbody></mujoco>', encoding="utf-8")
+    with pytest.raises(RobotFileError, match=r"no hinge or slide lies between .*; give the file of the whole arm$"):
+        read_robot(path)
+
+
 def test_mesh_that_gives_a_mass_must_be_there(tmp_path: Path) -> None:
     text = ARM.replace('<inertial pos="0 0 .01" mass=".1" diaginertia="1e-4 1e-4 1e-4"/>', "")
     with pytest.raises(RobotFileError, match=r"missing\.stl.*; put that file there, or state <inertial> of every body"):

@@ -10,6 +10,7 @@ import typer
 from tauscope.cli.verbs import OptionsOf
 from tauscope.errors import RobotFileError
 from tauscope.recording.units import parse_units
+from tauscope.remote_files import find_path
 from tauscope.robot.recording_layout import RecordingLayout
 from tauscope.robot.robot_file import read_layout
 from tauscope.tasks.task import ReadingOptions
@@ -26,19 +27,35 @@ def name_input(words: str, metavar: str | None = None, kind: Any = typer.Option,
     return kind(*names, metavar=metavar, help=words, **stated)
 
 
+def _find_input(name: str) -> Path:
+    path = find_path(name)
+    if isinstance(path, Path) and not path.exists():
+        raise typer.BadParameter(f"Path {name!r} does not exist.")
+    return path
+
+
+def _find_file(name: str) -> Path:
+    path = _find_input(name)
+    if isinstance(path, Path) and path.is_dir():
+        raise typer.BadParameter(f"File {name!r} is a directory.")
+    return path
+
+
 def name_recordings(words: str) -> Any:
-    """An argument that names recordings."""
-    return name_input(words, "RECORDING", typer.Argument, dir_okay=True)
+    """An argument that names recordings, or their URLs."""
+    return name_input(words, "RECORDING", typer.Argument, parser=_find_input)
 
 
-RobotFile = Annotated[Path, name_input("Robot file (YAML), or a URDF or MJCF by itself.", "ROBOT", typer.Argument)]
+RobotFile = Annotated[
+    Path, name_input("Robot file (YAML), or a URDF or MJCF by itself.", "ROBOT", typer.Argument, parser=_find_file)
+]
 RecordingFile = Annotated[
     Path,
     name_input(
         "Recording: CSV, Parquet, NumPy archive, MCAP, rosbag2 folder, or ROS 1 bag.",
         "FILE",
         typer.Argument,
-        dir_okay=True,
+        parser=_find_input,
     ),
 ]
 HeldOut = Annotated[
@@ -49,7 +66,7 @@ HeldOut = Annotated[
         "RECORDING...",
         typer.Option,
         "--held-out",
-        dir_okay=True,
+        parser=_find_input,
     ),
 ]
 Cutoff = Annotated[

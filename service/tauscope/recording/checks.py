@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from tauscope.errors import RecordingError
 from tauscope.recording.examination import find_implausible, find_missing_effort, mend_recording
@@ -114,7 +115,10 @@ def measure_rows(recording: Recording) -> RowMeasures:
     for start in range(0, len(recording), _ROWS_AT_ONCE):
         # One sample more than the block, so that the steps between blocks are seen too.
         samples = recording.samples(max(start - 1, 0), start + _ROWS_AT_ONCE)
-        _measure_ranges(running, recording.table.rows(start, min(start + _ROWS_AT_ONCE, len(recording))))
+        block = recording.table.rows(start, min(start + _ROWS_AT_ONCE, len(recording)))
+        running.missed += np.isnan(block).sum(axis=0)
+        running.least = np.fmin(running.least, np.fmin.reduce(block, axis=0))
+        running.greatest = np.fmax(running.greatest, np.fmax.reduce(block, axis=0))
         _measure_steps(running, samples, stride)
         if samples.period is not None:
             _measure_periods(running, samples.period if start == 0 else samples.period[1:])
@@ -149,12 +153,6 @@ def measure_gaps(recording: Recording, measures: RowMeasures) -> Gaps:
         if len(steps) and steps.max() > max(limit, longest):
             longest, longest_at = float(steps.max()), float(time[np.argmax(steps)])
     return Gaps(count, longest, longest_at)
-
-
-def _measure_ranges(running: _Running, block: Array) -> None:
-    running.missed += np.isnan(block).sum(axis=0)
-    running.least = np.fmin(running.least, np.fmin.reduce(block, axis=0))
-    running.greatest = np.fmax(running.greatest, np.fmax.reduce(block, axis=0))
 
 
 def _measure_steps(running: _Running, samples: Samples, stride: int) -> None:
@@ -206,18 +204,11 @@ def _find_clipped(recording: Recording, least: Array, greatest: Array) -> list[t
     counts = np.zeros(levels.shape, dtype=np.int64)
     for start in range(0, len(recording), _ROWS_AT_ONCE):
         effort = recording.samples(start, start + _ROWS_AT_ONCE).effort
-        if len(effort) < _CLIPPED_RUN:
-            continue
         for side in range(2):
-            at_level = effort == levels[side]
-            runs = np.logical_and.reduce(
-                [at_level[k : len(effort) - _CLIPPED_RUN + 1 + k] for k in range(_CLIPPED_RUN)]
-            )
             # Every sample that a run of five covers counts once.
-            covered = np.zeros_like(at_level)
-            for k in range(_CLIPPED_RUN):
-                covered[k : k + len(runs)] |= runs
-            counts[side] += covered.sum(axis=0)
+            counts[side] += ndimage.binary_opening(effort == levels[side], np.ones((_CLIPPED_RUN, 1), dtype=int)).sum(
+                axis=0
+            )
     # The lower extreme of an effort that never changes sign is rest, not a limit.
     is_limit = (np.abs(levels) > np.abs(levels).max(axis=0) / 2) & (least < greatest)
     enough = (counts >= max(_CLIPPED_SAMPLES, _CLIPPED_SHARE * len(recording))) & is_limit
@@ -291,8 +282,12 @@ def report_recording(recording: Recording, robot: Robot | None = None, *, trust_
     measures = measure_rows(recording)
     gaps = measure_gaps(recording, measures)
     runs = measures.period_lengths
-    findings = [*_about_units(recording, robot, trust_units=trust_units), *_about_samples(recording, robot)]
-    findings += [*_about_columns(recording), *_about_clock(gaps), *_about_missed(measures.missed)]
+    findings = [*_about_units(recording, robot, trust_units=trust_units)]
+    findings += [_locate(Severity.WARNING, note.text) for note in mend_recording(recording, robot).notes]
+    findings += [*_about_columns(recording), *_about_clock(gaps)]
+    for name, count in measures.missed.items():
+        text = "1 sample missed (NaN)" if count == 1 else f"{count} samples missed (NaN)"
+        findings += [Finding(Severity.INFO, name, text)] if name != "period" else []
     for joint, measure in enumerate(measures.joints, 1):
         findings += _about_position(f"q{joint}", measure)
         if recording.effort_kind is EffortKind.COMMAND:  # a target may rest
@@ -325,12 +320,6 @@ def _about_units(recording: Recording, robot: Robot | None, *, trust_units: bool
         yield _locate(trusted[0], doubt + trusted[1])
 
 
-def _about_samples(recording: Recording, robot: Robot | None) -> Iterator[Finding]:
-    """Samples that are none, masked or repaired before anything is estimated."""
-    for note in mend_recording(recording, robot).notes:
-        yield _locate(Severity.WARNING, note.text)
-
-
 def _locate(severity: Severity, text: str) -> Finding:
     """A finding from a text that begins with its column."""
     where, found, rest = text.partition(": ")
@@ -353,14 +342,6 @@ def _about_clock(gaps: Gaps) -> Iterator[Finding]:
         places = "1 gap" if gaps.count == 1 else f"{gaps.count} gaps"
         longest = f"the longest, {gaps.longest:.4g} s, begins at t = {gaps.longest_at:.6g} s"
         yield Finding(Severity.WARNING, "t", f"{places} in the clock; {longest}")
-
-
-def _about_missed(missed: dict[str, int]) -> Iterator[Finding]:
-    for name, count in missed.items():
-        if name != "period":
-            yield Finding(
-                Severity.INFO, name, "1 sample missed (NaN)" if count == 1 else f"{count} samples missed (NaN)"
-            )
 
 
 def _about_position(q: str, measure: JointMeasures) -> Iterator[Finding]:

@@ -125,6 +125,10 @@ def _read_columns(path: Path, name: str) -> dict[str, Array]:
             raise RecordingError(f"{name}: is a zip archive or a spreadsheet; {hint}") from error
         raise RecordingError(f"{name}: not a readable NumPy archive ({reason(error)})") from error
     tables = {key: array for key, array in arrays.items() if array.dtype.kind in "fiu" and array.ndim in (1, 2)}
+    samples = {len(array) for array in tables.values() if array.ndim == 1}
+    for key, array in tables.items():  # arrays may have a column a sample
+        if array.ndim == 2 and array.shape[1] in samples and len(array) not in samples:
+            tables[key] = array.T
     tables = {key: array for key, array in tables.items() if array[:1].size <= _MOST_COLUMNS}
     lengths = [len(array) for array in tables.values()]
     if not lengths:

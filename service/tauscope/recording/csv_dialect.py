@@ -22,7 +22,7 @@ _NUMBER_BYTES = b"0123456789+-.eE \tnaN"
 _NOT_SEPARATORS = bytes(set(range(256)) - set(b",\n"))
 _NUMBER = re.compile(rb"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _MISSED = re.compile(rb"[+-]?nan", re.IGNORECASE)
-_DATE = re.compile(rb"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ]")
+_DATE = re.compile(rb"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ]|[0-9]{2}:[0-9]{2}:")
 _SHOWN_CHARACTERS = 40
 
 
@@ -95,7 +95,7 @@ def parse_number(field: bytes, file: str, line: int, column: str) -> float:
 
 
 class Clock:
-    """Reads a file's column t: numbers, or ISO 8601 dates, of which seconds since the first are kept."""
+    """Reads a file's column t: numbers, or dates or times of day of ISO 8601, as seconds since the first."""
 
     def __init__(self) -> None:
         self._first: datetime | None = None
@@ -112,7 +112,8 @@ class Clock:
         if not _DATE.match(text):
             return parse_number(field, file, line, "t")
         try:
-            stamp = datetime.fromisoformat(text.decode("ascii"))
+            day = "" if b"-" in text[:5] else "2000-01-01T"
+            stamp = datetime.fromisoformat(day + text.decode("ascii"))
             self._first = self._first or stamp
             return (stamp - self._first).total_seconds()
         except (ValueError, TypeError) as error:
@@ -138,6 +139,8 @@ def _hint(text: bytes) -> str:
         return "; leave the field empty where a sample was missed"
     if lower in (b"na", b"n/a", b"null", b"none", b"-"):
         return "; leave the field empty or write nan where a sample was missed"
+    if text.count(b":") == 2:
+        return "; write a date as 2026-01-31T12:34:56.789"
     if re.fullmatch(rb"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?", text):
         return "; write decimals with a point"
     return ""
@@ -148,7 +151,7 @@ _KNOWN: Mapping[str, Mapping[str, str]] = {
     "q": {"rad": "rad", "deg": "deg", "°": "deg", "degrees": "deg", "m": "m", "mm": "mm"},
     "qd": {"rad/s": "rad", "deg/s": "deg", "°/s": "deg", "rpm": "rpm", "1/min": "rpm", "m/s": "m", "mm/s": "mm"},
     "qdd": {"rad/s^2": "rad", "rad/s2": "rad", "rad/s²": "rad", "m/s^2": "m", "m/s2": "m", "m/s²": "m"},
-    "tau": {"Nm": "Nm", "N*m": "Nm", "N·m": "Nm", "N m": "Nm", "N": "N", "A": "A", "mA": "mA"},
+    "tau": {"Nm": "Nm", "N*m": "Nm", "N·m": "Nm", "N m": "Nm", "N": "N", "mNm": "mNm", "A": "A", "mA": "mA"},
 }
 _LIKE: Mapping[str, str] = {"i": "tau", "qref": "q", "qlink": "q", "taucmd": "tau"}
 _FREE = ("temp", "period")  # groups whose units are not looked at

@@ -180,6 +180,11 @@ def _parse_names(
         fields = dialect.name_fields(sample[index], row)
         start += sum(len(each) + 1 for each in raw[:index])
         number += index
+        cells = rows.split(row)
+        if len(cells) == len(fields) + 1 and not cells[-1]:  # a delimiter ends the rows, and not the header
+            fields.append(b"")
+        elif len(fields) == len(cells) + 1 and not fields[-1]:
+            fields.pop()
     file.seek(start)
     return _Names(number, rows, [_decode(field) for field in fields])
 
@@ -222,14 +227,9 @@ def _chunks(file: BinaryIO, line: int, name: str) -> Iterator[_Chunk]:
         text = rest + data[:end]
         rest = data[end:]
         yield _Chunk(text, line, unterminated=False)
-        line += _count_lines(text)
+        line += int(np.count_nonzero(np.frombuffer(text, np.uint8) == ord("\n")))  # a fifth of the time of bytes.count
     if rest:
         yield _Chunk(rest + b"\n", line, unterminated=True)
-
-
-def _count_lines(text: bytes) -> int:
-    """Newlines, in a fifth of the time of `bytes.count`."""
-    return int(np.count_nonzero(np.frombuffer(text, dtype=np.uint8) == ord("\n")))
 
 
 def _parse_chunk(chunk: _Chunk, header: _Header, name: str, *, is_first: bool) -> tuple[Array, Sequence[int]]:

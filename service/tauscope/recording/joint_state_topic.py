@@ -1,5 +1,6 @@
 """From the topics of a log to a recording: which topic is meant, which joints, which clock."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias, TypeVar
@@ -16,6 +17,7 @@ from tauscope.recording.inflation import (
     require_plausible_inflation,
 )
 from tauscope.recording.intake import RowIntake
+from tauscope.recording.joint_parts import JointParts, merge_parts
 from tauscope.recording.joint_state import JointState, JointStateLayout, JointStates, decode_cdr
 from tauscope.recording.joint_state_decoders import Decoder, find_decoder
 from tauscope.recording.recording import EffortKind, Recording
@@ -28,32 +30,21 @@ _REMEDY = "record with one publisher on the topic, or choose another topic with 
 
 
 class OtherPublishers:
-    """Counts a topic's messages of others."""
+    """Counts a topic's messages of others, by what they lack, and their names; "" where they lack joints."""
 
     def __init__(self) -> None:
-        self._foreign: dict[tuple[str, ...], int] = {}
-        self._partial: dict[tuple[str, ...], int] = {}
-        self._incomplete: dict[tuple[str, tuple[str, ...]], int] = {}
+        self._counts: Counter[tuple[str, tuple[str, ...]]] = Counter()
 
-    def add(self, names: Sequence[str], wanted: Sequence[str], count: int) -> None:
-        """Messages that lack some of the wanted joints, or all of them."""
-        kind = self._partial if set(names) & set(wanted) else self._foreign
-        kind[tuple(names)] = kind.get(tuple(names), 0) + count
-
-    def add_incomplete(self, names: Sequence[str], missing: str, count: int) -> None:
-        """Messages without positions, or without efforts."""
-        key = missing, tuple(names)
-        self._incomplete[key] = self._incomplete.get(key, 0) + count
+    def add(self, names: Sequence[str], missing: str, count: int) -> None:
+        """Messages without joints that are wanted (""), without positions, or without efforts."""
+        self._counts[missing, tuple(names)] += count
 
     def notes(self, topic: str, wanted: Sequence[str]) -> tuple[ResultWarning, ...]:
         """Warnings about messages that name wanted joints; a gripper's own messages are none of the arm's business."""
         texts = [
-            f"{_messages(count)} no {missing}; left out"
-            for (missing, names), count in self._incomplete.items()
-            if not names or set(names) & set(wanted)
-        ]
-        texts += [
-            f"{_messages(count)} only the joints {listed(names)}; left out" for names, count in self._partial.items()
+            f"{_messages(count)} {f'no {missing}' if missing else f'only the joints {listed(names)}'}; left out"
+            for (missing, names), count in sorted(self._counts.items(), key=lambda entry: not entry[0][0])
+            if (missing and not names) or set(names) & set(wanted)
         ]
         return tuple(
             ResultWarning(code="other-publisher", text=f"topic {topic}: {text}", remedy=_REMEDY) for text in texts
@@ -61,16 +52,18 @@ class OtherPublishers:
 
     def error(self, place: str, wanted: Sequence[str] | None) -> RecordingError:
         """The reason why no message was of use."""
-        if self._incomplete:
-            missing, _ = next(iter(self._incomplete))
-            return RecordingError(f"{place}: carries no {missing}; record position and effort of every joint")
-        found = max((*self._partial.items(), *self._foreign.items()), key=lambda entry: entry[1], default=((), 0))[0]
-        names = wanted or ()
-        missing = [name for name in names if name not in found]
-        lacks = f": {listed(missing)} is missing" if self._partial else ""
+        for missing, _ in self._counts:
+            if missing:
+                return RecordingError(f"{place}: carries no {missing}; record position and effort of every joint")
+        known = wanted or ()
+        partial = dict.fromkeys(name for _, names in self._counts if set(names) & set(known) for name in names)
+        found = tuple(partial) or max(self._counts, key=lambda entry: self._counts[entry], default=("", ()))[1]
+        missed = [name for name in known if name not in found]
+        verb = "is" if len(missed) == 1 else "are"
+        lacks = f": {listed(missed)} {verb} missing; record them too, or" if partial else ";"
         return RecordingMismatchError(
-            f"{place} carries {len(found)} joints ({listed(found)}), the robot has {len(names)} ({listed(names)})"
-            f"{lacks}; name the joints in the robot file as the recording does"
+            f"{place} carries {len(found)} joints ({listed(found)}), the robot has {len(known)} ({listed(known)})"
+            f"{lacks} name the joints in the robot file as the recording does"
         )
 
 
@@ -120,6 +113,8 @@ class JointStateTopic:
         self._rows: _Rows | None = None
         self._others = OtherPublishers()
         self._wanted = choice.joint_names
+        self.parts: JointParts | None = JointParts(topic)
+        """Messages that lack joints, or their positions or efforts; None once a message has all."""
 
     def add(self, log_time: int, message: bytes) -> None:
         """Take the next message. `log_time`: when it was logged [ns]."""
@@ -151,7 +146,12 @@ class JointStateTopic:
                 name = f"{self._choice.file}: topic {self.topic}"
                 require_plausible_inflation(self._choice.packed_bytes, self._unpacked_bytes, name, HELD_BYTES)
             batches = sorted(self._decode(messages, first), key=lambda batch: batch[0][0])
-            own = [(rows, self._arrange(states)) for rows, states in batches if self._is_own(states, first + rows[0])]
+            own: list[Batch] = []
+            for at, states in batches:
+                if self._is_own(states, first + at[0]):
+                    own.append((at, self._arrange(states)))
+                elif self.parts is not None:
+                    self.parts.add(states, log_time[at], self._wanted or ())
             if own:
                 rows, states = _merge(own)
                 self._take(states, log_time[rows], first + rows)
@@ -206,7 +206,8 @@ class JointStateTopic:
         groups: dict[object, list[tuple[int, JointState]]] = {}
         for row, message in zip(rows.tolist(), messages, strict=True):
             state = self._decode_one(self._decoder, message, first + row)
-            groups.setdefault(_layout_of(state), []).append((row, state))
+            lengths = (len(array) for array in (state.position, state.velocity, state.effort))
+            groups.setdefault((state.names, *lengths), []).append((row, state))
         return [(np.array([row for row, _ in g]), _stack([state for _, state in g])) for g in groups.values()]
 
     def _decode_one(self, decode: Callable[[bytes], Decoded], message: bytes, number: int) -> Decoded:
@@ -225,10 +226,10 @@ class JointStateTopic:
         if wanted is not None:
             is_own = set(wanted) <= set(names) if names else count == len(wanted)
             if not is_own:
-                self._others.add(names or (f"{count} joints without names",), wanted, len(states.stamp))
+                self._others.add(names or (f"{count} joints without names",), "", len(states.stamp))
                 return False
         if not (count and states.effort.shape[1]):
-            self._others.add_incomplete(names, "effort" if count else "positions", len(states.stamp))
+            self._others.add(names, "effort" if count else "positions", len(states.stamp))
             return False
         _require_equal(states, f"{self._choice.file}: topic {self.topic}, message {number}")
         self._wanted = wanted or names or None
@@ -245,6 +246,7 @@ class JointStateTopic:
 
     def _take(self, states: JointStates, log_time: NDArray[np.int64], number: Rows) -> None:
         if self._rows is None:
+            self.parts = None
             count, has_velocity = states.position.shape[1], states.velocity.shape[1] > 0
             self._rows = _Rows(self._choice, self.topic, count, has_velocity=has_velocity)
         self._rows.append(states, log_time, number)
@@ -304,11 +306,6 @@ class _Rows:
             remedy="stamp every message",
         )
         return replace(recording, notes=(*recording.notes, note))
-
-
-def _layout_of(state: JointState) -> tuple[tuple[str, ...], int, int, int]:
-    """Messages that agree in this can be stacked."""
-    return state.names, len(state.position), len(state.velocity), len(state.effort)
 
 
 def _stack(states: Sequence[JointState]) -> JointStates:
@@ -386,6 +383,11 @@ class JointStateLog:
         if wanted is not None and wanted not in self._topics:
             known = listed(sorted(self._topics)) or "none"
             raise RecordingError(f"{self._choice.file}: no topic {wanted} carries joint states; those that do: {known}")
+        parts = [topic.parts for topic in self._topics.values() if topic.fault is None and topic.parts is not None]
+        if self._choice.joint_names and not self.samples:
+            merged = merge_parts(parts, self._choice.joint_names, self._choice.file, self._choice.reading)
+            if merged is not None:
+                return merged
         return choose_topic(self._topics, self._others, self._choice.file).finish()
 
 
@@ -402,9 +404,10 @@ def choose_topic(topics: Mapping[str, JointStateTopic], other_topics: Sequence[s
         topic.flush()
     usable = {name: topic for name, topic in filled.items() if topic.has_effort}
     best = usable or {name: topic for name, topic in filled.items() if topic.samples} or filled
-    for name in _PREFERRED_TOPICS:
-        if name in best:
-            return best[name]
+    named = [name for name in _PREFERRED_TOPICS if name in best][:1]
+    named = named or [name for name in best if name.endswith("/joint_states")]  # beside commands
+    if len(named) == 1:
+        return best[named[0]]
     plain = {name: topic for name, topic in best.items() if topic.is_plain}  # beside ros2_control's dynamic states
     best = plain if len(plain) == 1 else best
     if len(best) > 1:

@@ -5,11 +5,10 @@ record from the front, so that a file without an index (the writer was killed) d
 ends. Records and checksums are the mcap library's; the walk over a chunk's messages is our own, which is much quicker.
 """
 
-import os
 import struct
 import zlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO, Protocol
@@ -19,13 +18,15 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, ChunkIndex, Schema, Statistics
-from mcap.stream_reader import get_chunk_data_stream
+from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.summary import Summary
 
 from tauscope.errors import RecordingError
 from tauscope.recording.inflation import HELD_BYTES, LARGEST_RATIO, count_plausible_records, require_plausible_inflation
 from tauscope.recording.joint_state_topic import Choice, JointStateLog, MessageHandler
 from tauscope.recording.recording import Recording
 from tauscope.recording.samples import MINIMUM_ROWS
+from tauscope.remote_files import open_ranges, read_range
 from tauscope.robot.messages import reason
 
 RECORD = struct.Struct("<BQ")  # opcode and length of a record
@@ -92,16 +93,6 @@ _CHUNK_HEAD = struct.Struct("<QQQII")
 _INDEX_ENTRY = struct.Struct("<QQ")
 
 
-@dataclass
-class _Summary:
-    """Schemas, channels and chunks, as the end of a file lists them."""
-
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
-    chunks: list[ChunkIndex] = field(default_factory=list)
-    statistics: Statistics | None = None
-
-
 @dataclass(frozen=True)
 class _Part:
     """Wanted messages of one chunk: offsets within it, in the order of the file."""
@@ -134,7 +125,8 @@ def read_by_index(file: BinaryIO, size: int, sink: MessageSink) -> bool:
             return False
         handlers = {number: find_handler(sink, each, summary.schemas) for number, each in summary.channels.items()}
         wanted = {number for number, handler in handlers.items() if handler is not None}
-        parts = [_find_messages(file, size, chunk, wanted) for chunk in _sort_chunks(summary.chunks)]
+        chunks = sorted(summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset)
+        parts = [_find_messages(file, size, chunk, wanted) for chunk in chunks]
     except UNREADABLE:
         return False
     counts = summary.statistics.channel_message_counts if summary.statistics else {}
@@ -151,39 +143,28 @@ def read_by_index(file: BinaryIO, size: int, sink: MessageSink) -> bool:
     return True
 
 
-def _read_summary(file: BinaryIO, size: int) -> _Summary | None:
+def _read_summary(file: BinaryIO, size: int) -> Summary | None:
     end = size - _MAGIC_BYTES - _FOOTER.size
     opcode, length, start, _, checksum = _FOOTER.unpack(_read(file, end, _FOOTER.size))
     if opcode != Opcode.FOOTER or length != _FOOTER.size - RECORD.size or not _MAGIC_BYTES <= start < end:
         return None
-    data = _read(file, start, end - start)
-    stated = data + _read(file, end, _FOOTER.size - 4)
-    if checksum not in (0, zlib.crc32(stated)):
+    data = _read(file, start, size - start)
+    if checksum not in (0, zlib.crc32(data[: -4 - _MAGIC_BYTES])):
         return None
-    summary, at = _Summary(), 0
-    while at < len(data):
-        opcode, length = RECORD.unpack_from(data, at)
-        at += RECORD.size
-        record = ReadDataStream(BytesIO(data[at : at + length]))
-        at += length
-        if opcode == Opcode.SCHEMA:
-            schema = Schema.read(record)
-            summary.schemas[schema.id] = schema
-        elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(record)
-            summary.channels[channel.id] = channel
-        elif opcode == Opcode.CHUNK_INDEX:
-            summary.chunks.append(ChunkIndex.read(record))
-        elif opcode == Opcode.STATISTICS:
-            summary.statistics = Statistics.read(record)
-    statistics = summary.statistics
-    is_whole = statistics is not None and summary.chunks and statistics.chunk_count == len(summary.chunks)
+    summary = Summary()
+    for record in StreamReader(BytesIO(data), skip_magic=True).records:
+        if isinstance(record, Schema):
+            summary.schemas[record.id] = record
+        elif isinstance(record, Channel):
+            summary.channels[record.id] = record
+        elif isinstance(record, ChunkIndex):
+            summary.chunk_indexes.append(record)
+        elif isinstance(record, Statistics):
+            summary.statistics = record
+    statistics, chunks = summary.statistics, summary.chunk_indexes
+    is_whole = statistics is not None and chunks and statistics.chunk_count == len(chunks)
     is_named = statistics is not None and set(statistics.channel_message_counts) <= set(summary.channels)
     return summary if is_whole and is_named else None
-
-
-def _sort_chunks(chunks: Sequence[ChunkIndex]) -> Sequence[ChunkIndex]:
-    return sorted(chunks, key=lambda chunk: chunk.chunk_start_offset)
 
 
 def _find_messages(file: BinaryIO, size: int, chunk: ChunkIndex, wanted: set[int]) -> _Part:
@@ -240,8 +221,7 @@ def _hand_over(opcode: int, record: bytes, handlers: Mapping[int, MessageHandler
 
 
 def _read(file: BinaryIO, at: int, length: int) -> bytes:
-    """Bytes at a place of the file, past its buffer: a seek within a buffer would fill it anew."""
-    data = os.pread(file.fileno(), length, at) if at >= 0 and length >= 0 else b""
+    data = read_range(file, at, length) if at >= 0 and length >= 0 else b""
     if len(data) < length:
         raise ValueError("the file ends early")
     return data
@@ -300,7 +280,7 @@ def scan_mcap(path: Path, sink: MessageSink) -> str | None:
     """
     with path.open("rb") as file:
         try:
-            _Scan(file, os.fstat(file.fileno()).st_size, sink).run()
+            _Scan(file, path.stat().st_size, sink).run()
         except DamageError as damage:
             return str(damage)
     return None
@@ -309,8 +289,8 @@ def scan_mcap(path: Path, sink: MessageSink) -> str | None:
 def _read_whole(path: Path, log: JointStateLog) -> str | None:
     """Read by the index, else from the front; the damage, None where there is none."""
     try:
-        with path.open("rb") as file:
-            if read_by_index(file, os.fstat(file.fileno()).st_size, log):
+        with open_ranges(path) as file:
+            if read_by_index(file, path.stat().st_size, log):
                 return None
     except DamageError as damage:
         return str(damage)

@@ -27,14 +27,14 @@ _FOLDERS_UP = 3  # a LeRobot data set keeps ``data/chunk-000/FILE.parquet`` besi
 
 @dataclass(frozen=True)
 class FileColumn:
-    """A column of numbers: a whole one, or one element of a list column."""
+    """A column of numbers: a whole one, or one element of a column of lists or structures."""
 
     column: str
-    element: int | None = None
+    element: int | str | None = None
 
 
 def unfold_columns(arrow: Any, file: Any, path: Path, name: str) -> dict[str, FileColumn]:
-    """Every column by its name, elements of lists as ``observation.state[0]`` or ``observation.state[elbow.pos]``.
+    """Every column by its name, elements as ``observation.state[0]`` or ``observation.state[elbow.pos]``.
 
     Raises RecordingError where two columns have one name.
     """
@@ -43,7 +43,12 @@ def unfold_columns(arrow: Any, file: Any, path: Path, name: str) -> dict[str, Fi
     for column in map(str, schema.names):
         if column in found:
             raise RecordingError(f"{name}: column {column} appears twice; rename or delete one")
-        if not _is_list(arrow, schema.field(column).type):
+        kind = schema.field(column).type
+        if arrow.types.is_struct(kind):
+            fields = [each.name for each in kind if _NUMBER_TYPE.fullmatch(str(each.type))]
+            found |= {f"{column}[{field}]": FileColumn(column, field) for field in fields}
+            continue
+        if not _is_list(arrow, kind):
             found[column] = FileColumn(column)
             continue
         width = _width(arrow, file, column)
@@ -56,6 +61,8 @@ def unfold_columns(arrow: Any, file: Any, path: Path, name: str) -> dict[str, Fi
 def take_column(arrow: Any, batch: Any, wanted: FileColumn) -> Any:
     """A column of a batch, or one element of its lists."""
     column = batch.column(wanted.column)
+    if isinstance(wanted.element, str):
+        return arrow.compute.struct_field(column, wanted.element)
     return column if wanted.element is None else arrow.compute.list_element(column, wanted.element)
 
 
@@ -152,7 +159,8 @@ def _take_batches(
             stamps = arrow.compute.multiply(since.cast("float64"), 1e-9)
 
         def take(column: str, batch: Any = batch, stamps: Any = stamps) -> Array:
-            return _numbers(stamps if found[column] == time else take_column(arrow, batch, found[column]))
+            values = stamps if found[column] == time else take_column(arrow, batch, found[column])
+            return values.cast("float64", safe=False).to_numpy(zero_copy_only=False)
 
         yield take
 
@@ -216,7 +224,3 @@ def _require_numbers(schema: Any, wanted: Sequence[FileColumn], layout: ColumnLa
 
 def _is_stamp(kind: Any) -> bool:
     return str(kind).startswith("timestamp[")
-
-
-def _numbers(column: Any) -> Array:
-    return column.cast("float64", safe=False).to_numpy(zero_copy_only=False)

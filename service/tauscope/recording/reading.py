@@ -17,6 +17,7 @@ from tauscope.recording.parquet_format import PARQUET_MAGIC, read_parquet, read_
 from tauscope.recording.recording import Recording
 from tauscope.recording.ros_bags import ROS1_MAGIC, SQLITE_MAGIC, read_database, read_ros1_bag, read_rosbag2
 from tauscope.recording.units import SI, Reading
+from tauscope.remote_files import copy_locally, find_path, is_folder, knows_ranges, name_failures, open_ranges
 from tauscope.robot.messages import printable
 from tauscope.robot.recording_layout import UNITS
 from tauscope.robot.robot import Robot
@@ -47,14 +48,17 @@ def read_recording(
 
     `joint_count`: joints that the recording must have; None where any number is welcome, or as many as `joint_names`.
     """
-    path, name = Path(path), printable(str(path), _LONGEST_PATH)
+    path = find_path(path)
+    name = printable(str(path), _LONGEST_PATH)
     names = tuple(joint_names) if joint_names is not None else None
     reading = replace(reading, joint_names=names)
     if joint_count is None and names is not None:
         joint_count = len(names)
     try:
-        choice = Choice(name, joint_count, names, reading=reading, packed_bytes=_count_bytes(path))
-        recording = _read(path, name, joint_count, choice)
+        with name_failures(path):
+            packed_bytes = sum(file.stat().st_size for file in (path.iterdir() if is_folder(path) else [path]))
+            choice = Choice(name, joint_count, names, reading=reading, packed_bytes=packed_bytes)
+            recording = _read(path, name, joint_count, choice)
     except OSError as error:
         raise RecordingError(f"{name}: {_reason(error)}") from error
     require_joint_count(recording.joint_count, joint_count, name)
@@ -66,8 +70,12 @@ def read_header(path: Path) -> list[str]:
 
     Raises RecordingError where the file cannot be read, or is a log, which names its joints itself.
     """
+    path = find_path(path)
     name = printable(str(path), _LONGEST_PATH)
     try:
+        if not isinstance(path, Path):
+            with name_failures(path), copy_locally(path) as copy:
+                return read_header(copy)
         magic = b"" if path.is_dir() else first_bytes(path, name)
         if path.is_dir() or magic.startswith((MCAP_MAGIC, SQLITE_MAGIC, ROS1_MAGIC)):
             raise RecordingError(f"{name}: a log names its joints itself; choose a topic with --topic")
@@ -86,22 +94,21 @@ def first_bytes(path: Path, name: str) -> bytes:
 
     Raises RecordingError where it is not a regular file.
     """
-    if not path.exists():
-        raise FileNotFoundError(errno.ENOENT, "no such file")
-    if not path.is_file():
+    if isinstance(path, Path) and not path.is_file():
+        if not path.exists():
+            raise FileNotFoundError(errno.ENOENT, "no such file")
         raise RecordingError(f"{name}: not a regular file; save the data to a file first")
-    with path.open("rb") as file:
+    with open_ranges(path) as file:
         return file.read(_MAGIC_BYTES)
 
 
-def _count_bytes(path: Path) -> int:
-    return sum(file.stat().st_size for file in path.iterdir()) if path.is_dir() else path.stat().st_size
-
-
 def _read(path: Path, name: str, joint_count: int | None, choice: Choice) -> Recording:
-    if path.is_dir():
+    if is_folder(path):
         return read_rosbag2(path, choice)
     magic = first_bytes(path, name)
+    if not (isinstance(path, Path) or (magic.startswith((MCAP_MAGIC, PARQUET_MAGIC)) and knows_ranges(path))):
+        with copy_locally(path) as copy:
+            return _read(copy, name, joint_count, choice)
     if magic.startswith(PARQUET_MAGIC):
         return read_parquet(path, name, joint_count, reading=choice.reading)
     if magic.startswith(MCAP_MAGIC):

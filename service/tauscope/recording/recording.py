@@ -55,20 +55,13 @@ class Recording:
         first, last, _ = slice(start, stop).indices(len(self.table))
         block = self.table.rows(first, max(first, last))
         where = {name: index for index, name in enumerate(self.table.names)}
-        groups = {group: self._group(block, group, where) for group in OPTIONAL_GROUPS}
+        groups = {_ARGUMENTS[group]: self._group(block, group, where) for group in OPTIONAL_GROUPS}
         n = self.joint_count
         return Samples(
             time=block[:, 0],
             position=block[:, 1 : 1 + n],
             effort=block[:, 1 + n : 1 + 2 * n],
-            velocity=groups["qd"],
-            acceleration=groups["qdd"],
-            reference=groups["qref"],
-            effort_command=groups["taucmd"],
-            temperature=groups["temp"],
-            link_position=groups["qlink"],
-            voltage=groups["volt"],
-            gain=groups["kp"],
+            **groups,
             period=block[:, where["period"]] if "period" in where else None,
         )
 

@@ -19,6 +19,7 @@ from tauscope.recording.inflation import HELD_BYTES, LARGEST_RATIO, decompress_f
 from tauscope.recording.joint_state_topic import Choice, JointStateLog
 from tauscope.recording.mcap_format import add_mcap
 from tauscope.recording.recording import Recording
+from tauscope.remote_files import copy_locally
 from tauscope.robot.messages import printable, reason
 
 ROS1_MAGIC = b"#ROSBAG V2.0"
@@ -47,7 +48,8 @@ def read_ros1_bag(path: Path, choice: Choice) -> Recording:
         _require_plausible_chunks(path, name)
         with reader_type(path) as reader:
             handlers = {
-                each.id: log.handler(each.topic, _ros1_name(each.msgtype), "ros1") for each in reader.connections
+                each.id: log.handler(each.topic, each.msgtype.replace("/msg/", "/"), "ros1")
+                for each in reader.connections
             }
             wanted = [each for each in reader.connections if handlers[each.id] is not None]
             for connection, time, message in reader.messages(connections=wanted) if wanted else ():
@@ -71,10 +73,6 @@ def read_ros1_bag(path: Path, choice: Choice) -> Recording:
             f"{name}: not a readable ROS 1 bag ({reason(error)}); run `rosbag reindex` on it"
         ) from error
     return log.finish()
-
-
-def _ros1_name(type_name: str) -> str:
-    return type_name.replace("/msg/", "/")
 
 
 def _require_plausible_chunks(path: Path, name: str) -> None:
@@ -138,8 +136,8 @@ def read_rosbag2(folder: Path, choice: Choice) -> Recording:
         if not path.is_file():
             raise RecordingError(f"{choice.file}: {METADATA} names {printable(file)}, which is not there")
         if path.suffix == ".zstd":
-            with TemporaryDirectory(prefix="tauscope-") as temporary:
-                _add_file(decompress_file(path, Path(temporary) / path.stem, name), name, log)
+            with copy_locally(path) as copy, TemporaryDirectory(prefix="tauscope-") as temporary:
+                _add_file(decompress_file(copy, Path(temporary) / path.stem, name), name, log)
         else:
             _add_file(path, name, log)
     return log.finish()
@@ -149,7 +147,8 @@ def _add_file(path: Path, name: str, log: JointStateLog) -> None:
     if path.suffix == ".mcap":
         add_mcap(path, name, log)
     elif path.suffix == ".db3":
-        _add_database(path, name, log)
+        with copy_locally(path) as copy:
+            _add_database(copy, name, log)
     else:
         raise RecordingError(f"{name}: neither .mcap nor .db3; convert the bag with `ros2 bag convert` first")
 
@@ -168,7 +167,8 @@ def _files(folder: Path, name: str) -> list[str]:
     """The bag's files, by bare name: a bag never reaches out of its folder."""
     metadata = folder / METADATA
     if not metadata.is_file():
-        raise RecordingError(f"{name}: a folder without {METADATA} is no rosbag2 recording; give the file itself")
+        way_out = "give the file itself, or run `ros2 bag reindex`"
+        raise RecordingError(f"{name}: a folder without {METADATA} is no rosbag2 recording; {way_out}")
     try:
         content: Any = YAML(typ="safe", pure=True).load(metadata.read_text(encoding="utf-8"))
     except (YAMLError, ValueError, RecursionError) as error:

@@ -19,14 +19,9 @@ class MemoryTable:
 
     def __init__(self, names: tuple[str, ...], data: Array) -> None:
         """Keep `data` as it is, without a copy. `data`: (N, columns), the rows; made read-only."""
-        self._names = names
+        self.names = names
         self._data = data
         self._data.flags.writeable = False
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Column names."""
-        return self._names
 
     def __len__(self) -> int:
         return len(self._data)
@@ -44,16 +39,11 @@ class SpooledTable:
     """
 
     def __init__(self, names: tuple[str, ...]) -> None:
-        self._names = names
+        self.names = names
         self._row_bytes = 8 * len(names)
         self._length = 0
         self._file = tempfile.TemporaryFile(prefix="tauscope-")  # noqa: SIM115 — lives as long as the table
         weakref.finalize(self, self._file.close)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Column names."""
-        return self._names
 
     def __len__(self) -> int:
         return self._length
@@ -67,7 +57,7 @@ class SpooledTable:
     def rows(self, start: int, stop: int) -> Array:
         """Rows start:stop, a read-only copy of shape (stop-start, columns)."""
         start, stop, _ = slice(start, stop).indices(self._length)
-        block = np.empty((max(stop - start, 0), len(self._names)))
+        block = np.empty((max(stop - start, 0), len(self.names)))
         target = block.reshape(-1).view(np.uint8).data
         done = 0
         while done < len(target):

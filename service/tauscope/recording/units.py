@@ -15,6 +15,7 @@ SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  #
 # Units of angle [rad], and of speed a minute [rad/s].
 RADIANS: Mapping[str, float] = {"rad": 1.0, "deg": np.pi / 180.0, "rpm": 2.0 * np.pi / 60.0}
 METRES: Mapping[str, float] = {"m": 1.0, "mm": 1e-3}  # units of length [m]
+TORQUES: Mapping[str, float] = {"Nm": 1.0, "N": 1.0, "mNm": 1e-3}  # units of torque and force [Nm or N]
 # Units that a joint's torque constant turns into torque [A, or the drive's own unit].
 CURRENTS: Mapping[str, float] = {"A": 1.0, "mA": 1e-3, "drive": 1.0}
 _FOLLOWERS: Mapping[str, tuple[str, ...]] = {"q": ("q", "qref", "qlink"), "qd": ("qd", "qdd"), "tau": ("tau", "taucmd")}
@@ -150,4 +151,4 @@ def _factor(group: str, number: str, reading: Reading) -> float:
         return RADIANS[unit] if joint is not JointType.PRISMATIC else 1.0
     if unit in METRES:
         return METRES[unit] if joint is not JointType.REVOLUTE else 1.0
-    return CURRENTS.get(unit, 1.0)
+    return CURRENTS.get(unit, TORQUES.get(unit, 1.0))

@@ -15,9 +15,10 @@ def read_bounded(path: Path, limit: int) -> bytes:
     `limit`: largest size that is accepted [bytes].
     """
     try:
-        mode = path.stat().st_mode
-        # A pipe or a device might never end: only regular files are opened.
-        data = _first_bytes(path, limit + 1) if stat.S_ISREG(mode) else None
+        mode, data = path.stat().st_mode, None
+        if stat.S_ISREG(mode):  # a pipe or a device might never end
+            with path.open("rb") as file:
+                data = file.read(limit + 1)
     except FileNotFoundError:
         raise RobotFileError(one_line(f"{path}: no such file; check the path")) from None
     except (OSError, ValueError) as error:
@@ -31,11 +32,6 @@ def read_bounded(path: Path, limit: int) -> bytes:
     if len(data) > limit:
         raise RobotFileError(one_line(f"{path}: the file is larger than {limit // 1024} KiB; is it the right file?"))
     return data
-
-
-def _first_bytes(path: Path, count: int) -> bytes:
-    with path.open("rb") as file:
-        return file.read(count)
 
 
 def decode_utf8(data: bytes, label: str) -> str:

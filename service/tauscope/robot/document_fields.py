@@ -1,7 +1,7 @@
 """Fields of the robot file: strict numbers and names, each refusal worded for the user."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, model_validator
@@ -49,22 +49,15 @@ def _number(value: Any) -> float:
     return float(value)
 
 
-def _positive(value: float) -> float:
-    if value <= 0.0:
-        raise refusal(f"must be above zero, but is {value:g}; leave it out where it is not known")
-    return value
+def _require(is_right: Callable[[float], bool], words: str) -> AfterValidator:
+    """Refuses numbers by words that may hold ``{0:g}``, the number."""
 
+    def check(value: float) -> float:
+        if not is_right(value):
+            raise refusal(words.format(value))
+        return value
 
-def _not_negative(value: float) -> float:
-    if value < 0.0:
-        raise refusal(f"must not be below zero, but is {value:g}; write its size")
-    return value
-
-
-def _nonzero(value: float) -> float:
-    if value == 0.0:
-        raise refusal("must not be zero; leave it out where it is not known")
-    return value
+    return AfterValidator(check)
 
 
 def _name(value: Any) -> str:
@@ -75,12 +68,6 @@ def _name(value: Any) -> str:
         raise refusal("must not be empty")
     if len(value) > LONGEST_NAME or not value.isprintable():
         raise refusal(f"{shown(value)} must be printable text of at most {LONGEST_NAME} characters")
-    return value
-
-
-def _share(value: float) -> float:
-    if not 0.0 < value <= 1.0:
-        raise refusal(f"must be a share above 0 and up to 1, but is {value:g}")
     return value
 
 
@@ -176,10 +163,15 @@ def _plain_mapping(value: Any) -> dict[str, Any]:
 
 
 Number = Annotated[float, BeforeValidator(_number)]
-Positive = Annotated[Number, AfterValidator(_positive)]
-NotNegative = Annotated[Number, AfterValidator(_not_negative)]
-Share = Annotated[Number, AfterValidator(_share)]
-Nonzero = Annotated[Number, AfterValidator(_nonzero)]
+_UNKNOWN = "leave it out where it is not known"
+Positive = Annotated[Number, _require(lambda value: value > 0.0, f"must be above zero, but is {{0:g}}; {_UNKNOWN}")]
+NotNegative = Annotated[
+    Number, _require(lambda value: value >= 0.0, "must not be below zero, but is {0:g}; write its size")
+]
+Share = Annotated[
+    Number, _require(lambda value: 0.0 < value <= 1.0, "must be a share above 0 and up to 1, but is {0:g}")
+]
+Nonzero = Annotated[Number, _require(bool, f"must not be zero; {_UNKNOWN}")]
 Name = Annotated[str, BeforeValidator(_name)]
 Text = Annotated[str, BeforeValidator(_text)]
 Motion = Annotated[JointType, BeforeValidator(_motion)]

@@ -9,7 +9,7 @@ UNITS: Mapping[str, tuple[str, ...]] = {
     "t": ("s", "ms", "us", "ns", "index"),
     "q": ("rad", "deg", "m", "mm"),
     "qd": ("rad", "deg", "rpm", "m", "mm"),
-    "tau": ("Nm", "N", "A", "mA", "drive"),
+    "tau": ("Nm", "N", "mNm", "A", "mA", "drive"),
 }
 
 PRESETS = ("rtde", "libfranka", "plotjuggler", "lerobot", "mujoco", "isaac")  # names of the layouts that are known

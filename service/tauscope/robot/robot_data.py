@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from tauscope.errors import RobotFileError
-from tauscope.robot.actuator import Actuator
 from tauscope.robot.document import DocumentOrigin, PlainRobotDocument
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot import Joint, LinkInertia, Model, Placement, Robot, Segment
@@ -98,13 +97,9 @@ def _joint(joint: Joint) -> dict[str, Any]:
             "friction_shape": _drop_none({"k_v": joint.friction_shape.k_v, "delta": joint.friction_shape.delta})
             or None,
             "drive": None if joint.drive is None else dict(joint.drive),
-            "actuator": None if joint.actuator is None else _actuator(joint.actuator),
+            "actuator": (a := joint.actuator) and _drop_none(asdict(a) | ({} if a.has_loop else {"kp": None})),
         }
     )
-
-
-def _actuator(actuator: Actuator) -> dict[str, Any]:
-    return _drop_none(asdict(actuator) | ({} if actuator.has_loop else {"kp": None}))
 
 
 def _model(model: Model) -> dict[str, Any]:

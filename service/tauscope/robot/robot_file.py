@@ -3,9 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from shutil import which
+from subprocess import SubprocessError, run
 from typing import Any
 
 from tauscope.errors import RobotFileError
+from tauscope.remote_files import find_path
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.document import DocumentOrigin, RecordingDocument, RobotDocument
 from tauscope.robot.document_fields import LONGEST_NAME
@@ -13,11 +16,12 @@ from tauscope.robot.messages import one_line
 from tauscope.robot.recording_layout import PRESETS, RecordingLayout
 from tauscope.robot.robot import Robot
 from tauscope.robot.robot_building import SourceFile, build_robot
-from tauscope.robot.urdf_element import local_name
+from tauscope.robot.urdf_element import EXPAND, local_name
 from tauscope.robot.xml_text import LARGEST_XML, is_xml, parse_xml
 from tauscope.robot.yaml_text import Place, read_yaml
 
 LARGEST_ROBOT_FILE = 1024 * 1024
+XACRO_TIMEOUT_S = 60.0
 
 KINEMATICS_OF_ROOT = {"robot": "urdf", "mujoco": "mjcf"}  # kinds of kinematics by the root element of a file
 
@@ -28,7 +32,7 @@ def read_robot(path: Path | str) -> Robot:
     Raises RobotFileError if the file or the one that it names cannot be read or is not valid; one line naming file,
     line, place and joint.
     """
-    source = Path(path)
+    source = find_path(path)
     data = read_bounded(source, LARGEST_XML)
     document, origin = parse_robot_file(data, str(path))
 
@@ -41,8 +45,25 @@ def read_robot(path: Path | str) -> Robot:
         except RobotFileError as error:
             raise origin.error(("kinematics", kind, "file"), str(error)) from error
 
-    robot = build_robot(document, origin, beside)
+    try:
+        robot = build_robot(document, origin, beside)
+    except RobotFileError as error:
+        if EXPAND not in str(error) or which("xacro") is None:
+            raise
+        robot = build_robot(document, origin, lambda kind, file: _expand(beside(kind, file)))
     return replace(robot, source=source)
+
+
+def _expand(file: SourceFile) -> SourceFile:
+    """A xacro as the installed command expands it: the user's own file, which may include others."""
+    try:
+        words = ["xacro", str(file.path and file.path.absolute())]
+        done = run(words, capture_output=True, timeout=XACRO_TIMEOUT_S, check=True)  # noqa: S603 — a fixed program
+    except SubprocessError as error:
+        said = getattr(error, "stderr", None) or str(error).encode()
+        reason = said.decode(errors="replace").strip().partition("\n")[0]
+        raise RobotFileError(one_line(f"{file.label}: xacro cannot expand the file ({reason})")) from error
+    return replace(file, data=done.stdout)
 
 
 def parse_robot_file(data: bytes, label: str) -> tuple[RobotDocument, DocumentOrigin]:
@@ -68,7 +89,10 @@ def describe_bare_file(data: bytes, label: str) -> dict[str, Any]:
     root = parse_xml(data, label, [])
     kind, file = KINEMATICS_OF_ROOT.get(local_name(root)), Path(label).name
     if kind is None:
-        text = f"its root element is <{local_name(root)}>; give a URDF (<robot>), an MJCF (<mujoco>) or a robot file"
+        way_out = "give a URDF (<robot>), an MJCF (<mujoco>) or a robot file"
+        if local_name(root) == "sdf":
+            way_out = "give the URDF or xacro that it was made from, or an MJCF: pip install sdformat-mjcf; sdf2mjcf"
+        text = f"its root element is <{local_name(root)}>; {way_out}"
         raise RobotFileError(one_line(f"{label}:{root.sourceline}: {text}"))
     stated = root.get("name") or root.get("model") or ""
     is_name = bool(stated.strip()) and stated.isprintable() and len(stated) <= LONGEST_NAME

@@ -188,7 +188,12 @@ def read_urdf_chain(
             place = one_line(where(label, tree.links[joint.child]))
             findings.append(Finding(Severity.WARNING, place, "has no <inertial>; the model takes it as massless"))
     names = [joint.name for joint in motions.independent]
-    findings += [_follower(tree, joint, master) for joint in moving if (master := motions.master(joint))]
+    for joint in moving:
+        if (master := motions.master(joint)) is not None:
+            text = (
+                f"follows {shown(master.joint.name)}: {master.multiplier:g} times its position, plus {master.offset:g}"
+            )
+            findings.append(Finding(Severity.INFO, one_line(where(label, joint.element)), text))
     notes = [default_ends_note(label, "urdf", base, tip, names)] if is_default else []
     return Chain(
         base=base,
@@ -272,11 +277,6 @@ def _remark_on_base(tree: UrdfTree, base: str, findings: list[Finding]) -> None:
             text = f"moves the base {shown(base)}; it is taken to stand still"
             findings.append(Finding(Severity.INFO, one_line(where(tree.label, joint.element)), text))
         link = joint.parent
-
-
-def _follower(tree: UrdfTree, joint: UrdfJoint, master: Master) -> Finding:
-    text = f"follows {shown(master.joint.name)}: {master.multiplier:g} times its position, plus {master.offset:g}"
-    return Finding(Severity.INFO, one_line(where(tree.label, joint.element)), text)
 
 
 def _joint_type(joint: UrdfJoint) -> JointType:

@@ -82,6 +82,7 @@ def decode_xml(data: bytes, label: str, findings: list[Finding]) -> str:
             continue
         if text is not None:
             break
+    text = None if text is None else text.rstrip("\0")  # as C ends a string, and as ROS reads it
     if text is None or "\0" in text:
         raise RobotFileError(one_line(f"{label}: is not text; is it the right file?"))
     if encoding == "latin-1" and (stated or "").lower() not in ("latin-1", "iso-8859-1"):

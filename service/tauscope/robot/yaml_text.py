@@ -142,7 +142,7 @@ class _PlainBuilder:
             return text.lower() in TRUE
         try:
             if kind == "int":
-                return _integer(text)
+                return int(text.replace("_", ""), 0)  # what YAML 1.1 and 1.2 read differently is refused: 010, 1:30
             if kind == "float":
                 return _real(text)
         except ValueError:
@@ -151,11 +151,6 @@ class _PlainBuilder:
 
     def _error(self, line: int, text: str) -> RobotFileError:
         return RobotFileError(one_line(f"{self.label}:{line}: {text}"))
-
-
-def _integer(text: str) -> int:
-    """The int of a YAML scalar; forms that YAML 1.1 and 1.2 read differently (010, 1:30) are refused."""
-    return int(text.replace("_", ""), 0)
 
 
 def _real(text: str) -> float:

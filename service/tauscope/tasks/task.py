@@ -14,6 +14,7 @@ from tauscope.errors import RecordingMismatchError
 from tauscope.export.compensation import RecordingSource
 from tauscope.export.model import Origin
 from tauscope.recording import EffortKind, Reading, Recording, flow_text, open_recording
+from tauscope.remote_files import find_path
 from tauscope.report.provenance import InputFile, Provenance, input_files, versions
 from tauscope.robot import RecordingLayout, Robot, find_column_fault, find_fault, find_separator_fault
 from tauscope.robot.messages import one_line
@@ -162,7 +163,7 @@ class LocalFiles:
 
     def find(self, role: str, name: str) -> Path:
         """The path itself."""
-        return Path(name)
+        return find_path(name)
 
     def show(self, path: Path) -> str:
         """The path itself."""

@@ -73,6 +73,17 @@ def with_constants(ur5: Robot) -> Robot:
 
 
 @needs_shared_cases
+def test_milliamperes_are_told_by_the_stated_constants(with_constants: Robot) -> None:
+    path = RECORDINGS / "43-current-without-constant.csv"
+    joints = tuple(replace(joint, torque_constant=1e3) for joint in with_constants.joints)
+    robot = replace(with_constants, joints=joints)
+    doubt = message_of(lambda: open_recording(path, robot))
+    assert "gravity of the stated masses: hardly in that unit; read it with --units tau=mA, or correct" in doubt
+    for sound in (open_recording(path, with_constants), open_recording(path, robot, Reading({"tau": "mA"}))):
+        assert sound.effort_kind == "i"
+
+
+@needs_shared_cases
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_a_layout_of_another_tool_is_read(name: str, ur5: Robot, with_constants: Robot, held_out: Recording) -> None:
     columns, codes = LAYOUTS[name]

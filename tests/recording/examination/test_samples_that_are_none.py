@@ -245,3 +245,6 @@ def test_efforts_that_are_nan_throughout_are_refused() -> None:
     channels = Channels.of(BASE)
     channels.effort[:, 1] = np.nan
     assert "column tau2: NaN throughout" in message_of(lambda: read_text(channels.csv()))
+    channels = Channels.of(BASE)
+    channels.effort[:] = 0.0
+    assert "columns tau1 to tau3: zero throughout" in message_of(lambda: read_text(channels.csv()))

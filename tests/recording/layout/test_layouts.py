@@ -70,6 +70,9 @@ STYLES = {
     "dynamixel": ("timestamp", "Present_Position_{1}", "Present_Velocity_{1}", "Present_Torque_{1}"),
     "names in front": ("time", "{name}_position", "{name}_velocity", "{name}_effort"),
     "zero based": ("t", "q{0}", "qd{0}", "tau{0}"),
+    "short words": ("time", "pos_{0}", "vel_{0}", "eff_{0}"),
+    "krl trace": ("time", "AXIS_ACT_A{1}", "VEL_AXIS_ACT_A{1}", "TORQUE_AXIS_ACT_A{1}"),
+    "german": ("Zeit", "Winkel_Achse{1}", "qd_Achse{1}", "Drehmoment_Achse{1}"),
 }
 SEPARATORS = [(",", "."), (";", "."), (";", ","), ("\t", ","), (" ", "."), ("|", "."), (" ", ",")]
 
@@ -324,6 +327,45 @@ def test_lists_in_the_cells_of_a_csv(tmp_path: Path) -> None:
     assert np.array_equal(samples.effort, TAU)
 
 
+@pytest.mark.parametrize(
+    ("mark", "unit", "factor"), [("mNm", "mNm", 1e-3), ("percent", "drive", 1.0), ("%", "drive", 1.0)]
+)
+def test_units_of_torque_in_names(tmp_path: Path, mark: str, unit: str, factor: float) -> None:
+    header = ["t", "q1", "q2", "q3", *(f"torque{k} [{mark}]" for k in (1, 2, 3))]
+    path = write(tmp_path / "file.csv", header, np.column_stack([TIME, Q, TAU]))
+    layout = guess_of(message_of(lambda: read_recording(path)))
+    assert layout.units == {"tau": unit}
+    recording = read(path, layout)
+    assert np.allclose(recording.samples().effort, factor * TAU)
+    assert recording.effort_kind == ("i" if unit == "drive" else "tau")
+
+
+def test_a_delimiter_may_end_the_rows_or_the_header_alone(tmp_path: Path) -> None:
+    header = ["t", *(f"{group}{k}" for group in ("q", "tau") for k in (1, 2, 3))]
+    path = write(tmp_path / "file.csv", header, np.column_stack([TIME, Q, TAU]))
+    first, rest = path.read_text(encoding="utf-8").split("\n", 1)
+    for text in (f"{first}\n{rest.replace(chr(10), f',{chr(10)}')}", f"{first},\n{rest}"):
+        path.write_text(text, encoding="utf-8")
+        assert np.array_equal(rows_of(read_recording(path)), np.column_stack([TIME, Q, TAU]))
+
+
+def test_structures_and_arrays_with_a_column_a_sample(tmp_path: Path) -> None:
+    np.savez(tmp_path / "log.npz", time=TIME, qpos=Q.T, qfrc_actuator=TAU.T)
+    samples = [read(tmp_path / "log.npz", read_layout("mujoco"), JOINTS).samples()]
+    if importlib.util.find_spec("pyarrow"):
+        from pyarrow import parquet, table
+
+        columns = {
+            name: [dict(zip(JOINTS, row, strict=True)) for row in rows] for name, rows in (("q", Q), ("tau", TAU))
+        }
+        parquet.write_table(table({"t": TIME, **columns}), tmp_path / "log.parquet")
+        guess = guess_of(message_of(lambda: read_recording(tmp_path / "log.parquet", joint_names=JOINTS)))
+        samples.append(read(tmp_path / "log.parquet", guess, JOINTS).samples())
+    for each in samples:
+        assert np.array_equal(each.position, Q)
+        assert np.array_equal(each.effort, TAU)
+
+
 def test_units_in_names(tmp_path: Path) -> None:
     header = [
         "Time [ms]",
@@ -350,6 +392,8 @@ def test_seconds_and_nanoseconds_in_two_columns(tmp_path: Path) -> None:
     np.savez(tmp_path / "log.npz", sec=seconds, nsec=nanoseconds, q=Q, tau=TAU)
     by_number = layout_from_dict({"t": [1, 2], "q": [7, 8, 9], "tau": [10, 11, 12]})
     by_name = layout_from_dict({"t": ["sec", "nsec"], "q": "q", "tau": "tau"})
+    guess = guess_of(message_of(lambda: read_recording(tmp_path / "log.npz", joint_names=JOINTS)))
+    assert guess.columns == {"t": ["sec", "nsec"], "q": "q[{0}]", "tau": "tau[{0}]"}
     recordings = [read(tmp_path / "echo.csv", by_number), read(tmp_path / "log.npz", by_name)]
     if importlib.util.find_spec("pyarrow"):
         from pyarrow import parquet, table
@@ -362,6 +406,18 @@ def test_seconds_and_nanoseconds_in_two_columns(tmp_path: Path) -> None:
         assert np.allclose(np.diff(samples.time), 0.01, atol=1e-9)
         assert np.array_equal(samples.position, Q)
         assert np.array_equal(samples.effort, TAU)
+
+
+def test_the_echo_of_a_topic_is_mapped_by_place(tmp_path: Path) -> None:
+    rows = [
+        [str(1_700_000_000 + k // 10), str(k % 10 * 10**8), "", *JOINTS, *map(repr, [*q, *qd, *tau])]
+        for k, (q, qd, tau) in enumerate(zip(Q.tolist(), QD.tolist(), TAU.tolist(), strict=True))
+    ]
+    path = tmp_path / "echo.csv"
+    path.write_text("\n".join(",".join(row) for row in rows) + "\n", encoding="utf-8")
+    guess = guess_of(message_of(lambda: read_recording(path, joint_names=JOINTS)))
+    expected = np.column_stack([np.arange(40) / 10, Q, TAU, QD])
+    assert np.allclose(rows_of(read(path, guess, JOINTS)), expected, atol=1e-9)
 
 
 def test_a_row_of_units_is_obeyed_and_options_go_before_it(tmp_path: Path) -> None:

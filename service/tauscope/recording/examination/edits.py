@@ -37,14 +37,9 @@ class EditedTable:
     """A table of which some columns are mended as they are read."""
 
     def __init__(self, table: Table, edits: Mapping[int, ColumnEdit]) -> None:
-        self._table = table
+        self._table, self.names = table, table.names
         self._edits = dict(edits)
         self._spare = 2 + max(((2 * edit.hold + 2) * (edit.fill + 1) for edit in edits.values()), default=0)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Column names."""
-        return self._table.names
 
     def __len__(self) -> int:
         return len(self._table)

@@ -136,7 +136,7 @@ def examine_recording(recording: Recording, robot: Robot | None = None, *, trust
         return recording
     missing = find_missing_effort(recording)
     if robot is not None and all(joint.actuator is not None and joint.actuator.has_loop for joint in robot.joints):
-        commanded = take_commands(recording) if missing is not None or _is_zero(recording) else None
+        commanded = None if missing is None else take_commands(recording)
         if commanded is not None:
             recording, missing = commanded, None
     if missing is not None:
@@ -154,20 +154,19 @@ def examine_recording(recording: Recording, robot: Robot | None = None, *, trust
     return replace(mended, notes=(*mended.notes, *links), is_examined=True)
 
 
-def _is_zero(recording: Recording) -> bool:
-    """Whether the effort is exactly zero throughout, as position servos report what they do not measure."""
-    blocks = (recording.samples(start, start + BLOCK_ROWS) for start in range(0, len(recording), BLOCK_ROWS))
-    return not any(np.nan_to_num(block.effort).any() for block in blocks)
-
-
 def find_missing_effort(recording: Recording) -> str | None:
-    """The columns of effort that are NaN throughout, and what to do; None where every joint has an effort."""
+    """The columns of effort that are NaN throughout, or zero at all joints, and what to do; None where there is none.
+
+    Position servos report zero for what they do not measure.
+    """
     n, kind = recording.joint_count, recording.effort_kind.value
-    seen = np.zeros(n, dtype=bool)
+    seen, is_zero = np.zeros(n, dtype=bool), recording.effort_kind is not EffortKind.COMMAND
     for start in range(0, len(recording), BLOCK_ROWS):
-        seen |= np.isfinite(recording.samples(start, start + BLOCK_ROWS).effort).any(axis=0)
-        if seen.all():
+        effort = recording.samples(start, start + BLOCK_ROWS).effort
+        seen |= np.isfinite(effort).any(axis=0)
+        is_zero = is_zero and not np.nan_to_num(effort).any()
+        if seen.all() and not is_zero:
             return None
-    many = not seen.any() and n > 1
+    many, value = seen.all() == seen.any() and n > 1, "zero" if seen.all() else "NaN"
     columns = f"columns {kind}1 to {kind}{n}" if many else f"column {kind}{np.argmin(seen) + 1}"
-    return f"{columns}: NaN throughout: no effort was recorded; record torques or currents of every joint"
+    return f"{columns}: {value} throughout: no effort was recorded; record torques or currents of every joint"

@@ -258,7 +258,7 @@ def find_implausible_torque(recording: Recording, sketch: Sketch, robot: Robot |
     return (
         _find_register(recording, sketch, robot)
         or _find_magnitude(recording, sketch)
-        or (_find_excess(sketch, robot) if recording.effort_kind is EffortKind.TORQUE else None)
+        or _find_excess(recording, sketch, robot)
     )
 
 
@@ -329,37 +329,42 @@ def _find_magnitude(recording: Recording, sketch: Sketch) -> str | None:
     return None
 
 
-def _find_excess(sketch: Sketch, robot: Robot | None) -> str | None:
-    effort = sketch.effort
-    peak = percentile(np.abs(effort), 99.0)
+def _find_excess(recording: Recording, sketch: Sketch, robot: Robot | None) -> str | None:
+    unit, column, torque = "in Nm", recording.effort_kind.value, sketch.effort
     mend = "read current with --units tau=mA (or tau=A), and state torque_constant in the robot file"
+    if recording.effort_kind is EffortKind.CURRENT:
+        if robot is None:
+            return None
+        torque = recording.joint_torque(torque, robot)
+        unit, mend = "in that unit", "read it with --units tau=mA, or correct torque_constant in the robot file"
+    peak = percentile(np.abs(torque), 99.0)
     if peak.max() > LARGEST_TORQUE:
-        return f"column tau{np.argmax(peak) + 1}: {peak.max():.3g} is no joint's torque in Nm; {mend}"
+        return f"column {column}{np.argmax(peak) + 1}: {peak.max():.3g} is no joint's torque in Nm; {mend}"
     if robot is None:
         return None
-    ratio = _gravity_ratio(sketch, robot)
+    ratio = _gravity_ratio(sketch, torque, robot)
     if ratio is not None and ratio[1] > ABOVE_GRAVITY:
         joint, times = ratio
-        return f"column tau{joint + 1}: {times:.3g} times the gravity of the stated masses: hardly in Nm; {mend}"
+        return f"column {column}{joint + 1}: {times:.3g} times the gravity of the stated masses: hardly {unit}; {mend}"
     limits = np.array([joint.limits.torque or np.inf for joint in robot.joints])
     if ratio is not None or len(set(limits)) == 1 < len(limits):
         return None  # masses vouch for the unit; one limit for all joints is a default of a drawing program
     above = peak > ABOVE_LIMITS * limits
     if above.any() and above.sum() >= np.isfinite(limits).sum() / 2.0:
         joint = int(np.argmax(peak / limits))
-        return f"column tau{joint + 1}: {peak[joint]:.4g}, of a joint limited to {limits[joint]:.4g} Nm; {mend}"
+        return f"column {column}{joint + 1}: {peak[joint]:.4g} Nm, of a joint limited to {limits[joint]:.4g} Nm; {mend}"
     return None
 
 
-def _gravity_ratio(sketch: Sketch, robot: Robot) -> tuple[int, float] | None:
+def _gravity_ratio(sketch: Sketch, torque: Array, robot: Robot) -> tuple[int, float] | None:
     """A joint whose torque follows gravity's, and how many times that it is; None where none does."""
     if robot.model.links is None or _is_lively(sketch, robot):
         return None
-    known = np.flatnonzero(np.isfinite(sketch.position).all(axis=1) & np.isfinite(sketch.effort).all(axis=1))
+    known = np.flatnonzero(np.isfinite(sketch.position).all(axis=1) & np.isfinite(torque).all(axis=1))
     if len(known) < 10:
         return None
     rows = known[np.linspace(0, len(known) - 1, min(POSTURES, len(known))).astype(int)]
-    gravity, effort = _gravity_torque(robot, sketch.position[rows]), sketch.effort[rows]
+    gravity, effort = _gravity_torque(robot, sketch.position[rows]), torque[rows]
     weight = np.sqrt(np.mean(gravity**2, axis=0))
     size = np.sqrt(np.mean(effort**2, axis=0))
     cosine = np.mean(gravity * effort, axis=0) / np.maximum(weight * size, 1e-300)

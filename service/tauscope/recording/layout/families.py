@@ -5,11 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 _CORES: Mapping[str, str] = {
-    **dict.fromkeys(("q", "qpos", "position", "positions", "pos", "angle", "angles", "theta", "state"), "q"),
+    **dict.fromkeys(("q", "qpos", "position", "positions", "pos", "angle", "angles", "theta", "state", "axis"), "q"),
     **dict.fromkeys(("qd", "dq", "qdot", "qvel", "velocity", "velocities", "vel", "speed", "speeds", "omega"), "qd"),
     **dict.fromkeys(("qdd", "ddq", "qacc", "acceleration", "accelerations", "acc"), "qdd"),
-    **dict.fromkeys(("tau", "torque", "torques", "effort", "efforts", "moment", "moments", "trq", "force"), "tau"),
-    **dict.fromkeys(("i", "current", "currents", "cur", "load"), "i"),
+    **dict.fromkeys(("tau", "torque", "torques", "effort", "efforts", "eff", "trq", "moment", "moments"), "tau"),
+    **dict.fromkeys(("force", "drehmoment"), "tau"),
+    "winkel": "q",
+    **dict.fromkeys(("i", "current", "currents", "cur", "curr", "strom", "load"), "i"),
     **dict.fromkeys(("qref", "action"), "qref"),
     **dict.fromkeys(("taucmd", "ctrl"), "taucmd"),
     **dict.fromkeys(("temp", "temperature", "temperatures"), "temp"),
@@ -28,9 +30,22 @@ _QUALIFIERS = frozenset(
     ("present", "actual", "measured", "meas", "act", "raw", "filtered", "msr", "computed", "applied")
 )
 # Words that make a family second choice.
-_LEVELS: Mapping[str, int] = {"computed": 1, "force": 2, "theta": 2, "load": 2, "state": 3}
-_TIMES = ("t", "time", "timestamp", "stamp", "sim_time", "time_s", "seconds", "sec", "clock", "elapsed", "duration")
-_UNIT = re.compile(r"(?<![A-Za-z])(deg(?:rees?)?|mA)(?![A-Za-z])|(°)")
+_LEVELS: Mapping[str, int] = {"computed": 1, "force": 2, "theta": 2, "load": 2, "state": 3, "axis": 4}
+_TIMES = (
+    "t",
+    "time",
+    "zeit",
+    "timestamp",
+    "stamp",
+    "sim_time",
+    "time_s",
+    "seconds",
+    "sec",
+    "clock",
+    "elapsed",
+    "duration",
+)
+_UNIT = re.compile(r"(?<![A-Za-z])(deg(?:rees?)?|mA|mNm|percent|pct)(?![A-Za-z])|([°%])")
 
 
 def is_joint_name(words: Sequence[str]) -> bool:
@@ -47,7 +62,7 @@ def role_of(words: Sequence[str]) -> tuple[str, int] | None:
         return "tau", 0
     if _FOREIGN.intersection(words):
         return None
-    cores = [word for word in words if word in _CORES]
+    cores = sorted((word for word in words if word in _CORES), key=lambda word: word != "axis")  # a joint, mostly
     if not cores:
         return None
     role = _CORES[cores[-1]]
@@ -77,7 +92,8 @@ def time_unit(words: Sequence[str]) -> str | None:
 def unit_of(name: str) -> str | None:
     """The unit that the name of a joint's column states, None where it states none or SI."""
     match = _UNIT.search(name)
-    return None if match is None else "mA" if match[1] == "mA" else "deg"
+    word = "" if match is None else match[0]
+    return {"mA": "mA", "mNm": "mNm", "percent": "drive", "pct": "drive", "%": "drive", "": None}.get(word, "deg")
 
 
 # Placeholders of a template: the joint's number from 0, its number from 1, its name.

@@ -10,6 +10,7 @@ from tauscope.robot.recording_layout import RecordingLayout, Source
 
 _COMMON_JOINT_COUNTS = (6, 7)
 _PLAIN = re.compile(r"(?!(?:y|n|yes|no|on|off|true|false|null)$)[A-Za-z_][A-Za-z0-9_./-]*", re.IGNORECASE)
+_WHOLE_SECONDS = re.compile(r"(.*[^A-Za-z]|)secs?")
 _OPTIONAL = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt")
 
 # The group that words of a column mean, and how far they are from the first choice.
@@ -57,12 +58,13 @@ def guess_parts(
     effort = next((role for role in order if _choose(families, role, count)), "tau")
     groups = {"q": q, "i" if effort == "i" else "tau": _choose(families, effort, count)}
     groups |= {group: _choose(families, group, count) for group in _OPTIONAL if group != effort}
-    columns: dict[str, Source] = {} if time is None else {"t": time}
+    columns: dict[str, Source] = {} if time is None else {"t": _with_nanoseconds(header, time)}
     columns |= {group: _source(family, count) for group, family in groups.items() if family is not None}
+    torque = groups.get("i") or groups.get("tau")
     units = {
         "t": None if time is None else time_unit(words_of(time)),
         "q": None if q is None else unit_of(q.template),
-        "tau": _unit(groups.get("i")),
+        "tau": None if torque is None else unit_of(torque.template),
     }
     return RecordingLayout({column: unit for column, unit in units.items() if unit}, columns=columns)
 
@@ -95,6 +97,9 @@ def _guess_by_place(width: int, joint_count: int | None) -> RecordingLayout:
             if n > 0 and width == len(groups) * n + 1:
                 places = {group: [2 + k * n + j for j in range(n)] for k, group in enumerate(groups)}
                 return RecordingLayout(columns={"t": 1, **places})
+        if n > 0 and width == 4 * n + 3:  # `ros2 topic echo --csv`: sec, nanosec, frame, names, q, qd, effort
+            places = {group: [4 + k * n + j for j in range(n)] for k, group in enumerate(("q", "qd", "tau"), 1)}
+            return RecordingLayout(columns={"t": [1, 2], **places})
     return RecordingLayout(columns={})
 
 
@@ -123,6 +128,13 @@ def _find_time(header: Sequence[str], known: Sequence[str] | None) -> str | None
     return min(ranked)[2] if ranked else None
 
 
+def _with_nanoseconds(header: Sequence[str], time: str) -> Source:
+    """The column of the time, with that of its nanoseconds where it counts whole seconds."""
+    match = _WHOLE_SECONDS.fullmatch(time)
+    names = [f"{match[1]}{name}" for name in ("nanosec", "nsec", "nsecs")] if match else []
+    return next(([time, name] for name in names if name in header), time)
+
+
 def _choose(families: Sequence[tuple[Family, tuple[str, int]]], role: str, count: int | None) -> Family | None:
     """The family of a role: with a column for each joint, of the first rank, with the shortest name."""
     fit = [
@@ -141,7 +153,3 @@ def _source(family: Family, count: int | None) -> Source:
     """The family as a template, or as the columns of the first joints where it has more than the robot."""
     is_whole = family.is_regular and count in (None, len(family.columns))
     return family.template if is_whole else list(family.columns[:count])
-
-
-def _unit(current: Family | None) -> str | None:
-    return None if current is None else unit_of(current.template)

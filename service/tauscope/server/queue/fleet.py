@@ -11,6 +11,7 @@ from typing import Any
 
 from tauscope.errors import RecordingError, TauscopeError
 from tauscope.files import write_atomically
+from tauscope.remote_files import find_path
 from tauscope.robot.messages import one_line, shown
 from tauscope.server.queue.cluster_executor import ClusterUnavailableError
 from tauscope.server.store.files import FILE_NAME_RULE, is_file_name
@@ -178,9 +179,9 @@ def _entry(path: Path, line: int, row: dict[str, str], names: dict[str, int]) ->
     recordings, held_out = (_paths(path.parent, row[column]) for column in ("recordings", "held_out"))
     if not recordings or not row["robot"].strip():
         raise RecordingError(f"{place}: names no {'recording' if row['robot'].strip() else 'robot file'}; name one")
-    return FleetEntry(line, name, path.parent / row["robot"].strip(), recordings, held_out)
+    return FleetEntry(line, name, find_path(row["robot"].strip(), path.parent), recordings, held_out)
 
 
 def _paths(folder: Path, text: str) -> tuple[Path, ...]:
     words: Sequence[str] = [word.strip() for word in text.split(SEPARATOR)]
-    return tuple(folder / word for word in words if word)
+    return tuple(find_path(word, folder) for word in words if word)
