@@ -12,8 +12,7 @@ from tauscope.robot.robot import Joint
 Array = NDArray[np.float64]
 
 
-LEAST_HARMONICS = 2
-"""One harmonic alone cannot be at rest, with zero acceleration, at the ends of its period."""
+LEAST_HARMONICS = 2  # one harmonic alone cannot be at rest, with zero acceleration, at the ends of its period
 
 
 @dataclass(frozen=True, eq=False)

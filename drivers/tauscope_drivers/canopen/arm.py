@@ -33,11 +33,8 @@ from tauscope_drivers.limits import RunawayWatch, TorqueWatch, require_finite, r
 from tauscope_drivers.state import ArmState, Setpoint
 
 WATCHDOG_RANGE_S = (0.02, 5.0)
-HEARTBEATS_A_WATCHDOG = 10
-"""The master beats so often within a drive's watchdog time: one lost frame stops nothing."""
-
-PATIENCE_S = 0.002
-"""Time that drives and adapter may take to answer SYNC, beyond twice that of the frames on the wire."""
+HEARTBEATS_A_WATCHDOG = 10  # the master beats so often within a drive's watchdog time: one lost frame stops nothing
+PATIENCE_S = 0.002  # time that drives and adapter may take to answer SYNC, beyond twice that of the frames on the wire
 
 
 class CanopenArm:

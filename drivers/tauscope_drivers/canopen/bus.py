@@ -32,8 +32,7 @@ SEND_TIMEOUT_S = 0.5
 
 _MOST_DRAINED = 1000
 
-FrameHandler = Callable[[int, bytes], None]
-"""Takes the identifier and the payload of a frame."""
+FrameHandler = Callable[[int, bytes], None]  # takes the identifier and the payload of a frame
 
 
 class CanBus:

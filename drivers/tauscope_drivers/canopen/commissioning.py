@@ -19,8 +19,7 @@ from tauscope_drivers.errors import DriverError, DriverErrorKind
 
 PRODUCER_HEARTBEAT_MS = 100
 
-_STAYS_STOPPED = (6, 5)
-"""Quick stop options that keep the power: by the quick stop ramp, by the slow one."""
+_STAYS_STOPPED = (6, 5)  # quick stop options that keep the power: by the quick stop ramp, by the slow one
 _LETS_GO = (2, 1)
 _ABORT_BY_QUICK_STOP, _ABORT_BY_FAULT, _ABORT_BY_DISABLING = 3, 1, 2
 _FAULT_BY_RAMP = (2, 1)
@@ -178,8 +177,7 @@ def _takes(node: DriveNode, entry: DriveObject, value: int) -> bool:
     return True
 
 
-_PERIOD_EXPONENTS = range(-3, -7, -1)
-"""Milliseconds first: some drives know nothing else."""
+_PERIOD_EXPONENTS = range(-3, -7, -1)  # milliseconds first: some drives know nothing else
 _MILLISECONDS = -3
 
 _LARGEST_PERIOD = 0xFF

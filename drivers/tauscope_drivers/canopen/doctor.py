@@ -24,8 +24,7 @@ from tauscope_drivers.errors import DriverError
 from tauscope_drivers.inspection import Finding, FoundDevice, Severity, failure
 from tauscope_drivers.limits import require_sensible, stated_limits
 
-MEASURED_READS = 50
-"""Reads by which the round trip is measured."""
+MEASURED_READS = 50  # reads by which the round trip is measured
 
 _NETWORK = Path("/sys/class/net")
 _CAN_DEVICE_TYPE = "280"
@@ -164,11 +163,8 @@ def _read(path: Path) -> str:
 USUAL_BIT_RATES = (1_000_000, 500_000, 250_000, 125_000)
 """Tried one after the other where the interface sets the rate [bit/s]."""
 
-LISTENING_S = 0.3
-"""Time in which all nodes answer."""
-
-_FIXED_RATE = ("socketcan", "socketcand", "virtual", "udp_multicast")
-"""Interfaces whose rate is set elsewhere."""
+LISTENING_S = 0.3  # time in which all nodes answer
+_FIXED_RATE = ("socketcan", "socketcand", "virtual", "udp_multicast")  # interfaces whose rate is set elsewhere
 
 _NODES = range(1, 128)
 _UPLOAD = 0x40

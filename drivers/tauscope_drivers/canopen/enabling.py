@@ -9,13 +9,11 @@ from tauscope_drivers.canopen.state_machine import DriveState, Goal
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.state import ArmState, Array
 
-TRANSITION_S = 2.0
-"""Time for all drives together to reach a power state."""
+TRANSITION_S = 2.0  # time for all drives together to reach a power state
 
 _NO_MODE = 0
 
-STILL_CYCLES = 4
-"""Cycles at one place before anything moves: drives interpolate between the last few targets."""
+STILL_CYCLES = 4  # cycles at one place before anything moves: drives interpolate between the last few targets
 
 
 def power_up(session: Session, mode: ControlMode) -> tuple[ArmState, Array]:

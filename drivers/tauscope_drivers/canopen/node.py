@@ -35,11 +35,8 @@ from tauscope_drivers.canopen.state_machine import ENABLE_OPERATION, DriveState,
 from tauscope_drivers.canopen.units import DriveUnits, drive_units, read_rated_torque
 from tauscope_drivers.errors import DriverError, Fault
 
-FASTEST = 3.0
-"""A joint is believed to be so many times as fast as its limit, no faster."""
-
-SLACK_S = 0.002
-"""How much later than the host thinks a drive may have sampled [s]."""
+FASTEST = 3.0  # a joint is believed to be so many times as fast as its limit, no faster
+SLACK_S = 0.002  # how much later than the host thinks a drive may have sampled [s]
 
 
 class GlitchFilter:
@@ -56,11 +53,7 @@ class GlitchFilter:
         self._doubts_place = self._doubts_speed = False
 
     def believes_place(self, position: float, time_ns: int) -> bool:
-        """Whether a position may be true.
-
-        `position`: NaN where there is none, which is no lie [rad or m]; `time_ns`: instant of the reading, never before
-        that of the last [ns].
-        """
+        """Whether a position may be true; NaN is no lie. Instants never run backwards."""
         if math.isnan(position):
             return True
         self._doubts_place = not self._doubts_place and self._is_out_of_reach(position, time_ns)
@@ -69,7 +62,7 @@ class GlitchFilter:
         return not self._doubts_place
 
     def believes_speed(self, velocity: float) -> bool:
-        """Whether a velocity may be true. `velocity`: NaN where there is none, which is no lie [rad/s or m/s]."""
+        """Whether a velocity may be true; NaN is no lie."""
         self._doubts_speed = not self._doubts_speed and abs(velocity) > FASTEST * self.limit
         return not self._doubts_speed
 
@@ -82,11 +75,8 @@ class GlitchFilter:
 
 
 _CIA_402 = 402
-_INTERPOLATE = 0x10
-"""Bit of the controlword that starts interpolation, in the mode of that name."""
-
-Listener = Callable[[int, Callable[[int, bytes], None]], None]
-"""Hands the frames of an identifier to a handler."""
+_INTERPOLATE = 0x10  # bit of the controlword that starts interpolation, in the mode of that name
+Listener = Callable[[int, Callable[[int, bytes], None]], None]  # hands the frames of an identifier to a handler
 
 
 @dataclass(frozen=True)

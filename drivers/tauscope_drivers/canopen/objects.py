@@ -66,11 +66,8 @@ SUPPORTED_MODES = DriveObject("Supported drive modes", 0x6502, 0, 32)
 INTERPOLATED_POSITION = 7
 """Mode of operation: interpolated position, which older drives have in place of the cyclic one."""
 
-CYCLIC_POSITION = 8
-"""Mode of operation: cyclic synchronous position."""
-
-CYCLIC_TORQUE = 10
-"""Mode of operation: cyclic synchronous torque."""
+CYCLIC_POSITION = 8  # mode of operation: cyclic synchronous position
+CYCLIC_TORQUE = 10  # mode of operation: cyclic synchronous torque
 
 
 TARGETS: Mapping[ControlMode, Mapping[int, DriveObject]] = {
@@ -115,8 +112,7 @@ WRITTEN = frozenset(SUBSTITUTES) - {VELOCITY_ACTUAL, ERROR_CODE}
 """Optional objects that the driver sets; one that is read-only counts as absent."""
 
 
-STAYING_OPTIONS = range(5, 9)
-"""Quick stop options (0x605A) after which a drive keeps its power."""
+STAYING_OPTIONS = range(5, 9)  # quick stop options (0x605A) after which a drive keeps its power
 
 DOUBTFUL = (ABORT_CONNECTION, QUICK_STOP_OPTION)
 """Optional objects without which an operator has to try how the arm stops."""

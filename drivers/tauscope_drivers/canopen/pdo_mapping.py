@@ -27,8 +27,7 @@ _IDENTIFIER = 0x7FF
 _EVERY_SYNC = 1
 _LAST_SYNCHRONOUS = 240
 _LONGEST_MAPPING = 8
-_MAPPINGS = 2
-"""What is not kept the first time may have been altered on its way."""
+_MAPPINGS = 2  # what is not kept the first time may have been altered on its way
 
 _COMMANDED = {objects.CONTROLWORD, objects.TARGET_POSITION, objects.TARGET_TORQUE, objects.INTERPOLATION_DATA}
 

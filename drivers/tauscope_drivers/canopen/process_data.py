@@ -59,8 +59,7 @@ def mapping_entries(objects: Sequence[DriveObject]) -> list[int]:
 
 
 RECEIVED_ID = 0x200
-SENT_ID = 0x180
-"""Identifiers of the first PDOs of node 0, by CiA 301's default connection set."""
+SENT_ID = 0x180  # identifiers of the first PDOs of node 0, by CiA 301's default connection set
 
 
 @dataclass(frozen=True)
@@ -92,8 +91,7 @@ def _parameters(communication: int, mapping: int, entries: int) -> PdoParameters
     )
 
 
-PDO_COUNT = 4
-"""PDOs with an identifier of their own by CiA 301's default connection set."""
+PDO_COUNT = 4  # PDOs with an identifier of their own by CiA 301's default connection set
 
 MEASURED = (objects.STATUSWORD, objects.TORQUE_ACTUAL, objects.POSITION_ACTUAL)
 MEASURED_WHERE_THERE = (objects.VELOCITY_ACTUAL, objects.ERROR_CODE)

@@ -58,8 +58,7 @@ def listed(faults: Sequence[Fault]) -> str:
     return "; ".join(str(fault) for fault in faults)
 
 
-BRAKING_S = 0.1
-"""Time in which a joint is brought to rest by targets, as fast as it may come to its speed limit [s]."""
+BRAKING_S = 0.1  # time in which a joint is brought to rest by targets, as fast as it may come to its speed limit [s]
 
 
 class HostBrake:

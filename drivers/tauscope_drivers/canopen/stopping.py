@@ -13,11 +13,8 @@ from tauscope_drivers.state import ArmState
 POLICY_GOALS = {StopPolicy.HOLD: Goal.QUICK_STOP, StopPolicy.TORQUE_OFF: Goal.SWITCH_ON_DISABLED}
 """What drives can do by themselves, and where that takes them."""
 
-STOP_S = 0.5
-"""Time for a stop by process data; drives that are not there by then are told one by one."""
-
-RESET_S = 0.1
-"""Time in which a drive leaves its fault, or is back in it because the cause persists."""
+STOP_S = 0.5  # time for a stop by process data; drives that are not there by then are told one by one
+RESET_S = 0.1  # time in which a drive leaves its fault, or is back in it because the cause persists
 
 PROMPT_CYCLES = 3
 """A frame that tells a drive to stop may be lost, and the answer that it has stopped comes a cycle later."""

@@ -31,8 +31,7 @@ Array = NDArray[np.float64]
 _POLICIES = {ControlMode.POSITION: frozenset([StopPolicy.HOLD]), ControlMode.TORQUE: frozenset([StopPolicy.TORQUE_OFF])}
 """What the servos do by themselves when their watchdog fires."""
 
-_SUSPECT_SILENCE = 0.8
-"""Part of the watchdog's time after which a cycle asks all servos whether theirs has fired."""
+_SUSPECT_SILENCE = 0.8  # part of the watchdog's time after which a cycle asks all servos whether theirs has fired
 
 
 class DynamixelArm(SerialServoArm[Session]):

@@ -17,8 +17,7 @@ CURRENT_BASED_POSITION_MODE = 5
 WATCHDOG_STEP_S = 0.02
 """Unit of Bus Watchdog on every family [s]: e-Manual, Bus Watchdog of X, P and Y (100 is 2 000 ms)."""
 
-WATCHDOG_MOST = 127
-"""Largest value of Bus Watchdog; -1 is what it latches to."""
+WATCHDOG_MOST = 127  # largest value of Bus Watchdog; -1 is what it latches to
 
 _ARDUINO = "ROBOTIS Dynamixel2Arduino, table of units"
 _E_MANUAL = "ROBOTIS e-Manual, unit of Present Current"
@@ -123,8 +122,7 @@ _SIGNED = re.compile(
 STATE_ITEMS = ("Present Current", "Present Velocity", "Present Position")
 """What every cycle reads; one contiguous block on every family."""
 
-BYTES_BEFORE_STATE = 3
-"""Bytes of other items right before that block, on every family."""
+BYTES_BEFORE_STATE = 3  # bytes of other items right before that block, on every family
 
 
 @dataclass(frozen=True)

@@ -22,12 +22,10 @@ from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S, SHORTEST_
 from tauscope_drivers.serial_servos.doctor import examine_bus, measure_loop_rate, scan_bauds
 
 _SECONDARY = ("Secondary ID", "Secondary(Shadow) ID")
-_MOST_TURNS = 256
-"""Goal Position reaches this many turns both ways."""
+_MOST_TURNS = 256  # Goal Position reaches this many turns both ways
 
 _EXAMINED = ("Torque Enable", "Bus Watchdog", *_SECONDARY)
-_LEAST_FIRMWARE = 45
-"""Of the X series for Fast Sync Read and all bits of Drive Mode."""
+_LEAST_FIRMWARE = 45  # of the X series for Fast Sync Read and all bits of Drive Mode
 
 
 def examine(joints: Sequence[DriveJoint], *, slack_s: float = 0.002) -> list[Finding]:

@@ -14,11 +14,8 @@ from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers
 
 Array = NDArray[np.float64]
 
-PROBES = 3
-"""How often Fast Sync Read is tried before the firmware counts as not knowing it."""
-
-PLAIN_CYCLES = 50
-"""For how many cycles each servo answers for itself, after a common packet broke off at a silent one."""
+PROBES = 3  # how often Fast Sync Read is tried before the firmware counts as not knowing it
+PLAIN_CYCLES = 50  # for how many cycles each servo answers for itself, after a common packet broke off at a silent one
 
 _CURRENT, _VELOCITY, _POSITION = STATE_ITEMS
 

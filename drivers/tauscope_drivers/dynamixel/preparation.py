@@ -22,8 +22,7 @@ SETTINGS = (
 )
 """Items that are read of each servo when it is reached."""
 
-ANSWERS_ALL = 2
-"""Status Return Level of a servo that answers every instruction."""
+ANSWERS_ALL = 2  # Status Return Level of a servo that answers every instruction
 
 _TIME_BASED_PROFILE = 0x04
 _TORQUE_ON_BY_GOAL = 0x08

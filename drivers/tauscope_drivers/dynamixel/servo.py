@@ -7,8 +7,7 @@ from tauscope_drivers.dynamixel.configuration import ServoConfiguration
 from tauscope_drivers.dynamixel.control_table import ServoModel, find_model, find_model_by_name
 from tauscope_drivers.errors import DriverError
 
-MULTI_TURN_COUNTS = 1_048_575
-"""Goal Position reaches this far both ways in the current-based position mode of X and MX."""
+MULTI_TURN_COUNTS = 1_048_575  # Goal Position reaches this far both ways in the current-based position mode of X and MX
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,7 @@ from tauscope_drivers.serial_servos.budget import (
 from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers
 from tauscope_drivers.state import ArmState, Setpoint
 
-WATCHDOG_RANGE_S = (0.02, 2.5)
-"""Silence of the host after which no goal is sent until the fault is acknowledged [s]."""
+WATCHDOG_RANGE_S = (0.02, 2.5)  # silence of the host after which no goal is sent until the fault is acknowledged [s]
 
 _NO_WATCHDOG = "the servos have no watchdog: without their host they hold their last goal"
 

@@ -12,8 +12,7 @@ from tauscope_drivers.serial_servos.budget import CycleTraffic
 from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers, SerialServoBus
 
 _ASK_BYTES = 8
-_GOAL_BYTES = 7
-"""ID, position, time and speed."""
+_GOAL_BYTES = 7  # ID, position, time and speed
 
 
 def count_traffic(servos: int) -> CycleTraffic:

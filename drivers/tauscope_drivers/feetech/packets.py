@@ -15,8 +15,7 @@ HEADER = b"\xff\xff"
 BROADCAST_ID = 0xFE
 HIGHEST_ID = 253
 
-ANSWER_BYTES = 6
-"""Of an answer without data."""
+ANSWER_BYTES = 6  # of an answer without data
 
 LONGEST_FRAME = 259
 

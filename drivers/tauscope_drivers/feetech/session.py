@@ -22,8 +22,7 @@ from tauscope_drivers.feetech.servo import JointServo
 from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S
 from tauscope_drivers.serial_servos.bus import PATIENCE_S, learn_latency
 
-_PROBES = 3
-"""Answers by which the latency of an adapter is learnt."""
+_PROBES = 3  # answers by which the latency of an adapter is learnt
 
 _SILENCE = "no goal was sent in time; the servos hold their last one"
 _WATCHDOG = Fault("watchdog", None, _SILENCE, "make sure the host runs, then acknowledge")

@@ -12,11 +12,8 @@ from tauscope_drivers.serial_port import BITS_PER_BYTE
 LARGEST_LOAD = 0.85
 """Share of a cycle that the bus may take; the rest is for the servos' own turnaround and for the host."""
 
-RETURN_DELAY_UNIT_S = 2e-6
-"""One unit of Return Delay Time [s]."""
-
-SHORTEST_RETURN_DELAY_S = 2e-6
-"""Of a servo whose Return Delay Time is 0 [s]."""
+RETURN_DELAY_UNIT_S = 2e-6  # one unit of Return Delay Time [s]
+SHORTEST_RETURN_DELAY_S = 2e-6  # of a servo whose Return Delay Time is 0 [s]
 
 
 @dataclass(frozen=True)

@@ -9,20 +9,14 @@ from typing import Generic, TypeVar
 from tauscope_drivers.clock import AnswerTime, Clock, MonotonicClock
 from tauscope_drivers.serial_port import BITS_PER_BYTE, SerialPort
 
-FACTORY_RETURN_DELAY_S = 500e-6
-"""Return Delay Time of a servo as delivered: 250 units [s]."""
-
-ATTEMPTS = 3
-"""How often a single servo is asked outside the control loop."""
-
-PATIENCE_S = 0.02
-"""How much longer a single servo is waited for there [s]."""
+FACTORY_RETURN_DELAY_S = 500e-6  # Return Delay Time of a servo as delivered: 250 units [s]
+ATTEMPTS = 3  # how often a single servo is asked outside the control loop
+PATIENCE_S = 0.02  # how much longer a single servo is waited for there [s]
 
 _LATEST_ANSWER_NS = 500_000_000
 """Answers have come 133 ms late where a machine stood still; a control loop gives an arm up long before this."""
 
-_PING_SLOT_S = 0.003
-"""Time that a ping to all leaves each ID [s]."""
+_PING_SLOT_S = 0.003  # time that a ping to all leaves each ID [s]
 
 _Status = TypeVar("_Status")
 
@@ -47,8 +41,7 @@ class FrameParser(ABC):
     """Finds whole frames in what comes from a port; noise and damaged frames are passed over, and counted."""
 
     header: bytes
-    fixed_bytes: int
-    """Bytes from which a frame's end is known."""
+    fixed_bytes: int  # bytes from which a frame's end is known
 
     def __init__(self, longest: int) -> None:
         """Begin with nothing.

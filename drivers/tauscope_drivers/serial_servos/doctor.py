@@ -12,8 +12,7 @@ from tauscope_drivers.serial_servos.budget import BusTiming, CycleTraffic, large
 from tauscope_drivers.serial_servos.bus import Answers, SerialServoBus
 from tauscope_drivers.serial_servos.configuration import BusConfiguration
 
-MEASURED_CYCLES = 50
-"""Reads of which the loop rate is measured."""
+MEASURED_CYCLES = 50  # reads of which the loop rate is measured
 
 _Servo = TypeVar("_Servo")
 _Bus = TypeVar("_Bus", bound=SerialServoBus[Any])

@@ -120,7 +120,7 @@ class EmulatedDrive:
         self._outbox: list[Frame] = [(0x700 + self.node_id, b"\0")]
 
     def receive(self, frame: Frame, now_s: float) -> list[Frame]:
-        """Answers to a frame of the bus. `now_s`: when it came [s]."""
+        """Answers to a frame of the bus. it came [s]."""
         identifier, payload = frame
         if identifier == _NMT and len(payload) == 2 and payload[1] in (0, self.node_id):
             self._follow_network(payload[0])
@@ -136,10 +136,7 @@ class EmulatedDrive:
         return []
 
     def tick(self, now_s: float) -> list[Frame]:
-        """What the drive sends by itself by an instant: boot-up, heartbeat, emergencies.
-
-        `now_s`: present instant [s].
-        """
+        """What the drive sends by itself by an instant: boot-up, heartbeat, emergencies."""
         self._watch_master(now_s)
         frames, self._outbox = self._outbox, []
         period_s = self.dictionary.get(0x1017) / 1e3

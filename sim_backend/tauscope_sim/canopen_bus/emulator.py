@@ -10,8 +10,7 @@ from tauscope_sim.canopen_bus.power_state import PowerState
 from tauscope_sim.emulation.emulator import STEP_S, Emulator
 from tauscope_sim.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault
 
-_TICKS_PER_MEASUREMENT = 10
-"""While nobody asks: a drive that has stopped has to see that it stands."""
+_TICKS_PER_MEASUREMENT = 10  # while nobody asks: a drive that has stopped has to see that it stands
 
 _SYNC = 0x080
 _OVER_TEMPERATURE, _OVERLOAD = 0x4310, 0x7121
@@ -30,7 +29,7 @@ class CanEmulator(Emulator):
     ) -> None:
         """Everything at rest.
 
-        `now_s`: present instant [s]; `bit_rate`: of the bus; infinite where frames shall arrive at once [bit/s].
+        `bit_rate`: of the bus; infinite where frames shall arrive at once [bit/s].
         """
         super().__init__(now_s)
         self.drives = tuple(drives)
@@ -57,8 +56,6 @@ class CanEmulator(Emulator):
 
         Drives hear it before they catch up: it may have waited while this process slept, and its sleep is no silence of
         the master. SYNC is different: they sample when it comes, and the time of interpolation is counted from then.
-
-        `now_s`: when [s].
         """
         frames, answers = self._line.take(data)
         self._answers += answers
@@ -77,7 +74,7 @@ class CanEmulator(Emulator):
         self.advance_to(now_s)
 
     def due(self, now_s: float) -> bytes:
-        """Text that has reached the host by now. `now_s`: present instant [s]."""
+        """Text that has reached the host by now."""
         text, self._answers = self._answers, b""
         return text + b"".join(map(self._line.text, self._wire.take_arrived(now_s)))
 

@@ -79,8 +79,7 @@ def _frame(line: bytes) -> Frame | None:
     return (identifier, payload) if sent == length <= 8 else None
 
 
-_FRAME = struct.Struct("=IB3x8s")
-"""The kernel's ``struct can_frame``: identifier with flags, length, padding, data."""
+_FRAME = struct.Struct("=IB3x8s")  # the kernel's ``struct can_frame``: identifier with flags, length, padding, data
 
 _HIGHEST_IDENTIFIER = 0x7FF
 _LONGEST = 8
@@ -137,8 +136,7 @@ class SocketLine:
         return _FRAME.pack(identifier, len(payload), payload)
 
 
-_FRAME_BITS = 47
-"""Of a standard frame without data, with the space behind it."""
+_FRAME_BITS = 47  # of a standard frame without data, with the space behind it
 
 _BITS_PER_STUFFED_BIT = 5.0
 
@@ -161,7 +159,7 @@ class Wire:
     def carry(self, frames: list[Frame], now_s: float) -> None:
         """Send frames of the drives to the adapter.
 
-        `frames`: list of (int, bytes), that want to be sent now; `now_s`: present instant [s].
+        `frames`: list of (int, bytes), that want to be sent now.
         """
         for frame in sorted(frames):
             self._free_s = max(now_s, self._free_s) + self.duration_s(frame)
@@ -170,11 +168,11 @@ class Wire:
                 heapq.heappush(self._arriving, (arrival_s, self._count, frame))
 
     def occupy(self, frame: Frame, now_s: float) -> None:
-        """Let a frame of the master take its time. `now_s`: present instant [s]."""
+        """Let a frame of the master take its time."""
         self._free_s = max(now_s, self._free_s) + self.duration_s(frame)
 
     def take_arrived(self, now_s: float) -> list[Frame]:
-        """Frames that have reached the adapter. `now_s`: present instant [s]."""
+        """Frames that have reached the adapter."""
         frames = []
         while self._arriving and self._arriving[0][0] <= now_s:
             frames.append(heapq.heappop(self._arriving)[2])

@@ -45,7 +45,7 @@ class CanOrder(EmulatorOrder):
         return super().open_port() if self._interface is None else CanSocket(self._interface)
 
     def build(self, now_s: float) -> CanEmulator:
-        """The emulator. `now_s`: present instant [s]."""
+        """The emulator."""
         robot = read_robot(Path(self.robot))
         scenario = Scenario() if self.scenario is None else read_scenario(Path(self.scenario), robot)
         drives = []

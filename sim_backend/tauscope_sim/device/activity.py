@@ -8,25 +8,18 @@ from tauscope_drivers import ControlMode, StopPolicy
 class Activity(StrEnum):
     """What the drives do with the arm."""
 
-    BRAKED = "braked"
-    """Never yet under power: the brakes carry the arm, which stands still."""
-    TRACKING = "tracking"
-    """Following the host's positions."""
-    TORQUE = "torque"
-    """Giving the torque that the host commands."""
-    HOLDING = "holding"
-    """Stopped; under power where it stands."""
-    DAMPING = "damping"
-    """Stopped; resisting motion in proportion to speed."""
-    FREE = "free"
-    """Stopped; no torque and no brake: an arm that is not balanced falls."""
+    BRAKED = "braked"  # never yet under power: the brakes carry the arm, which stands still
+    TRACKING = "tracking"  # following the host's positions
+    TORQUE = "torque"  # giving the torque that the host commands
+    HOLDING = "holding"  # stopped; under power where it stands
+    DAMPING = "damping"  # stopped; resisting motion in proportion to speed
+    FREE = "free"  # stopped; no torque and no brake: an arm that is not balanced falls
 
 
 COMMANDED = frozenset({Activity.TRACKING, Activity.TORQUE})
 """What needs the host's setpoints: here the watchdog is armed."""
 
-POWERED = COMMANDED | {Activity.HOLDING, Activity.DAMPING}
-"""Where the drives hold or drive the joints."""
+POWERED = COMMANDED | {Activity.HOLDING, Activity.DAMPING}  # where the drives hold or drive the joints
 
 TRANSITIONS: dict[Activity, frozenset[Activity]] = {
     Activity.BRAKED: COMMANDED,

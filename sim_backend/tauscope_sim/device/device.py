@@ -19,14 +19,9 @@ from tauscope_sim.scenario import Scenario
 
 Array = NDArray[np.float64]
 
-TICK_NS = 500_000
-"""Time between two ticks of the drives: 2 kHz [ns]."""
-
-HOTTEST = 85.0
-"""Temperature of a motor above which its drive reports a fault [°C]."""
-
-WATCHDOG_RANGE_S = (0.005, 10.0)
-"""Shortest and longest time of the watchdog [s]."""
+TICK_NS = 500_000  # time between two ticks of the drives: 2 kHz [ns]
+HOTTEST = 85.0  # temperature of a motor above which its drive reports a fault [°C]
+WATCHDOG_RANGE_S = (0.005, 10.0)  # shortest and longest time of the watchdog [s]
 
 _TICK_S = TICK_NS * 1e-9
 _TICKS_PER_TEMPERATURE = 64
@@ -104,10 +99,7 @@ class SimulatedDevice:
         return self._mechanism.true.link_position, self._mechanism.true.link_velocity
 
     def advance_to(self, time_ns: int) -> None:
-        """Let time pass: every tick up to and at an instant is carried out.
-
-        `time_ns`: device time; one that has passed changes nothing [ns].
-        """
+        """Carry out every tick up to and at an instant; one that has passed changes nothing."""
         last = (time_ns - self._start_ns) // TICK_NS
         while self._tick <= last:
             if self._activity is Activity.BRAKED and not self._disturbances.waiting:

@@ -34,12 +34,9 @@ REMEDIES = {
 class Disturbance(StrEnum):
     """What a test can make happen to a joint."""
 
-    LOST_SAMPLE = "lost-sample"
-    """The joint does not answer: its readings are missing."""
-    OVER_TEMPERATURE = "over-temperature"
-    """The motor's temperature rises by the size [K]."""
-    OVERLOAD = "overload"
-    """The drive reports an overload."""
+    LOST_SAMPLE = "lost-sample"  # the joint does not answer: its readings are missing
+    OVER_TEMPERATURE = "over-temperature"  # the motor's temperature rises by the size [K]
+    OVERLOAD = "overload"  # the drive reports an overload
     ENCODER_JUMP = "encoder-jump"
     """The encoder slips by the size [rad or m], for the drive's own loop too, and stays so."""
 
@@ -61,7 +58,7 @@ class Injection:
     size: float = 0.0
 
     def active_at(self, time_ns: int) -> bool:
-        """Whether it acts at an instant. `time_ns`: device time [ns]."""
+        """Whether it acts at an instant."""
         return self.start_ns <= time_ns and (self.duration_ns is None or time_ns < self.start_ns + self.duration_ns)
 
 
@@ -98,16 +95,12 @@ class Disturbances:
     """What acts now."""
 
     def __init__(self, joint_count: int) -> None:
-        self.slip: Array = np.zeros(joint_count)
-        """slip of the encoders so far [rad or m]"""
-        self.heat: Array = np.zeros(joint_count)
-        """rise of the motors' temperature [K]"""
-        self.lost: NDArray[np.bool_] = np.zeros(joint_count, dtype=np.bool_)
-        """joints that do not answer"""
+        self.slip: Array = np.zeros(joint_count)  # slip of the encoders so far [rad or m]
+        self.heat: Array = np.zeros(joint_count)  # rise of the motors' temperature [K]
+        self.lost: NDArray[np.bool_] = np.zeros(joint_count, dtype=np.bool_)  # joints that do not answer
         self.overloaded: NDArray[np.bool_] = np.zeros(joint_count, dtype=np.bool_)
         """joints whose drive reports an overload"""
-        self.any = False
-        """whether anything was ever injected"""
+        self.any = False  # whether anything was ever injected
         self._injections: list[Injection] = []
 
     @property
@@ -121,7 +114,7 @@ class Disturbances:
         self._injections.append(injection)
 
     def update(self, time_ns: int) -> None:
-        """Renew what acts at an instant. `time_ns`: device time [ns]."""
+        """Renew what acts at an instant."""
         if not self._injections:
             return
         for values in (self.heat, self.lost, self.overloaded):

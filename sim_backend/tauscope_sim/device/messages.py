@@ -16,11 +16,8 @@ from tauscope_drivers import ArmState, ControlMode, DriveLimits, DriverError, Fa
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device.faults import Disturbance, Injection
 
-PROTOCOL = 1
-"""Version that host and device have to agree on."""
-
-LARGEST_BODY = 65536
-"""Longest body that is accepted [B]."""
+PROTOCOL = 1  # version that host and device have to agree on
+LARGEST_BODY = 65536  # longest body that is accepted [B]
 
 _HEADER = struct.Struct("<BxxxII")
 

@@ -69,17 +69,10 @@ class TraceWriter:
         os.write(self._file, (line + "\n").encode())
 
 
-PASS_NS = 2_000_000
-"""The drives are carried forward at least this often [ns]."""
-
-PASS_AT_REST_NS = 20_000_000
-"""Likewise while the arm is braked [ns]."""
-
-LATE_NS = 6_000_000
-"""Being later than this counts as an overrun [ns]."""
-
-OLDEST_NS = 100_000_000
-"""A setpoint that claims to have been sent longer ago counts as sent this long ago [ns]."""
+PASS_NS = 2_000_000  # the drives are carried forward at least this often [ns]
+PASS_AT_REST_NS = 20_000_000  # likewise while the arm is braked [ns]
+LATE_NS = 6_000_000  # being later than this counts as an overrun [ns]
+OLDEST_NS = 100_000_000  # a setpoint that claims to have been sent longer ago counts as sent this long ago [ns]
 
 _PEER = struct.Struct("3i")
 

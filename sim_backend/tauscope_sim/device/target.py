@@ -24,8 +24,7 @@ _MEMORY = 200
 _INTERVALS = 15
 _CHANGE_OF_PACE = 0.1
 _FIRST_PERIOD = 4.0
-_TOLD = 20
-"""A grid whose period was told begins as one that rests on so many arrivals."""
+_TOLD = 20  # a grid whose period was told begins as one that rests on so many arrivals
 
 _OFF_THE_GRID = 15
 """After so many arrivals in a row that are off the grid on the same side, it is the grid that is wrong."""
@@ -173,8 +172,7 @@ STOP_TIME_S = 0.1
 DEFAULT_ACCELERATION = 20.0
 """With which a target catches up with setpoints that leapt, where the robot file states no limit [rad/s² or m/s²]."""
 
-ROOM = 2.0
-"""Multiple of the robot file's acceleration that setpoints may have without counting as a leap."""
+ROOM = 2.0  # multiple of the robot file's acceleration that setpoints may have without counting as a leap
 
 _ROUNDING = 1e-9
 _LEAP = 0.02

@@ -14,8 +14,7 @@ from tauscope.robot import Robot, robot_to_dict
 from tauscope_drivers import DriverError
 from tauscope_sim.own_process import process_environment
 
-START_TIMEOUT_S = 60.0
-"""Time within which the process has to be ready [s]."""
+START_TIMEOUT_S = 60.0  # time within which the process has to be ready [s]
 
 _LONGEST_SOCKET_PATH = 107
 

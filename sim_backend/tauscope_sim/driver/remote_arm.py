@@ -41,8 +41,7 @@ from tauscope_sim.device.messages import (
     encode_stop,
 )
 
-LARGEST_RATE_HZ = 1000.0
-"""Cycles a second that a connection carries with some time to spare [Hz]."""
+LARGEST_RATE_HZ = 1000.0  # cycles a second that a connection carries with some time to spare [Hz]
 
 _PATIENCE_S = 2.0
 

@@ -40,8 +40,7 @@ class AnswerFaults:
         return [(due_s, frame), (due_s, frame)]
 
 
-Delivery = tuple[float, bytes]
-"""When bytes arrive at the master [s], and which."""
+Delivery = tuple[float, bytes]  # when bytes arrive at the master [s], and which
 
 PING, READ, WRITE, REG_WRITE, ACTION, REBOOT, CLEAR = 0x01, 0x02, 0x03, 0x04, 0x05, 0x08, 0x10
 SYNC_READ, SYNC_WRITE, FAST_SYNC_READ, BULK_READ, BULK_WRITE, FAST_BULK_READ = 0x82, 0x83, 0x8A, 0x92, 0x93, 0x9A
@@ -79,10 +78,7 @@ class EmulatedBus:
             self._handlers |= {FAST_SYNC_READ: self._fast_sync_read}
 
     def hear(self, data: bytes, now_s: float) -> list[Instruction]:
-        """Instructions in the bytes of a master; every servo that is there hears them, which contents its watchdog.
-
-        `now_s`: when [s].
-        """
+        """Instructions in the bytes of a master; every servo that is there hears them, which contents its watchdog."""
         instructions = self._parser.feed(data)
         if instructions:
             for servo in self._present(now_s):
@@ -90,7 +86,7 @@ class EmulatedBus:
         return instructions
 
     def answer(self, instructions: Iterable[Instruction], now_s: float) -> list[Delivery]:
-        """Carry instructions out and answer them. `now_s`: present instant [s]."""
+        """Carry instructions out and answer them."""
         deliveries: list[Delivery] = []
         for instruction in instructions:
             end_s = max(now_s, self._free_s) + self._wire_s(instruction.length)
@@ -103,7 +99,7 @@ class EmulatedBus:
         return self._handlers.get(instruction.code, self._refuse)(instruction, end_s)
 
     def run_faults(self, now_s: float) -> None:
-        """Let the faults happen that are due. `now_s`: present instant [s]."""
+        """Let the faults happen that are due."""
         self.schedule.run(now_s, lambda fault: self._carry_out(fault, now_s))
 
     def _carry_out(self, fault: InjectedFault, now_s: float) -> None:

@@ -24,7 +24,7 @@ class DynamixelEmulator(Emulator):
     def __init__(self, bus: EmulatedBus, arm: "Pendulums | PlantArm", now_s: float, *, latency_s: float = 0.0) -> None:
         """Everything at rest. The arm stands on a stand until all its servos have had torque once.
 
-        `now_s`: present instant [s]; `latency_s`: how much later than over the wire an answer reaches the master: the
+        `latency_s`: how much later than over the wire an answer reaches the master: the
         latency of an adapter [s].
         """
         super().__init__(now_s)
@@ -53,8 +53,6 @@ class DynamixelEmulator(Emulator):
 
         They are heard before the device catches up with the clock: they may have waited while this process slept, and
         its sleep is no silence of the master.
-
-        `now_s`: when [s].
         """
         instructions = self.bus.hear(data, now_s)
         self._clock.catch_up(now_s, self._step, ALL_STEPS)
@@ -65,7 +63,7 @@ class DynamixelEmulator(Emulator):
             heapq.heappush(self._outgoing, (due_s + self._latency_s, self._count, frame))
 
     def due(self, now_s: float) -> bytes:
-        """Bytes that have reached the master by now. `now_s`: present instant [s]."""
+        """Bytes that have reached the master by now."""
         arrived = b""
         while self._outgoing and self._outgoing[0][0] <= now_s:
             arrived += heapq.heappop(self._outgoing)[2]

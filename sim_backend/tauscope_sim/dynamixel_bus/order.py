@@ -52,7 +52,7 @@ class ServoOrder(EmulatorOrder, Generic[_Servo]):
         """The servos on their bus."""
 
     def build(self, now_s: float) -> DynamixelEmulator:
-        """The emulator. `now_s`: present instant [s]."""
+        """The emulator."""
         return DynamixelEmulator(self.make_bus(), self._arm(), now_s, latency_s=self.latency_s)
 
     def _arm(self) -> "Pendulums | PlantArm":

@@ -40,8 +40,7 @@ class Demand:
     cap: float = 0.0
 
 
-RELEASED = Demand(tracks=False)
-"""No torque."""
+RELEASED = Demand(tracks=False)  # no torque
 
 
 class ServoLoop:
@@ -182,7 +181,7 @@ class EmulatedServo:
         return self.memory.get("Return Delay Time") * 2e-6
 
     def hear(self, now_s: float) -> None:
-        """An instruction went over the bus: the watchdog begins anew. `now_s`: when [s]."""
+        """An instruction went over the bus: the watchdog begins anew."""
         self._heard_s = now_s
 
     def write(self, address: int, data: bytes) -> None:
@@ -253,7 +252,7 @@ class EmulatedServo:
     def demand(self, position: float, now_s: float, duration_s: float) -> Demand:
         """What the servo wants of its joint for the next stretch of time.
 
-        `position`: of the joint [rad or m]; `now_s`: present instant [s]; `duration_s`: since the last call [s].
+        `position`: of the joint [rad or m]; `duration_s`: since the last call [s].
         """
         if not self.has_torque:
             self._heard_s = now_s
@@ -276,10 +275,7 @@ class EmulatedServo:
         self._motion = (position, velocity)
 
     def sense(self, now_s: float, part: float = 1.0) -> None:
-        """Show the present measurement in the control table: position, velocity and current of one instant.
-
-        `now_s`: present instant [s].
-        """
+        """Show the present measurement in the control table: position, velocity and current of one instant."""
         older, newer = self._means(0), self._means(1)
         position, velocity, current = ((1.0 - part) * old + part * new for old, new in zip(older, newer, strict=True))
         figures = self.specification.figures

@@ -14,8 +14,7 @@ from tauscope.robot.messages import shown
 from tauscope.robot.robot import Joint, Robot
 from tauscope_sim.plant.term import Coordinates, Forces, Moment, Slopes, Term, Transmission
 
-LARGEST_EXPONENT = 10.0
-"""Of a power law in speed or angle."""
+LARGEST_EXPONENT = 10.0  # of a power law in speed or angle
 
 
 def _not_negative(value: float) -> float:
@@ -85,8 +84,7 @@ Array = NDArray[np.float64]
 class ScenarioEntry(Document):
     """One entry of a scenario's list of effects: its fields are the entry's keys."""
 
-    effect_id: ClassVar[str] = ""
-    """id of CONTRACT.md, the entry's key ``effect``"""
+    effect_id: ClassVar[str] = ""  # id of CONTRACT.md, the entry's key ``effect``
 
     def check(self, robot: Robot) -> None:
         """Refuse an entry that this robot cannot have. Raises ScenarioError naming effect and key."""
@@ -169,12 +167,9 @@ Law = tuple[Callable[[float, float], float], Callable[[float, float], tuple[floa
 class Side(StrEnum):
     """Where in the joint a torque acts."""
 
-    FRICTION = "friction"
-    """on the motor's side, as friction that heats the joint"""
-    MOTOR = "motor"
-    """on the motor's side"""
-    LINK = "link"
-    """on the link's side: part of the load that the transmission carries"""
+    FRICTION = "friction"  # on the motor's side, as friction that heats the joint
+    MOTOR = "motor"  # on the motor's side
+    LINK = "link"  # on the link's side: part of the load that the transmission carries
 
 
 class JointLaw(JointEffect):

@@ -24,8 +24,7 @@ from tauscope_sim.plant.term import AMBIENT, Coordinates, Forces, Moment, Slopes
 
 Array = NDArray[np.float64]
 
-LARGEST_EXPONENT = 20.0
-"""Beyond any oil: keeps nonsense coefficients from overflowing."""
+LARGEST_EXPONENT = 20.0  # beyond any oil: keeps nonsense coefficients from overflowing
 
 
 class FrictionDrift(JointEffect):

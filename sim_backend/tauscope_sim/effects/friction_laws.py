@@ -114,8 +114,7 @@ class AsymmetricViscous(JointLaw):
         return (lambda q, v: self.amplitude * max(v, 0.0), lambda q, v: (0.0, self.amplitude if v > 0.0 else 0.0))
 
 
-LEAST_SPEED = 1e-3
-"""Below this the slope of a root is taken as here: it has none at zero [rad/s or m/s]."""
+LEAST_SPEED = 1e-3  # below this the slope of a root is taken as here: it has none at zero [rad/s or m/s]
 
 
 class NonlinearViscous(JointLaw):

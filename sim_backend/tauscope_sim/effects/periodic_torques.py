@@ -119,8 +119,7 @@ class JointSpring(JointLaw):
         return (lambda q, v: self.stiffness * (q - self.rest)), (lambda q, v: (self.stiffness, 0.0))
 
 
-LEAST_STRETCH = 1e-6
-"""Below this the slope of a root is taken as here [rad or m]."""
+LEAST_STRETCH = 1e-6  # below this the slope of a root is taken as here [rad or m]
 
 
 class CableForce(JointLaw):

@@ -81,8 +81,7 @@ class _Saturation:
         return position, recorded
 
 
-LONGEST_DELAY = 1.0
-"""What is late by more is no delay of a channel [s]."""
+LONGEST_DELAY = 1.0  # what is late by more is no delay of a channel [s]
 
 
 class TimeDelay(SensorEffect):

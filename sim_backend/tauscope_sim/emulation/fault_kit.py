@@ -10,26 +10,17 @@ from typing import Any
 class FaultKind(StrEnum):
     """What happens."""
 
-    LOSE = "lose"
-    """The device's next answers do not arrive."""
-    CORRUPT = "corrupt"
-    """One bit of them is wrong."""
-    LATE = "late"
-    """They arrive `seconds` late."""
-    DUPLICATE = "duplicate"
-    """They arrive twice."""
-    SILENT = "silent"
-    """The device neither hears nor answers for `seconds`."""
-    BUS_OFF = "bus-off"
-    """Its CAN controller has seen too many errors and leaves the bus for `seconds`; on CAN alone."""
+    LOSE = "lose"  # the device's next answers do not arrive
+    CORRUPT = "corrupt"  # one bit of them is wrong
+    LATE = "late"  # they arrive `seconds` late
+    DUPLICATE = "duplicate"  # they arrive twice
+    SILENT = "silent"  # the device neither hears nor answers for `seconds`
+    BUS_OFF = "bus-off"  # its CAN controller has seen too many errors and leaves the bus for `seconds`; on CAN alone
     OVER_TEMPERATURE = "over-temperature"
     OVERLOAD = "overload"
-    ENCODER_JUMP = "encoder-jump"
-    """Its position jumps by `counts`."""
-    RESET = "reset"
-    """The device restarts and is away for `seconds`."""
-    POWER_DIP = "power-dip"
-    """All devices restart and are away for `seconds`."""
+    ENCODER_JUMP = "encoder-jump"  # its position jumps by `counts`
+    RESET = "reset"  # the device restarts and is away for `seconds`
+    POWER_DIP = "power-dip"  # all devices restart and are away for `seconds`
 
 
 @dataclass(frozen=True)
@@ -50,7 +41,7 @@ class InjectedFault:
 
 
 def faults_from(documents: Iterable[dict[str, Any]], now_s: float) -> list[InjectedFault]:
-    """Faults that a test asks for, by the emulator's clock. `now_s`: present instant [s]."""
+    """Faults that a test asks for, by the emulator's clock."""
     return [
         InjectedFault(**{**document, "kind": FaultKind(document["kind"]), "at_s": now_s + document["at_s"]})
         for document in documents
@@ -78,6 +69,6 @@ class FaultSchedule:
             heapq.heappush(self._queue, _Scheduled(fault.at_s, self._number, fault))
 
     def run(self, now_s: float, carry_out: Callable[[InjectedFault], None]) -> None:
-        """Carry out what is due. `now_s`: present instant [s]."""
+        """Carry out what is due."""
         while self._queue and self._queue[0].at_s <= now_s:
             carry_out(heapq.heappop(self._queue).fault)

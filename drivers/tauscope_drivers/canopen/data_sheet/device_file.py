@@ -28,8 +28,7 @@ _DEVICE = {"deviceinfo": "DeviceInfo", "devicecomissioning": "DeviceComissioning
 _OF_COMPACT = ("DataType", "AccessType", "PDOMapping", "DefaultValue")
 _MOST_SUBINDICES = 254
 
-Sections = dict[str, dict[str, str]]
-"""Keywords and values of each section."""
+Sections = dict[str, dict[str, str]]  # keywords and values of each section
 
 
 class DataSheetError(ValueError):
@@ -133,8 +132,7 @@ def _place(error: configparser.Error) -> str:
     return "is no EDS or DCF file; give one"
 
 
-LARGEST_FILE = 8 * 1024 * 1024
-"""Makers' files of drives have some hundred kilobytes [bytes]."""
+LARGEST_FILE = 8 * 1024 * 1024  # makers' files of drives have some hundred kilobytes [bytes]
 
 _TYPE_NAMES = (
     *("BOOLEAN", "INTEGER8", "INTEGER16", "INTEGER32", "UNSIGNED8", "UNSIGNED16", "UNSIGNED32", "REAL32"),
