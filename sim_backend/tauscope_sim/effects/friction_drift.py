@@ -51,7 +51,6 @@ class FrictionDrift(JointEffect):
             raise self.refused("joint", "has no friction in the robot file that could drift; state model.friction")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The warming joint."""
         friction = (robot.model.friction or ())[self.index]
         shape = shape_constants([friction], [self.joint_of(robot).friction_shape])[0]
         place = coordinates.motor(self.index)

@@ -40,7 +40,6 @@ class TorqueGainError(SensorEffect):
     gain: Nonzero
 
     def channel(self, joint_count: int) -> Channel:
-        """The scaling."""
         gains = np.ones(joint_count)
         gains[self.joint - 1] = self.gain
         return _Gain(gains)
@@ -66,7 +65,6 @@ class TorqueSaturation(SensorEffect):
     shape: Annotated[str, one_of("compression", "clip")] = "compression"
 
     def channel(self, joint_count: int) -> Channel:
-        """The saturation."""
         return _Saturation(self.joint - 1, self.level, self.shape == "clip")
 
 
@@ -102,7 +100,6 @@ class TimeDelay(SensorEffect):
             raise self.refused("delay", f"is {self.delay:g} s; state at most {LONGEST_DELAY:g} s")
 
     def channel(self, joint_count: int) -> Channel:
-        """The delay line."""
         columns = slice(None) if self.joint is None else slice(self.joint - 1, self.joint)
         return _DelayLine(self.delay, columns)
 
