@@ -15,8 +15,8 @@ from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, Dev
 from tauscope_drivers.canopen.data_sheet.settings import settings_of
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import DOUBTFUL, TARGETS
-from tauscope_drivers.canopen.pdo_mapping import read_mapping
-from tauscope_drivers.canopen.process_data import decode_mapping, received_parameters, sent_parameters
+from tauscope_drivers.canopen.pdo_mapping import read_mapping, require_plan
+from tauscope_drivers.canopen.process_data import decode_mapping
 from tauscope_drivers.canopen.session import possible_rate_hz
 from tauscope_drivers.canopen.state_machine import POWERED
 from tauscope_drivers.drive_block import DriveJoint
@@ -265,24 +265,16 @@ def _examine_mapping(node: DriveNode) -> list[Finding]:
     """Whether its PDOs hold all that is needed, or can be mapped so."""
     if ControlMode.POSITION not in node.mode_numbers:
         return []
-    plan = node.plan_for(ControlMode.POSITION)
-    if plan.missing:
-        detail = f"{plan.missing[0]} is in none of its PDOs, and their mapping is fixed"
-        return [Finding(Severity.FAILURE, node.place, detail, "map it with the maker's tool, or use another drive")]
+    plan = require_plan(node, ControlMode.POSITION)
     if node.configuration.device_file is not None:
-        return _compare_fixed(node)
+        for pdo in (pdo for pdo in (*plan.received, *plan.sent) if pdo.is_fixed):
+            held = decode_mapping(read_mapping(node, pdo.direction.parameters(pdo.number, 0)))
+            if held != pdo.layout.objects:
+                detail = f"its PDO {pdo.number + 1} is not mapped as its EDS or DCF file states"
+                return [Finding(Severity.FAILURE, node.place, detail, "give the file of this drive")]
+        return []
     detail = "has no EDS or DCF file: whether its objects and PDOs can be written shows only when a run writes them"
     return [Finding(Severity.WARNING, node.place, detail, "name its file as drive.eds")]
-
-
-def _compare_fixed(node: DriveNode) -> list[Finding]:
-    plan = node.plan_for(ControlMode.POSITION)
-    uses = [*((pdo, received_parameters) for pdo in plan.received), *((pdo, sent_parameters) for pdo in plan.sent)]
-    for pdo, parameters in uses:
-        if pdo.is_fixed and decode_mapping(read_mapping(node, parameters(pdo.number, 0))) != pdo.layout.objects:
-            detail = f"its PDO {pdo.number + 1} is not mapped as its EDS or DCF file states"
-            return [Finding(Severity.FAILURE, node.place, detail, "give the file of this drive")]
-    return []
 
 
 def _examine_abort(node: DriveNode) -> list[Finding]:

@@ -27,8 +27,6 @@ from tauscope_drivers.canopen.process_data import (
     decode_pdo,
     encode_pdo,
     plan_pdos,
-    received_identifier,
-    sent_identifier,
 )
 from tauscope_drivers.canopen.sdo import NodeDictionary
 from tauscope_drivers.canopen.state_machine import ENABLE_OPERATION, DriveState, Goal, decode_state, next_controlword
@@ -162,7 +160,7 @@ class DriveNode:
         """Listen to the frames of a plan from now on."""
         self.plan = plan
         for pdo in plan.sent:
-            identifier = sent_identifier(pdo.number, self.configuration.node_id)
+            identifier = pdo.direction.identifier(pdo.number, self.configuration.node_id)
             self.listen(identifier, lambda _, data, layout=pdo.layout: self._take(layout, data))
 
     def identify(self) -> frozenset[ControlMode]:
@@ -226,7 +224,7 @@ class DriveNode:
         values = {**self.held, objects.CONTROLWORD: controlword, target: quantity}
         try:
             return [
-                (received_identifier(pdo.number, self.configuration.node_id), encode_pdo(pdo.layout, values))
+                (pdo.direction.identifier(pdo.number, self.configuration.node_id), encode_pdo(pdo.layout, values))
                 for pdo in self.plan.received
             ]
         except OverflowError as error:

@@ -1,7 +1,5 @@
 """Whether a drive is what the driver needs and what its EDS or DCF file states."""
 
-from collections.abc import Iterator
-
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.data_sheet.device_file import TYPE_NAMES, DataSheetError, DescribedObject, DeviceFile
@@ -10,6 +8,9 @@ from tauscope_drivers.canopen.process_data import (
     MEASURED,
     MEASURED_WHERE_THERE,
     PDO_COUNT,
+    RECEIVED,
+    SENT,
+    PdoDirection,
     PdoSlot,
     PdoSlots,
     decode_mapping,
@@ -58,9 +59,11 @@ def require_target(file: DeviceFile, mode: ControlMode) -> None:
 
 def pdo_slots(file: DeviceFile) -> PdoSlots:
     """The PDOs of a drive, and which of them can be mapped."""
-    received = (_slot(file, number, 0x1400 + number, 0x1600 + number) for number in range(PDO_COUNT))
-    sent = (_slot(file, number, 0x1800 + number, 0x1A00 + number) for number in range(PDO_COUNT))
-    return PdoSlots(tuple(slot for slot in received if slot), tuple(slot for slot in sent if slot))
+    received, sent = (
+        tuple(slot for number in range(PDO_COUNT) if (slot := _slot(file, number, direction)))
+        for direction in (RECEIVED, SENT)
+    )
+    return PdoSlots(received, sent)
 
 
 def _target_flaws(file: DeviceFile, mode: ControlMode) -> list[str]:
@@ -80,23 +83,19 @@ def _target_flaws(file: DeviceFile, mode: ControlMode) -> list[str]:
     return [f"{entry} is in none of its PDOs, and their mapping cannot be written" for entry in missing]
 
 
-def _slot(file: DeviceFile, number: int, communication: int, mapping: int) -> PdoSlot | None:
+def _slot(file: DeviceFile, number: int, direction: PdoDirection) -> PdoSlot | None:
     """A PDO as the file describes it; None where it has none of this number."""
+    mapping = direction.mapping + number
     count = file.objects.get((mapping, 0))
-    if (communication, 1) not in file.objects or count is None:
+    if (direction.communication + number, 1) not in file.objects or count is None:
         return None
-    entries = list(_entries(file, mapping))
+    entries: list[DescribedObject] = []
+    while entry := file.objects.get((mapping, len(entries) + 1)):
+        entries.append(entry)
     if "w" in count.access and entries and all("w" in entry.access for entry in entries):
         return PdoSlot(number, entries=len(entries))
     words = [entry.default or 0 for entry in entries[: count.default or 0]]
     return PdoSlot(number, decode_mapping(words) or ())
-
-
-def _entries(file: DeviceFile, mapping: int) -> Iterator[DescribedObject]:
-    subindex = 1
-    while (entry := file.objects.get((mapping, subindex))) is not None:
-        yield entry
-        subindex += 1
 
 
 def _is_there(file: DeviceFile, entry: DriveObject) -> bool:
