@@ -13,18 +13,18 @@ from tauscope_drivers.canopen.bus import NMT_START, CanBus
 from tauscope_drivers.canopen.commissioning import commission_drive, write_settings
 from tauscope_drivers.canopen.configuration import BusConfiguration, read_configuration, require_targets
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST
-from tauscope_drivers.canopen.enabling import power_up
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.session import Session, blind_state, listed, possible_rate_hz, rate_limited_by
-from tauscope_drivers.canopen.state_machine import Goal
-from tauscope_drivers.canopen.stopping import (
+from tauscope_drivers.canopen.power import (
     POLICY_GOALS,
     dropped_faults,
+    power_up,
     reset_faults,
     stop_in_cycle,
     stop_one_by_one,
     stop_promptly,
 )
+from tauscope_drivers.canopen.session import Session, blind_state, listed, possible_rate_hz, rate_limited_by
+from tauscope_drivers.canopen.state_machine import Goal
 from tauscope_drivers.canopen.target_limiter import TargetLimiter
 from tauscope_drivers.clock import Clock, MonotonicClock
 from tauscope_drivers.drive_block import DriveJoint

@@ -9,8 +9,7 @@ from canopen.sdo.exceptions import SdoAbortedError
 from tauscope_drivers.backend import ControlMode, DriveLimits, StopPolicy
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import MASTER_NODE
-from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile
-from tauscope_drivers.canopen.data_sheet.settings import Setting, settings_of
+from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, Setting, settings_of
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import STAYING_OPTIONS, DriveObject
 from tauscope_drivers.canopen.pdo_mapping import map_process_data

@@ -13,14 +13,13 @@ from typing import Any
 
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
-from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, DeviceFile, read_device_file
+from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, DeviceFile, read_device_file, settings_of
 from tauscope_drivers.canopen.data_sheet.needs import (
     present_objects,
     require_needed,
     require_target,
     states_rated_torque,
 )
-from tauscope_drivers.canopen.data_sheet.settings import settings_of
 from tauscope_drivers.canopen.interfaces import OWN_OPTIONS
 from tauscope_drivers.canopen.objects import describe_absent
 from tauscope_drivers.drive_block import (

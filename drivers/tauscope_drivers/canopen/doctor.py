@@ -11,8 +11,7 @@ from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import CanBus
 from tauscope_drivers.canopen.commissioning import find_missing
 from tauscope_drivers.canopen.configuration import BusConfiguration, read_configuration
-from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile
-from tauscope_drivers.canopen.data_sheet.settings import settings_of
+from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile, settings_of
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import DOUBTFUL, TARGETS
 from tauscope_drivers.canopen.pdo_mapping import read_mapping, require_plan

@@ -10,8 +10,7 @@ from tauscope.errors import ScenarioError
 from tauscope.robot.robot import Robot
 from tauscope_drivers import ArmState, Capabilities, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
-from tauscope_sim.device.activity import COMMANDED, POWERED, Activity, commanded_by, stopped_by
-from tauscope_sim.device.drives import Drives, Motion
+from tauscope_sim.device.drives import COMMANDED, POWERED, Activity, Drives, Motion, commanded_by, stopped_by
 from tauscope_sim.device.faults import Disturbances, FaultCode, FaultLatch, Injection, device_fault
 from tauscope_sim.device.limits import checked_limits, checked_setpoint
 from tauscope_sim.device.mechanism import Mechanism

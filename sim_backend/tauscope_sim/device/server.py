@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tauscope_drivers import DriverError
-from tauscope_sim.device.activity import Activity
 from tauscope_sim.device.device import SimulatedDevice
+from tauscope_sim.device.drives import Activity
 from tauscope_sim.device.messages import (
     PROTOCOL,
     BadMessageError,

@@ -13,7 +13,7 @@ from dataclasses import asdict
 from math import ceil
 from typing import Any, Protocol, Self
 
-from tauscope_sim.emulation.fault_kit import InjectedFault, faults_from
+from tauscope_sim.emulation.fault_kit import FaultSchedule, InjectedFault, faults_from
 
 STEP_S = 1e-3  # period of the devices' own loops and of the physics [s]
 MOST_STEPS = 10  # steps that are taken in a row while nothing is asked
@@ -57,6 +57,7 @@ class Emulator(ABC):
     def __init__(self, now_s: float) -> None:
         """Everything at rest; the arm stands on a stand until all its devices have had torque once."""
         self._clock = DeviceClock(now_s)
+        self.schedule = FaultSchedule()
 
     @property
     def now_s(self) -> float:
@@ -105,9 +106,18 @@ class Emulator(ABC):
             self.set_stand(request["stand"])
         return None
 
-    @abstractmethod
     def inject(self, faults: list[InjectedFault]) -> None:
         """Plan faults, and carry out those that are due."""
+        self.schedule.add(faults)
+        self._run_faults()
+
+    def _run_faults(self) -> None:
+        for fault in self.schedule.take_due(self.now_s):
+            self._carry_out(fault)
+
+    @abstractmethod
+    def _carry_out(self, fault: InjectedFault) -> None:
+        """Let a fault happen now."""
 
     @abstractmethod
     def get(self, device: int, place: Any) -> int:
