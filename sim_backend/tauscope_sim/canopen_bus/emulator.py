@@ -34,10 +34,7 @@ class CanEmulator(Emulator):
         bit_rate: float,
         line: SerialLine | SocketLine,
     ) -> None:
-        """Everything at rest.
-
-        `bit_rate`: of the bus; infinite where frames shall arrive at once [bit/s].
-        """
+        """Everything at rest. `bit_rate`: of the bus; infinite where frames shall arrive at once [bit/s]."""
         super().__init__(now_s)
         self.drives = tuple(drives)
         self.driven = driven

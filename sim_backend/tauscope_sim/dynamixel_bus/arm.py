@@ -57,10 +57,7 @@ class Pendulums:
         return torque
 
     def advance(self, torque: Array, duration_s: float) -> None:
-        """Move on under a constant torque, by the semi-implicit Euler method.
-
-        `torque`: (n,) [Nm].
-        """
+        """Move on under a constant torque, by the semi-implicit Euler method. `torque`: (n,) [Nm]."""
         load = self._damping * self._velocity + self._weight * np.sin(self._position)
         self._velocity += duration_s * (torque - load) / self._inertia
         self._position += duration_s * self._velocity
