@@ -3,12 +3,20 @@
 Time is passed in, frames go in and come out; what moves is behind `AxisDemand` and `AxisMeasurement`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile
-from tauscope_sim.canopen_bus.object_dictionary import Abort, AbortError, ObjectDictionary, answer_request, apply_sheet
+from tauscope_sim.canopen_bus.object_dictionary import (
+    Abort,
+    AbortError,
+    ObjectDictionary,
+    WriteHook,
+    answer_request,
+    apply_sheet,
+)
 from tauscope_sim.canopen_bus.power_state import PowerState, PowerStateMachine
 from tauscope_sim.canopen_bus.process_data import ProcessData
 
@@ -84,11 +92,7 @@ _SYNC, _NMT = 0x080, 0x000
 _PRE_OPERATIONAL, _OPERATIONAL, _STOPPED = 0x7F, 0x05, 0x04
 _NMT_COMMANDS = {0x01: _OPERATIONAL, 0x02: _STOPPED, 0x80: _PRE_OPERATIONAL}
 _NMT_RESETS = (0x81, 0x82)
-_RATED = 1000
 _QUICK_STOP_STAYS = range(5, 9)
-_ABORT_QUICK_STOP = 3
-_ABORT_DISABLE = 2
-_ABORT_FAULT = 1
 _STANDING = 1e-3
 _INTERPOLATE = 0x10
 _EXPONENTS = range(-6, 1)
@@ -224,15 +228,11 @@ class EmulatedDrive:
         self._nmt = _PRE_OPERATIONAL
 
     def _abort_connection(self) -> None:
-        if self.power.state is not PowerState.OPERATION_ENABLED:
-            return
-        match self.dictionary.get(0x6007):
-            case value if value == _ABORT_QUICK_STOP:
-                self.power.quick_stop()
-            case value if value == _ABORT_DISABLE:
-                self.power.disable()
-            case value if value == _ABORT_FAULT:
-                self.power.fail()
+        """Do what 0x6007 says."""
+        reactions = {1: self.power.fail, 2: self.power.disable, 3: self.power.quick_stop}
+        reaction = reactions.get(self.dictionary.get(0x6007))
+        if reaction and self.power.state is PowerState.OPERATION_ENABLED:
+            reaction()
 
     def _report(self, error_code: int) -> None:
         self.dictionary.put(0x603F, error_code)
@@ -260,17 +260,11 @@ class EmulatedDrive:
     def _take_controlword(self, word: int) -> None:
         was = self.power.state
         self.power.command(word)
-        if was is PowerState.FAULT and self.power.state is not PowerState.FAULT:
-            self.dictionary.put(0x603F, 0)
-            self.dictionary.put(0x1001, 0)
-        if self.power.state is PowerState.OPERATION_ENABLED and was is not PowerState.OPERATION_ENABLED:
+        is_new = self.power.state is not was
+        if is_new and (was is PowerState.FAULT or self.power.state is PowerState.OPERATION_ENABLED):
             self.dictionary.put(0x603F, 0)
             self.dictionary.put(0x1001, 0)
         self._show_status()
-
-    def _take_consumer(self, _: int) -> None:
-        """The time of silence is counted anew from here."""
-        self._last_master_s = None
 
     def _take_mode(self, mode: int) -> None:
         known = (INTERPOLATED_POSITION, CYCLIC_POSITION, CYCLIC_TORQUE)
@@ -279,52 +273,67 @@ class EmulatedDrive:
         self._mode_taken = mode
         self.dictionary.put(0x6061, mode)
 
-    def _take_quick_stop_option(self, option: int) -> None:
-        self.power.quick_stop_stays = option in _QUICK_STOP_STAYS
-
-    def _take_interpolation(self, value: int) -> None:
-        if value == 0:
-            raise AbortError(Abort.VALUE_RANGE)
-
-    def _take_exponent(self, exponent: int) -> None:
-        if exponent not in _EXPONENTS:
-            raise AbortError(Abort.VALUE_RANGE)
-
     def _dictionary(self) -> ObjectDictionary:
         """Entries at power-up; the target position is stale on purpose, as it is on a real drive after a run."""
         dictionary = ObjectDictionary()
-        for place in self._entries():
-            dictionary.add(*place[:4], signed=place[4], writable=place[5], hook=place[6])
+        for index, subindex, size, value, signed, writable in _ENTRIES:
+            dictionary.add(index, subindex, size, value, signed=signed, writable=writable)
+        for (index, subindex), hook in self._hooks().items():
+            dictionary.entries[index, subindex].hook = hook
+        dictionary.put(0x6076, self.scale.rated_torque_mnm)
         dictionary.put(0x6041, PowerState.SWITCH_ON_DISABLED.value | 0x0200)
         return dictionary
 
-    def _entries(self) -> Iterator[tuple]:
-        """Index, subindex, bytes, value, signed, writable, hook."""
-        yield from (
-            (0x1000, 0, 4, 0x00020192, False, False, None),
-            (0x1001, 0, 1, 0, False, False, None),
-            (0x1016, 1, 4, 0, False, True, self._take_consumer),
-            (0x1017, 0, 2, 0, False, True, None),
-            (0x1018, 1, 4, 0x00000000, False, False, None),
-            (0x6007, 0, 2, 1, True, True, None),
-            (0x603F, 0, 2, 0, False, False, None),
-            (0x6040, 0, 2, 0, False, True, self._take_controlword),
-            (0x6041, 0, 2, 0, False, False, None),
-            (0x605A, 0, 2, 2, True, True, self._take_quick_stop_option),
-            (0x605E, 0, 2, 0, True, True, None),
-            (0x6060, 0, 1, 0, True, True, self._take_mode),
-            (0x6061, 0, 1, 0, True, False, None),
-            (0x6064, 0, 4, 0, True, False, None),
-            (0x606C, 0, 4, 0, True, False, None),
-            (0x6071, 0, 2, 0, True, True, None),
-            (0x6072, 0, 2, 3 * _RATED, False, True, None),
-            (0x6075, 0, 4, 1000, False, False, None),
-            (0x6076, 0, 4, self.scale.rated_torque_mnm, False, False, None),
-            (0x6077, 0, 2, 0, True, False, None),
-            (0x607A, 0, 4, 0x00100000, True, True, None),
-            (0x607D, 1, 4, -(2**31), True, True, None),
-            (0x607D, 2, 4, 2**31 - 1, True, True, None),
-            (0x60C2, 1, 1, 1, False, True, self._take_interpolation),
-            (0x60C2, 2, 1, -3, True, True, self._take_exponent),
-            (0x6502, 0, 4, 1 << (CYCLIC_POSITION - 1) | 1 << (CYCLIC_TORQUE - 1), False, False, None),
-        )
+    def _hooks(self) -> dict[tuple[int, int], WriteHook]:
+        """What a master's write does."""
+
+        def count_silence_anew(_: int) -> None:
+            self._last_master_s = None
+
+        def take_option(option: int) -> None:
+            self.power.quick_stop_stays = option in _QUICK_STOP_STAYS
+
+        return {
+            (0x1016, 1): count_silence_anew,
+            (0x6040, 0): self._take_controlword,
+            (0x605A, 0): take_option,
+            (0x6060, 0): self._take_mode,
+            (0x60C2, 1): partial(_require, lambda value: value != 0),
+            (0x60C2, 2): partial(_require, lambda exponent: exponent in _EXPONENTS),
+        }
+
+
+def _require(is_taken: Callable[[int], bool], value: int) -> None:
+    if not is_taken(value):
+        raise AbortError(Abort.VALUE_RANGE)
+
+
+_ENTRIES = (
+    # index, subindex, bytes, value, signed, writable
+    (0x1000, 0, 4, 0x00020192, False, False),
+    (0x1001, 0, 1, 0, False, False),
+    (0x1016, 1, 4, 0, False, True),
+    (0x1017, 0, 2, 0, False, True),
+    (0x1018, 1, 4, 0x00000000, False, False),
+    (0x6007, 0, 2, 1, True, True),
+    (0x603F, 0, 2, 0, False, False),
+    (0x6040, 0, 2, 0, False, True),
+    (0x6041, 0, 2, 0, False, False),
+    (0x605A, 0, 2, 2, True, True),
+    (0x605E, 0, 2, 0, True, True),
+    (0x6060, 0, 1, 0, True, True),
+    (0x6061, 0, 1, 0, True, False),
+    (0x6064, 0, 4, 0, True, False),
+    (0x606C, 0, 4, 0, True, False),
+    (0x6071, 0, 2, 0, True, True),
+    (0x6072, 0, 2, 3000, False, True),
+    (0x6075, 0, 4, 1000, False, False),
+    (0x6076, 0, 4, 0, False, False),
+    (0x6077, 0, 2, 0, True, False),
+    (0x607A, 0, 4, 0x00100000, True, True),
+    (0x607D, 1, 4, -(2**31), True, True),
+    (0x607D, 2, 4, 2**31 - 1, True, True),
+    (0x60C2, 1, 1, 1, False, True),
+    (0x60C2, 2, 1, -3, True, True),
+    (0x6502, 0, 4, 1 << (CYCLIC_POSITION - 1) | 1 << (CYCLIC_TORQUE - 1), False, False),
+)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile
+from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile
 
 
 class Abort(IntEnum):
@@ -72,26 +72,22 @@ class ObjectDictionary:
 
     def get(self, index: int, subindex: int = 0) -> int:
         """Value of an entry."""
-        try:
-            return self.entries[index, subindex].value
-        except KeyError:
-            raise self._missing(index, subindex) from None
+        return self._find(index, subindex).value
 
     def put(self, index: int, value: int, subindex: int = 0) -> None:
         """Set an entry from within the drive, whoever may write it."""
-        entry = self._entry(index, subindex)
+        entry = self._find(index, subindex)
         bits = 8 * entry.bytes
         low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if entry.signed else (0, (1 << bits) - 1)
         entry.value = min(max(value, low), high)
 
     def read(self, index: int, subindex: int) -> bytes:
         """Value of an entry as a master gets it, little end first. Raises AbortError where there is no such entry."""
-        self._visible(index, subindex)
-        return self.encode(index, subindex)
+        return self.encode(index, subindex, by_master=True)
 
-    def encode(self, index: int, subindex: int) -> bytes:
+    def encode(self, index: int, subindex: int, *, by_master: bool = False) -> bytes:
         """Value of an entry as the drive itself sends it, little end first."""
-        entry = self._entry(index, subindex)
+        entry = self._find(index, subindex, by_master=by_master)
         return entry.value.to_bytes(entry.bytes, "little", signed=entry.signed)
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
@@ -100,7 +96,7 @@ class ObjectDictionary:
         Raises AbortError where there is no such entry, it is not writable, the length is wrong, or the drive refuses
         the value.
         """
-        entry = self._visible(index, subindex)
+        entry = self._find(index, subindex, by_master=True)
         if not entry.writable:
             raise AbortError(Abort.READ_ONLY)
         if len(data) != entry.bytes:
@@ -114,54 +110,35 @@ class ObjectDictionary:
         """Whether a master finds an entry."""
         return (index, subindex) in self.entries and self.entries[index, subindex].is_visible
 
-    def _visible(self, index: int, subindex: int) -> Entry:
-        if not self.has(index, subindex):
-            raise self._missing(index, subindex)
-        return self.entries[index, subindex]
-
-    def _entry(self, index: int, subindex: int) -> Entry:
-        try:
-            return self.entries[index, subindex]
-        except KeyError:
-            raise self._missing(index, subindex) from None
-
-    def _missing(self, index: int, subindex: int) -> AbortError:
-        """What a master is told that asks for an entry that does not exist."""
-        known = any(place[0] == index and entry.is_visible for place, entry in self.entries.items())
-        return AbortError(Abort.NO_SUBINDEX if known else Abort.NO_OBJECT)
+    def _find(self, index: int, subindex: int, *, by_master: bool = False) -> Entry:
+        entry = self.entries.get((index, subindex))
+        if entry is None or (by_master and not entry.is_visible):
+            known = any(place[0] == index and entry.is_visible for place, entry in self.entries.items())
+            raise AbortError(Abort.NO_SUBINDEX if known else Abort.NO_OBJECT)
+        return entry
 
 
-_UPLOAD = 0x40
-_DOWNLOAD = 0x20
-_DOWNLOAD_DONE = 0x60
-_ABORT = 0x80
+_UPLOAD, _DOWNLOAD, _DOWNLOAD_DONE, _ABORT = 0x40, 0x20, 0x60, 0x80
 _COMMAND = 0xE0
 
 
 def answer_request(dictionary: ObjectDictionary, request: bytes) -> bytes | None:
     """Answer to a request; None where the frame is no request."""
-    if len(request) != 8 or request[0] & _COMMAND == _ABORT:
+    command = request[0] & _COMMAND if len(request) == 8 else _ABORT
+    if command == _ABORT:
         return None
     index, subindex = int.from_bytes(request[1:3], "little"), request[3]
     try:
-        return _answer(dictionary, request, index, subindex)
+        if command == _UPLOAD:
+            data = dictionary.read(index, subindex)
+            return bytes([0x43 | (4 - len(data)) << 2]) + request[1:4] + data.ljust(4, b"\0")
+        if command != _DOWNLOAD or not request[0] & 0x02:  # expedited ones alone
+            raise AbortError(Abort.UNKNOWN_COMMAND)
+        size = 4 - (request[0] >> 2 & 0x03) if request[0] & 0x01 else 4
+        dictionary.write(index, subindex, request[4 : 4 + size])
+        return bytes([_DOWNLOAD_DONE]) + request[1:4] + bytes(4)
     except AbortError as refusal:
         return bytes([_ABORT]) + request[1:4] + int(refusal.code).to_bytes(4, "little")
-
-
-def _answer(dictionary: ObjectDictionary, request: bytes, index: int, subindex: int) -> bytes:
-    command = request[0] & _COMMAND
-    if command == _UPLOAD:
-        data = dictionary.read(index, subindex)
-        head = 0x43 | (4 - len(data)) << 2
-        return bytes([head]) + request[1:4] + data.ljust(4, b"\0")
-    is_expedited = request[0] & 0x02
-    if command != _DOWNLOAD or not is_expedited:
-        raise AbortError(Abort.UNKNOWN_COMMAND)
-    has_size = request[0] & 0x01
-    size = 4 - (request[0] >> 2 & 0x03) if has_size else 4
-    dictionary.write(index, subindex, request[4 : 4 + size])
-    return bytes([_DOWNLOAD_DONE]) + request[1:4] + bytes(4)
 
 
 _SIZES = {
@@ -184,20 +161,13 @@ def apply_sheet(dictionary: ObjectDictionary, file: DeviceFile) -> None:
         size, signed = _SIZES.get(described.type_name, (0, False))
         if not size:
             continue
-        entry = dictionary.entries.get((index, subindex))
-        is_own = entry is not None
-        if entry is None:
-            entry = dictionary.add(index, subindex, size)
+        is_own = (index, subindex) in dictionary.entries
+        entry = dictionary.entries[index, subindex] if is_own else dictionary.add(index, subindex, size)
         entry.bytes, entry.signed, entry.writable = size, signed, "w" in described.access
-        value = _value(described)
+        data = described.value
+        value = described.default if data is None else int.from_bytes(data, "little", signed=signed)
         if value is not None and (not is_own or index in _PROCESS_DATA or (index in _STATED and value)):
             dictionary.put(index, value, subindex)
     for subindex, number in enumerate((file.vendor, file.product, file.revision), 1):
         if dictionary.has(_IDENTITY, subindex) and number is not None:
             dictionary.put(_IDENTITY, number, subindex)
-
-
-def _value(described: DescribedObject) -> int | None:
-    if described.value is None:
-        return described.default
-    return int.from_bytes(described.value, "little", signed=described.type_name.startswith("INTEGER"))
