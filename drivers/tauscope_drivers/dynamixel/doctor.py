@@ -6,8 +6,7 @@ from functools import partial
 
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.dynamixel.bus import ServoBus
-from tauscope_drivers.dynamixel.bus_budget import count_traffic
+from tauscope_drivers.dynamixel.bus import ServoBus, count_traffic
 from tauscope_drivers.dynamixel.configuration import ServoConfiguration, read_configuration
 from tauscope_drivers.dynamixel.control_table import WATCHDOG_MOST, WATCHDOG_STEP_S, model_names
 from tauscope_drivers.dynamixel.enabling import plan_tasks

@@ -40,6 +40,13 @@ class Bounds:
     current: tuple[int, ...]
     velocity: tuple[int, ...]
 
+    @staticmethod
+    def of(tasks: Sequence[ServoTask], ranges: Sequence[tuple[int, int]]) -> "Bounds":
+        """Bounds of planned tasks. `ranges`: lowest and highest Goal Position of each servo [counts]."""
+        lows, highs = zip(*ranges, strict=True)
+        caps, speeds = ([getattr(task, name) for task in tasks] for name in ("current_cap", "velocity_cap"))
+        return Bounds(lows, highs, tuple(caps), tuple(speeds))
+
 
 def goals_of(
     servos: Sequence[JointServo], mode: ControlMode, bounds: Bounds, setpoint: Setpoint
@@ -69,9 +76,7 @@ def enable_servos(
     """
     tasks, ranges = plan_tasks(session, mode, limits, watchdog_s)
     taken = _give_torque(session, tasks)
-    lows, highs = zip(*ranges, strict=True)
-    caps = tuple(task.current_cap for task in tasks)
-    return Bounds(tuple(lows), tuple(highs), caps, tuple(task.velocity_cap for task in tasks)), taken
+    return Bounds.of(tasks, ranges), taken
 
 
 def plan_tasks(

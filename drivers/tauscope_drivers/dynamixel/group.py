@@ -65,11 +65,8 @@ class ServoGroup:
 
     def write(self, name: str, values: Sequence[int | None]) -> None:
         """Write an item of all servos, without an answer."""
-        for _, members in self._families:
-            item = self.servos[members[0]].model.items[name]
-            chosen = {self.servos[index].servo: [value] for index in members if (value := values[index]) is not None}
-            if chosen:
-                self._bus.sync_write([item], chosen)
+        for items, chosen in item_writes(self.servos, name, values):
+            self._bus.sync_write(items, chosen)
 
     def write_goals(self, goals: Sequence[int], speeds: Sequence[int]) -> None:
         """Write Goal Position of all servos, with Profile Velocity where that is its neighbour.
@@ -177,6 +174,16 @@ def servo_families(servos: Sequence[JointServo]) -> list[tuple[Block, list[int]]
         key = (block.address, block.length, servo.model.items["Goal Position"].address)
         families.setdefault(key, (block, []))[1].append(index)
     return list(families.values())
+
+
+def item_writes(
+    servos: Sequence[JointServo], name: str, values: Sequence[int | None]
+) -> Iterator[tuple[list[Item], dict[int, list[int]]]]:
+    """Item and values of Sync Writes, one a family. `values`: one a joint, None where nothing is written."""
+    for _, members in servo_families(servos):
+        chosen = {servos[index].servo: [value] for index in members if (value := values[index]) is not None}
+        if chosen:
+            yield [servos[members[0]].model.items[name]], chosen
 
 
 def paced_goals(

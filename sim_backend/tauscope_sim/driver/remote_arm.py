@@ -21,9 +21,9 @@ from tauscope_drivers import (
     StopPolicy,
 )
 from tauscope_drivers.errors import DriverErrorKind
+from tauscope_drivers.limits import require_finite
 from tauscope_sim.device.device import WATCHDOG_RANGE_S
 from tauscope_sim.device.faults import Injection
-from tauscope_sim.device.limits import checked_setpoint
 from tauscope_sim.device.messages import (
     PROTOCOL,
     BadMessageError,
@@ -132,7 +132,8 @@ class RemoteSimulatedArm:
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
         """Write the setpoints, read the arm; see `drivers.Backend`."""
-        body = encode_setpoint(self._clock.now_ns(), checked_setpoint(setpoint, self._count))
+        require_finite(setpoint, self._count)
+        body = encode_setpoint(self._clock.now_ns(), setpoint)
         try:
             reply = self._request(FrameKind.EXCHANGE, body, self._reply_timeout_s)
         except TimeoutError:

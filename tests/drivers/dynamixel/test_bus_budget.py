@@ -2,7 +2,7 @@
 
 import pytest
 
-from tauscope_drivers.dynamixel.bus_budget import count_traffic
+from tauscope_drivers.dynamixel.bus import count_traffic
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.serial_servos.budget import BusTiming, cycle_parts, largest_rate_hz, require_rate
 
