@@ -111,18 +111,12 @@ def _weigh(body: mujoco.MjsBody, link: LinkInertia) -> None:
 
 @dataclass(frozen=True, eq=False)
 class BodyInertia:
-    """Inertia of a body in MuJoCo's terms.
+    """Inertia of a body in MuJoCo's terms."""
 
-    `mass`: m, above zero [kg].
-    `centre`: (3,), centre of mass in the link frame [m].
-    `quaternion`: (4,), (w, x, y, z) of the principal axes in the link frame.
-    `moments`: (3,), principal moments about the centre of mass, ascending, above zero [kg m²].
-    """
-
-    mass: float
-    centre: Array
-    quaternion: Array
-    moments: Array
+    mass: float  # m, above zero [kg]
+    centre: Array  # (3,), centre of mass in the link frame [m]
+    quaternion: Array  # (4,), (w, x, y, z) of the principal axes in the link frame
+    moments: Array  # (3,), principal moments about the centre of mass, ascending, above zero [kg m²]
 
 
 def body_inertia(link: LinkInertia) -> BodyInertia:

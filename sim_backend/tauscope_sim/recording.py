@@ -40,22 +40,14 @@ def rigid_body_torque(model: mujoco.MjModel, position: Array, velocity: Array, a
 
 @dataclass(frozen=True, eq=False)
 class SimulatedRecording:
-    """A simulated measurement together with the truth behind it.
+    """A simulated measurement together with the truth behind it."""
 
-    `time`: (N,), instants, uniform, from zero [s].
-    `position`: (N, n), q as the encoder reports it [rad or m].
-    `torque`: (N, n), τ as measured: exact torque plus noise [Nm or N].
-    `exact`: q, q̇, q̈ without noise, (N, n) each.
-    `torque_exact`: (N, n), τ without noise, friction included [Nm or N].
-    `period`: (N,) int64, index of the repeated period, from zero.
-    """
-
-    time: Array
-    position: Array
-    torque: Array
-    exact: MotionSamples
-    torque_exact: Array
-    period: NDArray[np.int64]
+    time: Array  # (N,), instants, uniform, from zero [s]
+    position: Array  # (N, n), q as the encoder reports it [rad or m]
+    torque: Array  # (N, n), τ as measured: exact torque plus noise [Nm or N]
+    exact: MotionSamples  # q, q̇, q̈ without noise, (N, n) each
+    torque_exact: Array  # (N, n), τ without noise, friction included [Nm or N]
+    period: NDArray[np.int64]  # (N,) int64, index of the repeated period, from zero
 
 
 def simulate_recording(

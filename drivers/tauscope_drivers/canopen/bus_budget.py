@@ -14,14 +14,10 @@ _SYNC_BYTES = 0
 
 @dataclass(frozen=True)
 class CycleFrames:
-    """Cyclic frames of one node.
+    """Cyclic frames of one node."""
 
-    `received_bytes`: payloads of its RPDOs [bytes].
-    `sent_bytes`: payloads of its TPDOs [bytes].
-    """
-
-    received_bytes: tuple[int, ...]
-    sent_bytes: tuple[int, ...]
+    received_bytes: tuple[int, ...]  # payloads of its RPDOs [bytes]
+    sent_bytes: tuple[int, ...]  # payloads of its TPDOs [bytes]
 
 
 def frame_bits(payload_bytes: int) -> int:

@@ -45,7 +45,6 @@ class NodeConfiguration:
     """One drive.
 
     `rated_torque_nm`: at the motor shaft, in place of what the drive states (0x6076): makers scale it differently [Nm].
-    `torque_limit`: of the joint; None where there is none [Nm or N].
     """
 
     node_id: int
@@ -55,21 +54,18 @@ class NodeConfiguration:
     direction: int = 1
     rated_torque_nm: float | None = None
     device_file: DeviceFile | None = None
-    torque_limit: float | None = None
+    torque_limit: float | None = None  # of the joint; None where there is none [Nm or N]
 
 
 @dataclass(frozen=True)
 class BusConfiguration:
-    """The bus and the drives on it, in the order of the joints.
-
-    `serial_baud`: of an adapter on a true serial line [bit/s].
-    """
+    """The bus and the drives on it, in the order of the joints."""
 
     nodes: tuple[NodeConfiguration, ...]
     interface: str
     channel: str
     bit_rate: int = 1_000_000
-    serial_baud: float | None = None
+    serial_baud: float | None = None  # of an adapter on a true serial line [bit/s]
     options: Mapping[str, Any] = field(default_factory=dict)
 
 

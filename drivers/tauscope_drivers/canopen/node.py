@@ -79,33 +79,23 @@ Listener = Callable[[int, Callable[[int, bytes], None]], None]  # hands the fram
 
 @dataclass(frozen=True)
 class Measurement:
-    """Of a joint, by its drive; NaN where it did not come.
+    """Of a joint, by its drive; NaN where it did not come."""
 
-    `position`: [rad or m].
-    `velocity`: [rad/s or m/s].
-    `effort`: torque at the joint [Nm or N].
-    """
-
-    position: float
-    velocity: float
-    effort: float
+    position: float  # [rad or m]
+    velocity: float  # [rad/s or m/s]
+    effort: float  # torque at the joint [Nm or N]
 
 
 @dataclass(eq=False)
 class DriveNode:
     """A drive on the bus.
 
-    `joint`: number of its joint, from 1.
     `last_position`: of the joint when it last answered: the place to stay at, never a measurement [rad or m].
-    `last_velocity`: of the joint when it last told one [rad/s or m/s].
-    `present`: optional objects that it has.
     `mode_numbers`: mode of operation for each control mode that it has.
-    `held`: values of other objects in its RPDOs of fixed mapping.
-    `stays_stopped`: whether it keeps its power after a quick stop.
     """
 
     configuration: NodeConfiguration
-    joint: int
+    joint: int  # number of its joint, from 1
     dictionary: NodeDictionary
     units: DriveUnits = field(default=DriveUnits(math.nan, 0, math.nan))
     values: dict[DriveObject, int] = field(default_factory=dict)
@@ -114,15 +104,15 @@ class DriveNode:
     measurement: Measurement = Measurement(math.nan, math.nan, math.nan)
     last_state: DriveState | None = None
     last_position: float = math.nan
-    last_velocity: float = 0.0
+    last_velocity: float = 0.0  # of the joint when it last told one [rad/s or m/s]
     is_deaf: bool = False
     glitches: GlitchFilter = field(default_factory=GlitchFilter)
-    present: frozenset[DriveObject] = frozenset(SUBSTITUTES)
+    present: frozenset[DriveObject] = frozenset(SUBSTITUTES)  # optional objects that it has
     mode_numbers: dict[ControlMode, int] = field(default_factory=dict)
     slots: PdoSlots = field(default_factory=PdoSlots)
     plan: PdoPlan = field(default=PdoPlan((), ()))
-    held: dict[DriveObject, int] = field(default_factory=dict)
-    stays_stopped: bool = True
+    held: dict[DriveObject, int] = field(default_factory=dict)  # values of other objects in its RPDOs of fixed mapping
+    stays_stopped: bool = True  # whether it keeps its power after a quick stop
     remarks: tuple[str, ...] = ()
     listen: Listener = field(default=lambda _identifier, _handler: None)
 

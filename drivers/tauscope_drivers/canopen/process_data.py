@@ -111,16 +111,11 @@ _KNOWN = {
 
 @dataclass(frozen=True)
 class PdoSlot:
-    """A PDO that a drive has.
+    """A PDO that a drive has."""
 
-    `number`: from 0.
-    `fixed`: its objects, where its mapping cannot be written; None where it can.
-    `entries`: most objects that it takes.
-    """
-
-    number: int
-    fixed: tuple[DriveObject, ...] | None = None
-    entries: int = 8
+    number: int  # from 0
+    fixed: tuple[DriveObject, ...] | None = None  # its objects, where its mapping cannot be written; None where it can
+    entries: int = 8  # most objects that it takes
 
 
 @dataclass(frozen=True)
@@ -135,14 +130,11 @@ class Pdo:
 
 @dataclass(frozen=True)
 class PdoPlan:
-    """All PDOs of a drive that are used.
-
-    `missing`: needed, and in none of them.
-    """
+    """All PDOs of a drive that are used."""
 
     received: tuple[Pdo, ...]
     sent: tuple[Pdo, ...]
-    missing: tuple[DriveObject, ...] = ()
+    missing: tuple[DriveObject, ...] = ()  # needed, and in none of them
 
 
 @dataclass(frozen=True)

@@ -105,14 +105,13 @@ def rate_limited_by(configuration: BusConfiguration) -> str:
 class Session:
     """An arm's drives, reached.
 
-    `answer_ns`: time that drives get to answer SYNC in the control loop [ns].
     `settling_ns`: cycle while drives change state: that of the control loop, once it is known [ns].
     """
 
     bus: CanBus
     nodes: tuple[DriveNode, ...]
     clock: Clock
-    answer_ns: int
+    answer_ns: int  # time that drives get to answer SYNC in the control loop [ns]
     caught: Fault | None = None
     settling_ns: int = round(SETTLING_CYCLE_S * 1e9)
     answer_time: AnswerTime = field(default_factory=AnswerTime)

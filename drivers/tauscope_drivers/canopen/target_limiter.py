@@ -26,16 +26,13 @@ class _Reached:
     """What a cycle has come to.
 
     `position`, `velocity`: (n,), targets sent, and how fast a drive in time goes there.
-    `begin`: (n,), where drives were by then.
-    `wanted`: (n,), targets asked for.
-    `behind`: (n,), joints that are still on their way to them.
     """
 
     position: Array
     velocity: Array
-    begin: Array
-    wanted: Array
-    behind: NDArray[np.bool_]
+    begin: Array  # (n,), where drives were by then
+    wanted: Array  # (n,), targets asked for
+    behind: NDArray[np.bool_]  # (n,), joints that are still on their way to them
 
     def after(self, part: float) -> Array:
         """Where drives are when so much of the cycle over which they interpolate has passed."""

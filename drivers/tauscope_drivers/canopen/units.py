@@ -16,14 +16,10 @@ _LARGEST_NM = 100.0  # no motor of an arm has more at its shaft, also without a 
 
 @dataclass(frozen=True)
 class RatedTorque:
-    """A motor's rated torque.
+    """A motor's rated torque."""
 
-    `nm`: at the motor shaft [Nm].
-    `remark`: why another unit than the standard's is taken; empty where it is the standard's.
-    """
-
-    nm: float
-    remark: str = ""
+    nm: float  # at the motor shaft [Nm]
+    remark: str = ""  # why another unit than the standard's is taken; empty where it is the standard's
 
 
 def read_rated_torque(

@@ -33,14 +33,11 @@ class CurrentUnit:
 
 @dataclass(frozen=True)
 class FamilyFacts:
-    """What servos of one family have in common.
-
-    `voltage_unit_v`: of Present Input Voltage [V].
-    """
+    """What servos of one family have in common."""
 
     name: str
     position_mode: int
-    voltage_unit_v: float = 0.1
+    voltage_unit_v: float = 0.1  # of Present Input Voltage [V]
     error_is_code: bool = False
     torque_on_by_goal: bool = False
 
@@ -127,14 +124,11 @@ BYTES_BEFORE_STATE = 3  # bytes of other items right before that block, on every
 
 @dataclass(frozen=True)
 class Item:
-    """An entry of a control table.
-
-    `size`: [bytes].
-    """
+    """An entry of a control table."""
 
     name: str
     address: int
-    size: int
+    size: int  # [bytes]
     signed: bool
 
     def encode(self, value: int) -> bytes:
@@ -154,13 +148,10 @@ def encode_items(items: Iterable[Item], values: Iterable[int]) -> bytes:
 
 @dataclass(frozen=True)
 class Block:
-    """A stretch of a control table that is read at once.
-
-    `length`: [bytes].
-    """
+    """A stretch of a control table that is read at once."""
 
     address: int
-    length: int
+    length: int  # [bytes]
     items: tuple[Item, ...]
 
     def decode(self, data: bytes) -> dict[str, int]:
@@ -172,21 +163,16 @@ class Block:
 
 @dataclass(frozen=True)
 class ServoModel:
-    """A model of servo.
-
-    `counts_per_radian`: of the horn [1/rad].
-    `velocity_unit`: one unit of Present Velocity [rad/s].
-    `current_unit`: one unit of Present Current; None where no source states it.
-    """
+    """A model of servo."""
 
     number: int
     name: str
     family: FamilyFacts
     items: Mapping[str, Item]
-    counts_per_radian: float
+    counts_per_radian: float  # of the horn [1/rad]
     zero_count: int
-    velocity_unit: float
-    current_unit: CurrentUnit | None
+    velocity_unit: float  # one unit of Present Velocity [rad/s]
+    current_unit: CurrentUnit | None  # one unit of Present Current; None where no source states it
 
     @property
     def label(self) -> str:

@@ -31,14 +31,12 @@ class Bounds:
     """Ranges of the goals, in units of the servos, one a joint.
 
     `low`, `high`: of Goal Position [counts].
-    `current`: of Goal Current, either sign [units].
-    `velocity`: of Profile Velocity, 0 for none [units].
     """
 
     low: tuple[int, ...]
     high: tuple[int, ...]
-    current: tuple[int, ...]
-    velocity: tuple[int, ...]
+    current: tuple[int, ...]  # of Goal Current, either sign [units]
+    velocity: tuple[int, ...]  # of Profile Velocity, 0 for none [units]
 
     @staticmethod
     def of(tasks: Sequence[ServoTask], ranges: Sequence[tuple[int, int]]) -> "Bounds":

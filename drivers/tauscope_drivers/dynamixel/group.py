@@ -22,21 +22,14 @@ _CURRENT, _VELOCITY, _POSITION = STATE_ITEMS
 
 @dataclass(frozen=True, eq=False)
 class GroupReading:
-    """What the servos measured in one cycle; NaN for who did not answer in it.
-
-    `position`: (n,) [rad or m].
-    `velocity`: (n,) [rad/s or m/s].
-    `current`: (n,) [mA].
-    `alerts`: alert bit of each servo; None for who did not answer.
-    `late_ns`: how much later than the bus takes the last answer came [ns].
-    """
+    """What the servos measured in one cycle; NaN for who did not answer in it."""
 
     time_ns: int
-    position: Array
-    velocity: Array
-    current: Array
-    alerts: tuple[bool | None, ...]
-    late_ns: int
+    position: Array  # (n,) [rad or m]
+    velocity: Array  # (n,) [rad/s or m/s]
+    current: Array  # (n,) [mA]
+    alerts: tuple[bool | None, ...]  # alert bit of each servo; None for who did not answer
+    late_ns: int  # how much later than the bus takes the last answer came [ns]
 
 
 class ServoGroup:

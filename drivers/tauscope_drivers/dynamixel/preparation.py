@@ -40,17 +40,12 @@ class RegisterWrite:
 
 @dataclass(frozen=True)
 class ServoTask:
-    """What a servo shall do once it has torque.
-
-    `current_cap`: most current [units].
-    `velocity_cap`: largest speed of its target while it tracks positions, 0 for none [units].
-    `present`: Present Position [counts].
-    """
+    """What a servo shall do once it has torque."""
 
     mode: ControlMode
-    current_cap: int
-    velocity_cap: int
-    present: int
+    current_cap: int  # most current [units]
+    velocity_cap: int  # largest speed of its target while it tracks positions, 0 for none [units]
+    present: int  # Present Position [counts]
     watchdog_steps: int
 
 

@@ -34,14 +34,12 @@ class ServoTask:
     """What a servo shall do once it has torque.
 
     `low`, `high`: range of its goals [counts].
-    `speed`: Goal Speed [units].
-    `torque`: Torque Limit [‰ of full duty].
     """
 
     low: int
     high: int
-    speed: int
-    torque: int
+    speed: int  # Goal Speed [units]
+    torque: int  # Torque Limit [‰ of full duty]
 
     def bound(self, goal: int) -> int:
         """A goal within the range."""

@@ -25,13 +25,10 @@ _FIXED_BYTES = 4
 
 @dataclass(frozen=True)
 class Status:
-    """An answer.
-
-    `alarms`: bits of the register Status.
-    """
+    """An answer."""
 
     servo: int
-    alarms: int
+    alarms: int  # bits of the register Status
     data: bytes
 
 

@@ -41,15 +41,12 @@ _COARSE_SPEED = 50
 
 @dataclass(frozen=True)
 class Register:
-    """A number in the memory table.
-
-    `sign_bit`: bit that says that the magnitude below it is negative; None for numbers without sign.
-    """
+    """A number in the memory table."""
 
     name: str
     address: int
     size: int = 1
-    sign_bit: int | None = None
+    sign_bit: int | None = None  # bit that says that the magnitude below it is negative; None for numbers without sign
 
     @property
     def end(self) -> int:

@@ -18,15 +18,11 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class JointServo:
-    """A servo that a robot file speaks of.
+    """A servo that a robot file speaks of."""
 
-    `number`: of the joint, from 1.
-    `counts_per_speed_unit`: one unit of Present Speed and Goal Speed [counts/s].
-    """
-
-    number: int
+    number: int  # of the joint, from 1
     configuration: ServoConfiguration
-    counts_per_speed_unit: int = 1
+    counts_per_speed_unit: int = 1  # one unit of Present Speed and Goal Speed [counts/s]
 
     @property
     def servo(self) -> int:

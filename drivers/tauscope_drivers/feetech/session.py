@@ -106,13 +106,12 @@ class Health:
 class Session:
     """An arm's servos, reached.
 
-    `settings`: EEPROM of each servo.
     `unsure`: joints whose servo has missed an answer since its torque and limits were read: it may have restarted.
     """
 
     bus: FeetechBus
     servos: tuple[JointServo, ...]
-    settings: list[dict[str, int]]
+    settings: list[dict[str, int]]  # EEPROM of each servo
     health: Health
     unsure: set[int] = field(default_factory=set)
     turn: int = 0

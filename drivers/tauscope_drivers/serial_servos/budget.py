@@ -18,30 +18,22 @@ SHORTEST_RETURN_DELAY_S = 2e-6  # of a servo whose Return Delay Time is 0 [s]
 
 @dataclass(frozen=True)
 class CycleTraffic:
-    """What goes over the bus in one cycle.
-
-    `bytes`: without stuffing; `answers`: packets that wait for a return delay; `reads`: that wait for the adapter.
-    `delay_remedy`: what to do about a long return delay.
-    """
+    """What goes over the bus in one cycle."""
 
     servos: int
-    bytes: int
+    bytes: int  # without stuffing; `answers`: packets that wait for a return delay; `reads`: that wait for the adapter
     answers: int
     reads: int
-    delay_remedy: str
+    delay_remedy: str  # what to do about a long return delay
 
 
 @dataclass(frozen=True)
 class BusTiming:
-    """How fast a bus is.
-
-    `return_delay_s`: largest Return Delay Time of the servos [s].
-    `latency_s`: latency timer of the adapter; 0 on a plain serial line [s].
-    """
+    """How fast a bus is."""
 
     baud: float
-    return_delay_s: float
-    latency_s: float
+    return_delay_s: float  # largest Return Delay Time of the servos [s]
+    latency_s: float  # latency timer of the adapter; 0 on a plain serial line [s]
 
 
 def cycle_parts(traffic: CycleTraffic, timing: BusTiming) -> dict[str, float]:

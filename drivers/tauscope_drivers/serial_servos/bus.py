@@ -23,18 +23,12 @@ _Status = TypeVar("_Status")
 
 @dataclass(frozen=True)
 class Answers(Generic[_Status]):
-    """Answers to one question to many servos.
+    """Answers to one question to many servos."""
 
-    `asked_ns`: instant at which the question had left [ns, by the bus' clock].
-    `late_ns`: how much later than usual the last answer came [ns].
-    `statuses`: by ID.
-    `beyond_ns`: how much longer than bus and adapter should take for it [ns].
-    """
-
-    asked_ns: int
-    late_ns: int
-    statuses: dict[int, _Status]
-    beyond_ns: int = 0
+    asked_ns: int  # instant at which the question had left [ns, by the bus' clock]
+    late_ns: int  # how much later than usual the last answer came [ns]
+    statuses: dict[int, _Status]  # by ID
+    beyond_ns: int = 0  # how much longer than bus and adapter should take for it [ns]
 
 
 class FrameParser(ABC):

@@ -34,43 +34,32 @@ class AxisMode(Enum):
 class AxisDemand:
     """What a drive wants of its joint until the next demand.
 
-    `position`: target where the mode is position [rad or m].
-    `torque`: target where the mode is torque [Nm or N].
-    `torque_cap`: most that it exerts; nothing where it is released [Nm or N].
     `interpolation_s`: time in which it goes from one target to the next, where the mode is position; 0 where nobody
         told it [s].
     """
 
     mode: AxisMode
-    position: float = 0.0
-    torque: float = 0.0
-    torque_cap: float = 0.0
+    position: float = 0.0  # target where the mode is position [rad or m]
+    torque: float = 0.0  # target where the mode is torque [Nm or N]
+    torque_cap: float = 0.0  # most that it exerts; nothing where it is released [Nm or N]
     interpolation_s: float = 0.0
 
 
 @dataclass(frozen=True)
 class AxisMeasurement:
-    """What a drive's sensors tell of its joint.
+    """What a drive's sensors tell of its joint."""
 
-    `position`: [rad or m].
-    `velocity`: [rad/s or m/s].
-    `torque`: [Nm or N].
-    """
-
-    position: float
-    velocity: float
-    torque: float
+    position: float  # [rad or m]
+    velocity: float  # [rad/s or m/s]
+    torque: float  # [Nm or N]
 
 
 @dataclass(frozen=True)
 class AxisScale:
-    """Counts and per mille of an emulated drive.
-
-    `rated_torque_mnm`: object 0x6076, at the motor shaft [mNm].
-    """
+    """Counts and per mille of an emulated drive."""
 
     counts_per_radian: float
-    rated_torque_mnm: int
+    rated_torque_mnm: int  # object 0x6076, at the motor shaft [mNm]
     gear_ratio: float
 
     @property

@@ -180,22 +180,16 @@ _SOCKET = "socketcan:"
 
 @dataclass(frozen=True)
 class CanOrder(EmulatorOrder):
-    """What to emulate.
-
-    `start`: where the joints stand [rad or m].
-    `rated_torque_mnm`: object 0x6076 of each drive, at the motor shaft [mNm].
-    `torque_noise`: standard deviation of what the drives measure of the torque [Nm or N].
-    `bit_rate`: of the bus [bit/s].
-    """
+    """What to emulate."""
 
     robot: str
-    start: tuple[float, ...]
+    start: tuple[float, ...]  # where the joints stand [rad or m]
     port: str
     control: str
-    rated_torque_mnm: tuple[int, ...]
+    rated_torque_mnm: tuple[int, ...]  # object 0x6076 of each drive, at the motor shaft [mNm]
     scenario: str | None = None
-    torque_noise: float = 0.0
-    bit_rate: int = 1_000_000
+    torque_noise: float = 0.0  # standard deviation of what the drives measure of the torque [Nm or N]
+    bit_rate: int = 1_000_000  # of the bus [bit/s]
     stepped: bool = False
     trace: str | None = None
 

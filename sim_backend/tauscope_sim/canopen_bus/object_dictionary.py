@@ -48,12 +48,9 @@ class Entry:
 
 @dataclass
 class ObjectDictionary:
-    """All entries, by index and subindex.
+    """All entries, by index and subindex."""
 
-    `entries`: of (index, subindex) to Entry.
-    """
-
-    entries: dict[tuple[int, int], Entry] = field(default_factory=dict)
+    entries: dict[tuple[int, int], Entry] = field(default_factory=dict)  # of (index, subindex) to Entry
 
     def add(
         self,

@@ -66,14 +66,10 @@ _MARGIN = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What the drives' own loop sees of the motors.
+    """What the drives' own loop sees of the motors."""
 
-    `position`: (n,), in joint units, with the encoders' slip [rad or m].
-    `velocity`: (n,), likewise [rad/s or m/s].
-    """
-
-    position: Array
-    velocity: Array
+    position: Array  # (n,), in joint units, with the encoders' slip [rad or m]
+    velocity: Array  # (n,), likewise [rad/s or m/s]
 
 
 class Drives:

@@ -43,19 +43,13 @@ class Disturbance(StrEnum):
 
 @dataclass(frozen=True)
 class Injection:
-    """One disturbance, for tests of what stands above the device.
-
-    `joint`: joint number, counted from 1.
-    `start_ns`: device time at which it begins; one that has passed means now [ns].
-    `duration_ns`: how long it lasts; None for ever [ns].
-    `size`: rise of the temperature or slip of the encoder [K; rad or m].
-    """
+    """One disturbance, for tests of what stands above the device."""
 
     kind: Disturbance
-    joint: int
-    start_ns: int = 0
-    duration_ns: int | None = None
-    size: float = 0.0
+    joint: int  # joint number, counted from 1
+    start_ns: int = 0  # device time at which it begins; one that has passed means now [ns]
+    duration_ns: int | None = None  # how long it lasts; None for ever [ns]
+    size: float = 0.0  # rise of the temperature or slip of the encoder [K; rad or m]
 
     def active_at(self, time_ns: int) -> bool:
         """Whether it acts at an instant."""

@@ -47,18 +47,12 @@ VELOCITY_BANDWIDTH = 2.0 * np.pi * 20.0
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """The true state that one reading is taken from.
+    """The true state that one reading is taken from."""
 
-    `time_s`: by the plant's clock [s].
-    `position`: (n,), of the motors, in joint units [rad or m].
-    `velocity`: (n,), likewise [rad/s or m/s].
-    `torque`: (n,), of the motors on the joint's side [Nm or N].
-    """
-
-    time_s: float
-    position: Array
-    velocity: Array
-    torque: Array
+    time_s: float  # by the plant's clock [s]
+    position: Array  # (n,), of the motors, in joint units [rad or m]
+    velocity: Array  # (n,), likewise [rad/s or m/s]
+    torque: Array  # (n,), of the motors on the joint's side [Nm or N]
 
 
 class Readings:

@@ -79,13 +79,10 @@ _PEER = struct.Struct("3i")
 
 @dataclass
 class Punctuality:
-    """How well the device kept to the machine's clock.
-
-    `largest_lag_ns`: the latest of them [ns].
-    """
+    """How well the device kept to the machine's clock."""
 
     overruns: int = 0
-    largest_lag_ns: int = 0
+    largest_lag_ns: int = 0  # the latest of them [ns]
 
 
 class _Host:

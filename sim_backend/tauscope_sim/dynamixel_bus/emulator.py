@@ -124,24 +124,19 @@ class DynamixelEmulator(Emulator):
 
 @dataclass(frozen=True)
 class ServoOrder(EmulatorOrder, Generic[_Servo]):
-    """An arm of servos, whoever made them.
-
-    `start`: where the joints stand [rad or m].
-    `weight`: m g l of the pendulums that they move where there is no robot file [Nm].
-    `latency_s`: latency of the adapter [s].
-    """
+    """An arm of servos, whoever made them."""
 
     specification: ClassVar[type]
 
     servos: tuple[_Servo, ...]
-    start: tuple[float, ...]
+    start: tuple[float, ...]  # where the joints stand [rad or m]
     port: str
     control: str
     robot: str | None = None
     scenario: str | None = None
-    weight: float = 0.5
+    weight: float = 0.5  # m g l of the pendulums that they move where there is no robot file [Nm]
     paced: bool = True
-    latency_s: float = 0.0
+    latency_s: float = 0.0  # latency of the adapter [s]
     stepped: bool = False
     trace: str | None = None
 

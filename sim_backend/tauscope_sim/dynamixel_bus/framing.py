@@ -16,15 +16,12 @@ _library = Protocol2PacketHandler()
 
 @dataclass(frozen=True)
 class Instruction:
-    """What a master asks.
-
-    `length`: of the frame on the wire [bytes].
-    """
+    """What a master asks."""
 
     servo: int
     code: int
     parameters: bytes
-    length: int
+    length: int  # of the frame on the wire [bytes]
 
 
 def status_frame(servo: int, error: int, data: bytes) -> bytes:

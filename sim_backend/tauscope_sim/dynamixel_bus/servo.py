@@ -25,19 +25,13 @@ CURRENT_MODE, POSITION_MODE, EXTENDED_MODE, CURRENT_BASED_MODE = 0, 3, 4, 5
 
 @dataclass(frozen=True)
 class Demand:
-    """What a servo wants of its joint until its loop runs again.
-
-    `position`: target [rad or m].
-    `speed`: of the target [rad/s or m/s].
-    `torque`: where it does not track [Nm or N].
-    `cap`: most that it exerts [Nm or N].
-    """
+    """What a servo wants of its joint until its loop runs again."""
 
     tracks: bool
-    position: float = 0.0
-    speed: float = 0.0
-    torque: float = 0.0
-    cap: float = 0.0
+    position: float = 0.0  # target [rad or m]
+    speed: float = 0.0  # of the target [rad/s or m/s]
+    torque: float = 0.0  # where it does not track [Nm or N]
+    cap: float = 0.0  # most that it exerts [Nm or N]
 
 
 RELEASED = Demand(tracks=False)  # no torque

@@ -30,14 +30,13 @@ class InjectedFault:
 
     `at_s`: when, by the emulator's clock, and in what a test asks for counted from then; at once where that has passed
         [s].
-    `seconds`: how late, or how long [s].
     """
 
     kind: FaultKind
     device: int = 0
     at_s: float = 0.0
     count: int = 1
-    seconds: float = 0.3
+    seconds: float = 0.3  # how late, or how long [s]
     counts: int = 0
 
 

@@ -66,22 +66,14 @@ SHORTEST_PART = 2.0**-12  # shortest sub-step, as a part of the step
 
 @dataclass(frozen=True, eq=False)
 class PlantState:
-    """Where the plant is, in joint units; every array a copy.
+    """Where the plant is, in joint units; every array a copy."""
 
-    `time`: since the arm was placed [s].
-    `motor_position`: (n,), of the motors, divided by the gear ratio [rad or m].
-    `motor_velocity`: (n,), likewise [rad/s or m/s].
-    `link_position`: (n,), q; the motor's own where the transmission is rigid [rad or m].
-    `link_velocity`: (n,), q̇ [rad/s or m/s].
-    `temperature`: (n,), of the joints [°C].
-    """
-
-    time: float
-    motor_position: Array
-    motor_velocity: Array
-    link_position: Array
-    link_velocity: Array
-    temperature: Array
+    time: float  # since the arm was placed [s]
+    motor_position: Array  # (n,), of the motors, divided by the gear ratio [rad or m]
+    motor_velocity: Array  # (n,), likewise [rad/s or m/s]
+    link_position: Array  # (n,), q; the motor's own where the transmission is rigid [rad or m]
+    link_velocity: Array  # (n,), q̇ [rad/s or m/s]
+    temperature: Array  # (n,), of the joints [°C]
 
 
 class Plant:

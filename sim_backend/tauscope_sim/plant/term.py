@@ -27,12 +27,10 @@ class Coordinates:
     Link j has place j. The motor of a rigid joint moves with its link and shares its place; the motors of compliant
     joints stand behind the links: N = n + number of compliant joints. All in joint units: a motor's angle is divided by
     its gear ratio.
-
-    `compliant`: joints whose transmission gives way, counted from 0, ascending.
     """
 
     joint_count: int
-    compliant: tuple[int, ...] = ()
+    compliant: tuple[int, ...] = ()  # joints whose transmission gives way, counted from 0, ascending
 
     @property
     def size(self) -> int:

@@ -152,11 +152,7 @@ logging.getLogger(eds.__name__).setLevel(logging.ERROR)
 
 @dataclass(frozen=True)
 class DescribedObject:
-    """One entry of the object dictionary as a file describes it.
-
-    `value`: the same as it is transferred, little end first; None where it is not of its type.
-    `default`: value as delivered; None where the file states none, or no whole number.
-    """
+    """One entry of the object dictionary as a file describes it."""
 
     name: str
     index: int
@@ -165,8 +161,8 @@ class DescribedObject:
     access: str
     is_mappable: bool
     value_text: str | None = None
-    value: bytes | None = None
-    default: int | None = None
+    value: bytes | None = None  # the same as it is transferred, little end first; None where it is not of its type
+    default: int | None = None  # value as delivered; None where the file states none, or no whole number
 
     @property
     def type_name(self) -> str:
@@ -178,17 +174,15 @@ class DescribedObject:
 class DeviceFile:
     """What a file says of a drive.
 
-    `objects`: of (index, subindex) to DescribedObject.
     `vendor`, `product`, `revision`: identity; None where it states none.
-    `node_id`: that a DCF is made for; None where it states none.
     """
 
     name: str
-    objects: Mapping[tuple[int, int], DescribedObject]
+    objects: Mapping[tuple[int, int], DescribedObject]  # by index and subindex
     vendor: int | None = None
     product: int | None = None
     revision: int | None = None
-    node_id: int | None = None
+    node_id: int | None = None  # that a DCF is made for; None where it states none
 
 
 def read_device_file(path: Path, node_id: int) -> DeviceFile:
