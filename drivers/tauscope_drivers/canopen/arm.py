@@ -8,21 +8,12 @@ import can
 import numpy as np
 
 from tauscope_drivers.backend import Capabilities, ControlMode, DriveLimits, StopPolicy
-from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen import objects, power
 from tauscope_drivers.canopen.bus import NMT_START, CanBus
 from tauscope_drivers.canopen.commissioning import commission_drive, write_settings
 from tauscope_drivers.canopen.configuration import BusConfiguration, read_configuration, require_targets
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.power import (
-    POLICY_GOALS,
-    dropped_faults,
-    power_up,
-    reset_faults,
-    stop_in_cycle,
-    stop_one_by_one,
-    stop_promptly,
-)
 from tauscope_drivers.canopen.session import Session, blind_state, listed, possible_rate_hz, rate_limited_by
 from tauscope_drivers.canopen.state_machine import Goal
 from tauscope_drivers.canopen.target_limiter import TargetLimiter
@@ -80,7 +71,7 @@ class CanopenArm:
         return Capabilities(
             joint_count=len(self._configuration.nodes),
             modes=self._modes,
-            stop_policies=frozenset(POLICY_GOALS),
+            stop_policies=frozenset(power.POLICY_GOALS),
             largest_rate_hz=possible_rate_hz(self._configuration),
             watchdog_range_s=WATCHDOG_RANGE_S,
             takes_feed_forward=False,
@@ -106,7 +97,7 @@ class CanopenArm:
         """Reset drives in fault, once, and forget emergencies; a drive that holds goes on holding."""
         session = self._require_session()
         self._mode = None
-        state = reset_faults(session)
+        state = power.reset_faults(session)
         if state.faults:
             raise DriverError(DriverErrorKind.FAULT, f"still in fault: {listed(state.faults)}", state.faults)
         return state
@@ -143,7 +134,7 @@ class CanopenArm:
             _require_hold(session.nodes, mode, stop_policy)
             session.bus.command_nodes(NMT_START)
             self._mode, self._policy, session.brake = mode, stop_policy, None
-            state, place = power_up(session, mode)
+            state, place = power.power_up(session, mode)
         except DriverError:
             self.stop(stop_policy)
             raise
@@ -176,7 +167,7 @@ class CanopenArm:
             session.caught = self._torque_watch.look(state.effort)
         if goal is Goal.OPERATION_ENABLED and (session.caught is not None or state.faults):
             # one drive's trouble becomes that of all: they stop together
-            return stop_promptly(session, mode, POLICY_GOALS[self._policy])
+            return power.stop_promptly(session, mode, power.POLICY_GOALS[self._policy])
         return state
 
     def stop(self, policy: StopPolicy) -> ArmState:
@@ -184,16 +175,16 @@ class CanopenArm:
         session, mode = self._session, self._mode
         if session is None:
             return blind_state(self.clock.now_ns(), len(self._configuration.nodes))
-        goal = POLICY_GOALS.get(policy, Goal.QUICK_STOP)
+        goal = power.POLICY_GOALS.get(policy, Goal.QUICK_STOP)
         for node in session.nodes:
             node.glitches.limit = math.inf
         self._mode, self._limiter, self._runaway, self._torque_watch = None, None, None, None
-        is_stopped = mode is not None and stop_in_cycle(session, mode, goal)
-        silent = stop_one_by_one(session.nodes, goal, is_stopped=is_stopped)
+        is_stopped = mode is not None and power.stop_in_cycle(session, mode, goal)
+        silent = power.stop_one_by_one(session.nodes, goal, is_stopped=is_stopped)
         session.bus.start_heartbeat(0.0)
         state = session.observe(self.clock.now_ns())
         shall_hold = mode is not None and goal is Goal.QUICK_STOP and self._policy is policy
-        dropped = dropped_faults(session.nodes) if shall_hold else []
+        dropped = power.dropped_faults(session.nodes) if shall_hold else []
         return replace(state, faults=(*state.faults, *silent, *dropped))
 
     def disconnect(self) -> None:
@@ -219,7 +210,7 @@ class CanopenArm:
         reason = None
         if mode not in self._modes:
             reason = f"not every drive has the cyclic synchronous {mode} mode (0x6502)"
-        elif policy not in POLICY_GOALS:
+        elif policy not in power.POLICY_GOALS:
             reason = f"drives cannot {policy} by themselves; choose hold or torque_off"
         elif not WATCHDOG_RANGE_S[0] <= watchdog_s <= WATCHDOG_RANGE_S[1]:
             reason = f"a watchdog of {watchdog_s:g} s is outside {WATCHDOG_RANGE_S[0]:g} to {WATCHDOG_RANGE_S[1]:g} s"

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from tauscope_drivers.backend import ControlMode
-from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen import objects, process_data
 from tauscope_drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, NMT_OPERATIONAL_STATE, CanBus
 from tauscope_drivers.canopen.configuration import NodeConfiguration
 from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects, require_identity
@@ -17,16 +17,6 @@ from tauscope_drivers.canopen.objects import (
     DriveObject,
     describe_absent,
     select_modes,
-)
-from tauscope_drivers.canopen.process_data import (
-    MEASURED,
-    MEASURED_WHERE_THERE,
-    PdoLayout,
-    PdoPlan,
-    PdoSlots,
-    decode_pdo,
-    encode_pdo,
-    plan_pdos,
 )
 from tauscope_drivers.canopen.sdo import NodeDictionary
 from tauscope_drivers.canopen.state_machine import ENABLE_OPERATION, DriveState, Goal, decode_state, next_controlword
@@ -109,8 +99,8 @@ class DriveNode:
     glitches: GlitchFilter = field(default_factory=GlitchFilter)
     present: frozenset[DriveObject] = frozenset(SUBSTITUTES)  # optional objects that it has
     mode_numbers: dict[ControlMode, int] = field(default_factory=dict)
-    slots: PdoSlots = field(default_factory=PdoSlots)
-    plan: PdoPlan = field(default=PdoPlan((), ()))
+    slots: process_data.PdoSlots = field(default_factory=process_data.PdoSlots)
+    plan: process_data.PdoPlan = field(default=process_data.PdoPlan((), ()))
     held: dict[DriveObject, int] = field(default_factory=dict)  # values of other objects in its RPDOs of fixed mapping
     stays_stopped: bool = True  # whether it keeps its power after a quick stop
     remarks: tuple[str, ...] = ()
@@ -141,12 +131,14 @@ class DriveNode:
         """Whether it has an optional object, which can be written where the driver writes it."""
         return entry in self.present
 
-    def plan_for(self, mode: ControlMode) -> PdoPlan:
+    def plan_for(self, mode: ControlMode) -> process_data.PdoPlan:
         """Its PDOs for a mode."""
         number = self.mode_numbers.get(mode, next(iter(TARGETS[mode])))
-        return plan_pdos(self.slots, TARGETS[mode][number], [one for one in MEASURED_WHERE_THERE if self.has(one)])
+        return process_data.plan_pdos(
+            self.slots, TARGETS[mode][number], [one for one in process_data.MEASURED_WHERE_THERE if self.has(one)]
+        )
 
-    def use_plan(self, plan: PdoPlan) -> None:
+    def use_plan(self, plan: process_data.PdoPlan) -> None:
         """Listen to the frames of a plan from now on."""
         self.plan = plan
         for pdo in plan.sent:
@@ -196,7 +188,7 @@ class DriveNode:
 
     def read_now(self) -> None:
         """Fill `values` by SDO: for an arm that is not in its cycle."""
-        entries = (*MEASURED, *(entry for entry in MEASURED_WHERE_THERE if self.has(entry)))
+        entries = (*process_data.MEASURED, *(entry for entry in process_data.MEASURED_WHERE_THERE if self.has(entry)))
         self.values = {entry: self.dictionary.read(entry) for entry in entries}
         self.error_code = self.values.get(objects.ERROR_CODE) or self.error_code
 
@@ -214,7 +206,10 @@ class DriveNode:
         values = {**self.held, objects.CONTROLWORD: controlword, target: quantity}
         try:
             return [
-                (pdo.direction.identifier(pdo.number, self.configuration.node_id), encode_pdo(pdo.layout, values))
+                (
+                    pdo.direction.identifier(pdo.number, self.configuration.node_id),
+                    process_data.encode_pdo(pdo.layout, values),
+                )
                 for pdo in self.plan.received
             ]
         except OverflowError as error:
@@ -285,8 +280,8 @@ class DriveNode:
                 "use a drive that watches the host's heartbeat"
             )
 
-    def _take(self, layout: PdoLayout, data: bytes) -> None:
-        values = decode_pdo(layout, data)
+    def _take(self, layout: process_data.PdoLayout, data: bytes) -> None:
+        values = process_data.decode_pdo(layout, data)
         if values is not None:
             self.values.update(values)
             self.is_deaf = False

@@ -3,19 +3,8 @@
 from dataclasses import replace
 
 from tauscope_drivers.backend import ControlMode
-from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen import objects, process_data
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.process_data import (
-    PDO_COUNT,
-    SENT,
-    Pdo,
-    PdoParameters,
-    PdoPlan,
-    PdoSlot,
-    PdoSlots,
-    decode_mapping,
-    mapping_entries,
-)
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 
 _PDO_OFF = 1 << 31
@@ -33,7 +22,7 @@ def map_process_data(node: DriveNode, mode: ControlMode) -> None:
 
     Raises DriverError ``refused`` where a needed object is in none of its PDOs, or a PDO is not exchanged at SYNC.
     """
-    for _ in range(2 * PDO_COUNT + 1):
+    for _ in range(2 * process_data.PDO_COUNT + 1):
         plan = require_plan(node, mode)
         if all(_write_pdo(node, pdo) for pdo in (*plan.received, *plan.sent)):
             break
@@ -46,7 +35,7 @@ def map_process_data(node: DriveNode, mode: ControlMode) -> None:
     node.held = held | dict.fromkeys(_COMMANDED, 0)
 
 
-def require_plan(node: DriveNode, mode: ControlMode) -> PdoPlan:
+def require_plan(node: DriveNode, mode: ControlMode) -> process_data.PdoPlan:
     """PDOs for a mode. Raises DriverError ``refused`` where a needed object is in none of them."""
     plan = node.plan_for(mode)
     if plan.missing:
@@ -57,16 +46,16 @@ def require_plan(node: DriveNode, mode: ControlMode) -> PdoPlan:
     return plan
 
 
-def _write_pdo(node: DriveNode, pdo: Pdo) -> bool:
+def _write_pdo(node: DriveNode, pdo: process_data.Pdo) -> bool:
     """Set up one PDO; False where its mapping cannot be written, and is known as fixed from now on."""
     places = pdo.direction.parameters(pdo.number, len(pdo.layout.objects))
     identifier = pdo.direction.identifier(pdo.number, node.configuration.node_id)
-    wanted = mapping_entries(pdo.layout.objects)
+    wanted = process_data.mapping_entries(pdo.layout.objects)
     if pdo.is_fixed:
         if read_mapping(node, places) != wanted:
             _learn(node, pdo, places)
             return False
-        _use_as_it_is(node, places, identifier, is_sent=pdo.direction is SENT)
+        _use_as_it_is(node, places, identifier, is_sent=pdo.direction is process_data.SENT)
         return True
     node.dictionary.write(places.identifier, _PDO_OFF | identifier)
     node.dictionary.write(places.kind, _EVERY_SYNC)
@@ -77,7 +66,7 @@ def _write_pdo(node: DriveNode, pdo: Pdo) -> bool:
     return True
 
 
-def _map(node: DriveNode, places: PdoParameters, wanted: list[int]) -> bool:
+def _map(node: DriveNode, places: process_data.PdoParameters, wanted: list[int]) -> bool:
     """Write a mapping in the order that CiA 301 asks for; False where the drive refuses it or keeps another one."""
     write = node.dictionary.write
     try:
@@ -93,7 +82,7 @@ def _map(node: DriveNode, places: PdoParameters, wanted: list[int]) -> bool:
     return all(node.dictionary.read(place) == entry for place, entry in zip(places.entries, wanted, strict=True))
 
 
-def _use_as_it_is(node: DriveNode, places: PdoParameters, identifier: int, *, is_sent: bool) -> None:
+def _use_as_it_is(node: DriveNode, places: process_data.PdoParameters, identifier: int, *, is_sent: bool) -> None:
     dictionary = node.dictionary
     kind = dictionary.read(places.kind)
     if not (kind == _EVERY_SYNC or (kind <= _LAST_SYNCHRONOUS and not is_sent)):
@@ -102,19 +91,23 @@ def _use_as_it_is(node: DriveNode, places: PdoParameters, identifier: int, *, is
         dictionary.write(places.identifier, identifier)
 
 
-def read_mapping(node: DriveNode, places: PdoParameters) -> list[int]:
+def read_mapping(node: DriveNode, places: process_data.PdoParameters) -> list[int]:
     """Mapping that a drive has."""
     count = min(node.dictionary.read_optional(places.count) or 0, _LONGEST_MAPPING)
     return [node.dictionary.read(replace(places.count, subindex=number, bits=32)) for number in range(1, count + 1)]
 
 
-def _learn(node: DriveNode, pdo: Pdo, places: PdoParameters) -> None:
+def _learn(node: DriveNode, pdo: process_data.Pdo, places: process_data.PdoParameters) -> None:
     """Keep that a PDO is fixed, and what it holds; others that the drive has may be free."""
-    slots = {slot.number: slot for slot in (node.slots.sent if pdo.direction is SENT else node.slots.received)}
-    for number in set(range(PDO_COUNT)) - slots.keys():
+    slots = {
+        slot.number: slot for slot in (node.slots.sent if pdo.direction is process_data.SENT else node.slots.received)
+    }
+    for number in set(range(process_data.PDO_COUNT)) - slots.keys():
         if node.dictionary.read_optional(pdo.direction.parameters(number, 0).identifier) is not None:
-            slots[number] = PdoSlot(number)
-    slots[pdo.number] = PdoSlot(pdo.number, decode_mapping(read_mapping(node, places)) or ())
+            slots[number] = process_data.PdoSlot(number)
+    slots[pdo.number] = process_data.PdoSlot(pdo.number, process_data.decode_mapping(read_mapping(node, places)) or ())
     ordered = tuple(slots[number] for number in sorted(slots))
-    received, sent = (node.slots.received, ordered) if pdo.direction is SENT else (ordered, node.slots.sent)
-    node.slots = PdoSlots(received, sent)
+    received, sent = (
+        (node.slots.received, ordered) if pdo.direction is process_data.SENT else (ordered, node.slots.sent)
+    )
+    node.slots = process_data.PdoSlots(received, sent)

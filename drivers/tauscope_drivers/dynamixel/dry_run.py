@@ -7,22 +7,12 @@ from numpy.typing import NDArray
 
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.dynamixel import packets
+from tauscope_drivers.dynamixel import packets, preparation
 from tauscope_drivers.dynamixel.bus import has_room_for_speeds, planned_budget
 from tauscope_drivers.dynamixel.configuration import read_configuration
 from tauscope_drivers.dynamixel.control_table import encode_items
 from tauscope_drivers.dynamixel.enabling import Bounds, goals_of
 from tauscope_drivers.dynamixel.group import health_turns, item_writes, paced_goals, servo_families
-from tauscope_drivers.dynamixel.preparation import (
-    SETTINGS,
-    RegisterWrite,
-    ServoTask,
-    commissioning_writes,
-    current_cap,
-    preparing_writes,
-    taking_writes,
-    watchdog_steps,
-)
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.inspection import FrameRequest, PlannedFrame
@@ -30,7 +20,7 @@ from tauscope_drivers.limits import require_sensible
 from tauscope_drivers.state import Setpoint
 
 _DELIVERED = {
-    **dict.fromkeys(SETTINGS, 0),
+    **dict.fromkeys(preparation.SETTINGS, 0),
     "Return Delay Time": 250,
     "Operating Mode": 3,
     "Status Return Level": 2,
@@ -54,22 +44,22 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
     servos = [make_servo(number, servo, None) for number, servo in enumerate(configuration.servos, 1)]
     require_sensible(limits, targets[0], [servo.label for servo in servos])
     tasks = [
-        ServoTask(
+        preparation.ServoTask(
             mode,
-            current_cap(servo, _DELIVERED, float(limits.torque[joint])),
+            preparation.current_cap(servo, _DELIVERED, float(limits.torque[joint])),
             servo.units.velocity_cap(float(limits.velocity[joint])),
             servo.units.counts(float(targets[0, joint])),
-            watchdog_steps(request.watchdog_s),
+            preparation.watchdog_steps(request.watchdog_s),
         )
         for joint, servo in enumerate(servos)
     ]
     for servo in servos:
         yield _frame("connect", f"{servo.label}: who are you?", packets.encode_ping(servo.servo))
-        yield from _writes(servo, "connect", commissioning_writes(servo, _DELIVERED, holds=False))
+        yield from _writes(servo, "connect", preparation.commissioning_writes(servo, _DELIVERED, holds=False))
     for servo, task in zip(servos, tasks, strict=True):
-        yield from _writes(servo, "enable", preparing_writes(servo, _DELIVERED, task, holds=False))
+        yield from _writes(servo, "enable", preparation.preparing_writes(servo, _DELIVERED, task, holds=False))
     for servo, task in zip(servos, tasks, strict=True):
-        yield from _writes(servo, "enable", taking_writes(servo, task, holds=False))
+        yield from _writes(servo, "enable", preparation.taking_writes(servo, task, holds=False))
     if cycle_s is not None and not has_room_for_speeds(*planned_budget(configuration), cycle_s):
         cycle_s = None
     ends = zip(servos, limits.position_low.tolist(), limits.position_high.tolist(), strict=True)
@@ -77,8 +67,10 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
     yield from _cycles(servos, mode, bounds, targets, cycle_s)
     for servo in servos:
         items = servo.model.items
-        off = [RegisterWrite(items["Torque Enable"], 0, "torque off")] if mode is ControlMode.TORQUE else []
-        yield from _writes(servo, "stop", [*off, RegisterWrite(items["Bus Watchdog"], 0, "stays so without cycles")])
+        off = [preparation.RegisterWrite(items["Torque Enable"], 0, "torque off")] if mode is ControlMode.TORQUE else []
+        yield from _writes(
+            servo, "stop", [*off, preparation.RegisterWrite(items["Bus Watchdog"], 0, "stays so without cycles")]
+        )
 
 
 def _cycles(
@@ -109,7 +101,7 @@ def _cycles(
         yield _frame("cycle", f"{servos[turn].label}: {names}?", frame)
 
 
-def _writes(servo: JointServo, phase: str, writes: Iterable[RegisterWrite]) -> Iterator[PlannedFrame]:
+def _writes(servo: JointServo, phase: str, writes: Iterable[preparation.RegisterWrite]) -> Iterator[PlannedFrame]:
     for write in writes:
         frame = packets.encode_write(servo.servo, write.item.address, write.item.encode(write.value))
         yield _frame(phase, f"{servo.label}: {write.item.name} := {write.value}, {write.reason}", frame)

@@ -17,14 +17,8 @@ from tauscope_drivers.feetech.registers import FEEDBACK, VOLT
 from tauscope_drivers.feetech.session import Session, open_session
 from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.serial_port import expect_latency_s
+from tauscope_drivers.serial_servos import budget
 from tauscope_drivers.serial_servos.arm import SerialServoArm
-from tauscope_drivers.serial_servos.budget import (
-    SHORTEST_RETURN_DELAY_S,
-    BusTiming,
-    CycleTraffic,
-    largest_part,
-    largest_rate_hz,
-)
 from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers
 from tauscope_drivers.state import ArmState, Setpoint
 
@@ -54,11 +48,11 @@ class FeetechArm(SerialServoArm[Session]):
             joint_count=len(self._configuration.servos),
             modes=frozenset([ControlMode.POSITION]),
             stop_policies=frozenset([StopPolicy.HOLD]),
-            largest_rate_hz=largest_rate_hz(*self._budget()),
+            largest_rate_hz=budget.largest_rate_hz(*self._budget()),
             watchdog_range_s=WATCHDOG_RANGE_S,
             takes_feed_forward=False,
             effort_unit="permille",
-            rate_limited_by=", ".join(largest_part(*self._budget())),
+            rate_limited_by=", ".join(budget.largest_part(*self._budget())),
             remarks=self._remarks,
         )
 
@@ -130,12 +124,12 @@ class FeetechArm(SerialServoArm[Session]):
                 break
         return _arm_state(session, answers)
 
-    def _budget(self) -> tuple[CycleTraffic, BusTiming]:
+    def _budget(self) -> tuple[budget.CycleTraffic, budget.BusTiming]:
         traffic = count_traffic(len(self._configuration.servos))
         if self._session is None:
             latency_s = expect_latency_s(self._port.path)
-            return traffic, BusTiming(self._port.baudrate, SHORTEST_RETURN_DELAY_S, latency_s)
-        return traffic, BusTiming(self._port.baudrate, self._session.bus.return_delay_s, self._port.latency_s)
+            return traffic, budget.BusTiming(self._port.baudrate, budget.SHORTEST_RETURN_DELAY_S, latency_s)
+        return traffic, budget.BusTiming(self._port.baudrate, self._session.bus.return_delay_s, self._port.latency_s)
 
 
 def _arm_state(session: Session, answers: Answers[Status]) -> ArmState:

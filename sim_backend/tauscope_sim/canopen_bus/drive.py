@@ -9,14 +9,7 @@ from enum import Enum
 from functools import partial
 
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile
-from tauscope_sim.canopen_bus.object_dictionary import (
-    Abort,
-    AbortError,
-    ObjectDictionary,
-    WriteHook,
-    answer_request,
-    apply_sheet,
-)
+from tauscope_sim.canopen_bus import object_dictionary
 from tauscope_sim.canopen_bus.power_state import PowerState, PowerStateMachine
 from tauscope_sim.canopen_bus.process_data import ProcessData
 
@@ -103,7 +96,7 @@ class EmulatedDrive:
         self.dictionary = self._dictionary()
         self.process_data = ProcessData(self.dictionary, self.node_id)
         if self._file is not None:
-            apply_sheet(self.dictionary, self._file)
+            object_dictionary.apply_sheet(self.dictionary, self._file)
         self.power.quick_stop_stays = self.dictionary.get(0x605A) in _QUICK_STOP_STAYS
         self._nmt = _PRE_OPERATIONAL
         self._is_off_bus = False
@@ -118,7 +111,7 @@ class EmulatedDrive:
         if identifier == _NMT and len(payload) == 2 and payload[1] in (0, self.node_id):
             self._follow_network(payload[0])
         elif identifier == 0x600 + self.node_id and self._nmt != _STOPPED:
-            answer = answer_request(self.dictionary, payload)
+            answer = object_dictionary.answer_request(self.dictionary, payload)
             return [] if answer is None else [(0x580 + self.node_id, answer)]
         elif identifier == 0x700 + self._watched_node:
             self._last_master_s = now_s
@@ -258,13 +251,13 @@ class EmulatedDrive:
     def _take_mode(self, mode: int) -> None:
         known = (INTERPOLATED_POSITION, CYCLIC_POSITION, CYCLIC_TORQUE)
         if mode not in known or not self.dictionary.get(0x6502) >> (mode - 1) & 1:
-            raise AbortError(Abort.VALUE_RANGE)
+            raise object_dictionary.AbortError(object_dictionary.Abort.VALUE_RANGE)
         self._mode_taken = mode
         self.dictionary.put(0x6061, mode)
 
-    def _dictionary(self) -> ObjectDictionary:
+    def _dictionary(self) -> object_dictionary.ObjectDictionary:
         """Entries at power-up; the target position is stale on purpose, as it is on a real drive after a run."""
-        dictionary = ObjectDictionary()
+        dictionary = object_dictionary.ObjectDictionary()
         for index, subindex, size, value, signed, writable in _ENTRIES:
             dictionary.add(index, subindex, size, value, signed=signed, writable=writable)
         for (index, subindex), hook in self._hooks().items():
@@ -273,7 +266,7 @@ class EmulatedDrive:
         dictionary.put(0x6041, PowerState.SWITCH_ON_DISABLED.value | 0x0200)
         return dictionary
 
-    def _hooks(self) -> dict[tuple[int, int], WriteHook]:
+    def _hooks(self) -> dict[tuple[int, int], object_dictionary.WriteHook]:
         """What a master's write does."""
 
         def count_silence_anew(_: int) -> None:
@@ -294,7 +287,7 @@ class EmulatedDrive:
 
 def _require(is_taken: Callable[[int], bool], value: int) -> None:
     if not is_taken(value):
-        raise AbortError(Abort.VALUE_RANGE)
+        raise object_dictionary.AbortError(object_dictionary.Abort.VALUE_RANGE)
 
 
 _ENTRIES = (

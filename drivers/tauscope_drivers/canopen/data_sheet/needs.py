@@ -1,21 +1,9 @@
 """Whether a drive is what the driver needs and what its EDS or DCF file states."""
 
 from tauscope_drivers.backend import ControlMode
-from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen import objects, process_data
 from tauscope_drivers.canopen.data_sheet.device_file import TYPE_NAMES, DataSheetError, DescribedObject, DeviceFile
 from tauscope_drivers.canopen.objects import SUBSTITUTES, TARGETS, WRITTEN, DriveObject, select_modes
-from tauscope_drivers.canopen.process_data import (
-    MEASURED,
-    MEASURED_WHERE_THERE,
-    PDO_COUNT,
-    RECEIVED,
-    SENT,
-    PdoDirection,
-    PdoSlot,
-    PdoSlots,
-    decode_mapping,
-    plan_pdos,
-)
 from tauscope_drivers.canopen.sdo import NodeDictionary
 from tauscope_drivers.errors import DriverError
 
@@ -35,7 +23,7 @@ def find_flaws(file: DeviceFile, *, reads_rated_torque: bool) -> list[str]:
     if flaw := _flaw(file, objects.CONSUMER_HEARTBEAT, is_written=True):
         flaws.append(f"{flaw}: the drive would not notice that the host is gone")
     flaws += [flaw for entry in SUBSTITUTES if _find(file, entry) and (flaw := _flaw(file, entry))]
-    flaws += [flaw for entry in MEASURED if (flaw := _flaw(file, entry, is_mapped=True))]
+    flaws += [flaw for entry in process_data.MEASURED if (flaw := _flaw(file, entry, is_mapped=True))]
     flaws += _target_flaws(file, ControlMode.POSITION)
     if flaws and reads_rated_torque and not states_rated_torque(file):
         flaws.append(f"{objects.RATED_TORQUE} is missing: give drive.rated_torque_nm")
@@ -57,13 +45,13 @@ def require_target(file: DeviceFile, mode: ControlMode) -> None:
     _refuse(_target_flaws(file, mode))
 
 
-def pdo_slots(file: DeviceFile) -> PdoSlots:
+def pdo_slots(file: DeviceFile) -> process_data.PdoSlots:
     """The PDOs of a drive, and which of them can be mapped."""
     received, sent = (
-        tuple(slot for number in range(PDO_COUNT) if (slot := _slot(file, number, direction)))
-        for direction in (RECEIVED, SENT)
+        tuple(slot for number in range(process_data.PDO_COUNT) if (slot := _slot(file, number, direction)))
+        for direction in (process_data.RECEIVED, process_data.SENT)
     )
-    return PdoSlots(received, sent)
+    return process_data.PdoSlots(received, sent)
 
 
 def _target_flaws(file: DeviceFile, mode: ControlMode) -> list[str]:
@@ -78,12 +66,12 @@ def _target_flaws(file: DeviceFile, mode: ControlMode) -> list[str]:
         return [flaw]
     if mode is ControlMode.TORQUE and not _find(file, objects.VELOCITY_ACTUAL):
         return [f"{objects.VELOCITY_ACTUAL} is missing, by which a runaway is noticed"]
-    optional = (entry for entry in MEASURED_WHERE_THERE if _is_mappable(file, entry))
-    missing = plan_pdos(pdo_slots(file), target, optional).missing
+    optional = (entry for entry in process_data.MEASURED_WHERE_THERE if _is_mappable(file, entry))
+    missing = process_data.plan_pdos(pdo_slots(file), target, optional).missing
     return [f"{entry} is in none of its PDOs, and their mapping cannot be written" for entry in missing]
 
 
-def _slot(file: DeviceFile, number: int, direction: PdoDirection) -> PdoSlot | None:
+def _slot(file: DeviceFile, number: int, direction: process_data.PdoDirection) -> process_data.PdoSlot | None:
     """A PDO as the file describes it; None where it has none of this number."""
     mapping = direction.mapping + number
     count = file.objects.get((mapping, 0))
@@ -93,14 +81,14 @@ def _slot(file: DeviceFile, number: int, direction: PdoDirection) -> PdoSlot | N
     while entry := file.objects.get((mapping, len(entries) + 1)):
         entries.append(entry)
     if "w" in count.access and entries and all("w" in entry.access for entry in entries):
-        return PdoSlot(number, entries=len(entries))
+        return process_data.PdoSlot(number, entries=len(entries))
     words = [entry.default or 0 for entry in entries[: count.default or 0]]
-    return PdoSlot(number, decode_mapping(words) or ())
+    return process_data.PdoSlot(number, process_data.decode_mapping(words) or ())
 
 
 def _is_there(file: DeviceFile, entry: DriveObject) -> bool:
     """Whether an optional object is there, and can be written where the driver writes it."""
-    if entry in MEASURED_WHERE_THERE:
+    if entry in process_data.MEASURED_WHERE_THERE:
         return _is_mappable(file, entry)
     return _flaw(file, entry, is_written=entry in WRITTEN) is None
 
