@@ -13,7 +13,6 @@ from tauscope_drivers import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.configuration import (
     BusConfiguration,
-    DriveJoint,
     NodeConfiguration,
     check_blocks,
     read_configuration,
@@ -23,6 +22,7 @@ from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, Devi
 from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects
 from tauscope_drivers.canopen.objects import describe_absent
 from tauscope_drivers.canopen.process_data import MEASURED_WHERE_THERE, plan_pdos
+from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.inspection import Severity
 
