@@ -17,6 +17,7 @@ from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.session import Session, blind_state, listed, possible_rate_hz, rate_limited_by
 from tauscope_drivers.canopen.state_machine import Goal
 from tauscope_drivers.canopen.target_limiter import TargetLimiter
+from tauscope_drivers.canopen.watchdog import BEATS
 from tauscope_drivers.clock import Clock, MonotonicClock
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
@@ -24,7 +25,6 @@ from tauscope_drivers.limits import RunawayWatch, TorqueWatch, require_finite, r
 from tauscope_drivers.state import ArmState, Setpoint
 
 WATCHDOG_RANGE_S = (0.02, 5.0)
-HEARTBEATS_A_WATCHDOG = 10  # the master beats so often within a drive's watchdog time: one lost frame stops nothing
 PATIENCE_S = 0.002  # time that drives and adapter may take to answer SYNC, beyond twice that of the frames on the wire
 
 
@@ -127,7 +127,7 @@ class CanopenArm:
         if state.faults:
             raise DriverError(DriverErrorKind.FAULT, f"{listed(state.faults)}; acknowledge it first", state.faults)
         session.learn_cycle(cycle_s)
-        session.bus.start_heartbeat(watchdog_s / HEARTBEATS_A_WATCHDOG)
+        session.bus.start_heartbeat(watchdog_s / BEATS)
         try:
             for node in session.nodes:
                 commission_drive(node, mode, limits, stop_policy, watchdog_s, cycle_s)
@@ -154,8 +154,11 @@ class CanopenArm:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the drives are not enabled; enable the arm first")
         require_finite(setpoint, len(session.nodes))
         session.bus.drain()
-        if any(node.error_code == HEARTBEAT_LOST for node in session.nodes):
-            return session.read_by_sdo()  # such a drive takes no process data any more
+        missing = [node for node in session.nodes if node.error_code == HEARTBEAT_LOST]
+        if len(missing) == len(session.nodes):
+            return session.read_by_sdo()  # such drives take no process data any more
+        if missing:
+            return power.stop_promptly(session, mode, power.POLICY_GOALS[self._policy])
         targets = limiter.limited(setpoint, self.clock.now_ns())
         # a stop that has begun goes on, whatever is asked for meanwhile
         goal = Goal.OPERATION_ENABLED if session.caught is None and session.brake is None else Goal.QUICK_STOP

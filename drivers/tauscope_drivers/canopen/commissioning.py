@@ -8,15 +8,13 @@ from canopen.sdo.exceptions import SdoAbortedError
 
 from tauscope_drivers.backend import ControlMode, DriveLimits, StopPolicy
 from tauscope_drivers.canopen import objects
-from tauscope_drivers.canopen.bus import MASTER_NODE
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, Setting, settings_of
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import STAYING_OPTIONS, DriveObject
 from tauscope_drivers.canopen.pdo_mapping import map_process_data
 from tauscope_drivers.canopen.state_machine import POWERED, decode_state
+from tauscope_drivers.canopen.watchdog import arm_watchdog
 from tauscope_drivers.errors import DriverError, DriverErrorKind
-
-PRODUCER_HEARTBEAT_MS = 100
 
 _STAYS_STOPPED = (6, 5)  # quick stop options that keep the power: by the quick stop ramp, by the slow one
 _LETS_GO = (2, 1)
@@ -98,9 +96,8 @@ def commission_drive(
     Raises DriverError ``refused`` where the drive does not take a value.
     `cycle_s`: time between two SYNCs; the drive keeps the one that it knows where None [s].
     """
-    write = node.dictionary.write
     holds = stop_policy is StopPolicy.HOLD
-    write(objects.MODE_OF_OPERATION, node.mode_numbers[mode])
+    node.dictionary.write(objects.MODE_OF_OPERATION, node.mode_numbers[mode])
     option = _choose(node, objects.QUICK_STOP_OPTION, _STAYS_STOPPED if holds else _LETS_GO)
     node.stays_stopped = option in STAYING_OPTIONS
     _arm_abort(node, holds=holds and node.stays_stopped)
@@ -108,9 +105,7 @@ def commission_drive(
     _write_limits(node, limits)
     if cycle_s is not None:
         _tell_cycle(node, cycle_s)
-    write(objects.CONSUMER_HEARTBEAT, MASTER_NODE << 16 | round(watchdog_s * 1e3))
-    if node.has(objects.PRODUCER_HEARTBEAT):
-        write(objects.PRODUCER_HEARTBEAT, PRODUCER_HEARTBEAT_MS)
+    arm_watchdog(node, watchdog_s)
     map_process_data(node, mode)
 
 

@@ -170,7 +170,8 @@ def _describe_file(place: str, node: NodeConfiguration) -> list[Finding]:
     file = node.device_file
     if file is None:
         return []
-    absent = describe_absent(needs.present_objects(file))
+    absent = [objects.GUARDED] if needs.needs_guarding(file) else []
+    absent += describe_absent(needs.present_objects(file))
     doubts: list[Finding] = []
     if node.rated_torque_nm is None and not needs.states_rated_torque(file):
         detail = f"{file.name} has no {objects.RATED_TORQUE}: torque in ‰ of it means nothing, and a run is refused"

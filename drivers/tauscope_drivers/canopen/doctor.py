@@ -18,6 +18,7 @@ from tauscope_drivers.canopen.pdo_mapping import read_mapping, require_plan
 from tauscope_drivers.canopen.process_data import decode_mapping
 from tauscope_drivers.canopen.session import possible_rate_hz
 from tauscope_drivers.canopen.state_machine import POWERED
+from tauscope_drivers.canopen.watchdog import require_guarding
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError
 from tauscope_drivers.inspection import Finding, FoundDevice, Severity, failure
@@ -224,6 +225,7 @@ def rehearse(node: DriveNode, joint: DriveJoint) -> list[Finding]:
         lambda: _examine_torque(node, joint),
         lambda: _examine_mapping(node),
         lambda: _examine_abort(node),
+        lambda: _examine_guarding(node),
     )
     findings: list[Finding] = []
     for check in checks:
@@ -282,3 +284,17 @@ def _examine_abort(node: DriveNode) -> list[Finding]:
         return []
     detail = f"{objects.ABORT_CONNECTION} is 0 and read-only: it goes on when the host is gone"
     return [Finding(Severity.FAILURE, node.place, detail, "set it to 1, 2 or 3 with the maker's tool")]
+
+
+def _examine_guarding(node: DriveNode) -> list[Finding]:
+    """Remote frames reach a drive that is guarded; one that counts already, or produces heartbeats, is not asked."""
+    read = node.dictionary.read_optional
+    beats = read(objects.PRODUCER_HEARTBEAT)
+    if not node.is_guarded or all(map(read, objects.GUARDING)):
+        return []
+    if beats and not node.has(objects.PRODUCER_HEARTBEAT):
+        detail = f"{objects.PRODUCER_HEARTBEAT} is {beats} ms and read-only: such a drive is not guarded"
+        return [Finding(Severity.FAILURE, node.place, detail, "set it to 0 with the maker's tool")]
+    if not beats:
+        require_guarding(node)
+    return []

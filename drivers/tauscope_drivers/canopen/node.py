@@ -8,7 +8,7 @@ from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects, process_data
 from tauscope_drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, NMT_OPERATIONAL_STATE, CanBus
 from tauscope_drivers.canopen.configuration import NodeConfiguration
-from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects, require_identity
+from tauscope_drivers.canopen.data_sheet.needs import needs_guarding, pdo_slots, present_objects, require_identity
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST, decode_emergency, describe_error
 from tauscope_drivers.canopen.objects import (
     STAYING_OPTIONS,
@@ -64,7 +64,6 @@ class GlitchFilter:
 
 _CIA_402 = 402
 _INTERPOLATE = 0x10  # bit of the controlword that starts interpolation, in the mode of that name
-Listener = Callable[[int, Callable[[int, bytes], None]], None]  # hands the frames of an identifier to a handler
 
 
 @dataclass(frozen=True)
@@ -87,6 +86,7 @@ class DriveNode:
     configuration: NodeConfiguration
     joint: int  # number of its joint, from 1
     dictionary: NodeDictionary
+    bus: CanBus = field(repr=False, kw_only=True)
     units: DriveUnits = field(default=DriveUnits(math.nan, 0, math.nan))
     values: dict[DriveObject, int] = field(default_factory=dict)
     error_code: int = 0
@@ -104,13 +104,13 @@ class DriveNode:
     held: dict[DriveObject, int] = field(default_factory=dict)  # values of other objects in its RPDOs of fixed mapping
     stays_stopped: bool = True  # whether it keeps its power after a quick stop
     remarks: tuple[str, ...] = ()
-    listen: Listener = field(default=lambda _identifier, _handler: None)
+    is_guarded: bool = False  # by remote frames, for it watches no heartbeat
 
     @staticmethod
     def on_bus(bus: CanBus, configuration: NodeConfiguration, joint: int) -> "DriveNode":
         """A drive whose frames are listened to from now on. `joint`: number of its joint, from 1."""
         node_id = configuration.node_id
-        node = DriveNode(configuration, joint, bus.add_node(node_id), listen=bus.subscribe)
+        node = DriveNode(configuration, joint, bus.add_node(node_id), bus=bus)
         node.use_plan(node.plan_for(ControlMode.POSITION))
         bus.subscribe(EMERGENCY_ID + node_id, lambda _, data: node._take_emergency(data))
         bus.subscribe(HEARTBEAT_ID + node_id, lambda _, data: node._take_heartbeat(data))
@@ -143,7 +143,7 @@ class DriveNode:
         self.plan = plan
         for pdo in plan.sent:
             identifier = pdo.direction.identifier(pdo.number, self.configuration.node_id)
-            self.listen(identifier, lambda _, data, layout=pdo.layout: self._take(layout, data))
+            self.bus.subscribe(identifier, lambda _, data, layout=pdo.layout: self._take(layout, data))
 
     def identify(self) -> frozenset[ControlMode]:
         """Make sure that it is the drive that is meant, learn its units, and return the modes that it has.
@@ -160,10 +160,10 @@ class DriveNode:
         if file is not None:
             require_identity(file, self.dictionary, self.place)
             self.slots = pdo_slots(file)
-        self._require_watchdog()
+        self._find_watchdog()
         found = (entry for entry in SUBSTITUTES if self.dictionary.read_optional(entry) is not None)
         self.present = frozenset(found) & (frozenset(SUBSTITUTES) if file is None else present_objects(file))
-        self.remarks = tuple(describe_absent(self.present))
+        self.remarks = (*([objects.GUARDED] if self.is_guarded else []), *describe_absent(self.present))
         self.stays_stopped = self.dictionary.read_optional(objects.QUICK_STOP_OPTION) in STAYING_OPTIONS
         self.units = self._learn_units()
         self.mode_numbers = select_modes(self.dictionary.read(objects.SUPPORTED_MODES))
@@ -272,12 +272,14 @@ class DriveNode:
                 return drive_units(configuration, rated.nm)
         raise DriverError.refusal(f"{self.place}: its rated torque (0x6076) {flaw}; give drive.rated_torque_nm")
 
-    def _require_watchdog(self) -> None:
-        """Refuse a drive that would not notice that the host is gone."""
-        if self.dictionary.read_optional(objects.CONSUMER_HEARTBEAT) is None:
+    def _find_watchdog(self) -> None:
+        """Find out how it notices that the host is gone, and refuse a drive that would not."""
+        file, read = self.configuration.device_file, self.dictionary.read_optional
+        self.is_guarded = read(objects.CONSUMER_HEARTBEAT) is None or (file is not None and needs_guarding(file))
+        if self.is_guarded and None in map(read, objects.GUARDING):
             raise DriverError.refusal(
-                f"{self.place}: has no {objects.CONSUMER_HEARTBEAT}: it would not notice that the host is gone; "
-                "use a drive that watches the host's heartbeat"
+                f"{self.place}: has neither {objects.CONSUMER_HEARTBEAT} nor node guarding (0x100C, 0x100D): it would "
+                "not notice that the host is gone; use a drive that watches its host"
             )
 
     def _take(self, layout: process_data.PdoLayout, data: bytes) -> None:

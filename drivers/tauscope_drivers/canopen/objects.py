@@ -33,6 +33,8 @@ DEVICE_TYPE = DriveObject("Device type", 0x1000, 0, 32)
 ERROR_REGISTER = DriveObject("Error register", 0x1001, 0, 8)
 DEVICE_NAME = DriveObject("Device name", 0x1008, 0, 0)
 SOFTWARE_VERSION = DriveObject("Software version", 0x100A, 0, 0)
+GUARD_TIME = DriveObject("Guard time", 0x100C, 0, 16)
+LIFE_TIME_FACTOR = DriveObject("Life time factor", 0x100D, 0, 8)
 CONSUMER_HEARTBEAT = DriveObject("Consumer heartbeat time", 0x1016, 1, 32)
 PRODUCER_HEARTBEAT = DriveObject("Producer heartbeat time", 0x1017, 0, 16)
 VENDOR = DriveObject("Vendor-ID", 0x1018, 1, 32)
@@ -113,6 +115,9 @@ WRITTEN = frozenset(SUBSTITUTES) - {VELOCITY_ACTUAL, ERROR_CODE}
 
 
 STAYING_OPTIONS = range(5, 9)  # quick stop options (0x605A) after which a drive keeps its power
+
+GUARDING = (GUARD_TIME, LIFE_TIME_FACTOR)
+GUARDED = f"has no {CONSUMER_HEARTBEAT}: the host guards it by remote frames (0x100C, 0x100D)"
 
 DOUBTFUL = (ABORT_CONNECTION, QUICK_STOP_OPTION)
 """Optional objects without which an operator has to try how the arm stops."""

@@ -8,6 +8,7 @@ from tauscope_drivers.canopen.bus import NMT_START
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.session import Session, listed, stay_at
 from tauscope_drivers.canopen.state_machine import DISABLE_VOLTAGE, FAULT_RESET, DriveState, Goal, next_controlword
+from tauscope_drivers.canopen.watchdog import disarm_watchdog
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
 from tauscope_drivers.state import ArmState, Array
 
@@ -145,7 +146,7 @@ def stop_one_by_one(nodes: Sequence[DriveNode], goal: Goal, *, is_stopped: bool)
             is_driven = node.state is DriveState.OPERATION_ENABLED and node.stays_stopped
             if not is_stopped and (goal is not Goal.QUICK_STOP or is_driven):
                 node.dictionary.write(objects.CONTROLWORD, next_controlword(node.state, goal))
-            node.dictionary.write(objects.CONSUMER_HEARTBEAT, 0)
+            disarm_watchdog(node)
             node.read_now()
         except DriverError as error:
             if error.kind is DriverErrorKind.LOST:

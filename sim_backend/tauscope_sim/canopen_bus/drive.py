@@ -62,6 +62,7 @@ class AxisScale:
 
 
 Frame = tuple[int, bytes]
+REMOTE = 1 << 30  # flag of a remote frame's identifier, as the kernel has it
 
 INTERPOLATED_POSITION = 7
 CYCLIC_POSITION = 8
@@ -103,6 +104,8 @@ class EmulatedDrive:
         self._mode_taken = 0
         self._next_heartbeat_s = 0.0
         self._last_master_s: float | None = None
+        self._last_guard_s: float | None = None
+        self._toggle = 0
         self._outbox: list[Frame] = [(0x700 + self.node_id, b"\0")]
 
     def receive(self, frame: Frame, now_s: float) -> list[Frame]:
@@ -115,6 +118,10 @@ class EmulatedDrive:
             return [] if answer is None else [(0x580 + self.node_id, answer)]
         elif identifier == 0x700 + self._watched_node:
             self._last_master_s = now_s
+        elif identifier == REMOTE | 0x700 + self.node_id and not self.dictionary.get(0x1017):
+            self._last_guard_s = now_s
+            self._toggle ^= 0x80
+            return [(0x700 + self.node_id, bytes([self._toggle ^ 0x80 | self._nmt]))]
         elif self._nmt == _OPERATIONAL and identifier == _SYNC:
             return self.process_data.synchronise()
         elif self._nmt == _OPERATIONAL:
@@ -194,16 +201,22 @@ class EmulatedDrive:
         return self.dictionary.get(0x60C2, 1) * 10.0 ** self.dictionary.get(0x60C2, 2)
 
     def _watch_master(self, now_s: float) -> None:
-        """React to a master that stays away, also to one that was never heard since the watch began."""
-        timeout_s = (self.dictionary.get(0x1016, 1) & 0xFFFF) / 1e3
-        if self._watched_node < 0:
+        """React to a master that stays away.
+
+        A heartbeat is missed also where none was ever heard since the watch began; guarding begins with a remote frame.
+        """
+        heartbeat_s = (self.dictionary.get(0x1016, 1) & 0xFFFF) / 1e3 if self._watched_node >= 0 else 0.0
+        life_s = self.dictionary.get(0x100C) * self.dictionary.get(0x100D) / 1e3
+        if not heartbeat_s:
             self._last_master_s = None
-            return
-        if self._last_master_s is None:
+        elif self._last_master_s is None:
             self._last_master_s = now_s
-        if now_s - self._last_master_s <= timeout_s:
+        if not life_s:
+            self._last_guard_s = None
+        watches = ((self._last_master_s, heartbeat_s), (self._last_guard_s, life_s))
+        if all(heard_s is None or now_s - heard_s <= limit_s for heard_s, limit_s in watches):
             return
-        self._last_master_s = now_s
+        self._last_master_s, self._last_guard_s = now_s, None
         if self.power.state is PowerState.OPERATION_ENABLED:
             self._abort_connection()
             self._report(HEARTBEAT_LOST)
@@ -294,6 +307,8 @@ _ENTRIES = (
     # index, subindex, bytes, value, signed, writable
     (0x1000, 0, 4, 0x00020192, False, False),
     (0x1001, 0, 1, 0, False, False),
+    (0x100C, 0, 2, 0, False, True),
+    (0x100D, 0, 1, 0, False, True),
     (0x1016, 1, 4, 0, False, True),
     (0x1017, 0, 2, 0, False, True),
     (0x1018, 1, 4, 0x00000000, False, False),

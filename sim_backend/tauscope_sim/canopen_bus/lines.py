@@ -5,7 +5,7 @@ import contextlib
 import socket
 import struct
 
-from tauscope_sim.canopen_bus.drive import Frame
+from tauscope_sim.canopen_bus.drive import REMOTE, Frame
 from tauscope_sim.emulation.fault_kit import AnswerFaults, FaultKind, TimedQueue
 
 _END, _ERROR = b"\r", b"\a"
@@ -28,7 +28,7 @@ class SerialLine:
     def take(self, data: bytes) -> tuple[list[Frame], bytes]:
         """Frames for the bus, and what the adapter answers.
 
-        Extended and remote frames are acknowledged and go nowhere: no drive listens to them.
+        Extended frames are acknowledged and go nowhere: no drive listens to them.
         """
         *lines, self._pending = (self._pending + data).split(_END)
         if len(self._pending) > _LONGEST_LINE:
@@ -60,6 +60,8 @@ class SerialLine:
                 return _ERROR
             if command == _STANDARD:
                 frames.append(frame)
+            elif command == _REMOTE:
+                frames.append((frame[0] | REMOTE, b""))
             return b"z" + _END
         return _ERROR
 
@@ -119,11 +121,11 @@ class SocketLine:
     """Frames in the kernel's form; implements `Line`."""
 
     def take(self, data: bytes) -> tuple[list[Frame], bytes]:
-        """Standard data frames for the bus; others go nowhere, for no drive listens to them."""
+        """Standard frames for the bus; others go nowhere, for no drive listens to them."""
         frames = []
         for identifier, length, payload in _FRAME.iter_unpack(data):
-            if identifier <= _HIGHEST_IDENTIFIER and length <= _LONGEST:
-                frames.append((identifier, payload[:length]))
+            if identifier & ~REMOTE <= _HIGHEST_IDENTIFIER and length <= _LONGEST:
+                frames.append((identifier, b"" if identifier & REMOTE else payload[:length]))
         return frames, b""
 
     def text(self, frame: Frame) -> bytes:

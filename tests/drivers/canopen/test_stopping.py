@@ -39,7 +39,7 @@ class Dictionary:
 
 def drive(joint: int, statusword: int, failure: DriverErrorKind | None = None) -> tuple[DriveNode, Dictionary]:
     dictionary = Dictionary(statusword, failure)
-    return DriveNode(NodeConfiguration(joint, 65536.0, 1.0), joint, dictionary), dictionary  # pyright: ignore[reportArgumentType]
+    return DriveNode(NodeConfiguration(joint, 65536.0, 1.0), joint, dictionary, bus=dictionary), dictionary  # pyright: ignore[reportArgumentType]
 
 
 FORGET_MASTER = (objects.CONSUMER_HEARTBEAT, 0)

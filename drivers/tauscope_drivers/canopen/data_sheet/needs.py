@@ -19,15 +19,23 @@ def present_objects(file: DeviceFile) -> frozenset[DriveObject]:
 def find_flaws(file: DeviceFile, *, reads_rated_torque: bool) -> list[str]:
     """Everything for which the driver cannot use a drive, each as a clause that names the object; empty if none."""
     flaws = [flaw for entry in _READ if (flaw := _flaw(file, entry))]
-    flaws += [flaw for entry in _WRITTEN if (flaw := _flaw(file, entry, is_written=True))]
-    if flaw := _flaw(file, objects.CONSUMER_HEARTBEAT, is_written=True):
-        flaws.append(f"{flaw}: the drive would not notice that the host is gone")
+    flaws += [flaw for entry in _WRITTEN if (flaw := _unwritable(file, entry))]
+    if needs_guarding(file) and (
+        unguarded := [flaw for entry in objects.GUARDING if (flaw := _unwritable(file, entry))]
+    ):
+        heartbeat = _unwritable(file, objects.CONSUMER_HEARTBEAT)
+        flaws.append(f"{heartbeat}, and {unguarded[0]}: the drive would not notice that the host is gone")
     flaws += [flaw for entry in SUBSTITUTES if _find(file, entry) and (flaw := _flaw(file, entry))]
     flaws += [flaw for entry in process_data.MEASURED if (flaw := _flaw(file, entry, is_mapped=True))]
     flaws += _target_flaws(file, ControlMode.POSITION)
     if flaws and reads_rated_torque and not states_rated_torque(file):
         flaws.append(f"{objects.RATED_TORQUE} is missing: give drive.rated_torque_nm")
     return flaws
+
+
+def needs_guarding(file: DeviceFile) -> bool:
+    """Whether a drive watches no heartbeat that the driver could send it."""
+    return _unwritable(file, objects.CONSUMER_HEARTBEAT) is not None
 
 
 def states_rated_torque(file: DeviceFile) -> bool:
@@ -111,6 +119,10 @@ def _flaw(file: DeviceFile, entry: DriveObject, *, is_mapped: bool = False, is_w
     if is_written and "w" not in described.access:
         return f"{entry} cannot be written (AccessType {described.access[:20]!a})"
     return None
+
+
+def _unwritable(file: DeviceFile, entry: DriveObject) -> str | None:
+    return _flaw(file, entry, is_written=True)
 
 
 def _is_mapped_always(file: DeviceFile, entry: DriveObject) -> bool:

@@ -61,6 +61,19 @@ def test_the_file_of_the_emulated_drive_is_what_the_driver_needs(tmp_path: Path)
     assert (0x607D, 3) not in file.objects
 
 
+@pytest.mark.parametrize("access", [None, "ro"])
+def test_a_drive_that_watches_no_heartbeat_is_guarded(tmp_path: Path, access: str | None) -> None:
+    content = sections()
+    if access is None:
+        remove(content, "1016")
+    else:
+        content["1016sub1"]["AccessType"] = access
+    block = {"interface": "virtual", "channel": "none", "node_id": 5, "counts_per_turn": 4096}
+    block |= {"eds": write_file(tmp_path, content)}
+    said = [finding.detail for finding in check_blocks([DriveJoint("elbow", block, gear_ratio=50.0)])]
+    assert any("Consumer heartbeat time (0x1016:01): the host guards it by remote frames" in line for line in said)
+
+
 def test_no_file_is_needed() -> None:
     assert configured(None).nodes[0].device_file is None
 
@@ -77,7 +90,7 @@ def remove(content: Sections, *sections: str) -> None:
 @pytest.mark.parametrize("section", NEEDED)
 def test_a_missing_object_is_named(tmp_path: Path, section: str) -> None:
     content = sections()
-    remove(content, section)
+    remove(content, section, *(["100D"] if section.startswith("1016") else []))
     path = write_file(tmp_path, content)
     index = section[:4]
     message = refusal(path)
@@ -87,11 +100,12 @@ def test_a_missing_object_is_named(tmp_path: Path, section: str) -> None:
 
 def test_all_flaws_are_named_at_once(tmp_path: Path) -> None:
     content = sections()
-    remove(content, *NEEDED)
-    remove(content, "6076")
+    remove(content, *NEEDED, "100C", "6076")
     content["6072"]["DataType"] = "0x20"
     message = refusal(write_file(tmp_path, content))
-    assert message.count(" is missing") == len(NEEDED)
+    assert message.count(" is missing") == len(NEEDED) + 1
+    watchdog = "heartbeat time (0x1016:01) is missing, and Guard time (0x100C:00) is missing: the drive would not notice"
+    assert watchdog in message
     assert "Motor rated torque (0x6076:00) is missing: give drive.rated_torque_nm" in message
     assert "Max torque (0x6072:00) is DOMAIN" in message
 
