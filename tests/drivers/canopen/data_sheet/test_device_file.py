@@ -104,7 +104,9 @@ def test_all_flaws_are_named_at_once(tmp_path: Path) -> None:
     content["6072"]["DataType"] = "0x20"
     message = refusal(write_file(tmp_path, content))
     assert message.count(" is missing") == len(NEEDED) + 1
-    watchdog = "heartbeat time (0x1016:01) is missing, and Guard time (0x100C:00) is missing: the drive would not notice"
+    watchdog = (
+        "heartbeat time (0x1016:01) is missing, and Guard time (0x100C:00) is missing: the drive would not notice"
+    )
     assert watchdog in message
     assert "Motor rated torque (0x6076:00) is missing: give drive.rated_torque_nm" in message
     assert "Max torque (0x6072:00) is DOMAIN" in message
