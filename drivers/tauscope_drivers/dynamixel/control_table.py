@@ -1,4 +1,4 @@
-"""Control tables of the servos, from the ``.model`` files that dynamixel-sdk brings along: no address is typed here."""
+"""Control tables of the servos, from the ``.model`` files that dynamixel-sdk brings along."""
 
 import math
 import re
@@ -89,6 +89,21 @@ MISSING_ITEMS: Mapping[str, Mapping[str, tuple[int, int]]] = {
     "mx_106": {"Bus Watchdog": (98, 1)},
 }
 """Items that the firmware has and the library's tables leave out: e-Manual, MX(2.0), Bus Watchdog, from firmware 38."""
+
+
+NEWER_MODELS: Mapping[int, tuple[str, str]] = {1280: ("xw430_t200", "xw430_t200"), 1700: ("xc335_t332", "xc330_t288")}
+"""Models that the library's index leaves out, each with a table of the library that holds for it.
+
+Sources: ROBOTIS Dynamixel2Arduino, actuator.h (1280); ROBOTIS dynamixel_hardware_interface, xc335_t332.model (1700: each
+item that the driver uses where the XC330-T288 has it, the unit of current left open).
+"""
+
+LEGACY_PRO: Mapping[int, str] = {
+    **{35072: "L42-10-S300-R", 37928: "L54-30-S400-R", 37896: "L54-30-S500-R", 38176: "L54-50-S290-R"},
+    **{38152: "L54-50-S500-R", 43288: "M42-10-S260-R", 46096: "M54-40-S250-R", 46352: "M54-60-S250-R"},
+    **{51200: "H42-20-S300-R", 53768: "H54-100-S500-R", 54024: "H54-200-S500-R"},
+}
+"""PRO servos whose firmware has another control table, by model number: ROBOTIS Dynamixel2Arduino, actuator.h."""
 
 
 def family_of(model: str) -> FamilyFacts | None:
@@ -255,7 +270,16 @@ def _block(items: Iterable[Item]) -> Block:
 def model_names() -> Mapping[int, str]:
     """Model numbers and names of every servo that the library has a table of."""
     rows = (line.split("\t") for line in _folder().joinpath("dynamixel.model").read_text("utf-8").splitlines())
-    return {int(row[0]): row[1].strip().removesuffix(".model") for row in rows if row[0].strip().isdigit()}
+    listed = {int(row[0]): row[1].strip().removesuffix(".model") for row in rows if row[0].strip().isdigit()}
+    return {number: name for number, (name, _) in NEWER_MODELS.items()} | listed
+
+
+def describe_model(number: int) -> str:
+    """A model as printed on its case, also where the driver does not know it."""
+    if number in LEGACY_PRO:
+        return f"{LEGACY_PRO[number]} (PRO with legacy firmware, not supported)"
+    name = model_names().get(number)
+    return f"model number {number}" if name is None else name.upper().replace("_", "-")
 
 
 @cache
@@ -264,6 +288,11 @@ def find_model(number: int, firmware: int = 0) -> ServoModel:
 
     Raises DriverError ``cannot-connect`` where no table is known for it.
     """
+    if number in LEGACY_PRO:
+        raise DriverError.no_connection(
+            f"a servo is a {describe_model(number)}: its control table is another one; update its firmware to PRO(A) "
+            "where ROBOTIS offers it, or use another servo"
+        )
     name = model_names().get(number)
     family = None if name is None else family_of(name)
     if name is None or family is None:
@@ -312,7 +341,10 @@ def _table_text(name: str, firmware: int) -> str:
     newer = _folder().joinpath(f"{name}_fw52.model")
     if firmware >= 52 and newer.is_file():
         return newer.read_text("utf-8")
-    return _folder().joinpath(f"{name}.model").read_text("utf-8")
+    own = _folder().joinpath(f"{name}.model")
+    return (own if own.is_file() else _folder().joinpath(f"{dict(NEWER_MODELS.values())[name]}.model")).read_text(
+        "utf-8"
+    )
 
 
 def _sections(text: str) -> dict[str, list[list[str]]]:

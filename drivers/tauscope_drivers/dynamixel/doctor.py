@@ -8,7 +8,7 @@ from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.bus import ServoBus, count_traffic
 from tauscope_drivers.dynamixel.configuration import ServoConfiguration, read_configuration
-from tauscope_drivers.dynamixel.control_table import WATCHDOG_MOST, WATCHDOG_STEP_S, model_names
+from tauscope_drivers.dynamixel.control_table import WATCHDOG_MOST, WATCHDOG_STEP_S, describe_model
 from tauscope_drivers.dynamixel.enabling import plan_tasks
 from tauscope_drivers.dynamixel.health import Health, hardware_faults, watchdog_fault
 from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, drive_mode, operating_mode
@@ -185,8 +185,4 @@ def scan_bus(path: str, bauds: Sequence[int] | None = None, *, slack_s: float = 
 
 
 def _list_servos(bus: ServoBus) -> list[tuple[int, str, str]]:
-    names = model_names()
-    return [
-        (servo, names[number].upper().replace("_", "-") if number in names else f"model number {number}", str(firmware))
-        for servo, (number, firmware) in bus.ping_all().items()
-    ]
+    return [(servo, describe_model(number), str(firmware)) for servo, (number, firmware) in bus.ping_all().items()]
