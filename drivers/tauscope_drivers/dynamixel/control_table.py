@@ -94,8 +94,8 @@ MISSING_ITEMS: Mapping[str, Mapping[str, tuple[int, int]]] = {
 NEWER_MODELS: Mapping[int, tuple[str, str]] = {1280: ("xw430_t200", "xw430_t200"), 1700: ("xc335_t332", "xc330_t288")}
 """Models that the library's index leaves out, each with a table of the library that holds for it.
 
-Sources: ROBOTIS Dynamixel2Arduino, actuator.h (1280); ROBOTIS dynamixel_hardware_interface, xc335_t332.model (1700: each
-item that the driver uses where the XC330-T288 has it, the unit of current left open).
+Sources: ROBOTIS Dynamixel2Arduino, actuator.h (1280); ROBOTIS dynamixel_hardware_interface, xc335_t332.model (1700: all
+items that the driver uses where the XC330-T288 has them, the unit of current left open).
 """
 
 LEGACY_PRO: Mapping[int, str] = {
