@@ -1,6 +1,8 @@
 """An EDS or DCF file: which objects its maker says a drive has, who it is, and the values that a DCF gives it."""
 
+import codecs
 import configparser
+import contextlib
 import io
 import logging
 import re
@@ -27,7 +29,12 @@ _NUMBERS = (
     *("VendorNumber", "ProductNumber", "RevisionNumber", "NodeID"),
 )
 _OBJECT = re.compile(r"([0-9a-f]{1,4})(?:sub([0-9a-f]{1,2})|(value|name))?", re.IGNORECASE | re.ASCII)
-_DEVICE = {"deviceinfo": "DeviceInfo", "devicecomissioning": "DeviceComissioning"}  # CiA 306 spells it so
+_DEVICE = {
+    "deviceinfo": "DeviceInfo",
+    "devicecomissioning": "DeviceComissioning",  # CiA 306 spells it so
+    "devicecommissioning": "DeviceComissioning",
+}
+_NODE_ID = re.compile(r"\+?\$NODEID\+?")
 _OF_COMPACT = ("DataType", "AccessType", "PDOMapping", "DefaultValue")
 _MOST_SUBINDICES = 254
 
@@ -57,8 +64,9 @@ def read_sections(text: str) -> Sections:
         if name in sections:
             raise DataSheetError(f"[{name}] stands twice; remove one")
         # What stands for nothing counts as left out: many makers' tools write every keyword.
-        sections[name] = {_KEYWORDS.get(key, key): value for key, value in parser.items(given) if value}
-        _require_numbers(name, sections[name])
+        entries = {_KEYWORDS.get(key, key): value for key, value in parser.items(given) if value}
+        # The library reads fewer ways of writing a number, and does not know the place of a wrong one.
+        sections[name] = entries | {key: str(_number(name, key, entries[key])) for key in _NUMBERS if key in entries}
     _write_out_compact(sections)
     sections.setdefault("DeviceInfo", {})
     return sections
@@ -85,25 +93,36 @@ def _section_name(given: str) -> str | None:
     return name + (match[3] or "").capitalize()
 
 
-def _require_numbers(section: str, entries: dict[str, str]) -> None:
-    """Refuse numbers that are none, by their place: the library does not know it any more."""
-    for key in _NUMBERS:
-        if key in entries:
-            _number(section, key, entries[key])
+def parse_number(text: str, node_id: int | None = None) -> int | None:
+    """A whole number as files write it; None where it is none.
+
+    Decimal, ``0x`` hexadecimal, octal by a leading zero (CiA 306), hexadecimal digits without ``0x``, and ``$NODEID``
+    alone or added to one of these.
+    """
+    number = text.replace(" ", "").upper()
+    if "$NODEID" in number:
+        if node_id is None:
+            return None
+        offset = parse_number(_NODE_ID.sub("", number, count=1) or "0")
+        return None if offset is None else offset + node_id
+    for base in (0, 8, 10, 16):
+        with contextlib.suppress(ValueError):
+            return int(number, base)
+    return None
 
 
 def _number(section: str, key: str, text: str) -> int:
-    try:
-        return int(text, 0)
-    except ValueError as error:
-        raise DataSheetError(f"{key} in [{section}] is {text[:40]!a}, which is no number; correct it") from error
+    number = parse_number(text)
+    if number is None:
+        raise DataSheetError(f"{key} in [{section}] is {text[:40]!a}, which is no number; correct it")
+    return number
 
 
 def _write_out_compact(sections: Sections) -> None:
     """Subindices of compact arrays as sections of their own, each with its own name and value where it has one."""
     for name in [name for name in sections if _number(name, "CompactSubObj", sections[name].get("CompactSubObj", "0"))]:
         entries = sections[name]
-        count = int(entries.pop("CompactSubObj"), 0)
+        count = int(entries.pop("CompactSubObj"))
         if not 1 <= count <= _MOST_SUBINDICES:
             raise DataSheetError(f"CompactSubObj in [{name}] is {count}; give 1 to {_MOST_SUBINDICES}")
         names, values = (sections.pop(f"{name}{kind}", {}) for kind in ("Name", "Value"))
@@ -194,7 +213,8 @@ def read_device_file(path: Path, node_id: int) -> DeviceFile:
     except (SectionError, LookupError, ValueError, TypeError, AttributeError, OverflowError) as error:
         reason = " ".join(str(error.args[0] if error.args else error).split())[:120]
         raise DataSheetError(f"is no whole EDS or DCF file ({reason!a}); get it anew from the maker") from error
-    entries = {(variable.index, variable.subindex): _describe(variable) for variable in _variables(dictionary)}
+    variables = list(_variables(dictionary))
+    entries = {(variable.index, variable.subindex): _describe(variable, node_id) for variable in variables}
     device = dictionary.device_information
     made_for = sections.get("DeviceComissioning", {}).get("NodeID")
     return DeviceFile(
@@ -203,7 +223,7 @@ def read_device_file(path: Path, node_id: int) -> DeviceFile:
         vendor=device.vendor_number or _default(dictionary, 1),
         product=device.product_number or _default(dictionary, 2),
         revision=device.revision_number or _default(dictionary, 3),
-        node_id=None if made_for is None else int(made_for, 0),
+        node_id=None if made_for is None else int(made_for),
     )
 
 
@@ -218,7 +238,7 @@ def _content(path: Path) -> str:
     except OSError as error:
         raise DataSheetError(f"cannot be read ({error.strerror or error}); check its permissions") from error
     try:
-        return data.decode("utf-8-sig")
+        return data.decode("utf-16" if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig")
     except UnicodeDecodeError:
         return data.decode("latin-1")
 
@@ -232,8 +252,8 @@ def _variables(dictionary: ObjectDictionary) -> Iterator[ODVariable]:
             yield from entry.subindices.values()
 
 
-def _describe(variable: ODVariable) -> DescribedObject:
-    text = getattr(variable, "value_raw", None)
+def _describe(variable: ODVariable, node_id: int) -> DescribedObject:
+    text, default = (getattr(variable, name, None) for name in ("value_raw", "default_raw"))
     return DescribedObject(
         name=_printable(variable.name),
         index=variable.index,
@@ -242,8 +262,8 @@ def _describe(variable: ODVariable) -> DescribedObject:
         access=variable.access_type,
         is_mappable=variable.pdo_mappable,
         value_text=None if text is None else _printable(text),
-        value=None if text is None else _encode_value(variable, text),
-        default=variable.default if isinstance(variable.default, int) else None,
+        value=None if text is None else _encode_value(variable, text, node_id),
+        default=parse_number(default, node_id) if default and _is_whole(variable) else None,
     )
 
 
@@ -251,12 +271,16 @@ def _printable(name: str) -> str:
     return "".join(letter if letter.isprintable() else "?" for letter in name)[:_LONGEST_NAME]
 
 
-def _encode_value(variable: ODVariable, text: str) -> bytes | None:
+def _is_whole(variable: ODVariable) -> bool:
+    return variable.data_type in (datatypes.BOOLEAN, *datatypes.INTEGER_TYPES)
+
+
+def _encode_value(variable: ODVariable, text: str, node_id: int) -> bytes | None:
     """A DCF's value as it goes over the bus; None where it is not of the object's type."""
-    value = variable.value
+    value = parse_number(text, node_id) if _is_whole(variable) else variable.value
     if value is None:
         return None
-    if isinstance(value, int) and variable.data_type in datatypes.SIGNED_TYPES and "x" in text.lower():
+    if isinstance(value, int) and variable.data_type in datatypes.SIGNED_TYPES and not text.isdecimal():
         bits = len(variable)
         value -= (1 << bits) if 1 << bits - 1 <= value < 1 << bits else 0  # makers write -1 as 0xFFFF
     try:

@@ -280,6 +280,55 @@ def test_values_are_those_of_their_type_and_node(tmp_path: Path) -> None:
     assert values == [bytes.fromhex("8501"), bytes.fromhex("FEFF"), b"Arm 1", bytes.fromhex("000000BF")]
 
 
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        *[("$NODEID", 5), ("$NODEID+0x180", 0x185), ("0x180+$NodeID", 0x185), ("0x180 + $NODEID", 0x185), ("19", 19)],
+        *[("0X1f", 31), ("1F", 31), ("00ff", 255), ("017", 15), ("0019", 19), ("0", 0), ("00000000", 0)],
+    ],
+)
+def test_numbers_are_read_as_makers_write_them(tmp_path: Path, text: str, value: int) -> None:
+    content = sections()
+    content[GAIN] |= {"ParameterValue": text, "DefaultValue": text}
+    described = read(tmp_path, content).objects[0x2001, 0]
+    assert (described.value, described.default) == (value.to_bytes(2, "little"), value)
+
+
+@pytest.mark.parametrize("text", ["0x", "12 apples", "$NODE", "1.5", "G0", "--3"])
+def test_a_value_that_is_no_number_is_refused(tmp_path: Path, text: str) -> None:
+    content = sections()
+    content[GAIN]["ParameterValue"] = text
+    assert "ParameterValue" in refusal(write_file(tmp_path, content))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "utf-16"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_encodings_and_line_ends_of_any_system_are_read(tmp_path: Path, encoding: str, end: str) -> None:
+    content = sections()
+    content["6077"]["ParameterName"] = "Drehmoment [µNm] für Möller"
+    path = tmp_path / "drive.eds"
+    path.write_bytes(text_of(content).replace("\n", end).encode(encoding))
+    (node,) = configured(str(path)).nodes
+    assert node.device_file is not None
+    assert node.device_file.objects[0x6077, 0].name == "Drehmoment [µNm] für Möller"
+
+
+@pytest.mark.parametrize("section", ["DeviceComissioning", "DeviceCommissioning"])
+def test_a_dcf_of_another_node_is_refused_however_its_section_is_spelt(tmp_path: Path, section: str) -> None:
+    content = sections() | {section: {"NodeID": "0x06"}}
+    assert "is made for node 6" in refusal(write_file(tmp_path, content))
+
+
+def test_leading_zeros_and_digits_without_a_prefix_are_numbers(tmp_path: Path) -> None:
+    content = sections(VendorNumber="000003A1", RevisionNumber="00020005")
+    for keys in content.values():
+        if "DataType" in keys:
+            keys["DataType"] = f"{int(keys['DataType'], 16):04d}"
+    (node,) = configured(write_file(tmp_path, content)).nodes
+    assert node.device_file is not None
+    assert node.device_file.vendor == 0x3A1
+
+
 def test_the_identity_is_that_of_the_device_or_of_its_object(tmp_path: Path) -> None:
     content = sections(ProductNumber="7")
     content["1018sub1"]["DefaultValue"] = "0x3A1"
