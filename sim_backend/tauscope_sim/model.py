@@ -18,9 +18,8 @@ from tauscope.robot.robot import JointType, LinkInertia, Robot, Segment
 
 Array = NDArray[np.float64]
 
+# added to each principal moment of inertia [kg m²]: a slender rod has a zero one, MuJoCo refuses less than 1e-15
 LEAST_INERTIA = 1e-12
-"""Added to each principal moment of inertia [kg m²]: a slender rod has a zero one, MuJoCo refuses less than 1e-15."""
-
 LEAST_MASS = 1e-12  # mass given to a massless link [kg], for the same reason
 
 _JOINT_TYPES = {JointType.REVOLUTE: mujoco.mjtJoint.mjJNT_HINGE, JointType.PRISMATIC: mujoco.mjtJoint.mjJNT_SLIDE}

@@ -162,11 +162,12 @@ def write_recording_csv(
     signs = np.array([joint.sign for joint in joints], dtype=np.float64)
     constants = np.array([joint.torque_constant for joint in joints])
     effort = recording.torque * signs / (constants if as_current else 1.0)
-    table = np.column_stack([recording.time, recording.position, effort])
+    table, columns = np.column_stack([recording.time, recording.position, effort]), "i" if as_current else "tau"
     try:
         with path.open("x", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(_header(len(joints), "i" if as_current else "tau"))
+            names = [f"{group}{number + 1}" for group in ("q", columns) for number in range(len(joints))]
+            writer.writerow(["t", *names, "period"])
             # tolist turns a row into Python floats, whose text is the shortest that reads back exactly
             writer.writerows([*row.tolist(), int(period)] for row, period in zip(table, recording.period, strict=True))
     except FileExistsError as error:
@@ -175,8 +176,3 @@ def write_recording_csv(
         ) from error
     except OSError as error:
         raise RecordingError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
-
-
-def _header(joint_count: int, effort: str) -> list[str]:
-    numbers = range(1, joint_count + 1)
-    return ["t", *(f"q{number}" for number in numbers), *(f"{effort}{number}" for number in numbers), "period"]

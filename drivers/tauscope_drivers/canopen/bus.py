@@ -27,9 +27,8 @@ NMT_START = 0x01
 NMT_PRE_OPERATIONAL = 0x80
 NMT_OPERATIONAL_STATE = 0x05
 
+# time in which the bus has to take a frame; the drives' own watchdog is what stops the arm meanwhile
 SEND_TIMEOUT_S = 0.5
-"""Time in which the bus has to take a frame; the drives' own watchdog is what stops the arm meanwhile."""
-
 GUARD_ATTEMPTS = 3
 GUARD_ANSWER_S = 0.05
 

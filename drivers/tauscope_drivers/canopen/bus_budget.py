@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 LARGEST_LOAD = 0.8  # share of the bus that cyclic frames may take; the rest is for heartbeats, emergencies and SDOs
 
+# characters of an 8-byte frame in the serial-line CAN protocol (slcan): ``t`` + 3 + 1 + 16 + return
 ASCII_FRAME_BYTES = 22
-"""Characters of an 8-byte frame in the serial-line CAN protocol (slcan): ``t`` + 3 + 1 + 16 + return."""
-
 HIGHEST_BIT_RATE = 1e6  # of classical CAN [bit/s]
 
 _SYNC_BYTES = 0

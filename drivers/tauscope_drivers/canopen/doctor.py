@@ -1,20 +1,19 @@
 """Looks at a CAN bus and the drives on it, moves nothing, writes nothing, and says what to do about what it finds."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from tauscope_drivers.backend import ControlMode
+from tauscope_drivers.backend import ControlMode, DriveLimits
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import CanBus
-from tauscope_drivers.canopen.commissioning import find_missing
+from tauscope_drivers.canopen.commissioning import find_missing, read_mapping, require_plan
 from tauscope_drivers.canopen.configuration import BusConfiguration, read_configuration
 from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile, settings_of
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import DOUBTFUL, TARGETS
-from tauscope_drivers.canopen.pdo_mapping import read_mapping, require_plan
 from tauscope_drivers.canopen.process_data import decode_mapping
 from tauscope_drivers.canopen.session import possible_rate_hz
 from tauscope_drivers.canopen.state_machine import POWERED
@@ -160,9 +159,8 @@ def _read(path: Path) -> str:
         return ""
 
 
+# tried one after the other where the interface sets the rate [bit/s]
 USUAL_BIT_RATES = (1_000_000, 500_000, 250_000, 125_000)
-"""Tried one after the other where the interface sets the rate [bit/s]."""
-
 LISTENING_S = 0.3  # time in which all nodes answer
 _FIXED_RATE = ("socketcan", "socketcand", "virtual", "udp_multicast")  # interfaces whose rate is set elsewhere
 
@@ -186,7 +184,8 @@ def scan_bus(interface: str, channel: str, bit_rates: Sequence[int] | None = Non
         bus = CanBus(BusConfiguration((), interface, channel, bit_rate))
         try:
             for node, device_type in sorted(_answers(bus).items()):
-                name, version = _name_and_version(bus, node)
+                dictionary = bus.add_node(node)
+                name, version = map(dictionary.read_text, (objects.DEVICE_NAME, objects.SOFTWARE_VERSION))
                 profile = f"profile {device_type & 0xFFFF}"
                 yield FoundDevice(node, bit_rate, f"{name} ({profile})" if name else profile, version)
         finally:
@@ -211,46 +210,32 @@ def _answers(bus: CanBus) -> dict[int, int]:
     return found
 
 
-def _name_and_version(bus: CanBus, node: int) -> tuple[str, str]:
-    """Device name (0x1008) and software version (0x100A); empty where it tells none."""
-    dictionary = bus.add_node(node)
-    return dictionary.read_text(objects.DEVICE_NAME), dictionary.read_text(objects.SOFTWARE_VERSION)
-
-
 def rehearse(node: DriveNode, joint: DriveJoint) -> list[Finding]:
     """What would keep a run with the limits of the robot file from starting. `node`: identified and read."""
-    checks: tuple[Callable[[], list[Finding]], ...] = (
-        lambda: _examine_settings(node),
-        lambda: _examine_place(node, joint),
-        lambda: _examine_torque(node, joint),
-        lambda: _examine_mapping(node),
-        lambda: _examine_abort(node),
-        lambda: _examine_guarding(node),
-    )
     findings: list[Finding] = []
+    checks = (_examine_settings, _examine_place, _examine_torque, _examine_mapping, _examine_abort, _examine_guarding)
     for check in checks:
         try:
-            findings += check()
+            findings += check(node, stated_limits([joint]))
         except DriverError as error:
             findings.append(failure(node.place, str(error), f"node {node.configuration.node_id}"))
     return findings
 
 
-def _examine_settings(node: DriveNode) -> list[Finding]:
+def _examine_settings(node: DriveNode, _: DriveLimits) -> list[Finding]:
     """Values of its DCF file: it has their objects, and no power while one is missing."""
     if node.configuration.device_file is not None:
         find_missing(node, node.configuration.device_file)
     return []
 
 
-def _examine_place(node: DriveNode, joint: DriveJoint) -> list[Finding]:
+def _examine_place(node: DriveNode, limits: DriveLimits) -> list[Finding]:
     place = node.units.position(node.dictionary.read(objects.POSITION_ACTUAL))
-    require_sensible(stated_limits([joint]), np.array([place]), [node.place])
+    require_sensible(limits, np.array([place]), [node.place])
     return []
 
 
-def _examine_torque(node: DriveNode, joint: DriveJoint) -> list[Finding]:
-    limits = stated_limits([joint])
+def _examine_torque(node: DriveNode, limits: DriveLimits) -> list[Finding]:
     if not node.has(objects.LARGEST_TORQUE):
         return []
     cap = node.dictionary.read(objects.LARGEST_TORQUE)
@@ -262,7 +247,7 @@ def _examine_torque(node: DriveNode, joint: DriveJoint) -> list[Finding]:
     return [Finding(Severity.FAILURE, node.place, f"{objects.LARGEST_TORQUE} leaves no torque", remedy)]
 
 
-def _examine_mapping(node: DriveNode) -> list[Finding]:
+def _examine_mapping(node: DriveNode, _: DriveLimits) -> list[Finding]:
     """Whether its PDOs hold all that is needed, or can be mapped so."""
     if ControlMode.POSITION not in node.mode_numbers:
         return []
@@ -278,7 +263,7 @@ def _examine_mapping(node: DriveNode) -> list[Finding]:
     return [Finding(Severity.WARNING, node.place, detail, "name its file as drive.eds")]
 
 
-def _examine_abort(node: DriveNode) -> list[Finding]:
+def _examine_abort(node: DriveNode, _: DriveLimits) -> list[Finding]:
     """A drive does something when its master is silent."""
     if node.has(objects.ABORT_CONNECTION) or node.dictionary.read_optional(objects.ABORT_CONNECTION) != 0:
         return []
@@ -286,7 +271,7 @@ def _examine_abort(node: DriveNode) -> list[Finding]:
     return [Finding(Severity.FAILURE, node.place, detail, "set it to 1, 2 or 3 with the maker's tool")]
 
 
-def _examine_guarding(node: DriveNode) -> list[Finding]:
+def _examine_guarding(node: DriveNode, _: DriveLimits) -> list[Finding]:
     """Remote frames reach a drive that is guarded; one that counts already, or produces heartbeats, is not asked."""
     read = node.dictionary.read_optional
     beats = read(objects.PRODUCER_HEARTBEAT)

@@ -19,9 +19,8 @@ from can.interfaces.slcan import slcanBus
 
 from tauscope_drivers.serial_port import find_holder
 
+# interfaces that two programs cannot drive at once: a port that is locked, and a bus inside of one process
 ONE_PROCESS = ("slcan", "virtual")
-"""Interfaces that two programs cannot drive at once: a port that is locked, and a bus inside of one process."""
-
 OWN_OPTIONS = ("interface", "channel", "bitrate")  # what python-can is told by keys of their own
 
 _DAEMON = "socketcand"

@@ -65,18 +65,17 @@ INTERPOLATION_VALUE = DriveObject("Interpolation time period, value", 0x60C2, 1,
 INTERPOLATION_EXPONENT = DriveObject("Interpolation time period, exponent", 0x60C2, 2, 8, signed=True)
 SUPPORTED_MODES = DriveObject("Supported drive modes", 0x6502, 0, 32)
 
+# mode of operation: interpolated position, which older drives have in place of the cyclic one
 INTERPOLATED_POSITION = 7
-"""Mode of operation: interpolated position, which older drives have in place of the cyclic one."""
-
 CYCLIC_POSITION = 8  # mode of operation: cyclic synchronous position
 CYCLIC_TORQUE = 10  # mode of operation: cyclic synchronous torque
 
 
+# modes of operation, the best first, and the target of each
 TARGETS: Mapping[ControlMode, Mapping[int, DriveObject]] = {
     ControlMode.POSITION: {CYCLIC_POSITION: TARGET_POSITION, INTERPOLATED_POSITION: INTERPOLATION_DATA},
     ControlMode.TORQUE: {CYCLIC_TORQUE: TARGET_TORQUE},
 }
-"""Modes of operation, the best first, and the target of each."""
 
 
 def select_modes(supported: int) -> dict[ControlMode, int]:
@@ -91,6 +90,7 @@ def select_modes(supported: int) -> dict[ControlMode, int]:
     return {mode: number for mode, number in found.items() if number is not None}
 
 
+# optional objects, and what is done where one is absent
 SUBSTITUTES: Mapping[DriveObject, str] = {
     ABORT_CONNECTION: (
         "by the standard it goes into fault when the host is silent; make sure of that with the arm supported"
@@ -108,10 +108,8 @@ SUBSTITUTES: Mapping[DriveObject, str] = {
     PRODUCER_HEARTBEAT: "a restart of the drive shows in its power state alone",
     INTERPOLATION_VALUE: "it finds the cycle from SYNC",
 }
-"""Optional objects, and what is done where one is absent."""
-
+# optional objects that the driver sets; one that is read-only counts as absent
 WRITTEN = frozenset(SUBSTITUTES) - {VELOCITY_ACTUAL, ERROR_CODE}
-"""Optional objects that the driver sets; one that is read-only counts as absent."""
 
 
 STAYING_OPTIONS = range(5, 9)  # quick stop options (0x605A) after which a drive keeps its power
@@ -119,8 +117,8 @@ STAYING_OPTIONS = range(5, 9)  # quick stop options (0x605A) after which a drive
 GUARDING = (GUARD_TIME, LIFE_TIME_FACTOR)
 GUARDED = f"has no {CONSUMER_HEARTBEAT}: the host guards it by remote frames (0x100C, 0x100D)"
 
+# optional objects without which an operator has to try how the arm stops
 DOUBTFUL = (ABORT_CONNECTION, QUICK_STOP_OPTION)
-"""Optional objects without which an operator has to try how the arm stops."""
 
 
 def describe_absent(present: Container[DriveObject]) -> list[str]:

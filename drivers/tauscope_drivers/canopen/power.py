@@ -88,15 +88,13 @@ def _require_up(session: Session, state: ArmState) -> None:
     raise DriverError(kind, f"the drives cannot be enabled: {text}", faults)
 
 
+# what drives can do by themselves, and where that takes them
 POLICY_GOALS = {StopPolicy.HOLD: Goal.QUICK_STOP, StopPolicy.TORQUE_OFF: Goal.SWITCH_ON_DISABLED}
-"""What drives can do by themselves, and where that takes them."""
-
 STOP_S = 0.5  # time for a stop by process data; drives that are not there by then are told one by one
 RESET_S = 0.1  # time in which a drive leaves its fault, or is back in it because the cause persists
 
+# a frame that tells a drive to stop may be lost, and the answer that it has stopped comes a cycle later
 PROMPT_CYCLES = 3
-"""A frame that tells a drive to stop may be lost, and the answer that it has stopped comes a cycle later."""
-
 _SILENT_REMEDY = "support the arm, check the drive's cable and power, then acknowledge"
 _RESTART_REMEDY = "support the arm, look for a dip of its supply, then acknowledge"
 

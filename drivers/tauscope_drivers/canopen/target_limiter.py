@@ -12,9 +12,8 @@ from tauscope_drivers.state import Setpoint
 
 Array = NDArray[np.float64]
 
+# how much farther than its cycle's way a target may lie, in ways of a cycle: plans and their instants are rounded
 _SLACK = 0.4
-"""How much farther than its cycle's way a target may lie, in ways of a cycle: plans and their instants are rounded."""
-
 _ACCELERATION_S = 0.1  # time in which a joint that has to catch up reaches its speed limit
 _FASTEST = 1e3  # where there is no speed limit [rad/s or m/s]
 

@@ -21,15 +21,13 @@ from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
 from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.limits import RunawayWatch
 from tauscope_drivers.serial_servos.arm import SerialServoArm
-from tauscope_drivers.serial_servos.budget import BusTiming, CycleTraffic, largest_part, largest_rate_hz
-from tauscope_drivers.serial_servos.bus import PATIENCE_S
+from tauscope_drivers.serial_servos.bus import PATIENCE_S, BusTiming, CycleTraffic, largest_part, largest_rate_hz
 from tauscope_drivers.state import ArmState, Setpoint
 
 Array = NDArray[np.float64]
 
+# what the servos do by themselves when their watchdog fires
 _POLICIES = {ControlMode.POSITION: frozenset([StopPolicy.HOLD]), ControlMode.TORQUE: frozenset([StopPolicy.TORQUE_OFF])}
-"""What the servos do by themselves when their watchdog fires."""
-
 _SUSPECT_SILENCE = 0.8  # part of the watchdog's time after which a cycle asks all servos whether theirs has fired
 
 

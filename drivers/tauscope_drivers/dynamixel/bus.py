@@ -12,8 +12,16 @@ from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
 from tauscope_drivers.dynamixel.packets import DynamixelParser, Status
 from tauscope_drivers.errors import DriverError
 from tauscope_drivers.serial_port import SerialPort, expect_latency_s
-from tauscope_drivers.serial_servos.budget import SHORTEST_RETURN_DELAY_S, BusTiming, CycleTraffic, largest_rate_hz
-from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers, SerialServoBus
+from tauscope_drivers.serial_servos.bus import (
+    ATTEMPTS,
+    PATIENCE_S,
+    SHORTEST_RETURN_DELAY_S,
+    Answers,
+    BusTiming,
+    CycleTraffic,
+    SerialServoBus,
+    largest_rate_hz,
+)
 from tauscope_drivers.serial_servos.configuration import BusConfiguration
 
 

@@ -14,9 +14,8 @@ CURRENT_MODE = 0
 POSITION_MODE = 3
 CURRENT_BASED_POSITION_MODE = 5
 
+# unit of Bus Watchdog on every family [s]: e-Manual, Bus Watchdog of X, P and Y (100 is 2 000 ms)
 WATCHDOG_STEP_S = 0.02
-"""Unit of Bus Watchdog on every family [s]: e-Manual, Bus Watchdog of X, P and Y (100 is 2 000 ms)."""
-
 WATCHDOG_MOST = 127  # largest value of Bus Watchdog; -1 is what it latches to
 
 _ARDUINO = "ROBOTIS Dynamixel2Arduino, table of units"
@@ -83,12 +82,12 @@ _CURRENT_UNITS: tuple[tuple[str, CurrentUnit], ...] = (
     ("ym", CurrentUnit(10.0, _E_MANUAL)),
 )
 
+# items that the firmware has and the library's tables leave out: e-Manual, MX(2.0), Bus Watchdog, from firmware 38
 MISSING_ITEMS: Mapping[str, Mapping[str, tuple[int, int]]] = {
     "mx_28": {"Bus Watchdog": (98, 1)},
     "mx_64": {"Bus Watchdog": (98, 1)},
     "mx_106": {"Bus Watchdog": (98, 1)},
 }
-"""Items that the firmware has and the library's tables leave out: e-Manual, MX(2.0), Bus Watchdog, from firmware 38."""
 
 
 NEWER_MODELS: Mapping[int, tuple[str, str]] = {1280: ("xw430_t200", "xw430_t200"), 1700: ("xc335_t332", "xc330_t288")}
@@ -98,12 +97,12 @@ Sources: ROBOTIS Dynamixel2Arduino, actuator.h (1280); ROBOTIS dynamixel_hardwar
 items that the driver uses where the XC330-T288 has them, the unit of current left open).
 """
 
+# PRO servos whose firmware has another control table, by model number: ROBOTIS Dynamixel2Arduino, actuator.h
 LEGACY_PRO: Mapping[int, str] = {
     **{35072: "L42-10-S300-R", 37928: "L54-30-S400-R", 37896: "L54-30-S500-R", 38176: "L54-50-S290-R"},
     **{38152: "L54-50-S500-R", 43288: "M42-10-S260-R", 46096: "M54-40-S250-R", 46352: "M54-60-S250-R"},
     **{51200: "H42-20-S300-R", 53768: "H54-100-S500-R", 54024: "H54-200-S500-R"},
 }
-"""PRO servos whose firmware has another control table, by model number: ROBOTIS Dynamixel2Arduino, actuator.h."""
 
 
 def family_of(model: str) -> FamilyFacts | None:
@@ -131,9 +130,8 @@ _SIGNED = re.compile(
     r"|(Position|Velocity) Trajectory|(Max|Min) Position Limit"
 )
 
+# what every cycle reads; one contiguous block on every family
 STATE_ITEMS = ("Present Current", "Present Velocity", "Present Position")
-"""What every cycle reads; one contiguous block on every family."""
-
 BYTES_BEFORE_STATE = 3  # bytes of other items right before that block, on every family
 
 

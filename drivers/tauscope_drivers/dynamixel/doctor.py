@@ -17,7 +17,7 @@ from tauscope_drivers.dynamixel.session import Session, make_session, read_items
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.inspection import Finding, FoundDevice, Severity, failure
 from tauscope_drivers.limits import stated_limits
-from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S
+from tauscope_drivers.serial_servos.bus import RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S
 from tauscope_drivers.serial_servos.doctor import examine_bus, measure_loop_rate, scan_bauds
 
 _SECONDARY = ("Secondary ID", "Secondary(Shadow) ID")
@@ -175,8 +175,8 @@ def _examine_servo(servo: JointServo, settings: dict[str, int]) -> list[Finding]
     return findings
 
 
+# rates that servos can be set to, the factory's first [bit/s]
 USUAL_BAUDS = (57_600, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 115_200, 4_500_000, 9_600)
-"""Rates that servos can be set to, the factory's first [bit/s]."""
 
 
 def scan_bus(path: str, bauds: Sequence[int] | None = None, *, slack_s: float = 0.002) -> Iterator[FoundDevice]:

@@ -19,6 +19,7 @@ from tauscope_drivers.inspection import FrameRequest, PlannedFrame
 from tauscope_drivers.limits import require_sensible
 from tauscope_drivers.state import Setpoint
 
+# settings of a servo of the X series as delivered, but for a Current Limit that limits nothing
 _DELIVERED = {
     **dict.fromkeys(preparation.SETTINGS, 0),
     "Return Delay Time": 250,
@@ -27,7 +28,6 @@ _DELIVERED = {
     "PWM Limit": 885,
     "Current Limit": 0x7FFF,
 }
-"""Settings of a servo of the X series as delivered, but for a Current Limit that limits nothing."""
 
 
 def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:

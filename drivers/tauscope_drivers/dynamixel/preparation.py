@@ -9,6 +9,7 @@ from tauscope_drivers.dynamixel.control_table import CURRENT_MODE, WATCHDOG_MOST
 from tauscope_drivers.dynamixel.servo import JointServo
 from tauscope_drivers.errors import DriverError
 
+# items that are read of each servo when it is reached
 SETTINGS = (
     "Return Delay Time",
     "Drive Mode",
@@ -20,8 +21,6 @@ SETTINGS = (
     "Status Return Level",
     "Velocity Limit",
 )
-"""Items that are read of each servo when it is reached."""
-
 ANSWERS_ALL = 2  # Status Return Level of a servo that answers every instruction
 
 _TIME_BASED_PROFILE = 0x04

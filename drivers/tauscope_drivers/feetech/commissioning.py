@@ -16,7 +16,7 @@ from tauscope_drivers.feetech.servo import JointServo
 from tauscope_drivers.feetech.session import Session, alarm_faults
 from tauscope_drivers.inspection import Finding, Severity, failure
 from tauscope_drivers.limits import require_sensible
-from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S
+from tauscope_drivers.serial_servos.bus import RETURN_DELAY_UNIT_S
 
 _TOOL = "with Feetech's FD: Tauscope writes nothing to EEPROM"
 

@@ -14,15 +14,13 @@ COUNTS_PER_RADIAN = COUNTS_PER_TURN / (2.0 * math.pi)
 
 MODEL_NUMBER = 777  # of an STS3215
 
+# other models of the maker that answer on such a bus
 NEIGHBOURS = {521: "STS3036", 2825: "STS3250", 11272: "SM8512BL", 1284: "SCS0009"}
-"""Other models of the maker that answer on such a bus."""
-
+# models of Dynamixel protocol 1.0, whose frames are the same: model number at 0, firmware at 2, ID at 3
 _ROBOTIS = {
     **{12: "AX-12", 18: "AX-18A", 300: "AX-12W", 24: "RX-24F", 28: "RX-28", 64: "RX-64", 107: "EX-106"},
     **{29: "MX-28", 310: "MX-64", 320: "MX-106"},
 }
-"""Models of Dynamixel protocol 1.0, whose frames are the same: model number at 0, firmware at 2, ID at 3."""
-
 TORQUE_PER_VOLT = 1.91 / 7.4  # stall torque of the horn per volt, from the data sheet at 7.4 V [Nm/V]
 VOLT = 0.1  # one unit of Present Voltage and of the voltage limits [V]
 PERMILLE = 1000  # Torque Limit and Present Load at full duty

@@ -11,8 +11,7 @@ from tauscope_drivers.feetech import registers
 from tauscope_drivers.feetech.bus import FeetechBus
 from tauscope_drivers.feetech.configuration import ServoConfiguration
 from tauscope_drivers.feetech.servo import JointServo
-from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S
-from tauscope_drivers.serial_servos.bus import PATIENCE_S, learn_latency
+from tauscope_drivers.serial_servos.bus import PATIENCE_S, RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S, learn_latency
 
 _PROBES = 3  # answers by which the latency of an adapter is learnt
 

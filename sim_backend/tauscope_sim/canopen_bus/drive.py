@@ -10,8 +10,8 @@ from functools import partial
 
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile
 from tauscope_sim.canopen_bus import object_dictionary
+from tauscope_sim.canopen_bus.object_dictionary import ProcessData
 from tauscope_sim.canopen_bus.power_state import PowerState, PowerStateMachine
-from tauscope_sim.canopen_bus.process_data import ProcessData
 
 
 class AxisMode(Enum):
@@ -149,7 +149,10 @@ class EmulatedDrive:
             low, high = (self.dictionary.get(0x607D, end) for end in (1, 2))
             target = min(max(self._target_count, low), high)
             place = target / self.scale.counts_per_radian
-            return AxisDemand(AxisMode.POSITION, position=place, torque_cap=cap, interpolation_s=self._interpolation_s)
+            period_s = 0.0
+            if self.dictionary.has(0x60C2, 1):
+                period_s = self.dictionary.get(0x60C2, 1) * 10.0 ** self.dictionary.get(0x60C2, 2)
+            return AxisDemand(AxisMode.POSITION, position=place, torque_cap=cap, interpolation_s=period_s)
         if self._mode_taken == CYCLIC_TORQUE:
             torque = self.dictionary.get(0x6071) * self.scale.torque_per_permille
             return AxisDemand(AxisMode.TORQUE, torque=min(max(torque, -cap), cap), torque_cap=cap)
@@ -193,12 +196,6 @@ class EmulatedDrive:
     def _watched_node(self) -> int:
         word = self.dictionary.get(0x1016, 1)
         return (word >> 16 & 0x7F) if word & 0xFFFF and word >> 16 & 0x7F else -1
-
-    @property
-    def _interpolation_s(self) -> float:
-        if not self.dictionary.has(0x60C2, 1):
-            return 0.0
-        return self.dictionary.get(0x60C2, 1) * 10.0 ** self.dictionary.get(0x60C2, 2)
 
     def _watch_master(self, now_s: float) -> None:
         """React to a master that stays away.

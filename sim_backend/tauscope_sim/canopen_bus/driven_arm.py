@@ -15,12 +15,12 @@ Array = NDArray[np.float64]
 
 FASTEST = 1.25  # of a joint's speed limit: the voltage of its motor lets it turn no faster
 
+# what is done by tracking a target: the master's, or the place where the joint comes to rest
 TRACKING = (AxisMode.POSITION, AxisMode.HOLDING)
-"""What is done by tracking a target: the master's, or the place where the joint comes to rest."""
 
 
+# what a drive does, and over which time it interpolates: drives that agree in both share a target
 Kind = tuple[AxisMode, float]
-"""What a drive does, and over which time it interpolates: drives that agree in both share a target."""
 
 
 class DrivenArm:

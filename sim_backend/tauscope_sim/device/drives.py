@@ -25,11 +25,11 @@ class Activity(StrEnum):
     FREE = "free"  # stopped; no torque and no brake: an arm that is not balanced falls
 
 
+# what needs the host's setpoints: here the watchdog is armed
 COMMANDED = frozenset({Activity.TRACKING, Activity.TORQUE})
-"""What needs the host's setpoints: here the watchdog is armed."""
-
 POWERED = COMMANDED | {Activity.HOLDING, Activity.DAMPING}  # where the drives hold or drive the joints
 
+# allowed changes. A stop never puts an arm under power that has none: a braked arm stays braked, a free one free.
 TRANSITIONS: dict[Activity, frozenset[Activity]] = {
     Activity.BRAKED: COMMANDED,
     Activity.TRACKING: frozenset({Activity.HOLDING, Activity.DAMPING, Activity.FREE}),
@@ -38,8 +38,6 @@ TRANSITIONS: dict[Activity, frozenset[Activity]] = {
     Activity.DAMPING: COMMANDED | {Activity.HOLDING, Activity.FREE},
     Activity.FREE: COMMANDED,
 }
-"""Allowed changes. A stop never puts an arm under power that has none: a braked arm stays braked, a free one free."""
-
 _BY_MODE = {ControlMode.POSITION: Activity.TRACKING, ControlMode.TORQUE: Activity.TORQUE}
 _BY_POLICY = {
     StopPolicy.HOLD: Activity.HOLDING,

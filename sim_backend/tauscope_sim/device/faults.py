@@ -20,6 +20,7 @@ class FaultCode(StrEnum):
     UNSTABLE = "simulation-unstable"
 
 
+# what the user does next, by fault
 REMEDIES = {
     FaultCode.WATCHDOG: "find out why the host fell silent, then acknowledge the fault and enable again",
     FaultCode.OVER_TEMPERATURE: "let the motor cool down, then acknowledge the fault",
@@ -28,7 +29,6 @@ REMEDIES = {
     FaultCode.POSITION_LIMIT: "command torque that turns the joint back in time, then acknowledge the fault",
     FaultCode.UNSTABLE: "make the scenario less extreme; the simulated arm was put to rest",
 }
-"""What the user does next, by fault."""
 
 
 class Disturbance(StrEnum):

@@ -41,8 +41,8 @@ def _inertia(bodies: RigidBodies, posture: Array) -> Array:
     return bodies.mass_matrix().diagonal().copy()
 
 
+# bandwidth of the drives' velocity estimate: turns the encoder's error into that of the velocity [rad/s]
 VELOCITY_BANDWIDTH = 2.0 * np.pi * 20.0
-"""Bandwidth of the drives' velocity estimate: turns the encoder's error into that of the velocity [rad/s]."""
 
 
 @dataclass(frozen=True, eq=False)

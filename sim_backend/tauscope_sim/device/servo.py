@@ -24,9 +24,8 @@ from tauscope_sim.plant.term import PhysicalEffect
 
 Array = NDArray[np.float64]
 
+# the damping of a drive with a compliant transmission is tuned to at most this many times its rotor's inertia
 LARGEST_EXCESS = 4.0
-"""The damping of a drive with a compliant transmission is tuned to at most this many times its rotor's inertia."""
-
 STIFFNESS_EXCESS = 5.0  # its stiffness may be tuned to so many times more
 
 

@@ -1,12 +1,102 @@
 """The bus of emulated servos: bytes of a master in, answers with the instants of their arrival out."""
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from functools import partial
 
-from tauscope_sim.dynamixel_bus import framing
+from dynamixel_sdk import Protocol2PacketHandler
+
 from tauscope_sim.dynamixel_bus.control_memory import WriteRefusedError
 from tauscope_sim.dynamixel_bus.servo import EmulatedServo
 from tauscope_sim.emulation.fault_kit import AnswerFaults, FaultKind, InjectedFault
+
+BROADCAST_ID = 0xFE
+_HEADER = b"\xff\xff\xfd\x00"
+_STATUS = 0x55
+_LONGEST = 1024
+_library = Protocol2PacketHandler()
+
+
+@dataclass(frozen=True)
+class Instruction:
+    """What a master asks."""
+
+    servo: int
+    code: int
+    parameters: bytes
+    length: int  # of the frame on the wire [bytes]
+
+
+def status_frame(servo: int, error: int, data: bytes) -> bytes:
+    """A status packet with stuffing and checksum."""
+    length = len(data) + 4
+    packet = [*_HEADER, servo, length & 0xFF, length >> 8, _STATUS, error, *data, 0, 0]
+    packet = _library.addStuffing(packet)
+    crc = _library.updateCRC(0, packet, len(packet) - 2)
+    return bytes(packet[:-2]) + crc.to_bytes(2, "little")
+
+
+def fast_status_frame(answers: list[tuple[int, int, bytes]], servos: int, length: int) -> bytes:
+    """The common packet of a Fast Sync Read, cut off after the last answer; it is never stuffed.
+
+    `length`: data of each [bytes].
+    """
+    total = 1 + servos * (length + 4)
+    frame = bytearray([*_HEADER, BROADCAST_ID, total & 0xFF, total >> 8, _STATUS])
+    for servo, error, data in answers:
+        frame += bytes([error, servo]) + data
+        frame += _library.updateCRC(0, frame, len(frame)).to_bytes(2, "little")
+    return bytes(frame)
+
+
+class InstructionParser:
+    """Finds instructions in what a master sends; answers of other servos are passed over."""
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+
+    def feed(self, received: bytes) -> list[Instruction]:
+        """Instructions that are complete now."""
+        self._buffer += received
+        found: list[Instruction] = []
+        while True:
+            start = self._buffer.find(_HEADER)
+            if start < 0:
+                del self._buffer[: max(0, len(self._buffer) - 3)]
+                return found
+            del self._buffer[:start]
+            if len(self._buffer) < 7:
+                return found
+            length = int.from_bytes(self._buffer[5:7], "little")
+            end = 7 + length
+            if length < 3 or end > _LONGEST:
+                del self._buffer[0]
+            elif len(self._buffer) < end:
+                return found
+            elif _library.updateCRC(0, self._buffer, end - 2) != int.from_bytes(self._buffer[end - 2 : end], "little"):
+                del self._buffer[0]
+            else:
+                frame = list(self._buffer[:end])
+                del self._buffer[:end]
+                if frame[7] != _STATUS:
+                    found.append(_instruction(frame))
+
+
+def _instruction(frame: list[int]) -> Instruction:
+    body = _remove_stuffing(frame[7:-2])
+    return Instruction(frame[4], body[0], bytes(body[1:]), len(frame))
+
+
+def _remove_stuffing(stuffed: list[int]) -> list[int]:
+    """Byte by byte: FD after FF FF FD is left out."""
+    plain: list[int] = []
+    skipped = False
+    for byte in stuffed:
+        skipped = byte == 0xFD and not skipped and plain[-3:] == [0xFF, 0xFF, 0xFD]
+        if not skipped:
+            plain.append(byte)
+    return plain
+
 
 Delivery = tuple[float, bytes]  # when bytes arrive at the master [s], and which
 
@@ -26,11 +116,11 @@ class EmulatedBus:
         self.servos = {servo.servo: servo for servo in servos}
         self._fast = fast_sync_read
         self._paced = paced
-        self._parser = framing.InstructionParser()
+        self._parser = InstructionParser()
         self._away_until_s = dict.fromkeys(self.servos, 0.0)
         self._answer_faults = {servo: AnswerFaults() for servo in self.servos}
         self._free_s = 0.0
-        self._handlers: dict[int, Callable[[framing.Instruction, float], list[Delivery]]] = {
+        self._handlers: dict[int, Callable[[Instruction, float], list[Delivery]]] = {
             PING: self._ping,
             READ: self._read,
             WRITE: self._write,
@@ -46,7 +136,7 @@ class EmulatedBus:
         if fast_sync_read:
             self._handlers |= {FAST_SYNC_READ: self._fast_sync_read}
 
-    def hear(self, data: bytes, now_s: float) -> list[framing.Instruction]:
+    def hear(self, data: bytes, now_s: float) -> list[Instruction]:
         """Instructions in the bytes of a master; every servo that is there hears them, which contents its watchdog."""
         instructions = self._parser.feed(data)
         if instructions:
@@ -54,7 +144,7 @@ class EmulatedBus:
                 servo.hear(now_s)
         return instructions
 
-    def answer(self, instructions: Iterable[framing.Instruction], now_s: float) -> list[Delivery]:
+    def answer(self, instructions: Iterable[Instruction], now_s: float) -> list[Delivery]:
         """Carry instructions out and answer them."""
         deliveries: list[Delivery] = []
         for instruction in instructions:
@@ -64,7 +154,7 @@ class EmulatedBus:
             deliveries += answers
         return deliveries
 
-    def _obey(self, instruction: framing.Instruction, end_s: float) -> list[Delivery]:
+    def _obey(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         return self._handlers.get(instruction.code, self._refuse)(instruction, end_s)
 
     def carry_out(self, fault: InjectedFault, now_s: float) -> None:
@@ -95,9 +185,9 @@ class EmulatedBus:
     def _present(self, now_s: float) -> list[EmulatedServo]:
         return [self.servos[key] for key in sorted(self.servos) if now_s >= self._away_until_s[key]]
 
-    def _find_addressed(self, instruction: framing.Instruction, now_s: float) -> list[EmulatedServo]:
+    def _find_addressed(self, instruction: Instruction, now_s: float) -> list[EmulatedServo]:
         present = self._present(now_s)
-        return [servo for servo in present if instruction.servo in (servo.servo, framing.BROADCAST_ID)]
+        return [servo for servo in present if instruction.servo in (servo.servo, BROADCAST_ID)]
 
     def _find_present(self, servos: Sequence[int], now_s: float) -> list[EmulatedServo]:
         present = {servo.servo: servo for servo in self._present(now_s)}
@@ -108,7 +198,7 @@ class EmulatedBus:
         return length * _BITS_PER_BYTE / baud if self._paced else 0.0
 
     def _answer(self, servo: EmulatedServo, error: int, data: bytes, after_s: float) -> list[Delivery]:
-        frame = framing.status_frame(servo.servo, error | servo.error_byte, data)
+        frame = status_frame(servo.servo, error | servo.error_byte, data)
         due = after_s + servo.return_delay_s + self._wire_s(len(frame))
         return self._answer_faults[servo.servo].apply(frame, due)
 
@@ -119,12 +209,12 @@ class EmulatedBus:
             after_s += servo.return_delay_s + self._wire_s(11 + len(data))
         return deliveries
 
-    def _ping(self, instruction: framing.Instruction, end_s: float) -> list[Delivery]:
+    def _ping(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         servos = self._find_addressed(instruction, end_s)
         return self._answers([(servo, 0, servo.memory.read(0, 2) + servo.memory.read(6, 1)) for servo in servos], end_s)
 
-    def _read(self, instruction: framing.Instruction, end_s: float) -> list[Delivery]:
-        if instruction.servo == framing.BROADCAST_ID or len(instruction.parameters) != 4:
+    def _read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
+        if instruction.servo == BROADCAST_ID or len(instruction.parameters) != 4:
             return []
         servos = [
             servo for servo in self._find_addressed(instruction, end_s) if servo.memory.get("Status Return Level")
@@ -137,7 +227,7 @@ class EmulatedBus:
         except WriteRefusedError as refusal:
             return servo, refusal.error, b""
 
-    def _write(self, instruction: framing.Instruction, end_s: float) -> list[Delivery]:
+    def _write(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         address, data = int.from_bytes(instruction.parameters[:2], "little"), instruction.parameters[2:]
         for servo in self._followers(instruction.servo, end_s):
             if servo.servo != instruction.servo:
@@ -147,40 +237,40 @@ class EmulatedBus:
             level = servo.memory.get("Status Return Level")
             write = servo.write if instruction.code == WRITE else servo.register
             error = _attempt(partial(write, address, data))
-            if instruction.servo != framing.BROADCAST_ID and level == 2:
+            if instruction.servo != BROADCAST_ID and level == 2:
                 deliveries += self._answer(servo, error, b"", end_s)
         return deliveries
 
-    def _act(self, instruction: framing.Instruction, end_s: float) -> list[Delivery]:
+    def _act(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         servos = self._find_addressed(instruction, end_s)
         return self._confirm(instruction, [(servo, _attempt(servo.act), b"") for servo in servos], end_s)
 
-    def _clear(self, instruction: framing.Instruction, end_s: float) -> list[Delivery]:
+    def _clear(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         clear, servos = EmulatedServo.clear, self._find_addressed(instruction, end_s)
         errors = [_attempt(partial(clear, servo, instruction.parameters)) for servo in servos]
         return self._confirm(instruction, [(one, error, b"") for one, error in zip(servos, errors, strict=True)], end_s)
 
-    def _confirm(self, instruction: framing.Instruction, parts: list[Part], end_s: float) -> list[Delivery]:
+    def _confirm(self, instruction: Instruction, parts: list[Part], end_s: float) -> list[Delivery]:
         """Answers to an instruction; none to one that concerns all."""
-        return [] if instruction.servo == framing.BROADCAST_ID else self._answers(parts, end_s)
+        return [] if instruction.servo == BROADCAST_ID else self._answers(parts, end_s)
 
-    def _reboot(self, instruction: framing.Instruction, end_s: float) -> list[Delivery]:
+    def _reboot(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         servos = self._find_addressed(instruction, end_s)
         answers = self._confirm(instruction, [(servo, 0, b"") for servo in servos], end_s)
         for servo in servos:
             self._restart(servo.servo, end_s + _REBOOT_S)
         return answers
 
-    def _refuse(self, instruction: framing.Instruction, end_s: float) -> list[Delivery]:
+    def _refuse(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         servos = self._find_addressed(instruction, end_s)
         return self._confirm(instruction, [(servo, _UNKNOWN_INSTRUCTION, b"") for servo in servos], end_s)
 
-    def _sync_read(self, instruction: framing.Instruction, end_s: float) -> list[Delivery]:
+    def _sync_read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         address, length = _words(instruction.parameters)
         servos = self._find_present(instruction.parameters[4:], end_s)
         return self._answers([self._value(servo, address, length) for servo in servos], end_s)
 
-    def _fast_sync_read(self, instruction: framing.Instruction, end_s: float) -> list[Delivery]:
+    def _fast_sync_read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         """One packet, to which each servo appends its part; who is silent ends it."""
         address, length = _words(instruction.parameters)
         wanted = instruction.parameters[4:]
@@ -196,11 +286,11 @@ class EmulatedBus:
             answers.append((key, error | servo.error_byte, data))
         if not answers:
             return []
-        frame = framing.fast_status_frame(answers, len(wanted), length)
+        frame = fast_status_frame(answers, len(wanted), length)
         delay_s = max(present[key].return_delay_s for key, _, _ in answers)
         return faults.apply(frame, end_s + delay_s + self._wire_s(len(frame)))
 
-    def _sync_write(self, instruction: framing.Instruction, end_s: float) -> list[Delivery]:
+    def _sync_write(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         address, length = _words(instruction.parameters)
         data = instruction.parameters[4:]
         for start in range(0, len(data) - length, 1 + length):
@@ -208,7 +298,7 @@ class EmulatedBus:
                 _attempt(partial(servo.write, address, data[start + 1 : start + 1 + length]))
         return []
 
-    def _bulk_read(self, instruction: framing.Instruction, end_s: float) -> list[Delivery]:
+    def _bulk_read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         data = instruction.parameters
         parts: list[Part] = []
         for start in range(0, len(data) - 4, 5):
@@ -216,7 +306,7 @@ class EmulatedBus:
                 parts.append(self._value(servo, *_words(data[start + 1 : start + 5])))
         return self._answers(parts, end_s)
 
-    def _bulk_write(self, instruction: framing.Instruction, end_s: float) -> list[Delivery]:
+    def _bulk_write(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         data = instruction.parameters
         start = 0
         while start + 5 <= len(data):

@@ -29,6 +29,7 @@ _P = ModelFigures(1_003_846, 0, 0.0010471976, 1.0, 22_740, 2_900, 2_009, (0, 1, 
 _Y_EEPROM = ((0, 8), (10, 15), (32, 152), (256, 512))
 _Y = ModelFigures(524_288, 0, 0.0010471976, 10.0, 2_080, 2_020, 1_000, (0, 1, 3), True, _Y_EEPROM, 99)
 
+# XM430-W350, XM540-W270, XL430-W250 (senses no current), XL330-M288, PH54-200-S500 and YM070-210-R099
 MODELS: dict[int, ModelFigures] = {
     1020: _X,
     1120: replace(_X, current_limit=2047, velocity_limit=128),
@@ -37,7 +38,6 @@ MODELS: dict[int, ModelFigures] = {
     2020: _P,
     4030: _Y,
 }
-"""XM430-W350, XM540-W270, XL430-W250 (senses no current), XL330-M288, PH54-200-S500 and YM070-210-R099."""
 
 
 @dataclass(frozen=True)

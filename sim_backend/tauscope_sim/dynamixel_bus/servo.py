@@ -113,8 +113,8 @@ _Y_WATCHDOG_CODE = 18
 _Y_LASTING = (7, 9, 10, 11, 12, 13, 14, 15)
 _ERROR_TO_CLEAR = bytes.fromhex("02 45 52 43 4C")
 _TICKS = 32_768
+# measurements are means of as many periods of the servo's loop: goals that come in steps make current ripple
 _FILTERED_STEPS = 5
-"""Measurements are means of as many periods of the servo's loop: goals that come in steps make current ripple."""
 
 
 class EmulatedServo:

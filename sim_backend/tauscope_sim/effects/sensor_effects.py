@@ -1,6 +1,7 @@
 """What sensors and drives make of the torque and the time: gains, limits, delays."""
 
 from collections import deque
+from collections.abc import Callable
 from typing import Annotated, ClassVar, Protocol
 
 import numpy as np
@@ -40,17 +41,19 @@ class TorqueGainError(SensorEffect):
     gain: Nonzero
 
     def channel(self, joint_count: int) -> Channel:
-        gains = np.ones(joint_count)
-        gains[self.joint - 1] = self.gain
-        return _Gain(gains)
+        return _Recorded(self.joint - 1, lambda torque: self.gain * torque)
 
 
-class _Gain:
-    def __init__(self, gains: Array) -> None:
-        self._gains = gains
+class _Recorded:
+    """One joint's torque, recorded as something else."""
+
+    def __init__(self, joint: int, record: Callable[[float], float]) -> None:
+        self._joint, self._record = joint, record
 
     def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        return position, self._gains * torque
+        recorded = torque.copy()
+        recorded[self._joint] = self._record(torque[self._joint])
+        return position, recorded
 
 
 class TorqueSaturation(SensorEffect):
@@ -65,18 +68,8 @@ class TorqueSaturation(SensorEffect):
     shape: Annotated[str, one_of("compression", "clip")] = "compression"
 
     def channel(self, joint_count: int) -> Channel:
-        return _Saturation(self.joint - 1, self.level, self.shape == "clip")
-
-
-class _Saturation:
-    def __init__(self, joint: int, level: float, clip: bool) -> None:
-        self._joint, self._level, self._clip = joint, level, clip
-
-    def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        recorded, joint, level = torque.copy(), self._joint, self._level
-        ratio = torque[joint] / level
-        recorded[joint] = level * (np.clip(ratio, -1.0, 1.0) if self._clip else np.tanh(ratio))
-        return position, recorded
+        shrink = (lambda ratio: np.clip(ratio, -1.0, 1.0)) if self.shape == "clip" else np.tanh
+        return _Recorded(self.joint - 1, lambda torque: self.level * shrink(torque / self.level))
 
 
 LONGEST_DELAY = 1.0  # what is late by more is no delay of a channel [s]

@@ -18,9 +18,8 @@ from tauscope_sim.emulation.fault_kit import FaultSchedule, InjectedFault, fault
 STEP_S = 1e-3  # period of the devices' own loops and of the physics [s]
 MOST_STEPS = 10  # steps that are taken in a row while nothing is asked
 
+# where the machine stood still for longer than this, the device's clock has lost the rest [s]
 LONGEST_CATCH_UP_S = 0.25
-"""Where the machine stood still for longer than this, the device's clock has lost the rest [s]."""
-
 ALL_STEPS = ceil(LONGEST_CATCH_UP_S / STEP_S)  # as many as can be due
 
 

@@ -16,9 +16,8 @@ from tauscope_sim.plant.term import AMBIENT, PhysicalEffect
 Array = NDArray[np.float64]
 
 
+# the twist shrinks by the ratio of gravity's gradient to stiffness each time; a few rounds are usual
 MOST_ITERATIONS = 200
-"""The twist shrinks by the ratio of gravity's gradient to stiffness each time; a few rounds are usual."""
-
 SETTLED = 1e-13  # change of a link's position that ends the iteration [rad or m]
 
 

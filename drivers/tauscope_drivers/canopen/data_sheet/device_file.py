@@ -160,9 +160,8 @@ _TYPE_NAMES = (
     *("BOOLEAN", "INTEGER8", "INTEGER16", "INTEGER32", "UNSIGNED8", "UNSIGNED16", "UNSIGNED32", "REAL32"),
     *("VISIBLE_STRING", "OCTET_STRING", "UNICODE_STRING", "DOMAIN", "REAL64", "INTEGER64", "UNSIGNED64"),
 )
+# data types of CiA 301 by their number
 TYPE_NAMES: Mapping[int, str] = {getattr(datatypes, name): name for name in _TYPE_NAMES}
-"""Data types of CiA 301 by their number."""
-
 _LONGEST_NAME = 60
 
 # The library warns of each of a maker's own data types, on the terminal where nobody listens; the driver needs none.
@@ -304,9 +303,8 @@ _OWN = frozenset(
         *(objects.FAULT_REACTION_OPTION, objects.LARGEST_TORQUE, objects.LOWEST_POSITION, objects.INTERPOLATION_VALUE),
     )
 )
+# controlword, targets, offsets to them, and outputs, among which is the brake: nobody asked to move
 _COMMANDS = frozenset((0x6040, 0x6042, 0x6071, 0x607A, 0x60B0, 0x60B1, 0x60B2, 0x60C1, 0x60FE, 0x60FF))
-"""Controlword, targets, offsets to them, and outputs, among which is the brake: nobody asked to move."""
-
 _LINE = re.compile(r"node.?id|baud|bit.?rate", re.IGNORECASE)
 _TEXTS = ("VISIBLE_STRING", "UNICODE_STRING", "OCTET_STRING")
 

@@ -76,7 +76,8 @@ def _target_flaws(file: DeviceFile, mode: ControlMode) -> list[str]:
         return [f"{objects.VELOCITY_ACTUAL} is missing, by which a runaway is noticed"]
     optional = (entry for entry in process_data.MEASURED_WHERE_THERE if _is_mappable(file, entry))
     missing = process_data.plan_pdos(pdo_slots(file), target, optional).missing
-    return [f"{entry} is in none of its PDOs, and their mapping cannot be written" for entry in missing]
+    there = (entry for entry in missing if _find(file, entry))
+    return [f"{entry} is in none of its PDOs, and their mapping cannot be written" for entry in there]
 
 
 def _slot(file: DeviceFile, number: int, direction: process_data.PdoDirection) -> process_data.PdoSlot | None:
