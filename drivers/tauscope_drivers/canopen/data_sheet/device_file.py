@@ -34,6 +34,7 @@ _DEVICE = {
     "devicecomissioning": "DeviceComissioning",  # CiA 306 spells it so
     "devicecommissioning": "DeviceComissioning",
 }
+_LONGEST_NUMBER = 64  # digits of 64 bits, in whatever base
 _NODE_ID = re.compile(r"\+?\$NODEID\+?")
 _OF_COMPACT = ("DataType", "AccessType", "PDOMapping", "DefaultValue")
 _MOST_SUBINDICES = 254
@@ -105,7 +106,7 @@ def parse_number(text: str, node_id: int | None = None) -> int | None:
             return None
         offset = parse_number(_NODE_ID.sub("", number, count=1) or "0")
         return None if offset is None else offset + node_id
-    for base in (0, 8, 10, 16):
+    for base in (0, 8, 10, 16) if len(number) <= _LONGEST_NUMBER else ():
         with contextlib.suppress(ValueError):
             return int(number, base)
     return None
