@@ -19,7 +19,7 @@ from device_trace import read_trace
 from tauscope.robot.robot import FrictionCoefficients, FrictionShape, JointLimits, LinkInertia, Model, Robot
 from tauscope_drivers import ArmState, Backend, ControlMode, DriveLimits, Setpoint, StopPolicy
 from tauscope_sim.device import Injection
-from tauscope_sim.device.activity import COMMANDED
+from tauscope_sim.device.drives import COMMANDED
 from tauscope_sim.driver import RemoteSimulatedArm, SimulatedArm, start_device
 
 Array = NDArray[np.float64]

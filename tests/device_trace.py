@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.errors import RecordingError
-from tauscope_sim.device.activity import Activity
+from tauscope_sim.device.drives import Activity
 from tauscope_sim.device.server import FIXED_COLUMNS
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ import can
 
 from tauscope_drivers.canopen.data_sheet.device_file import read_device_file
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_sim.canopen_bus.drive import AxisMeasurement, AxisMode, AxisScale, EmulatedDrive
+from tauscope_sim.canopen_bus.drive import REMOTE, AxisMeasurement, AxisMode, AxisScale, EmulatedDrive
 
 GEAR = 50.0
 COUNTS_PER_TURN = 65536
@@ -66,7 +66,8 @@ class EmulatedBus:
                 self._move(index, drive)
                 answers = drive.tick(now)
                 if message is not None and not self.swallows(message):
-                    answers += drive.receive((message.arbitration_id, bytes(message.data)), now)
+                    identifier = message.arbitration_id | (REMOTE if message.is_remote_frame else 0)
+                    answers += drive.receive((identifier, bytes(message.data)), now)
                 for identifier, data in answers:
                     if self.deaf and 0x180 <= identifier < 0x500:
                         continue

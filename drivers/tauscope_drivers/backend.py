@@ -26,19 +26,15 @@ class ControlMode(StrEnum):
 
     POSITION = "position"
     """The drives track positions with a torque cap: Dynamixel current-based position, CiA 402 cyclic synchronous."""
-    TORQUE = "torque"
-    """The host commands torque: Dynamixel current, CiA 402 cyclic synchronous torque."""
+    TORQUE = "torque"  # the host commands torque: Dynamixel current, CiA 402 cyclic synchronous torque
 
 
 class StopPolicy(StrEnum):
     """What the arm does when it is stopped."""
 
-    HOLD = "hold"
-    """Stay under power at the place of the stop."""
-    DAMP = "damp"
-    """Resist motion in proportion to speed: a falling arm sinks slowly."""
-    TORQUE_OFF = "torque_off"
-    """No torque: for arms that are balanced or braked."""
+    HOLD = "hold"  # stay under power at the place of the stop
+    DAMP = "damp"  # resist motion in proportion to speed: a falling arm sinks slowly
+    TORQUE_OFF = "torque_off"  # no torque: for arms that are balanced or braked
 
 
 @dataclass(frozen=True, eq=False)

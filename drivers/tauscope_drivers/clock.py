@@ -5,8 +5,7 @@ from collections import deque
 from statistics import median
 from typing import Protocol
 
-REMEMBERED = 31
-"""Answers by which it is known how long they usually take: adapters differ."""
+REMEMBERED = 31  # answers by which it is known how long they usually take: adapters differ
 
 
 class AnswerTime:
@@ -59,8 +58,7 @@ _EARLY, _LATE = 0.5, 1.9
 """A call that comes so many cycles after the one before is the next. One that comes sooner takes the place of a late
 one, in the same cycle; a host that is later has skipped whole cycles."""
 
-_PAUSE = 10
-"""After so many cycles without a call the host begins anew, at any instant."""
+_PAUSE = 10  # after so many cycles without a call the host begins anew, at any instant
 
 
 class CycleGrid:

@@ -56,14 +56,11 @@ class ArmDescription:
 class Driver(ABC):
     """One kind of arm; moves nothing by itself."""
 
-    name: str
-    """As ``--backend`` calls it: the name of the entry point."""
-    title: str
-    """What the page calls it."""
+    name: str  # as ``--backend`` calls it: the name of the entry point
+    title: str  # what the page calls it
     is_simulated: bool = False
     options: tuple[Option, ...] = ()
-    file_keys: tuple[str, ...] = ()
-    """Keys of a ``drive`` block that name a file, looked up beside the robot file."""
+    file_keys: tuple[str, ...] = ()  # keys of a ``drive`` block that name a file, looked up beside the robot file
 
     @property
     def option_names(self) -> tuple[str, ...]:
@@ -85,18 +82,12 @@ class BusDriver(Driver):
     ``dry_run.plan_frames``, with the arguments of the methods here that call them.
     """
 
-    id_key: str
-    """Key by which a ``drive`` block speaks of this bus."""
-    block_example: str
-    """The least ``drive`` block, as a message shows it."""
-    port_help: str
-    """What ``bus scan`` takes as port; drivers that state the same share a kind of bus."""
-    answering: str = ""
-    """Devices that answer a scan, for who finds nobody with another driver of the same kind of bus."""
-    neighbours: str = ""
-    """Devices that hang on such a bus and answer no driver, in a sentence for who finds nobody."""
-    bus_options: tuple[str, ...] = ()
-    """Names of the options that replace a key of the first joint's ``drive`` block."""
+    id_key: str  # key by which a ``drive`` block speaks of this bus
+    block_example: str  # the least ``drive`` block, as a message shows it
+    port_help: str  # what ``bus scan`` takes as port; drivers that state the same share a kind of bus
+    answering: str = ""  # devices that answer a scan, for who finds nobody with another driver of the same kind of bus
+    neighbours: str = ""  # devices that hang on such a bus and answer no driver, in a sentence for who finds nobody
+    bus_options: tuple[str, ...] = ()  # names of the options that replace a key of the first joint's ``drive`` block
 
     def is_meant(self, block: Mapping[str, Any]) -> bool:
         """Whether a ``drive`` block speaks of this bus."""

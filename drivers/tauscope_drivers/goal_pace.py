@@ -19,11 +19,8 @@ _AHEAD_CYCLES = 2.0
 """A goal is to be reached when that of the next cycle but one comes: while the host is less than a cycle late, no servo
 stands still for want of a goal. It is one more cycle behind for that."""
 
-_LEAST_CYCLES = 0.5
-"""A goal that comes very late is still not leapt to."""
-
-_LEAST_PART = 0.01
-"""Part of the largest speed with which even the shortest way is gone."""
+_LEAST_CYCLES = 0.5  # a goal that comes very late is still not leapt to
+_LEAST_PART = 0.01  # part of the largest speed with which even the shortest way is gone
 
 
 class PacedServo(Protocol):

@@ -63,8 +63,7 @@ class PlannedFrame:
     wire: str
 
 
-PHASES = ("connect", "enable", "cycle", "stop")
-"""In the order in which a run goes through them."""
+PHASES = ("connect", "enable", "cycle", "stop")  # in the order in which a run goes through them
 
 
 def failure(place: str, message: str, device: str = "") -> Finding:

@@ -12,20 +12,12 @@ from tauscope_drivers.state import Setpoint
 
 Array = NDArray[np.float64]
 
+# how far outside its range a joint may stand when it is enabled: as far as a stop can carry it [rad or m]
 ENABLE_MARGIN = 0.05
-"""How far outside its range a joint may stand when it is enabled: as far as a stop can carry it [rad or m]."""
-
-CATCH_S = 0.05
-"""Time that stopping a joint takes, a change of mode included: it is stopped where it would be by then."""
-
-SPEED_MARGIN = 1.1
-"""Measured speed, and that of targets, may be this many times the limit."""
-
-TORQUE_MARGIN = 1.1
-"""Measured torque may be this many times the limit: a drive estimates it from its current."""
-
-PERSISTENCE = 2
-"""Cycles in a row after which a speed or a torque counts: one noisy reading is no runaway."""
+CATCH_S = 0.05  # time that stopping a joint takes, a change of mode included: it is stopped where it would be by then
+SPEED_MARGIN = 1.1  # measured speed, and that of targets, may be this many times the limit
+TORQUE_MARGIN = 1.1  # measured torque may be this many times the limit: a drive estimates it from its current
+PERSISTENCE = 2  # cycles in a row after which a speed or a torque counts: one noisy reading is no runaway
 
 _TORQUE_REMEDY = "the arm was stopped; look for an obstacle or slow the motion down, then acknowledge"
 _REMEDY = "the arm was stopped; correct the commanded torque, then acknowledge"

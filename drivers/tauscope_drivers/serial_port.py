@@ -15,11 +15,8 @@ from serial.tools.list_ports import comports
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.inspection import Finding, Severity
 
-BITS_PER_BYTE = 10
-"""Start bit, eight bits, stop bit."""
-
-LEAST_LATENCY_S = 0.001
-"""What an adapter adds to every answer at least [s]: one USB frame."""
+BITS_PER_BYTE = 10  # start bit, eight bits, stop bit
+LEAST_LATENCY_S = 0.001  # what an adapter adds to every answer at least [s]: one USB frame
 
 _TTY_DEVICES = Path("/sys/class/tty")
 _PROCESSES = Path("/proc")

@@ -31,8 +31,7 @@ from tauscope_sim.mjcf_compiler import compile_model
 Array = NDArray[np.float64]
 
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
-CHOSEN_STD = 0.2
-"""Relative standard error of an MJCF's gains: most are chosen so that the arm looks right."""
+CHOSEN_STD = 0.2  # relative standard error of an MJCF's gains: most are chosen so that the arm looks right
 
 OF_JOINT = int(mujoco.mjtTrn.mjTRN_JOINT)
 

@@ -18,11 +18,9 @@ from tauscope.robot.robot import JointType, LinkInertia, Robot, Segment
 
 Array = NDArray[np.float64]
 
+# added to each principal moment of inertia [kg m²]: a slender rod has a zero one, MuJoCo refuses less than 1e-15
 LEAST_INERTIA = 1e-12
-"""Added to each principal moment of inertia [kg m²]: a slender rod has a zero one, MuJoCo refuses less than 1e-15."""
-
-LEAST_MASS = 1e-12
-"""Mass given to a massless link [kg], for the same reason."""
+LEAST_MASS = 1e-12  # mass given to a massless link [kg], for the same reason
 
 _JOINT_TYPES = {JointType.REVOLUTE: mujoco.mjtJoint.mjJNT_HINGE, JointType.PRISMATIC: mujoco.mjtJoint.mjJNT_SLIDE}
 
@@ -112,18 +110,12 @@ def _weigh(body: mujoco.MjsBody, link: LinkInertia) -> None:
 
 @dataclass(frozen=True, eq=False)
 class BodyInertia:
-    """Inertia of a body in MuJoCo's terms.
+    """Inertia of a body in MuJoCo's terms."""
 
-    `mass`: m, above zero [kg].
-    `centre`: (3,), centre of mass in the link frame [m].
-    `quaternion`: (4,), (w, x, y, z) of the principal axes in the link frame.
-    `moments`: (3,), principal moments about the centre of mass, ascending, above zero [kg m²].
-    """
-
-    mass: float
-    centre: Array
-    quaternion: Array
-    moments: Array
+    mass: float  # m, above zero [kg]
+    centre: Array  # (3,), centre of mass in the link frame [m]
+    quaternion: Array  # (4,), (w, x, y, z) of the principal axes in the link frame
+    moments: Array  # (3,), principal moments about the centre of mass, ascending, above zero [kg m²]
 
 
 def body_inertia(link: LinkInertia) -> BodyInertia:

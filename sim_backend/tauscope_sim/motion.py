@@ -12,8 +12,7 @@ from tauscope.robot.robot import Joint
 Array = NDArray[np.float64]
 
 
-LEAST_HARMONICS = 2
-"""One harmonic alone cannot be at rest, with zero acceleration, at the ends of its period."""
+LEAST_HARMONICS = 2  # one harmonic alone cannot be at rest, with zero acceleration, at the ends of its period
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,18 +29,12 @@ class MotionSamples:
 
 @dataclass(frozen=True, eq=False)
 class FourierMotion:
-    """A finite Fourier series a joint, the form of the paper's section 5.2 about a centre position.
+    """A finite Fourier series a joint, the form of the paper's section 5.2 about a centre position."""
 
-    `period_s`: duration of one period, 2π/ω_f [s].
-    `centre`: (n,), mean position [rad or m].
-    `cosine`: (n, M), a_l, velocity amplitude of the cosine of harmonic l [rad/s or m/s].
-    `sine`: (n, M), b_l, velocity amplitude of the sine of harmonic l [rad/s or m/s].
-    """
-
-    period_s: float
-    centre: Array
-    cosine: Array
-    sine: Array
+    period_s: float  # duration of one period, 2π/ω_f [s]
+    centre: Array  # (n,), mean position [rad or m]
+    cosine: Array  # (n, M), a_l, velocity amplitude of the cosine of harmonic l [rad/s or m/s]
+    sine: Array  # (n, M), b_l, velocity amplitude of the sine of harmonic l [rad/s or m/s]
 
     def evaluate(self, time: Array) -> MotionSamples:
         """Exact position, velocity and acceleration. `time`: (N,), instants since the start of a period [s]."""

@@ -21,6 +21,8 @@ from tauscope.errors import RecordingError
 
 HINGE_OR_SLIDE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 
+_GROUPS = ("q", "tau", "qd", "qref")
+
 
 class MujocoLog:
     """Steps a simulation and keeps time, position, velocity, actuator torque and commands of its joints.
@@ -64,17 +66,14 @@ class MujocoLog:
         `with_torque`: whether torque is among the columns; a position servo's log has none.
         """
         rows, count = np.array(self._rows), len(self.joints)
-        groups = ("q", "tau", "qd", "qref") if with_torque else ("q", "qd", "qref")
-        kept = [0, *(1 + count * place + joint for place in self._places(groups) for joint in range(count))]
+        groups = [group for group in _GROUPS if with_torque or group != "tau"]
+        places = [_GROUPS.index(group) for group in groups]
+        kept = [0, *(1 + count * place + joint for place in places for joint in range(count))]
         names = ["t", *(f"{group}{joint}" for group in groups for joint in range(1, count + 1))]
         known = [place for place, column in enumerate(kept) if np.isfinite(rows[:, column]).any()]
         header = f"# joints: {', '.join(self.joints)}\n" + ",".join(names[place] for place in known)
         data = rows[:, [kept[place] for place in known]]
         np.savetxt(path, data, fmt="%.9g", delimiter=",", header=header, comments="", encoding="utf-8")
-
-    @staticmethod
-    def _places(groups: Sequence[str]) -> list[int]:
-        return [("q", "tau", "qd", "qref").index(group) for group in groups]
 
     def _actuator_of(self, joint: int) -> int | None:
         model, on_joint = self._model, int(mujoco.mjtTrn.mjTRN_JOINT)

@@ -5,8 +5,7 @@ import gc
 import os
 from pathlib import Path
 
-PRIORITY = -10
-"""Nice level that a device's process asks for."""
+PRIORITY = -10  # nice level that a device's process asks for
 
 _TREE = Path(__file__).resolve().parents[1]
 

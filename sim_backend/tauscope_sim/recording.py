@@ -40,22 +40,14 @@ def rigid_body_torque(model: mujoco.MjModel, position: Array, velocity: Array, a
 
 @dataclass(frozen=True, eq=False)
 class SimulatedRecording:
-    """A simulated measurement together with the truth behind it.
+    """A simulated measurement together with the truth behind it."""
 
-    `time`: (N,), instants, uniform, from zero [s].
-    `position`: (N, n), q as the encoder reports it [rad or m].
-    `torque`: (N, n), τ as measured: exact torque plus noise [Nm or N].
-    `exact`: q, q̇, q̈ without noise, (N, n) each.
-    `torque_exact`: (N, n), τ without noise, friction included [Nm or N].
-    `period`: (N,) int64, index of the repeated period, from zero.
-    """
-
-    time: Array
-    position: Array
-    torque: Array
-    exact: MotionSamples
-    torque_exact: Array
-    period: NDArray[np.int64]
+    time: Array  # (N,), instants, uniform, from zero [s]
+    position: Array  # (N, n), q as the encoder reports it [rad or m]
+    torque: Array  # (N, n), τ as measured: exact torque plus noise [Nm or N]
+    exact: MotionSamples  # q, q̇, q̈ without noise, (N, n) each
+    torque_exact: Array  # (N, n), τ without noise, friction included [Nm or N]
+    period: NDArray[np.int64]  # (N,) int64, index of the repeated period, from zero
 
 
 def simulate_recording(
@@ -170,11 +162,12 @@ def write_recording_csv(
     signs = np.array([joint.sign for joint in joints], dtype=np.float64)
     constants = np.array([joint.torque_constant for joint in joints])
     effort = recording.torque * signs / (constants if as_current else 1.0)
-    table = np.column_stack([recording.time, recording.position, effort])
+    table, columns = np.column_stack([recording.time, recording.position, effort]), "i" if as_current else "tau"
     try:
         with path.open("x", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(_header(len(joints), "i" if as_current else "tau"))
+            names = [f"{group}{number + 1}" for group in ("q", columns) for number in range(len(joints))]
+            writer.writerow(["t", *names, "period"])
             # tolist turns a row into Python floats, whose text is the shortest that reads back exactly
             writer.writerows([*row.tolist(), int(period)] for row, period in zip(table, recording.period, strict=True))
     except FileExistsError as error:
@@ -183,8 +176,3 @@ def write_recording_csv(
         ) from error
     except OSError as error:
         raise RecordingError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
-
-
-def _header(joint_count: int, effort: str) -> list[str]:
-    numbers = range(1, joint_count + 1)
-    return ["t", *(f"q{number}" for number in numbers), *(f"{effort}{number}" for number in numbers), "period"]

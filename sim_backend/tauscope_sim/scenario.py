@@ -22,17 +22,15 @@ class Scenario:
     """What differs from the robot file, and how well the sensors see it; ``Scenario()`` conceals nothing.
 
     `torque_noise_std`: (n,) or (), standard deviation of the recorded torque's white noise [Nm or N].
-    `position_noise_std`: (n,) or (), of the recorded position's [rad or m].
     `encoder_step`: (n,) or (), resolution to which positions are recorded, zero for none [rad or m].
-    `command_latency_s`: time from a setpoint's arrival to its effect [s].
     """
 
     effects: tuple[Effect, ...] = ()
     sensor_effects: tuple[SensorEffect, ...] = ()
     torque_noise_std: Array = field(default_factory=_zero)
-    position_noise_std: Array = field(default_factory=_zero)
+    position_noise_std: Array = field(default_factory=_zero)  # (n,) or (), of the recorded position's [rad or m]
     encoder_step: Array = field(default_factory=_zero)
-    command_latency_s: float = 0.0
+    command_latency_s: float = 0.0  # time from a setpoint's arrival to its effect [s]
     seed: int = 0
 
     def plant(self, robot: Robot, *, step_s: float = STEP) -> Plant:

@@ -11,8 +11,7 @@ from tauscope_drivers.driver import ArmDescription, Connection, Driver, Option
 from tauscope_drivers.errors import DriverError
 
 _LINGER_S = 5.0
-_LONGEST_FOLDER = 90
-"""The path of a socket has room for little more."""
+_LONGEST_FOLDER = 90  # the path of a socket has room for little more
 
 
 class SimulatedDriver(Driver):
@@ -84,5 +83,4 @@ def _refusal(reason: str) -> DriverError:
     return DriverError.refusal(f"backend sim: {reason}")
 
 
-DRIVER = SimulatedDriver()
-"""Found by the entry point ``tauscope.drivers``."""
+DRIVER = SimulatedDriver()  # found by the entry point ``tauscope.drivers``

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from tauscope_sim.dynamixel_bus.order import ServoOrder
+from tauscope_sim.dynamixel_bus.emulator import ServoOrder
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from hardware_emulated.stepped_clock import SteppedClock
 from tauscope.robot import read_robot
 from tauscope_drivers import Backend
 from tauscope_drivers.canopen.arm import CanopenArm
-from tauscope_sim.canopen_bus.order import CanOrder
+from tauscope_sim.canopen_bus.emulator import CanOrder
 from tauscope_sim.device import Injection
 from tauscope_sim.emulation.fault_kit import InjectedFault
 

@@ -16,7 +16,7 @@ from tauscope_drivers.dynamixel.packets import DynamixelParser
 from tauscope_drivers.feetech.arm import FeetechArm
 from tauscope_drivers.feetech.packets import FeetechParser
 from tauscope_sim.dynamixel_bus import DynamixelOrder, ServoSpecification
-from tauscope_sim.dynamixel_bus.order import ServoOrder
+from tauscope_sim.dynamixel_bus.emulator import ServoOrder
 
 _MODEL_NUMBERS = {"XM430-W350": 1020, "XM540-W270": 1120, "XL330-M288": 1200, "PH54-200-S500": 2020}
 TORQUE_PER_PERMILLE = 0.15

@@ -25,7 +25,7 @@ from tauscope.runtime.record import RunRecord
 from tauscope.runtime.run import run_trajectory
 from tauscope.runtime.states import RunState
 from tauscope_drivers.canopen.arm import CanopenArm
-from tauscope_sim.canopen_bus.order import CanOrder
+from tauscope_sim.canopen_bus.emulator import CanOrder
 from tauscope_sim.emulation import FaultKind, InjectedFault
 
 TORQUE_NOISE = 0.5

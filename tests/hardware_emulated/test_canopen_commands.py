@@ -13,7 +13,7 @@ from hardware_emulated.commands import Tauscope, write_short_motion
 from tauscope.recording import read_recording
 from tauscope.recording.recording import EffortKind
 from tauscope_drivers.inspection import PHASES
-from tauscope_sim.canopen_bus.order import CanOrder
+from tauscope_sim.canopen_bus.emulator import CanOrder
 from tauscope_sim.emulation import FaultKind, InjectedFault
 
 pytestmark = pytest.mark.realtime

@@ -15,7 +15,7 @@ from hardware_emulated.fault_table import FaultTable
 from hardware_emulated.stepped_clock import SteppedClock
 from tauscope.robot import Robot
 from tauscope_drivers.canopen.arm import CanopenArm
-from tauscope_sim.canopen_bus.order import CanOrder
+from tauscope_sim.canopen_bus.emulator import CanOrder
 from tauscope_sim.emulation import FaultKind
 
 

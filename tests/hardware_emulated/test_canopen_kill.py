@@ -25,7 +25,7 @@ from tauscope.runtime.run_process import RunProcess, recover_runs
 from tauscope.runtime.states import RunState
 from tauscope.trajectory import write_trajectory
 from tauscope_drivers.canopen.arm import CanopenArm
-from tauscope_sim.canopen_bus.order import CanOrder
+from tauscope_sim.canopen_bus.emulator import CanOrder
 
 WATCHDOG_S = 0.25
 STANDSTILL_S = 0.4

@@ -24,7 +24,7 @@ from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
 from tauscope.runtime.record import RunRecord
 from tauscope.runtime.run_process import RunProcess
 from tauscope.trajectory import Trajectory, write_trajectory
-from tauscope_sim.canopen_bus.order import CanOrder
+from tauscope_sim.canopen_bus.emulator import CanOrder
 
 RATE_HZ = 200.0
 TORQUE_NOISE = 0.5

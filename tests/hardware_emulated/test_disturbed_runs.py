@@ -22,7 +22,7 @@ from tauscope.robot import Robot
 from tauscope.runtime.states import RunState
 from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_drivers.canopen.node import FASTEST, SLACK_S
-from tauscope_sim.canopen_bus.order import CanOrder
+from tauscope_sim.canopen_bus.emulator import CanOrder
 
 INTERFACE = os.environ.get("TAUSCOPE_SOCKETCAN", "")
 NETEM = os.environ.get("TAUSCOPE_NETEM", "")

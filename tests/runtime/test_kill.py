@@ -31,7 +31,7 @@ from tauscope.runtime.record import RunRecord, read_record
 from tauscope.runtime.run_process import recover_runs
 from tauscope.runtime.states import RunState
 from tauscope.trajectory import write_trajectory
-from tauscope_sim.device.activity import COMMANDED
+from tauscope_sim.device.drives import COMMANDED
 from tauscope_sim.driver import DeviceProcess, start_device
 
 WATCHDOG_S, HEARTBEAT_S = 0.2, 0.5

@@ -8,24 +8,16 @@ import can
 import numpy as np
 
 from tauscope_drivers.backend import Capabilities, ControlMode, DriveLimits, StopPolicy
-from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen import objects, power
 from tauscope_drivers.canopen.bus import NMT_START, CanBus
 from tauscope_drivers.canopen.commissioning import commission_drive, write_settings
 from tauscope_drivers.canopen.configuration import BusConfiguration, read_configuration, require_targets
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST
-from tauscope_drivers.canopen.enabling import power_up
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.session import Session, blind_state, listed, possible_rate_hz, rate_limited_by
 from tauscope_drivers.canopen.state_machine import Goal
-from tauscope_drivers.canopen.stopping import (
-    POLICY_GOALS,
-    dropped_faults,
-    reset_faults,
-    stop_in_cycle,
-    stop_one_by_one,
-    stop_promptly,
-)
 from tauscope_drivers.canopen.target_limiter import TargetLimiter
+from tauscope_drivers.canopen.watchdog import BEATS
 from tauscope_drivers.clock import Clock, MonotonicClock
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
@@ -33,11 +25,7 @@ from tauscope_drivers.limits import RunawayWatch, TorqueWatch, require_finite, r
 from tauscope_drivers.state import ArmState, Setpoint
 
 WATCHDOG_RANGE_S = (0.02, 5.0)
-HEARTBEATS_A_WATCHDOG = 10
-"""The master beats so often within a drive's watchdog time: one lost frame stops nothing."""
-
-PATIENCE_S = 0.002
-"""Time that drives and adapter may take to answer SYNC, beyond twice that of the frames on the wire."""
+PATIENCE_S = 0.002  # time that drives and adapter may take to answer SYNC, beyond twice that of the frames on the wire
 
 
 class CanopenArm:
@@ -83,7 +71,7 @@ class CanopenArm:
         return Capabilities(
             joint_count=len(self._configuration.nodes),
             modes=self._modes,
-            stop_policies=frozenset(POLICY_GOALS),
+            stop_policies=frozenset(power.POLICY_GOALS),
             largest_rate_hz=possible_rate_hz(self._configuration),
             watchdog_range_s=WATCHDOG_RANGE_S,
             takes_feed_forward=False,
@@ -109,7 +97,7 @@ class CanopenArm:
         """Reset drives in fault, once, and forget emergencies; a drive that holds goes on holding."""
         session = self._require_session()
         self._mode = None
-        state = reset_faults(session)
+        state = power.reset_faults(session)
         if state.faults:
             raise DriverError(DriverErrorKind.FAULT, f"still in fault: {listed(state.faults)}", state.faults)
         return state
@@ -139,14 +127,14 @@ class CanopenArm:
         if state.faults:
             raise DriverError(DriverErrorKind.FAULT, f"{listed(state.faults)}; acknowledge it first", state.faults)
         session.learn_cycle(cycle_s)
-        session.bus.start_heartbeat(watchdog_s / HEARTBEATS_A_WATCHDOG)
+        session.bus.start_heartbeat(watchdog_s / BEATS)
         try:
             for node in session.nodes:
                 commission_drive(node, mode, limits, stop_policy, watchdog_s, cycle_s)
             _require_hold(session.nodes, mode, stop_policy)
             session.bus.command_nodes(NMT_START)
             self._mode, self._policy, session.brake = mode, stop_policy, None
-            state, place = power_up(session, mode)
+            state, place = power.power_up(session, mode)
         except DriverError:
             self.stop(stop_policy)
             raise
@@ -166,8 +154,11 @@ class CanopenArm:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the drives are not enabled; enable the arm first")
         require_finite(setpoint, len(session.nodes))
         session.bus.drain()
-        if any(node.error_code == HEARTBEAT_LOST for node in session.nodes):
-            return session.read_by_sdo()  # such a drive takes no process data any more
+        missing = [node for node in session.nodes if node.error_code == HEARTBEAT_LOST]
+        if len(missing) == len(session.nodes):
+            return session.read_by_sdo()  # such drives take no process data any more
+        if missing:
+            return power.stop_promptly(session, mode, power.POLICY_GOALS[self._policy])
         targets = limiter.limited(setpoint, self.clock.now_ns())
         # a stop that has begun goes on, whatever is asked for meanwhile
         goal = Goal.OPERATION_ENABLED if session.caught is None and session.brake is None else Goal.QUICK_STOP
@@ -179,7 +170,7 @@ class CanopenArm:
             session.caught = self._torque_watch.look(state.effort)
         if goal is Goal.OPERATION_ENABLED and (session.caught is not None or state.faults):
             # one drive's trouble becomes that of all: they stop together
-            return stop_promptly(session, mode, POLICY_GOALS[self._policy])
+            return power.stop_promptly(session, mode, power.POLICY_GOALS[self._policy])
         return state
 
     def stop(self, policy: StopPolicy) -> ArmState:
@@ -187,16 +178,16 @@ class CanopenArm:
         session, mode = self._session, self._mode
         if session is None:
             return blind_state(self.clock.now_ns(), len(self._configuration.nodes))
-        goal = POLICY_GOALS.get(policy, Goal.QUICK_STOP)
+        goal = power.POLICY_GOALS.get(policy, Goal.QUICK_STOP)
         for node in session.nodes:
             node.glitches.limit = math.inf
         self._mode, self._limiter, self._runaway, self._torque_watch = None, None, None, None
-        is_stopped = mode is not None and stop_in_cycle(session, mode, goal)
-        silent = stop_one_by_one(session.nodes, goal, is_stopped=is_stopped)
+        is_stopped = mode is not None and power.stop_in_cycle(session, mode, goal)
+        silent = power.stop_one_by_one(session.nodes, goal, is_stopped=is_stopped)
         session.bus.start_heartbeat(0.0)
         state = session.observe(self.clock.now_ns())
         shall_hold = mode is not None and goal is Goal.QUICK_STOP and self._policy is policy
-        dropped = dropped_faults(session.nodes) if shall_hold else []
+        dropped = power.dropped_faults(session.nodes) if shall_hold else []
         return replace(state, faults=(*state.faults, *silent, *dropped))
 
     def disconnect(self) -> None:
@@ -222,7 +213,7 @@ class CanopenArm:
         reason = None
         if mode not in self._modes:
             reason = f"not every drive has the cyclic synchronous {mode} mode (0x6502)"
-        elif policy not in POLICY_GOALS:
+        elif policy not in power.POLICY_GOALS:
             reason = f"drives cannot {policy} by themselves; choose hold or torque_off"
         elif not WATCHDOG_RANGE_S[0] <= watchdog_s <= WATCHDOG_RANGE_S[1]:
             reason = f"a watchdog of {watchdog_s:g} s is outside {WATCHDOG_RANGE_S[0]:g} to {WATCHDOG_RANGE_S[1]:g} s"

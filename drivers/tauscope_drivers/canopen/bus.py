@@ -27,13 +27,15 @@ NMT_START = 0x01
 NMT_PRE_OPERATIONAL = 0x80
 NMT_OPERATIONAL_STATE = 0x05
 
+# time in which the bus has to take a frame; the drives' own watchdog is what stops the arm meanwhile
 SEND_TIMEOUT_S = 0.5
-"""Time in which the bus has to take a frame; the drives' own watchdog is what stops the arm meanwhile."""
+GUARD_ATTEMPTS = 3
+GUARD_ANSWER_S = 0.05
 
+_BOOT_UP = b"\0"
 _MOST_DRAINED = 1000
 
-FrameHandler = Callable[[int, bytes], None]
-"""Takes the identifier and the payload of a frame."""
+FrameHandler = Callable[[int, bytes], None]  # takes the identifier and the payload of a frame
 
 
 class CanBus:
@@ -52,6 +54,7 @@ class CanBus:
         self._handlers: dict[int, FrameHandler] = {}
         self._heartbeat_period_ns = 0
         self._next_heartbeat_ns = 0
+        self.guarded: set[int] = set()  # nodes that each heartbeat of the master asks for their state
         self._claim: BusClaim | None = None
         try:
             self._claim = _claim_interface(configuration) if bus is None else None
@@ -79,12 +82,11 @@ class CanBus:
         self.subscribe(client.tx_cobid, lambda identifier, data: client.on_response(identifier, data, 0.0))
         return NodeDictionary(client, node_id)
 
-    def send(self, identifier: int, data: bytes) -> None:
+    def send(self, identifier: int, data: bytes, *, is_remote: bool = False) -> None:
         """Send a frame. Raises DriverError ``lost`` where the bus does not take it."""
+        frame = can.Message(arbitration_id=identifier, data=data, is_extended_id=False, is_remote_frame=is_remote)
         try:
-            self._bus.send(
-                can.Message(arbitration_id=identifier, data=data, is_extended_id=False), timeout=SEND_TIMEOUT_S
-            )
+            self._bus.send(frame, timeout=SEND_TIMEOUT_S)
         except (can.CanError, OSError, ValueError) as error:
             raise self._report_loss(error) from error
 
@@ -139,6 +141,7 @@ class CanBus:
         `period_s`: time between heartbeats; 0 ends them [s].
         """
         self._heartbeat_period_ns = round(period_s * 1e9)
+        self.guarded.clear()
         self._next_heartbeat_ns = self._clock.now_ns()
         self.beat()
 
@@ -148,6 +151,22 @@ class CanBus:
         if self._heartbeat_period_ns and now >= self._next_heartbeat_ns:
             self._next_heartbeat_ns = now + self._heartbeat_period_ns
             self.send(HEARTBEAT_ID + MASTER_NODE, bytes([NMT_OPERATIONAL_STATE]))
+            for node_id in self.guarded:
+                self.send(HEARTBEAT_ID + node_id, b"", is_remote=True)
+
+    def ask_guard(self, node_id: int) -> bool:
+        """Ask a node that produces no heartbeat for its state by remote frames; whether it answers."""
+        identifier, answers = HEARTBEAT_ID + node_id, list[bytes]()
+        handler = self._handlers.get(identifier)
+        self.subscribe(identifier, lambda _, data: answers.append(data))
+        for _ in range(GUARD_ATTEMPTS):
+            self.send(identifier, b"", is_remote=True)
+            deadline = time.monotonic_ns() + round(GUARD_ANSWER_S * 1e9)
+            while not answers and time.monotonic_ns() < deadline:
+                self.receive(deadline)
+        if handler is not None:
+            self.subscribe(identifier, handler)
+        return any(answer != _BOOT_UP for answer in answers)
 
     def command_nodes(self, command: int, node_id: int = 0) -> None:
         """Send a network-management command."""

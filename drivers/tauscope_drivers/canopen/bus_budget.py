@@ -2,28 +2,21 @@
 
 from dataclasses import dataclass
 
-LARGEST_LOAD = 0.8
-"""Share of the bus that cyclic frames may take; the rest is for heartbeats, emergencies and SDOs."""
+LARGEST_LOAD = 0.8  # share of the bus that cyclic frames may take; the rest is for heartbeats, emergencies and SDOs
 
+# characters of an 8-byte frame in the serial-line CAN protocol (slcan): ``t`` + 3 + 1 + 16 + return
 ASCII_FRAME_BYTES = 22
-"""Characters of an 8-byte frame in the serial-line CAN protocol (slcan): ``t`` + 3 + 1 + 16 + return."""
-
-HIGHEST_BIT_RATE = 1e6
-"""Of classical CAN [bit/s]."""
+HIGHEST_BIT_RATE = 1e6  # of classical CAN [bit/s]
 
 _SYNC_BYTES = 0
 
 
 @dataclass(frozen=True)
 class CycleFrames:
-    """Cyclic frames of one node.
+    """Cyclic frames of one node."""
 
-    `received_bytes`: payloads of its RPDOs [bytes].
-    `sent_bytes`: payloads of its TPDOs [bytes].
-    """
-
-    received_bytes: tuple[int, ...]
-    sent_bytes: tuple[int, ...]
+    received_bytes: tuple[int, ...]  # payloads of its RPDOs [bytes]
+    sent_bytes: tuple[int, ...]  # payloads of its TPDOs [bytes]
 
 
 def frame_bits(payload_bytes: int) -> int:

@@ -11,28 +11,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from tauscope_drivers import drive_block
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
-from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, DeviceFile, read_device_file
-from tauscope_drivers.canopen.data_sheet.needs import (
-    present_objects,
-    require_needed,
-    require_target,
-    states_rated_torque,
-)
-from tauscope_drivers.canopen.data_sheet.settings import settings_of
+from tauscope_drivers.canopen.data_sheet import needs
+from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, DeviceFile, read_device_file, settings_of
 from tauscope_drivers.canopen.interfaces import OWN_OPTIONS
 from tauscope_drivers.canopen.objects import describe_absent
-from tauscope_drivers.drive_block import (
-    DriveJoint,
-    read_direction,
-    read_positive,
-    read_text,
-    read_whole,
-    refusal,
-    require_distinct,
-    require_known_keys,
-)
 from tauscope_drivers.errors import DriverError
 from tauscope_drivers.inspection import Finding, Severity, failure
 
@@ -46,7 +31,6 @@ class NodeConfiguration:
     """One drive.
 
     `rated_torque_nm`: at the motor shaft, in place of what the drive states (0x6076): makers scale it differently [Nm].
-    `torque_limit`: of the joint; None where there is none [Nm or N].
     """
 
     node_id: int
@@ -56,40 +40,37 @@ class NodeConfiguration:
     direction: int = 1
     rated_torque_nm: float | None = None
     device_file: DeviceFile | None = None
-    torque_limit: float | None = None
+    torque_limit: float | None = None  # of the joint; None where there is none [Nm or N]
 
 
 @dataclass(frozen=True)
 class BusConfiguration:
-    """The bus and the drives on it, in the order of the joints.
-
-    `serial_baud`: of an adapter on a true serial line [bit/s].
-    """
+    """The bus and the drives on it, in the order of the joints."""
 
     nodes: tuple[NodeConfiguration, ...]
     interface: str
     channel: str
     bit_rate: int = 1_000_000
-    serial_baud: float | None = None
+    serial_baud: float | None = None  # of an adapter on a true serial line [bit/s]
     options: Mapping[str, Any] = field(default_factory=dict)
 
 
-def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
+def read_configuration(joints: Sequence[drive_block.DriveJoint]) -> BusConfiguration:
     """Bus and drives of an arm.
 
     Raises DriverError ``refused`` where a key is missing, unknown or not usable, or the EDS or DCF file describes no
     drive that the driver can use; names the joint and the key.
     """
     first = joints[0]
-    require_known_keys(joints, _BUS_KEYS, _NODE_KEYS)
+    drive_block.require_known_keys(joints, _BUS_KEYS, _NODE_KEYS)
     nodes = tuple(read_node(joint) for joint in joints)
-    require_distinct(joints, "node_id")
+    drive_block.require_distinct(joints, "node_id")
     return BusConfiguration(
         nodes=nodes,
-        interface=read_text(first, "interface", "name it as python-can does"),
-        channel=read_text(first, "channel", "name it as python-can does"),
-        bit_rate=read_whole(first, "bit_rate", 1_000_000, least=10_000, most=1_000_000),
-        serial_baud=read_positive(first, "serial_baud"),
+        interface=drive_block.read_text(first, "interface", "name it as python-can does"),
+        channel=drive_block.read_text(first, "channel", "name it as python-can does"),
+        bit_rate=drive_block.read_whole(first, "bit_rate", 1_000_000, least=10_000, most=1_000_000),
+        serial_baud=drive_block.read_positive(first, "serial_baud"),
         options=_options(first),
     )
 
@@ -103,62 +84,64 @@ def require_targets(configuration: BusConfiguration, mode: ControlMode) -> None:
         if node.device_file is None:
             continue
         try:
-            require_target(node.device_file, mode)
+            needs.require_target(node.device_file, mode)
         except DataSheetError as error:
             text = f"joint {joint} (node {node.node_id}): {node.device_file.name}: {error}"
             raise DriverError.refusal(text) from error
 
 
-def read_node(joint: DriveJoint) -> NodeConfiguration:
+def read_node(joint: drive_block.DriveJoint) -> NodeConfiguration:
     """The drive of a joint. Raises DriverError ``refused`` as `read_configuration`."""
-    counts_per_turn = read_positive(joint, "counts_per_turn")
+    counts_per_turn = drive_block.read_positive(joint, "counts_per_turn")
     if counts_per_turn is None:
-        raise refusal(joint, "counts_per_turn", "is missing; give the position counts of a motor turn")
-    node_id = read_whole(joint, "node_id", None, least=1, most=_HIGHEST_NODE)
-    rated_torque_nm = read_positive(joint, "rated_torque_nm")
+        raise drive_block.refusal(joint, "counts_per_turn", "is missing; give the position counts of a motor turn")
+    node_id = drive_block.read_whole(joint, "node_id", None, least=1, most=_HIGHEST_NODE)
+    rated_torque_nm = drive_block.read_positive(joint, "rated_torque_nm")
     return NodeConfiguration(
         node_id=node_id,
         counts_per_turn=counts_per_turn,
         gear_ratio=joint.gear_ratio,
-        zero_count=read_whole(joint, "zero_count", 0, least=-(2**31), most=2**31 - 1),
-        direction=read_direction(joint),
+        zero_count=drive_block.read_whole(joint, "zero_count", 0, least=-(2**31), most=2**31 - 1),
+        direction=drive_block.read_direction(joint),
         rated_torque_nm=rated_torque_nm,
         device_file=_device_file(joint, node_id, reads_rated_torque=rated_torque_nm is None),
         torque_limit=joint.torque_limit,
     )
 
 
-def _options(joint: DriveJoint) -> Mapping[str, Any]:
+def _options(joint: drive_block.DriveJoint) -> Mapping[str, Any]:
     options = joint.drive.get("options", {})
     if not isinstance(options, Mapping) or not all(isinstance(value, str | int | float) for value in options.values()):
-        raise refusal(joint, "options", f"= {options!r}; give what python-can takes, as in {{host: 192.168.1.5}}")
+        raise drive_block.refusal(
+            joint, "options", f"= {options!r}; give what python-can takes, as in {{host: 192.168.1.5}}"
+        )
     for name in options:
         if name in OWN_OPTIONS:
-            raise refusal(joint, f"options.{name}", "has a key of its own: interface, channel, bit_rate")
+            raise drive_block.refusal(joint, f"options.{name}", "has a key of its own: interface, channel, bit_rate")
     return dict(options)
 
 
-def _device_file(joint: DriveJoint, node_id: int, *, reads_rated_torque: bool) -> DeviceFile | None:
+def _device_file(joint: drive_block.DriveJoint, node_id: int, *, reads_rated_torque: bool) -> DeviceFile | None:
     """The EDS or DCF file of a joint's drive, which describes one that the driver can use; None where none is given."""
     path = joint.drive.get("eds")
     if path is None:
         return None
     if not isinstance(path, str) or not path:
-        raise refusal(joint, "eds", f"= {path!r}; give the path of the drive's EDS or DCF file")
+        raise drive_block.refusal(joint, "eds", f"= {path!r}; give the path of the drive's EDS or DCF file")
     try:
         file = read_device_file(Path(path), node_id)
         if file.node_id not in (None, node_id):
             raise DataSheetError(
                 f"is made for node {file.node_id}; correct drive.node_id, or give the file of this node"
             )
-        require_needed(file, reads_rated_torque=reads_rated_torque)
+        needs.require_needed(file, reads_rated_torque=reads_rated_torque)
         settings_of(file)
     except DataSheetError as error:
-        raise refusal(joint, "eds", f"= {path!r}: {error}") from error
+        raise drive_block.refusal(joint, "eds", f"= {path!r}: {error}") from error
     return file
 
 
-def check_blocks(joints: Sequence[DriveJoint]) -> list[Finding]:
+def check_blocks(joints: Sequence[drive_block.DriveJoint]) -> list[Finding]:
     """Flaws of every joint at once; of usable drives, the absent objects and their substitutes."""
     findings: list[Finding] = []
     without: list[str] = []
@@ -187,9 +170,10 @@ def _describe_file(place: str, node: NodeConfiguration) -> list[Finding]:
     file = node.device_file
     if file is None:
         return []
-    absent = describe_absent(present_objects(file))
+    absent = [objects.GUARDED] if needs.needs_guarding(file) else []
+    absent += describe_absent(needs.present_objects(file))
     doubts: list[Finding] = []
-    if node.rated_torque_nm is None and not states_rated_torque(file):
+    if node.rated_torque_nm is None and not needs.states_rated_torque(file):
         detail = f"{file.name} has no {objects.RATED_TORQUE}: torque in ‰ of it means nothing, and a run is refused"
         doubts.append(Finding(Severity.WARNING, place, detail, "state drive.rated_torque_nm"))
     usable = Finding(Severity.GOOD, place, f"{file.name} describes all that the driver needs")

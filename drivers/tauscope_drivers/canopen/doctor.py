@@ -1,31 +1,29 @@
 """Looks at a CAN bus and the drives on it, moves nothing, writes nothing, and says what to do about what it finds."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from tauscope_drivers.backend import ControlMode
+from tauscope_drivers.backend import ControlMode, DriveLimits
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import CanBus
-from tauscope_drivers.canopen.commissioning import find_missing
+from tauscope_drivers.canopen.commissioning import find_missing, read_mapping, require_plan
 from tauscope_drivers.canopen.configuration import BusConfiguration, read_configuration
-from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile
-from tauscope_drivers.canopen.data_sheet.settings import settings_of
+from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile, settings_of
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import DOUBTFUL, TARGETS
-from tauscope_drivers.canopen.pdo_mapping import read_mapping
-from tauscope_drivers.canopen.process_data import decode_mapping, received_parameters, sent_parameters
+from tauscope_drivers.canopen.process_data import decode_mapping
 from tauscope_drivers.canopen.session import possible_rate_hz
 from tauscope_drivers.canopen.state_machine import POWERED
+from tauscope_drivers.canopen.watchdog import require_guarding
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError
 from tauscope_drivers.inspection import Finding, FoundDevice, Severity, failure
 from tauscope_drivers.limits import require_sensible, stated_limits
 
-MEASURED_READS = 50
-"""Reads by which the round trip is measured."""
+MEASURED_READS = 50  # reads by which the round trip is measured
 
 _NETWORK = Path("/sys/class/net")
 _CAN_DEVICE_TYPE = "280"
@@ -161,14 +159,10 @@ def _read(path: Path) -> str:
         return ""
 
 
+# tried one after the other where the interface sets the rate [bit/s]
 USUAL_BIT_RATES = (1_000_000, 500_000, 250_000, 125_000)
-"""Tried one after the other where the interface sets the rate [bit/s]."""
-
-LISTENING_S = 0.3
-"""Time in which all nodes answer."""
-
-_FIXED_RATE = ("socketcan", "socketcand", "virtual", "udp_multicast")
-"""Interfaces whose rate is set elsewhere."""
+LISTENING_S = 0.3  # time in which all nodes answer
+_FIXED_RATE = ("socketcan", "socketcand", "virtual", "udp_multicast")  # interfaces whose rate is set elsewhere
 
 _NODES = range(1, 128)
 _UPLOAD = 0x40
@@ -190,7 +184,8 @@ def scan_bus(interface: str, channel: str, bit_rates: Sequence[int] | None = Non
         bus = CanBus(BusConfiguration((), interface, channel, bit_rate))
         try:
             for node, device_type in sorted(_answers(bus).items()):
-                name, version = _name_and_version(bus, node)
+                dictionary = bus.add_node(node)
+                name, version = map(dictionary.read_text, (objects.DEVICE_NAME, objects.SOFTWARE_VERSION))
                 profile = f"profile {device_type & 0xFFFF}"
                 yield FoundDevice(node, bit_rate, f"{name} ({profile})" if name else profile, version)
         finally:
@@ -215,45 +210,32 @@ def _answers(bus: CanBus) -> dict[int, int]:
     return found
 
 
-def _name_and_version(bus: CanBus, node: int) -> tuple[str, str]:
-    """Device name (0x1008) and software version (0x100A); empty where it tells none."""
-    dictionary = bus.add_node(node)
-    return dictionary.read_text(objects.DEVICE_NAME), dictionary.read_text(objects.SOFTWARE_VERSION)
-
-
 def rehearse(node: DriveNode, joint: DriveJoint) -> list[Finding]:
     """What would keep a run with the limits of the robot file from starting. `node`: identified and read."""
-    checks: tuple[Callable[[], list[Finding]], ...] = (
-        lambda: _examine_settings(node),
-        lambda: _examine_place(node, joint),
-        lambda: _examine_torque(node, joint),
-        lambda: _examine_mapping(node),
-        lambda: _examine_abort(node),
-    )
     findings: list[Finding] = []
+    checks = (_examine_settings, _examine_place, _examine_torque, _examine_mapping, _examine_abort, _examine_guarding)
     for check in checks:
         try:
-            findings += check()
+            findings += check(node, stated_limits([joint]))
         except DriverError as error:
             findings.append(failure(node.place, str(error), f"node {node.configuration.node_id}"))
     return findings
 
 
-def _examine_settings(node: DriveNode) -> list[Finding]:
+def _examine_settings(node: DriveNode, _: DriveLimits) -> list[Finding]:
     """Values of its DCF file: it has their objects, and no power while one is missing."""
     if node.configuration.device_file is not None:
         find_missing(node, node.configuration.device_file)
     return []
 
 
-def _examine_place(node: DriveNode, joint: DriveJoint) -> list[Finding]:
+def _examine_place(node: DriveNode, limits: DriveLimits) -> list[Finding]:
     place = node.units.position(node.dictionary.read(objects.POSITION_ACTUAL))
-    require_sensible(stated_limits([joint]), np.array([place]), [node.place])
+    require_sensible(limits, np.array([place]), [node.place])
     return []
 
 
-def _examine_torque(node: DriveNode, joint: DriveJoint) -> list[Finding]:
-    limits = stated_limits([joint])
+def _examine_torque(node: DriveNode, limits: DriveLimits) -> list[Finding]:
     if not node.has(objects.LARGEST_TORQUE):
         return []
     cap = node.dictionary.read(objects.LARGEST_TORQUE)
@@ -265,33 +247,39 @@ def _examine_torque(node: DriveNode, joint: DriveJoint) -> list[Finding]:
     return [Finding(Severity.FAILURE, node.place, f"{objects.LARGEST_TORQUE} leaves no torque", remedy)]
 
 
-def _examine_mapping(node: DriveNode) -> list[Finding]:
+def _examine_mapping(node: DriveNode, _: DriveLimits) -> list[Finding]:
     """Whether its PDOs hold all that is needed, or can be mapped so."""
     if ControlMode.POSITION not in node.mode_numbers:
         return []
-    plan = node.plan_for(ControlMode.POSITION)
-    if plan.missing:
-        detail = f"{plan.missing[0]} is in none of its PDOs, and their mapping is fixed"
-        return [Finding(Severity.FAILURE, node.place, detail, "map it with the maker's tool, or use another drive")]
+    plan = require_plan(node, ControlMode.POSITION)
     if node.configuration.device_file is not None:
-        return _compare_fixed(node)
+        for pdo in (pdo for pdo in (*plan.received, *plan.sent) if pdo.is_fixed):
+            held = decode_mapping(read_mapping(node, pdo.direction.parameters(pdo.number, 0)))
+            if held != pdo.layout.objects:
+                detail = f"its PDO {pdo.number + 1} is not mapped as its EDS or DCF file states"
+                return [Finding(Severity.FAILURE, node.place, detail, "give the file of this drive")]
+        return []
     detail = "has no EDS or DCF file: whether its objects and PDOs can be written shows only when a run writes them"
     return [Finding(Severity.WARNING, node.place, detail, "name its file as drive.eds")]
 
 
-def _compare_fixed(node: DriveNode) -> list[Finding]:
-    plan = node.plan_for(ControlMode.POSITION)
-    uses = [*((pdo, received_parameters) for pdo in plan.received), *((pdo, sent_parameters) for pdo in plan.sent)]
-    for pdo, parameters in uses:
-        if pdo.is_fixed and decode_mapping(read_mapping(node, parameters(pdo.number, 0))) != pdo.layout.objects:
-            detail = f"its PDO {pdo.number + 1} is not mapped as its EDS or DCF file states"
-            return [Finding(Severity.FAILURE, node.place, detail, "give the file of this drive")]
-    return []
-
-
-def _examine_abort(node: DriveNode) -> list[Finding]:
+def _examine_abort(node: DriveNode, _: DriveLimits) -> list[Finding]:
     """A drive does something when its master is silent."""
     if node.has(objects.ABORT_CONNECTION) or node.dictionary.read_optional(objects.ABORT_CONNECTION) != 0:
         return []
     detail = f"{objects.ABORT_CONNECTION} is 0 and read-only: it goes on when the host is gone"
     return [Finding(Severity.FAILURE, node.place, detail, "set it to 1, 2 or 3 with the maker's tool")]
+
+
+def _examine_guarding(node: DriveNode, _: DriveLimits) -> list[Finding]:
+    """Remote frames reach a drive that is guarded; one that counts already, or produces heartbeats, is not asked."""
+    read = node.dictionary.read_optional
+    beats = read(objects.PRODUCER_HEARTBEAT)
+    if not node.is_guarded or all(map(read, objects.GUARDING)):
+        return []
+    if beats and not node.has(objects.PRODUCER_HEARTBEAT):
+        detail = f"{objects.PRODUCER_HEARTBEAT} is {beats} ms and read-only: such a drive is not guarded"
+        return [Finding(Severity.FAILURE, node.place, detail, "set it to 0 with the maker's tool")]
+    if not beats:
+        require_guarding(node)
+    return []

@@ -1,16 +1,25 @@
 """The frames that a run would send, without a bus: ``identifier#payload``, as can-utils write them."""
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tauscope_drivers.backend import ControlMode, StopPolicy
 from tauscope_drivers.canopen import objects
-from tauscope_drivers.canopen.bus import HEARTBEAT_ID, MASTER_NODE, NMT_ID, NMT_PRE_OPERATIONAL, NMT_START, SYNC_ID
+from tauscope_drivers.canopen.bus import (
+    HEARTBEAT_ID,
+    MASTER_NODE,
+    NMT_ID,
+    NMT_PRE_OPERATIONAL,
+    NMT_START,
+    SYNC_ID,
+    FrameHandler,
+)
 from tauscope_drivers.canopen.commissioning import commission_drive, write_settings
 from tauscope_drivers.canopen.configuration import NodeConfiguration, read_configuration, require_targets
-from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects
+from tauscope_drivers.canopen.data_sheet.needs import needs_guarding, pdo_slots, present_objects
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import DriveObject, select_modes
 from tauscope_drivers.canopen.state_machine import DriveState, Goal, next_controlword
@@ -35,6 +44,7 @@ class _PlannedDictionary:
         self._label = label
         self._values = dict(_AS_DELIVERED)
         self._data: dict[DriveObject, bytes] = {}
+        self.guarded: set[int] = set()
 
     def read(self, entry: DriveObject) -> int:
         request = bytes([_UPLOAD]) + _place(entry) + bytes(4)
@@ -64,6 +74,13 @@ class _PlannedDictionary:
             return
         command = _DOWNLOAD | (4 - len(data)) << 2
         self._add(f"{entry} := {text}", bytes([command]) + _place(entry) + data.ljust(4, b"\0"))
+
+    def subscribe(self, identifier: int, handler: FrameHandler) -> None:
+        """Nobody answers."""
+
+    def ask_guard(self, node_id: int) -> bool:
+        self.frames.append(PlannedFrame("enable", f"{self._label}: guarded, alive?", f"{HEARTBEAT_ID + node_id:03X}#R"))
+        return True
 
     def _add(self, meaning: str, payload: bytes) -> None:
         self.frames.append(_frame("enable", f"{self._label}: {meaning}", 0x600 + self.node_id, payload))
@@ -109,10 +126,12 @@ def _plan_node(joint: int, configuration: NodeConfiguration) -> tuple[DriveNode,
             f"{label}: only the drive knows its rated torque (0x6076); state drive.rated_torque_nm for a dry run"
         )
     dictionary = _PlannedDictionary(configuration, label)
-    node = DriveNode(configuration, joint, dictionary)  # pyright: ignore[reportArgumentType]
+    stand_in: Any = dictionary
+    node = DriveNode(configuration, joint, stand_in, bus=stand_in)
     node.units = drive_units(configuration, configuration.rated_torque_nm)
     node.mode_numbers = select_modes(_ALL_MODES)
     if configuration.device_file is not None:
+        node.is_guarded = needs_guarding(configuration.device_file)
         node.present, node.slots = present_objects(configuration.device_file), pdo_slots(configuration.device_file)
         supported = configuration.device_file.objects[objects.SUPPORTED_MODES.index, 0].default
         node.mode_numbers = select_modes(supported or _ALL_MODES)

@@ -4,11 +4,8 @@ from tauscope_drivers.errors import Fault
 
 _LENGTH = 8
 
-HEARTBEAT_LOST = 0x8130
-"""Error code of a drive that misses the master."""
-
-WATCHDOG_CODE = "watchdog"
-"""`Fault.code` of a host that fell silent."""
+HEARTBEAT_LOST = 0x8130  # error code of a drive that misses the master
+WATCHDOG_CODE = "watchdog"  # `Fault.code` of a host that fell silent
 
 _BLOCKED = "look for a short circuit or a blocked joint"
 _SUPPLY, _COOL = "check the supply, then acknowledge", "let it cool down, then acknowledge"

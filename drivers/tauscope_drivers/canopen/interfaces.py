@@ -19,11 +19,9 @@ from can.interfaces.slcan import slcanBus
 
 from tauscope_drivers.serial_port import find_holder
 
+# interfaces that two programs cannot drive at once: a port that is locked, and a bus inside of one process
 ONE_PROCESS = ("slcan", "virtual")
-"""Interfaces that two programs cannot drive at once: a port that is locked, and a bus inside of one process."""
-
-OWN_OPTIONS = ("interface", "channel", "bitrate")
-"""What python-can is told by keys of their own."""
+OWN_OPTIONS = ("interface", "channel", "bitrate")  # what python-can is told by keys of their own
 
 _DAEMON = "socketcand"
 _DAEMON_PORT = 29536
@@ -60,8 +58,7 @@ def _open_daemon(channel: str, bit_rate: int, options: Mapping[str, Any]) -> can
     return can.Bus(interface=_DAEMON, channel=channel, bitrate=bit_rate, **tuned)
 
 
-_PEER = struct.Struct("3i")
-"""The kernel's ``struct ucred``: process, user, group."""
+_PEER = struct.Struct("3i")  # the kernel's ``struct ucred``: process, user, group
 
 
 class ClaimedError(Exception):
@@ -104,15 +101,13 @@ def _holder(name: str) -> str:
     return f"process {process} ({command})"
 
 
-RESTART_S = 2.0
-"""Time that an adapter takes to restart after its port was opened, as python-can has it."""
+RESTART_S = 2.0  # time that an adapter takes to restart after its port was opened, as python-can has it
 
 _VERSION_S = 0.1
 _ACKNOWLEDGEMENTS = ("\r", "z\r", "Z\r")
 _FRAME_LETTERS = "tTrRxdDbB"
 _FRAME = re.compile(r"(?:t[0-7][0-9A-F]{2}|T[01][0-9A-F]{7})(?P<bytes>[0-8])(?P<data>[0-9A-F]*)\r", re.IGNORECASE)
-_STAMP_DIGITS = 4
-"""Of the time that some adapters write behind a frame."""
+_STAMP_DIGITS = 4  # of the time that some adapters write behind a frame
 
 
 class SerialAdapterBus(slcanBus):

@@ -5,10 +5,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from tauscope_drivers.backend import ControlMode
-from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen import objects, process_data
 from tauscope_drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, NMT_OPERATIONAL_STATE, CanBus
 from tauscope_drivers.canopen.configuration import NodeConfiguration
-from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects, require_identity
+from tauscope_drivers.canopen.data_sheet.needs import needs_guarding, pdo_slots, present_objects, require_identity
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST, decode_emergency, describe_error
 from tauscope_drivers.canopen.objects import (
     STAYING_OPTIONS,
@@ -18,28 +18,13 @@ from tauscope_drivers.canopen.objects import (
     describe_absent,
     select_modes,
 )
-from tauscope_drivers.canopen.process_data import (
-    MEASURED,
-    MEASURED_WHERE_THERE,
-    PdoLayout,
-    PdoPlan,
-    PdoSlots,
-    decode_pdo,
-    encode_pdo,
-    plan_pdos,
-    received_identifier,
-    sent_identifier,
-)
 from tauscope_drivers.canopen.sdo import NodeDictionary
 from tauscope_drivers.canopen.state_machine import ENABLE_OPERATION, DriveState, Goal, decode_state, next_controlword
 from tauscope_drivers.canopen.units import DriveUnits, drive_units, read_rated_torque
 from tauscope_drivers.errors import DriverError, Fault
 
-FASTEST = 3.0
-"""A joint is believed to be so many times as fast as its limit, no faster."""
-
-SLACK_S = 0.002
-"""How much later than the host thinks a drive may have sampled [s]."""
+FASTEST = 3.0  # a joint is believed to be so many times as fast as its limit, no faster
+SLACK_S = 0.002  # how much later than the host thinks a drive may have sampled [s]
 
 
 class GlitchFilter:
@@ -56,11 +41,7 @@ class GlitchFilter:
         self._doubts_place = self._doubts_speed = False
 
     def believes_place(self, position: float, time_ns: int) -> bool:
-        """Whether a position may be true.
-
-        `position`: NaN where there is none, which is no lie [rad or m]; `time_ns`: instant of the reading, never before
-        that of the last [ns].
-        """
+        """Whether a position may be true; NaN is no lie. Instants never run backwards."""
         if math.isnan(position):
             return True
         self._doubts_place = not self._doubts_place and self._is_out_of_reach(position, time_ns)
@@ -69,7 +50,7 @@ class GlitchFilter:
         return not self._doubts_place
 
     def believes_speed(self, velocity: float) -> bool:
-        """Whether a velocity may be true. `velocity`: NaN where there is none, which is no lie [rad/s or m/s]."""
+        """Whether a velocity may be true; NaN is no lie."""
         self._doubts_speed = not self._doubts_speed and abs(velocity) > FASTEST * self.limit
         return not self._doubts_speed
 
@@ -82,43 +63,30 @@ class GlitchFilter:
 
 
 _CIA_402 = 402
-_INTERPOLATE = 0x10
-"""Bit of the controlword that starts interpolation, in the mode of that name."""
-
-Listener = Callable[[int, Callable[[int, bytes], None]], None]
-"""Hands the frames of an identifier to a handler."""
+_INTERPOLATE = 0x10  # bit of the controlword that starts interpolation, in the mode of that name
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """Of a joint, by its drive; NaN where it did not come.
+    """Of a joint, by its drive; NaN where it did not come."""
 
-    `position`: [rad or m].
-    `velocity`: [rad/s or m/s].
-    `effort`: torque at the joint [Nm or N].
-    """
-
-    position: float
-    velocity: float
-    effort: float
+    position: float  # [rad or m]
+    velocity: float  # [rad/s or m/s]
+    effort: float  # torque at the joint [Nm or N]
 
 
 @dataclass(eq=False)
 class DriveNode:
     """A drive on the bus.
 
-    `joint`: number of its joint, from 1.
     `last_position`: of the joint when it last answered: the place to stay at, never a measurement [rad or m].
-    `last_velocity`: of the joint when it last told one [rad/s or m/s].
-    `present`: optional objects that it has.
     `mode_numbers`: mode of operation for each control mode that it has.
-    `held`: values of other objects in its RPDOs of fixed mapping.
-    `stays_stopped`: whether it keeps its power after a quick stop.
     """
 
     configuration: NodeConfiguration
-    joint: int
+    joint: int  # number of its joint, from 1
     dictionary: NodeDictionary
+    bus: CanBus = field(repr=False, kw_only=True)
     units: DriveUnits = field(default=DriveUnits(math.nan, 0, math.nan))
     values: dict[DriveObject, int] = field(default_factory=dict)
     error_code: int = 0
@@ -126,23 +94,23 @@ class DriveNode:
     measurement: Measurement = Measurement(math.nan, math.nan, math.nan)
     last_state: DriveState | None = None
     last_position: float = math.nan
-    last_velocity: float = 0.0
+    last_velocity: float = 0.0  # of the joint when it last told one [rad/s or m/s]
     is_deaf: bool = False
     glitches: GlitchFilter = field(default_factory=GlitchFilter)
-    present: frozenset[DriveObject] = frozenset(SUBSTITUTES)
+    present: frozenset[DriveObject] = frozenset(SUBSTITUTES)  # optional objects that it has
     mode_numbers: dict[ControlMode, int] = field(default_factory=dict)
-    slots: PdoSlots = field(default_factory=PdoSlots)
-    plan: PdoPlan = field(default=PdoPlan((), ()))
-    held: dict[DriveObject, int] = field(default_factory=dict)
-    stays_stopped: bool = True
+    slots: process_data.PdoSlots = field(default_factory=process_data.PdoSlots)
+    plan: process_data.PdoPlan = field(default=process_data.PdoPlan((), ()))
+    held: dict[DriveObject, int] = field(default_factory=dict)  # values of other objects in its RPDOs of fixed mapping
+    stays_stopped: bool = True  # whether it keeps its power after a quick stop
     remarks: tuple[str, ...] = ()
-    listen: Listener = field(default=lambda _identifier, _handler: None)
+    is_guarded: bool = False  # by remote frames, for it watches no heartbeat
 
     @staticmethod
     def on_bus(bus: CanBus, configuration: NodeConfiguration, joint: int) -> "DriveNode":
         """A drive whose frames are listened to from now on. `joint`: number of its joint, from 1."""
         node_id = configuration.node_id
-        node = DriveNode(configuration, joint, bus.add_node(node_id), listen=bus.subscribe)
+        node = DriveNode(configuration, joint, bus.add_node(node_id), bus=bus)
         node.use_plan(node.plan_for(ControlMode.POSITION))
         bus.subscribe(EMERGENCY_ID + node_id, lambda _, data: node._take_emergency(data))
         bus.subscribe(HEARTBEAT_ID + node_id, lambda _, data: node._take_heartbeat(data))
@@ -163,17 +131,19 @@ class DriveNode:
         """Whether it has an optional object, which can be written where the driver writes it."""
         return entry in self.present
 
-    def plan_for(self, mode: ControlMode) -> PdoPlan:
+    def plan_for(self, mode: ControlMode) -> process_data.PdoPlan:
         """Its PDOs for a mode."""
         number = self.mode_numbers.get(mode, next(iter(TARGETS[mode])))
-        return plan_pdos(self.slots, TARGETS[mode][number], [one for one in MEASURED_WHERE_THERE if self.has(one)])
+        return process_data.plan_pdos(
+            self.slots, TARGETS[mode][number], [one for one in process_data.MEASURED_WHERE_THERE if self.has(one)]
+        )
 
-    def use_plan(self, plan: PdoPlan) -> None:
+    def use_plan(self, plan: process_data.PdoPlan) -> None:
         """Listen to the frames of a plan from now on."""
         self.plan = plan
         for pdo in plan.sent:
-            identifier = sent_identifier(pdo.number, self.configuration.node_id)
-            self.listen(identifier, lambda _, data, layout=pdo.layout: self._take(layout, data))
+            identifier = pdo.direction.identifier(pdo.number, self.configuration.node_id)
+            self.bus.subscribe(identifier, lambda _, data, layout=pdo.layout: self._take(layout, data))
 
     def identify(self) -> frozenset[ControlMode]:
         """Make sure that it is the drive that is meant, learn its units, and return the modes that it has.
@@ -190,10 +160,10 @@ class DriveNode:
         if file is not None:
             require_identity(file, self.dictionary, self.place)
             self.slots = pdo_slots(file)
-        self._require_watchdog()
+        self._find_watchdog()
         found = (entry for entry in SUBSTITUTES if self.dictionary.read_optional(entry) is not None)
         self.present = frozenset(found) & (frozenset(SUBSTITUTES) if file is None else present_objects(file))
-        self.remarks = tuple(describe_absent(self.present))
+        self.remarks = (*([objects.GUARDED] if self.is_guarded else []), *describe_absent(self.present))
         self.stays_stopped = self.dictionary.read_optional(objects.QUICK_STOP_OPTION) in STAYING_OPTIONS
         self.units = self._learn_units()
         self.mode_numbers = select_modes(self.dictionary.read(objects.SUPPORTED_MODES))
@@ -218,7 +188,7 @@ class DriveNode:
 
     def read_now(self) -> None:
         """Fill `values` by SDO: for an arm that is not in its cycle."""
-        entries = (*MEASURED, *(entry for entry in MEASURED_WHERE_THERE if self.has(entry)))
+        entries = (*process_data.MEASURED, *(entry for entry in process_data.MEASURED_WHERE_THERE if self.has(entry)))
         self.values = {entry: self.dictionary.read(entry) for entry in entries}
         self.error_code = self.values.get(objects.ERROR_CODE) or self.error_code
 
@@ -236,7 +206,10 @@ class DriveNode:
         values = {**self.held, objects.CONTROLWORD: controlword, target: quantity}
         try:
             return [
-                (received_identifier(pdo.number, self.configuration.node_id), encode_pdo(pdo.layout, values))
+                (
+                    pdo.direction.identifier(pdo.number, self.configuration.node_id),
+                    process_data.encode_pdo(pdo.layout, values),
+                )
                 for pdo in self.plan.received
             ]
         except OverflowError as error:
@@ -299,16 +272,18 @@ class DriveNode:
                 return drive_units(configuration, rated.nm)
         raise DriverError.refusal(f"{self.place}: its rated torque (0x6076) {flaw}; give drive.rated_torque_nm")
 
-    def _require_watchdog(self) -> None:
-        """Refuse a drive that would not notice that the host is gone."""
-        if self.dictionary.read_optional(objects.CONSUMER_HEARTBEAT) is None:
+    def _find_watchdog(self) -> None:
+        """Find out how it notices that the host is gone, and refuse a drive that would not."""
+        file, read = self.configuration.device_file, self.dictionary.read_optional
+        self.is_guarded = read(objects.CONSUMER_HEARTBEAT) is None or (file is not None and needs_guarding(file))
+        if self.is_guarded and None in map(read, objects.GUARDING):
             raise DriverError.refusal(
-                f"{self.place}: has no {objects.CONSUMER_HEARTBEAT}: it would not notice that the host is gone; "
-                "use a drive that watches the host's heartbeat"
+                f"{self.place}: has neither {objects.CONSUMER_HEARTBEAT} nor node guarding (0x100C, 0x100D): it would "
+                "not notice that the host is gone; use a drive that watches its host"
             )
 
-    def _take(self, layout: PdoLayout, data: bytes) -> None:
-        values = decode_pdo(layout, data)
+    def _take(self, layout: process_data.PdoLayout, data: bytes) -> None:
+        values = process_data.decode_pdo(layout, data)
         if values is not None:
             self.values.update(values)
             self.is_deaf = False

@@ -33,6 +33,8 @@ DEVICE_TYPE = DriveObject("Device type", 0x1000, 0, 32)
 ERROR_REGISTER = DriveObject("Error register", 0x1001, 0, 8)
 DEVICE_NAME = DriveObject("Device name", 0x1008, 0, 0)
 SOFTWARE_VERSION = DriveObject("Software version", 0x100A, 0, 0)
+GUARD_TIME = DriveObject("Guard time", 0x100C, 0, 16)
+LIFE_TIME_FACTOR = DriveObject("Life time factor", 0x100D, 0, 8)
 CONSUMER_HEARTBEAT = DriveObject("Consumer heartbeat time", 0x1016, 1, 32)
 PRODUCER_HEARTBEAT = DriveObject("Producer heartbeat time", 0x1017, 0, 16)
 VENDOR = DriveObject("Vendor-ID", 0x1018, 1, 32)
@@ -63,21 +65,17 @@ INTERPOLATION_VALUE = DriveObject("Interpolation time period, value", 0x60C2, 1,
 INTERPOLATION_EXPONENT = DriveObject("Interpolation time period, exponent", 0x60C2, 2, 8, signed=True)
 SUPPORTED_MODES = DriveObject("Supported drive modes", 0x6502, 0, 32)
 
+# mode of operation: interpolated position, which older drives have in place of the cyclic one
 INTERPOLATED_POSITION = 7
-"""Mode of operation: interpolated position, which older drives have in place of the cyclic one."""
-
-CYCLIC_POSITION = 8
-"""Mode of operation: cyclic synchronous position."""
-
-CYCLIC_TORQUE = 10
-"""Mode of operation: cyclic synchronous torque."""
+CYCLIC_POSITION = 8  # mode of operation: cyclic synchronous position
+CYCLIC_TORQUE = 10  # mode of operation: cyclic synchronous torque
 
 
+# modes of operation, the best first, and the target of each
 TARGETS: Mapping[ControlMode, Mapping[int, DriveObject]] = {
     ControlMode.POSITION: {CYCLIC_POSITION: TARGET_POSITION, INTERPOLATED_POSITION: INTERPOLATION_DATA},
     ControlMode.TORQUE: {CYCLIC_TORQUE: TARGET_TORQUE},
 }
-"""Modes of operation, the best first, and the target of each."""
 
 
 def select_modes(supported: int) -> dict[ControlMode, int]:
@@ -92,6 +90,7 @@ def select_modes(supported: int) -> dict[ControlMode, int]:
     return {mode: number for mode, number in found.items() if number is not None}
 
 
+# optional objects, and what is done where one is absent
 SUBSTITUTES: Mapping[DriveObject, str] = {
     ABORT_CONNECTION: (
         "by the standard it goes into fault when the host is silent; make sure of that with the arm supported"
@@ -109,17 +108,17 @@ SUBSTITUTES: Mapping[DriveObject, str] = {
     PRODUCER_HEARTBEAT: "a restart of the drive shows in its power state alone",
     INTERPOLATION_VALUE: "it finds the cycle from SYNC",
 }
-"""Optional objects, and what is done where one is absent."""
-
+# optional objects that the driver sets; one that is read-only counts as absent
 WRITTEN = frozenset(SUBSTITUTES) - {VELOCITY_ACTUAL, ERROR_CODE}
-"""Optional objects that the driver sets; one that is read-only counts as absent."""
 
 
-STAYING_OPTIONS = range(5, 9)
-"""Quick stop options (0x605A) after which a drive keeps its power."""
+STAYING_OPTIONS = range(5, 9)  # quick stop options (0x605A) after which a drive keeps its power
 
+GUARDING = (GUARD_TIME, LIFE_TIME_FACTOR)
+GUARDED = f"has no {CONSUMER_HEARTBEAT}: the host guards it by remote frames (0x100C, 0x100D)"
+
+# optional objects without which an operator has to try how the arm stops
 DOUBTFUL = (ABORT_CONNECTION, QUICK_STOP_OPTION)
-"""Optional objects without which an operator has to try how the arm stops."""
 
 
 def describe_absent(present: Container[DriveObject]) -> list[str]:

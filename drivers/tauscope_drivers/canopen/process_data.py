@@ -58,11 +58,6 @@ def mapping_entries(objects: Sequence[DriveObject]) -> list[int]:
     return [entry.mapping for entry in objects]
 
 
-RECEIVED_ID = 0x200
-SENT_ID = 0x180
-"""Identifiers of the first PDOs of node 0, by CiA 301's default connection set."""
-
-
 @dataclass(frozen=True)
 class PdoParameters:
     """Where a drive keeps what one of its PDOs is."""
@@ -73,32 +68,37 @@ class PdoParameters:
     entries: tuple[DriveObject, ...]
 
 
-def received_parameters(number: int, entries: int) -> PdoParameters:
-    """Parameters of a PDO with targets. `number`: from 0; `entries`: objects that it holds."""
-    return _parameters(0x1400 + number, 0x1600 + number, entries)
+@dataclass(frozen=True)
+class PdoDirection:
+    """Where CiA 301 has the parameters of PDOs that go one way, and their identifiers by its default connection set."""
+
+    communication: int
+    mapping: int
+    first_identifier: int
+
+    def identifier(self, number: int, node_id: int) -> int:
+        """Identifier of a PDO. `number`: from 0."""
+        return self.first_identifier + 0x100 * number + node_id
+
+    def parameters(self, number: int, entries: int) -> PdoParameters:
+        """Parameters of a PDO. `number`: from 0; `entries`: objects that it holds."""
+        communication, mapping = self.communication + number, self.mapping + number
+        return PdoParameters(
+            identifier=DriveObject("PDO COB-ID", communication, 1, 32),
+            kind=DriveObject("PDO transmission type", communication, 2, 8),
+            count=DriveObject("PDO number of entries", mapping, 0, 8),
+            entries=tuple(DriveObject("PDO entry", mapping, subindex, 32) for subindex in range(1, entries + 1)),
+        )
 
 
-def sent_parameters(number: int, entries: int) -> PdoParameters:
-    """Parameters of a PDO with measurements. `number`: from 0; `entries`: objects that it holds."""
-    return _parameters(0x1800 + number, 0x1A00 + number, entries)
+RECEIVED = PdoDirection(0x1400, 0x1600, 0x200)  # by the drive: targets
+SENT = PdoDirection(0x1800, 0x1A00, 0x180)  # by the drive: measurements
 
-
-def _parameters(communication: int, mapping: int, entries: int) -> PdoParameters:
-    return PdoParameters(
-        identifier=DriveObject("PDO COB-ID", communication, 1, 32),
-        kind=DriveObject("PDO transmission type", communication, 2, 8),
-        count=DriveObject("PDO number of entries", mapping, 0, 8),
-        entries=tuple(DriveObject("PDO entry", mapping, subindex, 32) for subindex in range(1, entries + 1)),
-    )
-
-
-PDO_COUNT = 4
-"""PDOs with an identifier of their own by CiA 301's default connection set."""
+PDO_COUNT = 4  # PDOs with an identifier of their own by CiA 301's default connection set
 
 MEASURED = (objects.STATUSWORD, objects.TORQUE_ACTUAL, objects.POSITION_ACTUAL)
 MEASURED_WHERE_THERE = (objects.VELOCITY_ACTUAL, objects.ERROR_CODE)
 
-_STEP = 0x100
 _FRAME_BITS = 64
 _KNOWN = {
     entry.mapping: entry
@@ -111,22 +111,18 @@ _KNOWN = {
 
 @dataclass(frozen=True)
 class PdoSlot:
-    """A PDO that a drive has.
+    """A PDO that a drive has."""
 
-    `number`: from 0.
-    `fixed`: its objects, where its mapping cannot be written; None where it can.
-    `entries`: most objects that it takes.
-    """
-
-    number: int
-    fixed: tuple[DriveObject, ...] | None = None
-    entries: int = 8
+    number: int  # from 0
+    fixed: tuple[DriveObject, ...] | None = None  # its objects, where its mapping cannot be written; None where it can
+    entries: int = 8  # most objects that it takes
 
 
 @dataclass(frozen=True)
 class Pdo:
     """A PDO as it is used."""
 
+    direction: PdoDirection
     number: int
     layout: PdoLayout
     is_fixed: bool = False
@@ -134,14 +130,11 @@ class Pdo:
 
 @dataclass(frozen=True)
 class PdoPlan:
-    """All PDOs of a drive that are used.
-
-    `missing`: needed, and in none of them.
-    """
+    """All PDOs of a drive that are used."""
 
     received: tuple[Pdo, ...]
     sent: tuple[Pdo, ...]
-    missing: tuple[DriveObject, ...] = ()
+    missing: tuple[DriveObject, ...] = ()  # needed, and in none of them
 
 
 @dataclass(frozen=True)
@@ -157,19 +150,9 @@ def plan_pdos(slots: PdoSlots, target: DriveObject, optional: Iterable[DriveObje
 
     `target`: what the mode is commanded by; `optional`: measurements that the drive has beside the needed ones.
     """
-    received, not_received = _assign(slots.received, (objects.CONTROLWORD, target), ())
-    sent, not_sent = _assign(slots.sent, MEASURED, tuple(optional))
+    received, not_received = _assign(RECEIVED, slots.received, (objects.CONTROLWORD, target), ())
+    sent, not_sent = _assign(SENT, slots.sent, MEASURED, tuple(optional))
     return PdoPlan(received, sent, (*not_received, *not_sent))
-
-
-def received_identifier(number: int, node_id: int) -> int:
-    """Identifier of an RPDO by CiA 301's default connection set."""
-    return RECEIVED_ID + _STEP * number + node_id
-
-
-def sent_identifier(number: int, node_id: int) -> int:
-    """Identifier of a TPDO by CiA 301's default connection set."""
-    return SENT_ID + _STEP * number + node_id
 
 
 def decode_mapping(entries: Sequence[int]) -> tuple[DriveObject, ...] | None:
@@ -183,7 +166,7 @@ def decode_mapping(entries: Sequence[int]) -> tuple[DriveObject, ...] | None:
 
 
 def _assign(
-    slots: Sequence[PdoSlot], needed: Sequence[DriveObject], optional: Sequence[DriveObject]
+    direction: PdoDirection, slots: Sequence[PdoSlot], needed: Sequence[DriveObject], optional: Sequence[DriveObject]
 ) -> tuple[tuple[Pdo, ...], tuple[DriveObject, ...]]:
     """PDOs that hold all objects, and the needed ones that are left over: fixed PDOs are used first."""
     left = [*needed, *optional]
@@ -194,12 +177,12 @@ def _assign(
         held = fixed.pop(number)
         if not set(left) & set(held):
             break
-        used.append(Pdo(number, PdoLayout(held), is_fixed=True))
+        used.append(Pdo(direction, number, PdoLayout(held), is_fixed=True))
         left = [entry for entry in left if entry not in held]
     for slot in slots:
         if slot.fixed is None and left:
             content = _fill(left, slot.entries)
-            used.append(Pdo(slot.number, PdoLayout(content)))
+            used.append(Pdo(direction, slot.number, PdoLayout(content)))
             left = [entry for entry in left if entry not in content]
     return tuple(sorted(used, key=lambda one: one.number)), tuple(entry for entry in needed if entry in left)
 

@@ -49,14 +49,11 @@ def describe_abort(code: int) -> tuple[str, str]:
 
 
 SDO_TIMEOUT_S = 0.3
-ATTEMPTS = 2
-"""A question is asked so many times in a transfer; each answer is waited for as long as `SDO_TIMEOUT_S`."""
+ATTEMPTS = 2  # a question is asked so many times in a transfer; each answer is waited for as long as `SDO_TIMEOUT_S`
 
+# a transfer that does not succeed is begun so many times: a request or an answer may have been altered on its way
 TRANSFERS = 2
-"""A transfer that does not succeed is begun so many times: a request or an answer may have been altered on its way."""
-
-_INITIATE = {1: 3, 2: 2}
-"""Command of a request that begins a download or an upload, and of its answer (CiA 301)."""
+_INITIATE = {1: 3, 2: 2}  # command of a request that begins a download or an upload, and of its answer (CiA 301)
 
 _ABORT = 4
 _WRITES = 2

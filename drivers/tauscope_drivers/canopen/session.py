@@ -16,27 +16,10 @@ from tauscope_drivers.canopen.configuration import BusConfiguration
 from tauscope_drivers.canopen.emergency import WATCHDOG_CODE
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.process_data import MEASURED_WHERE_THERE, PdoSlots, plan_pdos
-from tauscope_drivers.canopen.state_machine import DriveState, Goal, decode_state
+from tauscope_drivers.canopen.state_machine import POWERED, DriveState, Goal, decode_state
 from tauscope_drivers.clock import AnswerTime, Clock
 from tauscope_drivers.errors import Fault
 from tauscope_drivers.state import ArmState, Array, Setpoint
-
-_UNDER_POWER = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
-
-
-def arm_state(nodes: Sequence[DriveNode], time_ns: int, caught: Fault | None) -> ArmState:
-    """What the nodes answered, in joint units; NaN where they did not."""
-    measured = [node.measurement for node in nodes]
-    return ArmState(
-        time_ns=time_ns,
-        position=np.array([one.position for one in measured]),
-        velocity=np.array([one.velocity for one in measured]),
-        effort=np.array([one.effort for one in measured]),
-        temperature=np.full(len(nodes), math.nan),
-        # of a node that did not answer, as it last told: whether it is missed is what NaN says
-        enabled=np.array([node.last_state in _UNDER_POWER for node in nodes]),
-        faults=arm_faults(nodes, caught),
-    )
 
 
 def arm_faults(nodes: Sequence[DriveNode], caught: Fault | None) -> tuple[Fault, ...]:
@@ -58,8 +41,7 @@ def listed(faults: Sequence[Fault]) -> str:
     return "; ".join(str(fault) for fault in faults)
 
 
-BRAKING_S = 0.1
-"""Time in which a joint is brought to rest by targets, as fast as it may come to its speed limit [s]."""
+BRAKING_S = 0.1  # time in which a joint is brought to rest by targets, as fast as it may come to its speed limit [s]
 
 
 class HostBrake:
@@ -83,13 +65,12 @@ class HostBrake:
 
 
 _PLAN = plan_pdos(PdoSlots(), objects.TARGET_POSITION, MEASURED_WHERE_THERE)
+# frames of a drive that has everything and whose PDOs are free
 CYCLE_FRAMES = CycleFrames(
     tuple(pdo.layout.size for pdo in _PLAN.received), tuple(pdo.layout.size for pdo in _PLAN.sent)
 )
-"""Frames of a drive that has everything and whose PDOs are free."""
-
+# cycle while drives change state, before and after the control loop's own, where that is not known
 SETTLING_CYCLE_S = 0.01
-"""Cycle while drives change state, before and after the control loop's own, where that is not known."""
 
 
 def possible_rate_hz(configuration: BusConfiguration) -> float:
@@ -106,14 +87,13 @@ def rate_limited_by(configuration: BusConfiguration) -> str:
 class Session:
     """An arm's drives, reached.
 
-    `answer_ns`: time that drives get to answer SYNC in the control loop [ns].
     `settling_ns`: cycle while drives change state: that of the control loop, once it is known [ns].
     """
 
     bus: CanBus
     nodes: tuple[DriveNode, ...]
     clock: Clock
-    answer_ns: int
+    answer_ns: int  # time that drives get to answer SYNC in the control loop [ns]
     caught: Fault | None = None
     settling_ns: int = round(SETTLING_CYCLE_S * 1e9)
     answer_time: AnswerTime = field(default_factory=AnswerTime)
@@ -207,10 +187,20 @@ class Session:
         return self.observe(self.clock.now_ns())
 
     def observe(self, time_ns: int) -> ArmState:
-        """The arm by what its drives sent since they were asked."""
+        """The arm by what its drives sent since they were asked, in joint units; NaN where one did not answer."""
         for node in self.nodes:
             node.remember(time_ns)
-        return arm_state(self.nodes, time_ns, self.caught)
+        measured = [node.measurement for node in self.nodes]
+        return ArmState(
+            time_ns=time_ns,
+            position=np.array([one.position for one in measured]),
+            velocity=np.array([one.velocity for one in measured]),
+            effort=np.array([one.effort for one in measured]),
+            temperature=np.full(len(self.nodes), math.nan),
+            # of a node that did not answer, as it last told: whether it is missed is what NaN says
+            enabled=np.array([node.last_state in POWERED for node in self.nodes]),
+            faults=self.faults,
+        )
 
     def step_until(self, is_reached: Callable[[], bool], step: Callable[[], ArmState], within_s: float) -> ArmState:
         """Go on stepping until something is reached or the time for it has passed; the last state."""

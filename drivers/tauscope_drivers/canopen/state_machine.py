@@ -19,8 +19,8 @@ class DriveState(StrEnum):
     FAULT = "fault"
 
 
+# states in which a drive holds or moves its joint
 POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
-"""States in which a drive holds or moves its joint."""
 
 
 class Goal(StrEnum):

@@ -12,14 +12,10 @@ from tauscope_drivers.state import Setpoint
 
 Array = NDArray[np.float64]
 
+# how much farther than its cycle's way a target may lie, in ways of a cycle: plans and their instants are rounded
 _SLACK = 0.4
-"""How much farther than its cycle's way a target may lie, in ways of a cycle: plans and their instants are rounded."""
-
-_ACCELERATION_S = 0.1
-"""Time in which a joint that has to catch up reaches its speed limit."""
-
-_FASTEST = 1e3
-"""Where there is no speed limit [rad/s or m/s]."""
+_ACCELERATION_S = 0.1  # time in which a joint that has to catch up reaches its speed limit
+_FASTEST = 1e3  # where there is no speed limit [rad/s or m/s]
 
 _ARRIVED = 1e-6
 
@@ -29,16 +25,13 @@ class _Reached:
     """What a cycle has come to.
 
     `position`, `velocity`: (n,), targets sent, and how fast a drive in time goes there.
-    `begin`: (n,), where drives were by then.
-    `wanted`: (n,), targets asked for.
-    `behind`: (n,), joints that are still on their way to them.
     """
 
     position: Array
     velocity: Array
-    begin: Array
-    wanted: Array
-    behind: NDArray[np.bool_]
+    begin: Array  # (n,), where drives were by then
+    wanted: Array  # (n,), targets asked for
+    behind: NDArray[np.bool_]  # (n,), joints that are still on their way to them
 
     def after(self, part: float) -> Array:
         """Where drives are when so much of the cycle over which they interpolate has passed."""

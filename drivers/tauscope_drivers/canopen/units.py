@@ -7,26 +7,18 @@ from tauscope_drivers.canopen.configuration import NodeConfiguration
 
 _MILLI, _MICRO = 1e-3, 1e-6
 
+# two units are a factor of 1000 apart: a value nearer to one than to the other is within the root of it
 _HALF_WAY = math.sqrt(_MILLI / _MICRO)
-"""Two units are a factor of 1000 apart: a value nearer to one than to the other is within the root of it."""
-
-_NM_PER_AMPERE = 0.15
-"""Torque constant of an arm's motor at its shaft: 0.005 to 5 Nm/A, the geometric mean [Nm/A]."""
-
-_LARGEST_NM = 100.0
-"""No motor of an arm has more at its shaft, also without a gear [Nm]."""
+_NM_PER_AMPERE = 0.15  # torque constant of an arm's motor at its shaft: 0.005 to 5 Nm/A, the geometric mean [Nm/A]
+_LARGEST_NM = 100.0  # no motor of an arm has more at its shaft, also without a gear [Nm]
 
 
 @dataclass(frozen=True)
 class RatedTorque:
-    """A motor's rated torque.
+    """A motor's rated torque."""
 
-    `nm`: at the motor shaft [Nm].
-    `remark`: why another unit than the standard's is taken; empty where it is the standard's.
-    """
-
-    nm: float
-    remark: str = ""
+    nm: float  # at the motor shaft [Nm]
+    remark: str = ""  # why another unit than the standard's is taken; empty where it is the standard's
 
 
 def read_rated_torque(

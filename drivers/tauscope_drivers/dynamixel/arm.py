@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from tauscope_drivers.backend import Capabilities, ControlMode, DriveLimits, StopPolicy
 from tauscope_drivers.clock import Clock
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.dynamixel.bus import ServoBus
-from tauscope_drivers.dynamixel.bus_budget import found_budget, has_room_for_speeds, planned_budget
+from tauscope_drivers.dynamixel.bus import ServoBus, count_traffic, has_room_for_speeds, planned_budget
 from tauscope_drivers.dynamixel.configuration import read_configuration
 from tauscope_drivers.dynamixel.control_table import WATCHDOG_MOST, WATCHDOG_STEP_S
 from tauscope_drivers.dynamixel.enabling import Bounds, enable_servos, goals_of
@@ -22,17 +21,14 @@ from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
 from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.limits import RunawayWatch
 from tauscope_drivers.serial_servos.arm import SerialServoArm
-from tauscope_drivers.serial_servos.budget import BusTiming, CycleTraffic, largest_part, largest_rate_hz
-from tauscope_drivers.serial_servos.bus import PATIENCE_S
+from tauscope_drivers.serial_servos.bus import PATIENCE_S, BusTiming, CycleTraffic, largest_part, largest_rate_hz
 from tauscope_drivers.state import ArmState, Setpoint
 
 Array = NDArray[np.float64]
 
+# what the servos do by themselves when their watchdog fires
 _POLICIES = {ControlMode.POSITION: frozenset([StopPolicy.HOLD]), ControlMode.TORQUE: frozenset([StopPolicy.TORQUE_OFF])}
-"""What the servos do by themselves when their watchdog fires."""
-
-_SUSPECT_SILENCE = 0.8
-"""Part of the watchdog's time after which a cycle asks all servos whether theirs has fired."""
+_SUSPECT_SILENCE = 0.8  # part of the watchdog's time after which a cycle asks all servos whether theirs has fired
 
 
 class DynamixelArm(SerialServoArm[Session]):
@@ -184,7 +180,12 @@ class DynamixelArm(SerialServoArm[Session]):
         return _arm_state(session, reading, temperature)
 
     def _budget(self) -> tuple[CycleTraffic, BusTiming]:
-        return planned_budget(self._configuration) if self._session is None else found_budget(self._session)
+        if (session := self._session) is None:
+            return planned_budget(self._configuration)
+        longest = max(block.length for servo in session.servos for block in servo.model.watched_blocks)
+        group, timing = session.group, BusTiming(self._port.baudrate, session.bus.return_delay_s, self._port.latency_s)
+        families = group.family_count
+        return count_traffic(len(session.servos), health_bytes=longest, fast=group.fast, families=families), timing
 
 
 def _arm_state(session: Session, reading: GroupReading, temperature: Array) -> ArmState:

@@ -17,20 +17,16 @@ class ServoConfiguration:
 
     `torque_per_milliampere`: joint torque for one milliampere; None: the driver tracks positions, but neither limits
         torque in newton metres nor commands it [Nm/mA or N/mA].
-    `reduction`: turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints.
-    `zero_count`: count at which the joint stands at zero; None for the model's own.
-    `milliampere_per_unit`: one unit of Present Current, in place of the model's [mA].
-    `current_limit_ma`: most current that it is given, besides its own Current Limit [mA].
     """
 
     joint: str
     servo: int
     model: str | None = None
     direction: int = 1
-    reduction: float = 1.0
-    zero_count: int | None = None
-    milliampere_per_unit: float | None = None
-    current_limit_ma: float | None = None
+    reduction: float = 1.0  # turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints
+    zero_count: int | None = None  # count at which the joint stands at zero; None for the model's own
+    milliampere_per_unit: float | None = None  # one unit of Present Current, in place of the model's [mA]
+    current_limit_ma: float | None = None  # most current that it is given, besides its own Current Limit [mA]
     torque_per_milliampere: float | None = None
 
 

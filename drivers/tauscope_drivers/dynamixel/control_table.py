@@ -1,4 +1,4 @@
-"""Control tables of the servos, from the ``.model`` files that dynamixel-sdk brings along: no address is typed here."""
+"""Control tables of the servos, from the ``.model`` files that dynamixel-sdk brings along."""
 
 import math
 import re
@@ -14,11 +14,9 @@ CURRENT_MODE = 0
 POSITION_MODE = 3
 CURRENT_BASED_POSITION_MODE = 5
 
+# unit of Bus Watchdog on every family [s]: e-Manual, Bus Watchdog of X, P and Y (100 is 2 000 ms)
 WATCHDOG_STEP_S = 0.02
-"""Unit of Bus Watchdog on every family [s]: e-Manual, Bus Watchdog of X, P and Y (100 is 2 000 ms)."""
-
-WATCHDOG_MOST = 127
-"""Largest value of Bus Watchdog; -1 is what it latches to."""
+WATCHDOG_MOST = 127  # largest value of Bus Watchdog; -1 is what it latches to
 
 _ARDUINO = "ROBOTIS Dynamixel2Arduino, table of units"
 _E_MANUAL = "ROBOTIS e-Manual, unit of Present Current"
@@ -34,14 +32,11 @@ class CurrentUnit:
 
 @dataclass(frozen=True)
 class FamilyFacts:
-    """What servos of one family have in common.
-
-    `voltage_unit_v`: of Present Input Voltage [V].
-    """
+    """What servos of one family have in common."""
 
     name: str
     position_mode: int
-    voltage_unit_v: float = 0.1
+    voltage_unit_v: float = 0.1  # of Present Input Voltage [V]
     error_is_code: bool = False
     torque_on_by_goal: bool = False
 
@@ -87,12 +82,27 @@ _CURRENT_UNITS: tuple[tuple[str, CurrentUnit], ...] = (
     ("ym", CurrentUnit(10.0, _E_MANUAL)),
 )
 
+# items that the firmware has and the library's tables leave out: e-Manual, MX(2.0), Bus Watchdog, from firmware 38
 MISSING_ITEMS: Mapping[str, Mapping[str, tuple[int, int]]] = {
     "mx_28": {"Bus Watchdog": (98, 1)},
     "mx_64": {"Bus Watchdog": (98, 1)},
     "mx_106": {"Bus Watchdog": (98, 1)},
 }
-"""Items that the firmware has and the library's tables leave out: e-Manual, MX(2.0), Bus Watchdog, from firmware 38."""
+
+
+NEWER_MODELS: Mapping[int, tuple[str, str]] = {1280: ("xw430_t200", "xw430_t200"), 1700: ("xc335_t332", "xc330_t288")}
+"""Models that the library's index leaves out, each with a table of the library that holds for it.
+
+Sources: ROBOTIS Dynamixel2Arduino, actuator.h (1280); ROBOTIS dynamixel_hardware_interface, xc335_t332.model (1700: all
+items that the driver uses where the XC330-T288 has them, the unit of current left open).
+"""
+
+# PRO servos whose firmware has another control table, by model number: ROBOTIS Dynamixel2Arduino, actuator.h
+LEGACY_PRO: Mapping[int, str] = {
+    **{35072: "L42-10-S300-R", 37928: "L54-30-S400-R", 37896: "L54-30-S500-R", 38176: "L54-50-S290-R"},
+    **{38152: "L54-50-S500-R", 43288: "M42-10-S260-R", 46096: "M54-40-S250-R", 46352: "M54-60-S250-R"},
+    **{51200: "H42-20-S300-R", 53768: "H54-100-S500-R", 54024: "H54-200-S500-R"},
+}
 
 
 def family_of(model: str) -> FamilyFacts | None:
@@ -120,23 +130,18 @@ _SIGNED = re.compile(
     r"|(Position|Velocity) Trajectory|(Max|Min) Position Limit"
 )
 
+# what every cycle reads; one contiguous block on every family
 STATE_ITEMS = ("Present Current", "Present Velocity", "Present Position")
-"""What every cycle reads; one contiguous block on every family."""
-
-BYTES_BEFORE_STATE = 3
-"""Bytes of other items right before that block, on every family."""
+BYTES_BEFORE_STATE = 3  # bytes of other items right before that block, on every family
 
 
 @dataclass(frozen=True)
 class Item:
-    """An entry of a control table.
-
-    `size`: [bytes].
-    """
+    """An entry of a control table."""
 
     name: str
     address: int
-    size: int
+    size: int  # [bytes]
     signed: bool
 
     def encode(self, value: int) -> bytes:
@@ -156,13 +161,10 @@ def encode_items(items: Iterable[Item], values: Iterable[int]) -> bytes:
 
 @dataclass(frozen=True)
 class Block:
-    """A stretch of a control table that is read at once.
-
-    `length`: [bytes].
-    """
+    """A stretch of a control table that is read at once."""
 
     address: int
-    length: int
+    length: int  # [bytes]
     items: tuple[Item, ...]
 
     def decode(self, data: bytes) -> dict[str, int]:
@@ -174,21 +176,16 @@ class Block:
 
 @dataclass(frozen=True)
 class ServoModel:
-    """A model of servo.
-
-    `counts_per_radian`: of the horn [1/rad].
-    `velocity_unit`: one unit of Present Velocity [rad/s].
-    `current_unit`: one unit of Present Current; None where no source states it.
-    """
+    """A model of servo."""
 
     number: int
     name: str
     family: FamilyFacts
     items: Mapping[str, Item]
-    counts_per_radian: float
+    counts_per_radian: float  # of the horn [1/rad]
     zero_count: int
-    velocity_unit: float
-    current_unit: CurrentUnit | None
+    velocity_unit: float  # one unit of Present Velocity [rad/s]
+    current_unit: CurrentUnit | None  # one unit of Present Current; None where no source states it
 
     @property
     def label(self) -> str:
@@ -271,7 +268,16 @@ def _block(items: Iterable[Item]) -> Block:
 def model_names() -> Mapping[int, str]:
     """Model numbers and names of every servo that the library has a table of."""
     rows = (line.split("\t") for line in _folder().joinpath("dynamixel.model").read_text("utf-8").splitlines())
-    return {int(row[0]): row[1].strip().removesuffix(".model") for row in rows if row[0].strip().isdigit()}
+    listed = {int(row[0]): row[1].strip().removesuffix(".model") for row in rows if row[0].strip().isdigit()}
+    return {number: name for number, (name, _) in NEWER_MODELS.items()} | listed
+
+
+def describe_model(number: int) -> str:
+    """A model as printed on its case, also where the driver does not know it."""
+    if number in LEGACY_PRO:
+        return f"{LEGACY_PRO[number]} (PRO with legacy firmware, not supported)"
+    name = model_names().get(number)
+    return f"model number {number}" if name is None else name.upper().replace("_", "-")
 
 
 @cache
@@ -280,6 +286,11 @@ def find_model(number: int, firmware: int = 0) -> ServoModel:
 
     Raises DriverError ``cannot-connect`` where no table is known for it.
     """
+    if number in LEGACY_PRO:
+        raise DriverError.no_connection(
+            f"a servo is a {describe_model(number)}: its control table is another one; update its firmware to PRO(A) "
+            "where ROBOTIS offers it, or use another servo"
+        )
     name = model_names().get(number)
     family = None if name is None else family_of(name)
     if name is None or family is None:
@@ -328,7 +339,10 @@ def _table_text(name: str, firmware: int) -> str:
     newer = _folder().joinpath(f"{name}_fw52.model")
     if firmware >= 52 and newer.is_file():
         return newer.read_text("utf-8")
-    return _folder().joinpath(f"{name}.model").read_text("utf-8")
+    own = _folder().joinpath(f"{name}.model")
+    return (own if own.is_file() else _folder().joinpath(f"{dict(NEWER_MODELS.values())[name]}.model")).read_text(
+        "utf-8"
+    )
 
 
 def _sections(text: str) -> dict[str, list[list[str]]]:

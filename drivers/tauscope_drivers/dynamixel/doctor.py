@@ -6,10 +6,9 @@ from functools import partial
 
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.dynamixel.bus import ServoBus
-from tauscope_drivers.dynamixel.bus_budget import count_traffic
+from tauscope_drivers.dynamixel.bus import ServoBus, count_traffic
 from tauscope_drivers.dynamixel.configuration import ServoConfiguration, read_configuration
-from tauscope_drivers.dynamixel.control_table import WATCHDOG_MOST, WATCHDOG_STEP_S, model_names
+from tauscope_drivers.dynamixel.control_table import WATCHDOG_MOST, WATCHDOG_STEP_S, describe_model
 from tauscope_drivers.dynamixel.enabling import plan_tasks
 from tauscope_drivers.dynamixel.health import Health, hardware_faults, watchdog_fault
 from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, drive_mode, operating_mode
@@ -18,16 +17,14 @@ from tauscope_drivers.dynamixel.session import Session, make_session, read_items
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.inspection import Finding, FoundDevice, Severity, failure
 from tauscope_drivers.limits import stated_limits
-from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S
+from tauscope_drivers.serial_servos.bus import RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S
 from tauscope_drivers.serial_servos.doctor import examine_bus, measure_loop_rate, scan_bauds
 
 _SECONDARY = ("Secondary ID", "Secondary(Shadow) ID")
-_MOST_TURNS = 256
-"""Goal Position reaches this many turns both ways."""
+_MOST_TURNS = 256  # Goal Position reaches this many turns both ways
 
 _EXAMINED = ("Torque Enable", "Bus Watchdog", *_SECONDARY)
-_LEAST_FIRMWARE = 45
-"""Of the X series for Fast Sync Read and all bits of Drive Mode."""
+_LEAST_FIRMWARE = 45  # of the X series for Fast Sync Read and all bits of Drive Mode
 
 
 def examine(joints: Sequence[DriveJoint], *, slack_s: float = 0.002) -> list[Finding]:
@@ -178,8 +175,8 @@ def _examine_servo(servo: JointServo, settings: dict[str, int]) -> list[Finding]
     return findings
 
 
+# rates that servos can be set to, the factory's first [bit/s]
 USUAL_BAUDS = (57_600, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 115_200, 4_500_000, 9_600)
-"""Rates that servos can be set to, the factory's first [bit/s]."""
 
 
 def scan_bus(path: str, bauds: Sequence[int] | None = None, *, slack_s: float = 0.002) -> Iterator[FoundDevice]:
@@ -188,8 +185,4 @@ def scan_bus(path: str, bauds: Sequence[int] | None = None, *, slack_s: float = 
 
 
 def _list_servos(bus: ServoBus) -> list[tuple[int, str, str]]:
-    names = model_names()
-    return [
-        (servo, names[number].upper().replace("_", "-") if number in names else f"model number {number}", str(firmware))
-        for servo, (number, firmware) in bus.ping_all().items()
-    ]
+    return [(servo, describe_model(number), str(firmware)) for servo, (number, firmware) in bus.ping_all().items()]

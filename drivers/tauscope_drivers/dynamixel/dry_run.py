@@ -1,42 +1,33 @@
 """The frames that a run would send, without a port."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope_drivers.backend import ControlMode, DriveLimits
+from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.dynamixel import packets
-from tauscope_drivers.dynamixel.bus_budget import has_room_for_speeds, planned_budget
+from tauscope_drivers.dynamixel import packets, preparation
+from tauscope_drivers.dynamixel.bus import has_room_for_speeds, planned_budget
 from tauscope_drivers.dynamixel.configuration import read_configuration
-from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
+from tauscope_drivers.dynamixel.control_table import encode_items
 from tauscope_drivers.dynamixel.enabling import Bounds, goals_of
-from tauscope_drivers.dynamixel.group import health_turns, paced_goals, servo_families
-from tauscope_drivers.dynamixel.preparation import (
-    SETTINGS,
-    ServoTask,
-    commissioning_writes,
-    current_cap,
-    preparing_writes,
-    taking_writes,
-    watchdog_steps,
-)
+from tauscope_drivers.dynamixel.group import health_turns, item_writes, paced_goals, servo_families
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.inspection import FrameRequest, PlannedFrame
 from tauscope_drivers.limits import require_sensible
 from tauscope_drivers.state import Setpoint
 
+# settings of a servo of the X series as delivered, but for a Current Limit that limits nothing
 _DELIVERED = {
-    **dict.fromkeys(SETTINGS, 0),
+    **dict.fromkeys(preparation.SETTINGS, 0),
     "Return Delay Time": 250,
     "Operating Mode": 3,
     "Status Return Level": 2,
     "PWM Limit": 885,
     "Current Limit": 0x7FFF,
 }
-"""Settings of a servo of the X series as delivered, but for a Current Limit that limits nothing."""
 
 
 def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:
@@ -53,104 +44,67 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
     servos = [make_servo(number, servo, None) for number, servo in enumerate(configuration.servos, 1)]
     require_sensible(limits, targets[0], [servo.label for servo in servos])
     tasks = [
-        ServoTask(
+        preparation.ServoTask(
             mode,
-            current_cap(servo, _DELIVERED, float(limits.torque[joint])),
+            preparation.current_cap(servo, _DELIVERED, float(limits.torque[joint])),
             servo.units.velocity_cap(float(limits.velocity[joint])),
             servo.units.counts(float(targets[0, joint])),
-            watchdog_steps(request.watchdog_s),
+            preparation.watchdog_steps(request.watchdog_s),
         )
         for joint, servo in enumerate(servos)
     ]
-    yield from _connection(servos)
-    yield from _enabling(servos, tasks)
-    if cycle_s is not None and not has_room_for_speeds(*planned_budget(configuration), cycle_s):
-        cycle_s = None
-    yield from _cycles(servos, mode, _bounds(servos, limits, tasks), targets, cycle_s)
-    yield from _stop(servos, mode)
-
-
-def _connection(servos: Sequence[JointServo]) -> Iterator[PlannedFrame]:
     for servo in servos:
         yield _frame("connect", f"{servo.label}: who are you?", packets.encode_ping(servo.servo))
-        for write in commissioning_writes(servo, _DELIVERED, holds=False):
-            yield _write(servo, "connect", write.item.name, write.value, write.reason)
-
-
-def _enabling(servos: Sequence[JointServo], tasks: Sequence[ServoTask]) -> Iterator[PlannedFrame]:
+        yield from _writes(servo, "connect", preparation.commissioning_writes(servo, _DELIVERED, holds=False))
     for servo, task in zip(servos, tasks, strict=True):
-        for write in preparing_writes(servo, _DELIVERED, task, holds=False):
-            yield _write(servo, "enable", write.item.name, write.value, write.reason)
+        yield from _writes(servo, "enable", preparation.preparing_writes(servo, _DELIVERED, task, holds=False))
     for servo, task in zip(servos, tasks, strict=True):
-        for write in taking_writes(servo, task, holds=False):
-            yield _write(servo, "enable", write.item.name, write.value, write.reason)
-
-
-def _bounds(servos: Sequence[JointServo], limits: DriveLimits, tasks: Sequence[ServoTask]) -> Bounds:
-    ends = [
-        servo.units.counts_within(float(limits.position_low[joint]), float(limits.position_high[joint]))
-        for joint, servo in enumerate(servos)
-    ]
-    lows, highs = zip(*ends, strict=True)
-    caps = tuple(task.current_cap for task in tasks)
-    return Bounds(lows, highs, caps, tuple(task.velocity_cap for task in tasks))
+        yield from _writes(servo, "enable", preparation.taking_writes(servo, task, holds=False))
+    if cycle_s is not None and not has_room_for_speeds(*planned_budget(configuration), cycle_s):
+        cycle_s = None
+    ends = zip(servos, limits.position_low.tolist(), limits.position_high.tolist(), strict=True)
+    bounds = Bounds.of(tasks, [servo.units.counts_within(low, high) for servo, low, high in ends])
+    yield from _cycles(servos, mode, bounds, targets, cycle_s)
+    for servo in servos:
+        items = servo.model.items
+        off = [preparation.RegisterWrite(items["Torque Enable"], 0, "torque off")] if mode is ControlMode.TORQUE else []
+        yield from _writes(
+            servo, "stop", [*off, preparation.RegisterWrite(items["Bus Watchdog"], 0, "stays so without cycles")]
+        )
 
 
 def _cycles(
     servos: Sequence[JointServo], mode: ControlMode, bounds: Bounds, targets: NDArray[np.float64], cycle_s: float | None
 ) -> Iterator[PlannedFrame]:
-    turns = health_turns(servos)
-    pace = None
+    turns, pace = health_turns(servos), None
     for cycle, position in enumerate(targets):
         name, goals = goals_of(servos, mode, bounds, Setpoint(position, np.zeros(len(servos))))
         if mode is ControlMode.TORQUE or cycle_s is None:
-            yield from _goals(servos, name, goals)
+            writes = item_writes(servos, name, goals)
         else:
             pace = pace or GoalPace(servos, goals, bounds.velocity, cycle_s, 0)
-            yield from _pace_goals(servos, goals, pace.speeds(goals, round(cycle * cycle_s * 1e9)))
-        yield from _questions(servos, *turns[cycle % len(turns)])
+            writes = paced_goals(servos, goals, pace.speeds(goals, round(cycle * cycle_s * 1e9)))
+        for items, values in writes:
+            names = ", ".join(item.name for item in items)
+            told = ", ".join(f"{servo} := {', '.join(map(str, own))}" for servo, own in values.items())
+            encoded = {servo: encode_items(items, own) for servo, own in values.items()}
+            frame = packets.encode_sync_write(encoded, items[0].address)
+            yield _frame("cycle", f"{names}: servo {told}", frame)
+        for block, members in servo_families(servos):
+            identifiers = [servos[index].servo for index in members]
+            asked = ", ".join(map(str, identifiers))
+            frame = packets.encode_sync_read(identifiers, block.address, block.length, fast=True)
+            yield _frame("cycle", f"servos {asked}: current, velocity, position?", frame)
+        turn, health = turns[cycle % len(turns)]
+        names = ", ".join(item.name for item in health.items)
+        frame = packets.encode_read(servos[turn].servo, health.address, health.length)
+        yield _frame("cycle", f"{servos[turn].label}: {names}?", frame)
 
 
-def _stop(servos: Sequence[JointServo], mode: ControlMode) -> Iterator[PlannedFrame]:
-    for servo in servos:
-        if mode is ControlMode.TORQUE:
-            yield _write(servo, "stop", "Torque Enable", 0, "torque off")
-        yield _write(servo, "stop", "Bus Watchdog", 0, "stays so without cycles")
-
-
-def _goals(servos: Sequence[JointServo], name: str, goals: Sequence[int]) -> Iterator[PlannedFrame]:
-    for _, members in servo_families(servos):
-        items = [servos[members[0]].model.items[name]]
-        yield _sync_write(items, {servos[index].servo: [goals[index]] for index in members})
-
-
-def _pace_goals(servos: Sequence[JointServo], goals: Sequence[int], speeds: Sequence[int]) -> Iterator[PlannedFrame]:
-    for items, values in paced_goals(servos, goals, speeds):
-        yield _sync_write(items, values)
-
-
-def _sync_write(items: Sequence[Item], values: Mapping[int, Sequence[int]]) -> PlannedFrame:
-    names = ", ".join(item.name for item in items)
-    told = ", ".join(f"{servo} := {', '.join(map(str, own))}" for servo, own in values.items())
-    encoded = {servo: encode_items(items, own) for servo, own in values.items()}
-    return _frame("cycle", f"{names}: servo {told}", packets.encode_sync_write(encoded, items[0].address))
-
-
-def _questions(servos: Sequence[JointServo], turn: int, health: Block) -> Iterator[PlannedFrame]:
-    for block, members in servo_families(servos):
-        identifiers = [servos[index].servo for index in members]
-        asked = ", ".join(map(str, identifiers))
-        frame = packets.encode_sync_read(identifiers, block.address, block.length, fast=True)
-        yield _frame("cycle", f"servos {asked}: current, velocity, position?", frame)
-    names = ", ".join(item.name for item in health.items)
-    frame = packets.encode_read(servos[turn].servo, health.address, health.length)
-    yield _frame("cycle", f"{servos[turn].label}: {names}?", frame)
-
-
-def _write(servo: JointServo, phase: str, name: str, value: int, reason: str) -> PlannedFrame:
-    item = servo.model.items[name]
-    frame = packets.encode_write(servo.servo, item.address, item.encode(value))
-    return _frame(phase, f"{servo.label}: {name} := {value}, {reason}", frame)
+def _writes(servo: JointServo, phase: str, writes: Iterable[preparation.RegisterWrite]) -> Iterator[PlannedFrame]:
+    for write in writes:
+        frame = packets.encode_write(servo.servo, write.item.address, write.item.encode(write.value))
+        yield _frame(phase, f"{servo.label}: {write.item.name} := {write.value}, {write.reason}", frame)
 
 
 def _frame(phase: str, meaning: str, frame: bytes) -> PlannedFrame:

@@ -8,17 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauscope_drivers.backend import ControlMode, DriveLimits
-from tauscope_drivers.dynamixel.preparation import (
-    ServoTask,
-    current_cap,
-    drive_mode,
-    operating_mode,
-    position_counts,
-    preparing_writes,
-    taking_writes,
-    velocity_cap,
-    watchdog_steps,
-)
+from tauscope_drivers.dynamixel import preparation
 from tauscope_drivers.dynamixel.servo import JointServo
 from tauscope_drivers.dynamixel.session import Session
 from tauscope_drivers.errors import DriverError
@@ -31,14 +21,19 @@ class Bounds:
     """Ranges of the goals, in units of the servos, one a joint.
 
     `low`, `high`: of Goal Position [counts].
-    `current`: of Goal Current, either sign [units].
-    `velocity`: of Profile Velocity, 0 for none [units].
     """
 
     low: tuple[int, ...]
     high: tuple[int, ...]
-    current: tuple[int, ...]
-    velocity: tuple[int, ...]
+    current: tuple[int, ...]  # of Goal Current, either sign [units]
+    velocity: tuple[int, ...]  # of Profile Velocity, 0 for none [units]
+
+    @staticmethod
+    def of(tasks: Sequence[preparation.ServoTask], ranges: Sequence[tuple[int, int]]) -> "Bounds":
+        """Bounds of planned tasks. `ranges`: lowest and highest Goal Position of each servo [counts]."""
+        lows, highs = zip(*ranges, strict=True)
+        caps = tuple(task.current_cap for task in tasks)
+        return Bounds(lows, highs, caps, tuple(task.velocity_cap for task in tasks))
 
 
 def goals_of(
@@ -69,38 +64,36 @@ def enable_servos(
     """
     tasks, ranges = plan_tasks(session, mode, limits, watchdog_s)
     taken = _give_torque(session, tasks)
-    lows, highs = zip(*ranges, strict=True)
-    caps = tuple(task.current_cap for task in tasks)
-    return Bounds(tuple(lows), tuple(highs), caps, tuple(task.velocity_cap for task in tasks)), taken
+    return Bounds.of(tasks, ranges), taken
 
 
 def plan_tasks(
     session: Session, mode: ControlMode, limits: DriveLimits, watchdog_s: float
-) -> tuple[list[ServoTask], list[tuple[int, int]]]:
+) -> tuple[list[preparation.ServoTask], list[tuple[int, int]]]:
     """Check everything that enabling needs, and plan it; only reads.
 
     Raises DriverError: ``refused`` or ``cannot-connect``: names the joint. Returns one task a joint, and the lowest and
     highest Goal Position of each [counts].
     """
-    steps = watchdog_steps(watchdog_s)
+    steps = preparation.watchdog_steps(watchdog_s)
     present = [_present_position(session, joint) for joint in range(len(session.servos))]
     places = np.array([servo.units.position(count) for servo, count in zip(session.servos, present, strict=True)])
     require_sensible(limits, places, [servo.label for servo in session.servos])
-    tasks: list[ServoTask] = []
+    tasks: list[preparation.ServoTask] = []
     ranges: list[tuple[int, int]] = []
     for joint, servo in enumerate(session.servos):
         settings = session.settings[joint]
-        cap = current_cap(servo, settings, float(limits.torque[joint]))
+        cap = preparation.current_cap(servo, settings, float(limits.torque[joint]))
         _require_in_own_range(session, joint, mode, present[joint])
         ranges.append(_range(session, joint, limits, mode))
-        speed = velocity_cap(servo, settings, float(limits.velocity[joint]))
-        tasks.append(ServoTask(mode, cap, speed, present[joint], steps))
+        speed = preparation.velocity_cap(servo, settings, float(limits.velocity[joint]))
+        tasks.append(preparation.ServoTask(mode, cap, speed, present[joint], steps))
         if session.health.has_torque[joint]:
             _require_adoptable(session, joint, mode)
     return tasks, ranges
 
 
-def _give_torque(session: Session, tasks: list[ServoTask]) -> list[int]:
+def _give_torque(session: Session, tasks: list[preparation.ServoTask]) -> list[int]:
     """Carry out the tasks; where one fails, those that had no torque before are let go again. The servos' places."""
     held_before = session.health.has_torque.copy()
     reached: list[int] = []
@@ -108,7 +101,7 @@ def _give_torque(session: Session, tasks: list[ServoTask]) -> list[int]:
     try:
         for joint, task in enumerate(tasks):
             servo, settings, holds = session.servos[joint], session.settings[joint], bool(held_before[joint])
-            session.carry_out(joint, preparing_writes(servo, settings, task, holds=holds))
+            session.carry_out(joint, preparation.preparing_writes(servo, settings, task, holds=holds))
         for joint, task in enumerate(tasks):
             reached.append(joint)
             taken.append(_take(session, joint, task))
@@ -122,13 +115,13 @@ def _give_torque(session: Session, tasks: list[ServoTask]) -> list[int]:
     return taken
 
 
-def _take(session: Session, joint: int, task: ServoTask) -> int:
+def _take(session: Session, joint: int, task: preparation.ServoTask) -> int:
     """Take a prepared servo under power where it is now; that place [counts]."""
     holds = bool(session.health.has_torque[joint])
     if not holds:
         task = replace(task, present=_present_position(session, joint))
         _require_in_own_range(session, joint, task.mode, task.present)
-    session.carry_out(joint, taking_writes(session.servos[joint], task, holds=holds))
+    session.carry_out(joint, preparation.taking_writes(session.servos[joint], task, holds=holds))
     session.health.has_torque[joint] = True
     return task.present
 
@@ -140,7 +133,7 @@ def _present_position(session: Session, joint: int) -> int:
 def _range(session: Session, joint: int, limits: DriveLimits, mode: ControlMode) -> tuple[int, int]:
     low, high = float(limits.position_low[joint]), float(limits.position_high[joint])
     servo = session.servos[joint]
-    lowest, highest = position_counts(servo, session.settings[joint], low, high, mode)
+    lowest, highest = preparation.position_counts(servo, session.settings[joint], low, high, mode)
     if lowest >= highest:
         raise DriverError.refusal(
             f"{servo.label}: its own Position Limits leave nothing of the range {low:.4g} to {high:.4g}; widen them"
@@ -151,7 +144,7 @@ def _range(session: Session, joint: int, limits: DriveLimits, mode: ControlMode)
 def _require_in_own_range(session: Session, joint: int, mode: ControlMode, present: int) -> None:
     """A servo that stands beyond Position Limits that it applies would not stay where it is."""
     servo = session.servos[joint]
-    lowest, highest = position_counts(servo, session.settings[joint], -math.inf, math.inf, mode)
+    lowest, highest = preparation.position_counts(servo, session.settings[joint], -math.inf, math.inf, mode)
     if not lowest <= present <= highest:
         place = servo.units.position(present)
         ends = sorted((servo.units.position(lowest), servo.units.position(highest)))
@@ -164,8 +157,8 @@ def _require_in_own_range(session: Session, joint: int, mode: ControlMode, prese
 def _require_adoptable(session: Session, joint: int, mode: ControlMode) -> None:
     """A servo under torque can only go on as it is: its modes are locked, and letting go would drop the arm."""
     servo, settings = session.servos[joint], session.settings[joint]
-    wrong_mode = settings["Operating Mode"] != operating_mode(servo, mode)
-    if wrong_mode or settings["Drive Mode"] != drive_mode(servo, settings["Drive Mode"]):
+    wrong_mode = settings["Operating Mode"] != preparation.operating_mode(servo, mode)
+    if wrong_mode or settings["Drive Mode"] != preparation.drive_mode(servo, settings["Drive Mode"]):
         raise DriverError.refusal(
             f"{servo.label} is under torque in another mode; support the arm, stop it with torque_off, then enable"
         )

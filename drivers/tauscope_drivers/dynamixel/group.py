@@ -14,32 +14,22 @@ from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers
 
 Array = NDArray[np.float64]
 
-PROBES = 3
-"""How often Fast Sync Read is tried before the firmware counts as not knowing it."""
-
-PLAIN_CYCLES = 50
-"""For how many cycles each servo answers for itself, after a common packet broke off at a silent one."""
+PROBES = 3  # how often Fast Sync Read is tried before the firmware counts as not knowing it
+PLAIN_CYCLES = 50  # for how many cycles each servo answers for itself, after a common packet broke off at a silent one
 
 _CURRENT, _VELOCITY, _POSITION = STATE_ITEMS
 
 
 @dataclass(frozen=True, eq=False)
 class GroupReading:
-    """What the servos measured in one cycle; NaN for who did not answer in it.
-
-    `position`: (n,) [rad or m].
-    `velocity`: (n,) [rad/s or m/s].
-    `current`: (n,) [mA].
-    `alerts`: alert bit of each servo; None for who did not answer.
-    `late_ns`: how much later than the bus takes the last answer came [ns].
-    """
+    """What the servos measured in one cycle; NaN for who did not answer in it."""
 
     time_ns: int
-    position: Array
-    velocity: Array
-    current: Array
-    alerts: tuple[bool | None, ...]
-    late_ns: int
+    position: Array  # (n,) [rad or m]
+    velocity: Array  # (n,) [rad/s or m/s]
+    current: Array  # (n,) [mA]
+    alerts: tuple[bool | None, ...]  # alert bit of each servo; None for who did not answer
+    late_ns: int  # how much later than the bus takes the last answer came [ns]
 
 
 class ServoGroup:
@@ -68,11 +58,8 @@ class ServoGroup:
 
     def write(self, name: str, values: Sequence[int | None]) -> None:
         """Write an item of all servos, without an answer."""
-        for _, members in self._families:
-            item = self.servos[members[0]].model.items[name]
-            chosen = {self.servos[index].servo: [value] for index in members if (value := values[index]) is not None}
-            if chosen:
-                self._bus.sync_write([item], chosen)
+        for items, chosen in item_writes(self.servos, name, values):
+            self._bus.sync_write(items, chosen)
 
     def write_goals(self, goals: Sequence[int], speeds: Sequence[int]) -> None:
         """Write Goal Position of all servos, with Profile Velocity where that is its neighbour.
@@ -180,6 +167,16 @@ def servo_families(servos: Sequence[JointServo]) -> list[tuple[Block, list[int]]
         key = (block.address, block.length, servo.model.items["Goal Position"].address)
         families.setdefault(key, (block, []))[1].append(index)
     return list(families.values())
+
+
+def item_writes(
+    servos: Sequence[JointServo], name: str, values: Sequence[int | None]
+) -> Iterator[tuple[list[Item], dict[int, list[int]]]]:
+    """Item and values of Sync Writes, one a family. `values`: one a joint, None where nothing is written."""
+    for _, members in servo_families(servos):
+        chosen = {servos[index].servo: [value] for index in members if (value := values[index]) is not None}
+        if chosen:
+            yield [servos[members[0]].model.items[name]], chosen
 
 
 def paced_goals(

@@ -69,9 +69,8 @@ def watchdog_fault(joint: int | None) -> Fault:
     return Fault("watchdog", joint, detail, "make sure the host runs, then acknowledge")
 
 
+# which error it is was not read yet
 _ALERT = "the servo sets its alert bit", "read Hardware Error Status with the wizard"
-"""Which error it is was not read yet."""
-
 _TORQUE_LOST = (
     "the servo has let go of the joint; it lost power or was restarted",
     "check supply and cable, then acknowledge and enable again",

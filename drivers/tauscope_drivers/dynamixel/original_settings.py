@@ -9,11 +9,9 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
+# items in EEPROM that the driver changes, in the order in which they are put back: a mode resets others
 CHANGED = ("Drive Mode", "Return Delay Time", "Operating Mode")
-"""Items in EEPROM that the driver changes, in the order in which they are put back: a mode resets others."""
-
-FOLDER = "TAUSCOPE_STATE"
-"""Environment variable that names the folder, in place of ``~/.local/state/tauscope``."""
+FOLDER = "TAUSCOPE_STATE"  # environment variable that names the folder, in place of ``~/.local/state/tauscope``
 
 
 class OriginalSettings:

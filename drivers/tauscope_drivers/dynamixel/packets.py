@@ -17,11 +17,8 @@ HEADER = b"\xff\xff\xfd\x00"
 BROADCAST_ID = 0xFE
 HIGHEST_ID = 252
 
-ALERT = 0x80
-"""Bit of the error byte: the servo has a hardware error."""
-
-LONGEST_FRAME = 1024
-"""Frames that say to be longer are noise [bytes]."""
+ALERT = 0x80  # bit of the error byte: the servo has a hardware error
+LONGEST_FRAME = 1024  # frames that say to be longer are noise [bytes]
 
 _PING, _READ, _WRITE, _CLEAR, _STATUS = 0x01, 0x02, 0x03, 0x10, 0x55
 _ERROR_TO_CLEAR = b"\x02ERCL"

@@ -9,6 +9,7 @@ from tauscope_drivers.dynamixel.control_table import CURRENT_MODE, WATCHDOG_MOST
 from tauscope_drivers.dynamixel.servo import JointServo
 from tauscope_drivers.errors import DriverError
 
+# items that are read of each servo when it is reached
 SETTINGS = (
     "Return Delay Time",
     "Drive Mode",
@@ -20,10 +21,7 @@ SETTINGS = (
     "Status Return Level",
     "Velocity Limit",
 )
-"""Items that are read of each servo when it is reached."""
-
-ANSWERS_ALL = 2
-"""Status Return Level of a servo that answers every instruction."""
+ANSWERS_ALL = 2  # Status Return Level of a servo that answers every instruction
 
 _TIME_BASED_PROFILE = 0x04
 _TORQUE_ON_BY_GOAL = 0x08
@@ -41,17 +39,12 @@ class RegisterWrite:
 
 @dataclass(frozen=True)
 class ServoTask:
-    """What a servo shall do once it has torque.
-
-    `current_cap`: most current [units].
-    `velocity_cap`: largest speed of its target while it tracks positions, 0 for none [units].
-    `present`: Present Position [counts].
-    """
+    """What a servo shall do once it has torque."""
 
     mode: ControlMode
-    current_cap: int
-    velocity_cap: int
-    present: int
+    current_cap: int  # most current [units]
+    velocity_cap: int  # largest speed of its target while it tracks positions, 0 for none [units]
+    present: int  # Present Position [counts]
     watchdog_steps: int
 
 

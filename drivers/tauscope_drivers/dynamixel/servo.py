@@ -7,8 +7,7 @@ from tauscope_drivers.dynamixel.configuration import ServoConfiguration
 from tauscope_drivers.dynamixel.control_table import ServoModel, find_model, find_model_by_name
 from tauscope_drivers.errors import DriverError
 
-MULTI_TURN_COUNTS = 1_048_575
-"""Goal Position reaches this far both ways in the current-based position mode of X and MX."""
+MULTI_TURN_COUNTS = 1_048_575  # Goal Position reaches this far both ways in the current-based position mode of X and MX
 
 
 @dataclass(frozen=True)
@@ -17,16 +16,14 @@ class ServoUnits:
 
     `radians_per_count`: joint position for one count, negative where the servo is mounted the other way round [rad or
         m].
-    `velocity_unit`: joint velocity for one unit of Present Velocity, signed likewise [rad/s or m/s].
-    `milliampere`: current for one unit of Present Current, signed likewise [mA].
     `torque_per_milliampere`: joint torque for one milliampere; None where the robot file does not say, for no maker's
         figure exists [Nm/mA or N/mA].
     """
 
     radians_per_count: float
     zero_count: int
-    velocity_unit: float
-    milliampere: float
+    velocity_unit: float  # joint velocity for one unit of Present Velocity, signed likewise [rad/s or m/s]
+    milliampere: float  # current for one unit of Present Current, signed likewise [mA]
     source: str
     torque_per_milliampere: float | None = None
 
@@ -120,12 +117,9 @@ def servo_units(
 
 @dataclass(frozen=True)
 class JointServo:
-    """A servo and what its numbers mean.
+    """A servo and what its numbers mean."""
 
-    `number`: of the joint, from 1.
-    """
-
-    number: int
+    number: int  # of the joint, from 1
     joint: str
     servo: int
     model: ServoModel

@@ -15,8 +15,13 @@ from tauscope_drivers.dynamixel.original_settings import CHANGED, OriginalSettin
 from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, SETTINGS, RegisterWrite, commissioning_writes
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.errors import DriverError
-from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S
-from tauscope_drivers.serial_servos.bus import FACTORY_RETURN_DELAY_S, PATIENCE_S, learn_latency
+from tauscope_drivers.serial_servos.bus import (
+    FACTORY_RETURN_DELAY_S,
+    PATIENCE_S,
+    RETURN_DELAY_UNIT_S,
+    SHORTEST_RETURN_DELAY_S,
+    learn_latency,
+)
 
 ELECTRONIC_GEAR = ("Electronic GearRatio Numerator", "Electronic GearRatio Denominator")
 

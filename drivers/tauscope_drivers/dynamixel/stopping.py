@@ -9,9 +9,8 @@ from tauscope_drivers.dynamixel.preparation import operating_mode
 from tauscope_drivers.dynamixel.session import Session
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 
+# a servo that is no further than this from its goal only lags behind it, or gives way to a load [rad of the horn]
 NEAR_GOAL_RAD = 0.1
-"""A servo that is no further than this from its goal only lags behind it, or gives way to a load [rad of the horn]."""
-
 _SLOWEST = 1
 
 

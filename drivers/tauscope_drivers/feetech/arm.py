@@ -17,19 +17,11 @@ from tauscope_drivers.feetech.registers import FEEDBACK, VOLT
 from tauscope_drivers.feetech.session import Session, open_session
 from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.serial_port import expect_latency_s
+from tauscope_drivers.serial_servos import bus
 from tauscope_drivers.serial_servos.arm import SerialServoArm
-from tauscope_drivers.serial_servos.budget import (
-    SHORTEST_RETURN_DELAY_S,
-    BusTiming,
-    CycleTraffic,
-    largest_part,
-    largest_rate_hz,
-)
-from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers
 from tauscope_drivers.state import ArmState, Setpoint
 
-WATCHDOG_RANGE_S = (0.02, 2.5)
-"""Silence of the host after which no goal is sent until the fault is acknowledged [s]."""
+WATCHDOG_RANGE_S = (0.02, 2.5)  # silence of the host after which no goal is sent until the fault is acknowledged [s]
 
 _NO_WATCHDOG = "the servos have no watchdog: without their host they hold their last goal"
 
@@ -55,11 +47,11 @@ class FeetechArm(SerialServoArm[Session]):
             joint_count=len(self._configuration.servos),
             modes=frozenset([ControlMode.POSITION]),
             stop_policies=frozenset([StopPolicy.HOLD]),
-            largest_rate_hz=largest_rate_hz(*self._budget()),
+            largest_rate_hz=bus.largest_rate_hz(*self._budget()),
             watchdog_range_s=WATCHDOG_RANGE_S,
             takes_feed_forward=False,
             effort_unit="permille",
-            rate_limited_by=", ".join(largest_part(*self._budget())),
+            rate_limited_by=", ".join(bus.largest_part(*self._budget())),
             remarks=self._remarks,
         )
 
@@ -125,21 +117,21 @@ class FeetechArm(SerialServoArm[Session]):
         session.health.starved |= silence_s > self._watchdog_s
 
     def _read_state(self, session: Session, *, is_health_fresh: bool) -> ArmState:
-        for _ in range(ATTEMPTS):
-            answers = session.bus.sync_read(session.identifiers, FEEDBACK, PATIENCE_S)
+        for _ in range(bus.ATTEMPTS):
+            answers = session.bus.sync_read(session.identifiers, FEEDBACK, bus.PATIENCE_S)
             if len(answers.statuses) == len(session.servos):
                 break
         return _arm_state(session, answers)
 
-    def _budget(self) -> tuple[CycleTraffic, BusTiming]:
+    def _budget(self) -> tuple[bus.CycleTraffic, bus.BusTiming]:
         traffic = count_traffic(len(self._configuration.servos))
         if self._session is None:
             latency_s = expect_latency_s(self._port.path)
-            return traffic, BusTiming(self._port.baudrate, SHORTEST_RETURN_DELAY_S, latency_s)
-        return traffic, BusTiming(self._port.baudrate, self._session.bus.return_delay_s, self._port.latency_s)
+            return traffic, bus.BusTiming(self._port.baudrate, bus.SHORTEST_RETURN_DELAY_S, latency_s)
+        return traffic, bus.BusTiming(self._port.baudrate, self._session.bus.return_delay_s, self._port.latency_s)
 
 
-def _arm_state(session: Session, answers: Answers[Status]) -> ArmState:
+def _arm_state(session: Session, answers: bus.Answers[Status]) -> ArmState:
     position, velocity, load, temperature, voltage = np.full((5, len(session.servos)), np.nan)
     for joint, servo in enumerate(session.servos):
         if (status := answers.statuses.get(servo.servo)) is None:

@@ -8,12 +8,10 @@ from tauscope_drivers.feetech import packets
 from tauscope_drivers.feetech.packets import ANSWER_BYTES, FeetechParser, Status
 from tauscope_drivers.feetech.registers import FEEDBACK, FIRST_IN_RAM, REGISTERS, SPARE_BYTES, TARGETS, Block
 from tauscope_drivers.serial_port import SerialPort
-from tauscope_drivers.serial_servos.budget import CycleTraffic
-from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers, SerialServoBus
+from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers, CycleTraffic, SerialServoBus
 
 _ASK_BYTES = 8
-_GOAL_BYTES = 7
-"""ID, position, time and speed."""
+_GOAL_BYTES = 7  # ID, position, time and speed
 
 
 def count_traffic(servos: int) -> CycleTraffic:

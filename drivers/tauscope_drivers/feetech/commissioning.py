@@ -11,20 +11,12 @@ import numpy as np
 
 from tauscope_drivers.backend import DriveLimits
 from tauscope_drivers.errors import DriverError
-from tauscope_drivers.feetech.registers import (
-    COUNTS_PER_TURN,
-    FULL_ANGLE,
-    MODE_NAMES,
-    POSITION_MODE,
-    PROTECTIONS,
-    PROTECTIVE,
-    VOLT,
-)
+from tauscope_drivers.feetech import registers
 from tauscope_drivers.feetech.servo import JointServo
 from tauscope_drivers.feetech.session import Session, alarm_faults
 from tauscope_drivers.inspection import Finding, Severity, failure
 from tauscope_drivers.limits import require_sensible
-from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S
+from tauscope_drivers.serial_servos.bus import RETURN_DELAY_UNIT_S
 
 _TOOL = "with Feetech's FD: Tauscope writes nothing to EEPROM"
 
@@ -34,14 +26,12 @@ class ServoTask:
     """What a servo shall do once it has torque.
 
     `low`, `high`: range of its goals [counts].
-    `speed`: Goal Speed [units].
-    `torque`: Torque Limit [‰ of full duty].
     """
 
     low: int
     high: int
-    speed: int
-    torque: int
+    speed: int  # Goal Speed [units]
+    torque: int  # Torque Limit [‰ of full duty]
 
     def bound(self, goal: int) -> int:
         """A goal within the range."""
@@ -84,33 +74,26 @@ def find_flaws(servo: JointServo, reading: Reading, limits: DriveLimits, joint: 
         flaws.append(Finding(Severity.FAILURE, servo.label, detail, remedy))
 
     settings = reading.settings
-    if (mode := settings["Operating Mode"]) != POSITION_MODE:
-        find(
-            f"Operating Mode is {mode} ({MODE_NAMES.get(mode, 'unknown')}), a run needs {POSITION_MODE} (position)",
-            f"set it to {POSITION_MODE} {_TOOL}",
-        )
-    if settings["Phase"] & FULL_ANGLE or settings["Min Position Limit"] >= settings["Max Position Limit"]:
+    if (mode := settings["Operating Mode"]) != registers.POSITION_MODE:
+        name, wanted = registers.MODE_NAMES.get(mode, "unknown"), registers.POSITION_MODE
+        find(f"Operating Mode is {mode} ({name}), a run needs {wanted} (position)", f"set it to {wanted} {_TOOL}")
+    if settings["Phase"] & registers.FULL_ANGLE or settings["Min Position Limit"] >= settings["Max Position Limit"]:
         find(
             "it counts whole turns (Position Limits 0 and 0, or bit 4 of Phase), and forgets them without power",
-            f"set Min and Max Position Limit within 0 to {COUNTS_PER_TURN - 1}, and clear that bit, {_TOOL}",
+            f"set Min and Max Position Limit within 0 to {registers.COUNTS_PER_TURN - 1}, and clear that bit, {_TOOL}",
         )
     if not settings["P Coefficient"]:
         find("P Coefficient is 0: it cannot hold anything", f"set it, 32 as delivered, {_TOOL}")
     if not settings["Max Torque Limit"]:
         find("Max Torque Limit is 0: it cannot exert any torque", f"raise it {_TOOL}")
-    flaws += _find_supply(servo, reading)
+    volts, unit = reading.feedback["Present Voltage"], registers.VOLT
+    low, high = settings["Min Voltage Limit"], settings["Max Voltage Limit"]
+    if not low <= volts <= high:
+        detail = f"supply of {volts * unit:.1f} V, its Voltage Limits are {low * unit:.1f} to {high * unit:.1f} V"
+        find(detail, "check the supply, its plug and the cables")
     for fault in alarm_faults(reading.alarms, servo.number):
         find(fault.detail, fault.remedy)
     return flaws or _find_limits(servo, reading, plan_task(servo, reading, limits, joint))
-
-
-def _find_supply(servo: JointServo, reading: Reading) -> list[Finding]:
-    volts = reading.feedback["Present Voltage"]
-    low, high = reading.settings["Min Voltage Limit"], reading.settings["Max Voltage Limit"]
-    if low <= volts <= high:
-        return []
-    detail = f"supply of {volts * VOLT:.1f} V, its Voltage Limits are {low * VOLT:.1f} to {high * VOLT:.1f} V"
-    return [Finding(Severity.FAILURE, servo.label, detail, "check the supply, its plug and the cables")]
 
 
 def _find_limits(servo: JointServo, reading: Reading, task: ServoTask) -> list[Finding]:
@@ -145,7 +128,7 @@ def find_doubts(servo: JointServo, reading: Reading, limits: DriveLimits, target
     """
     settings = reading.settings
     gains = ", ".join(f"{name} {settings[f'{name} Coefficient']}" for name in "PDI")
-    volts = reading.feedback["Present Voltage"] * VOLT
+    volts = reading.feedback["Present Voltage"] * registers.VOLT
     dead = max(settings["CW Dead Zone"], settings["CCW Dead Zone"])
     found = [
         Finding(
@@ -164,9 +147,9 @@ def find_doubts(servo: JointServo, reading: Reading, limits: DriveLimits, target
         find(f"Return Delay Time {delay_us:.0f} µs lowers the rate", f"set it to 0 {_TOOL}")
     if not settings["Response Status Level"]:
         find("Response Status Level 0: it answers reads alone", f"none needed; 1 enables sooner, set {_TOOL}")
-    if (unloading := settings["Unloading Condition"]) & PROTECTIONS != PROTECTIONS:
+    if (unloading := settings["Unloading Condition"]) & registers.PROTECTIONS != registers.PROTECTIONS:
         detail = f"Unloading Condition {unloading}: it does not protect itself from both heat and overload"
-        find(detail, f"set it to {PROTECTIVE}, as delivered, {_TOOL}")
+        find(detail, f"set it to {registers.PROTECTIVE}, as delivered, {_TOOL}")
     if not targets["Lock"]:
         find("Lock is 0: whatever a program writes to EEPROM stays", "set Lock to 1 once it is set up")
     if targets["Torque Enable"]:

@@ -15,16 +15,14 @@ _KEYS = ("servo_id", "direction", "reduction", "zero_count")
 class ServoConfiguration:
     """One servo.
 
-    `reduction`: turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints.
-    `zero_count`: count at which the joint stands at zero.
     `torque_per_permille`: joint torque for 1 ‰ of load; None: the data sheet's, at the present voltage [Nm or N].
     """
 
     joint: str
     servo: int
     direction: int = 1
-    reduction: float = 1.0
-    zero_count: int = MIDDLE_COUNT
+    reduction: float = 1.0  # turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints
+    zero_count: int = MIDDLE_COUNT  # count at which the joint stands at zero
     torque_per_permille: float | None = None
 
 

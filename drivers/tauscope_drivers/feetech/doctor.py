@@ -14,8 +14,8 @@ from tauscope_drivers.inspection import Finding, FoundDevice, failure
 from tauscope_drivers.limits import stated_limits
 from tauscope_drivers.serial_servos.doctor import examine_bus, measure_loop_rate, scan_bauds
 
+# rates that servos can be set to, the factory's first [bit/s]
 USUAL_BAUDS = (1_000_000, 500_000, 250_000, 128_000, 115_200, 57_600, 38_400)
-"""Rates that servos can be set to, the factory's first [bit/s]."""
 
 
 def examine(joints: Sequence[DriveJoint], *, slack_s: float = 0.002) -> list[Finding]:

@@ -16,11 +16,11 @@ from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.inspection import FrameRequest, PlannedFrame
 from tauscope_drivers.limits import require_sensible
 
+# a servo as delivered, at 7.4 V
 _DELIVERED = Reading(
     {"Min Position Limit": 0, "Max Position Limit": COUNTS_PER_TURN - 1, "Max Torque Limit": PERMILLE},
     {"Present Voltage": 74},
 )
-"""A servo as delivered, at 7.4 V."""
 
 
 def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:

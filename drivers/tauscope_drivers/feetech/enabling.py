@@ -13,11 +13,9 @@ from tauscope_drivers.feetech.session import Session
 from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.limits import require_sensible
 
+# a servo that is no further than this from its goal only lags behind it, or gives way to a load [rad of the horn]
 NEAR_GOAL_RAD = 0.1
-"""A servo that is no further than this from its goal only lags behind it, or gives way to a load [rad of the horn]."""
-
-FREE_ACCELERATION = 0
-"""Acceleration of a target that follows each goal at Goal Speed."""
+FREE_ACCELERATION = 0  # acceleration of a target that follows each goal at Goal Speed
 
 _LET_GO = {"Torque Enable": 0}
 _BLIND_ATTEMPTS = 3

@@ -15,8 +15,7 @@ HEADER = b"\xff\xff"
 BROADCAST_ID = 0xFE
 HIGHEST_ID = 253
 
-ANSWER_BYTES = 6
-"""Of an answer without data."""
+ANSWER_BYTES = 6  # of an answer without data
 
 LONGEST_FRAME = 259
 
@@ -26,13 +25,10 @@ _FIXED_BYTES = 4
 
 @dataclass(frozen=True)
 class Status:
-    """An answer.
-
-    `alarms`: bits of the register Status.
-    """
+    """An answer."""
 
     servo: int
-    alarms: int
+    alarms: int  # bits of the register Status
     data: bytes
 
 

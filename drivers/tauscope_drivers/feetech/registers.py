@@ -12,59 +12,39 @@ COUNTS_PER_TURN = 4096
 MIDDLE_COUNT = 2048
 COUNTS_PER_RADIAN = COUNTS_PER_TURN / (2.0 * math.pi)
 
-MODEL_NUMBER = 777
-"""Of an STS3215."""
+MODEL_NUMBER = 777  # of an STS3215
 
+# other models of the maker that answer on such a bus
 NEIGHBOURS = {521: "STS3036", 2825: "STS3250", 11272: "SM8512BL", 1284: "SCS0009"}
-"""Other models of the maker that answer on such a bus."""
-
+# models of Dynamixel protocol 1.0, whose frames are the same: model number at 0, firmware at 2, ID at 3
 _ROBOTIS = {
     **{12: "AX-12", 18: "AX-18A", 300: "AX-12W", 24: "RX-24F", 28: "RX-28", 64: "RX-64", 107: "EX-106"},
     **{29: "MX-28", 310: "MX-64", 320: "MX-106"},
 }
-"""Models of Dynamixel protocol 1.0, whose frames are the same: model number at 0, firmware at 2, ID at 3."""
-
-TORQUE_PER_VOLT = 1.91 / 7.4
-"""Stall torque of the horn per volt, from the data sheet at 7.4 V [Nm/V]."""
-
-VOLT = 0.1
-"""One unit of Present Voltage and of the voltage limits [V]."""
-
-PERMILLE = 1000
-"""Torque Limit and Present Load at full duty."""
-
-LARGEST_SPEED = 32_766
-"""Largest Goal Speed that the memory table names."""
+TORQUE_PER_VOLT = 1.91 / 7.4  # stall torque of the horn per volt, from the data sheet at 7.4 V [Nm/V]
+VOLT = 0.1  # one unit of Present Voltage and of the voltage limits [V]
+PERMILLE = 1000  # Torque Limit and Present Load at full duty
+LARGEST_SPEED = 32_766  # largest Goal Speed that the memory table names
 
 POSITION_MODE = 0
 MODE_NAMES = {0: "position", 1: "speed", 2: "open loop", 3: "steps"}
 
-FINE_SPEED = 0x04
-"""Bit of Phase: speeds are in counts/s, else in 50 counts/s."""
-
-FULL_ANGLE = 0x10
-"""Bit of Phase: Present Position counts whole turns."""
-
-PROTECTIONS = 0x24
-"""Bits of Unloading Condition: the servo lets go when it is too hot, or overloaded for too long."""
-
-PROTECTIVE = 44
-"""Unloading Condition as delivered: heat, current, overload."""
+FINE_SPEED = 0x04  # bit of Phase: speeds are in counts/s, else in 50 counts/s
+FULL_ANGLE = 0x10  # bit of Phase: Present Position counts whole turns
+PROTECTIONS = 0x24  # bits of Unloading Condition: the servo lets go when it is too hot, or overloaded for too long
+PROTECTIVE = 44  # Unloading Condition as delivered: heat, current, overload
 
 _COARSE_SPEED = 50
 
 
 @dataclass(frozen=True)
 class Register:
-    """A number in the memory table.
-
-    `sign_bit`: bit that says that the magnitude below it is negative; None for numbers without sign.
-    """
+    """A number in the memory table."""
 
     name: str
     address: int
     size: int = 1
-    sign_bit: int | None = None
+    sign_bit: int | None = None  # bit that says that the magnitude below it is negative; None for numbers without sign
 
     @property
     def end(self) -> int:
@@ -128,11 +108,8 @@ _ALL = (
     Register("Moving", 66),
 )
 
-REGISTERS = {register.name: register for register in _ALL}
-"""Registers by name."""
-
-FIRST_IN_RAM = 40
-"""What is written from here on is gone with the power; this driver writes nothing below."""
+REGISTERS = {register.name: register for register in _ALL}  # registers by name
+FIRST_IN_RAM = 40  # what is written from here on is gone with the power; this driver writes nothing below
 
 
 @dataclass(frozen=True)
@@ -152,17 +129,10 @@ class Block:
 
 
 IDENTITY = Block(0, 5)
-SETTINGS = Block(0, 40)
-"""All of the EEPROM."""
-
-TARGETS = Block(40, 16)
-"""Torque, targets and limits in RAM; longer than `FEEDBACK` with all its spare bytes."""
-
-FEEDBACK = Block(56, 8)
-"""Position, speed, load, voltage, temperature."""
-
-SPARE_BYTES = 6
-"""So many bytes may be read behind either of them."""
+SETTINGS = Block(0, 40)  # all of the EEPROM
+TARGETS = Block(40, 16)  # torque, targets and limits in RAM; longer than `FEEDBACK` with all its spare bytes
+FEEDBACK = Block(56, 8)  # position, speed, load, voltage, temperature
+SPARE_BYTES = 6  # so many bytes may be read behind either of them
 
 
 def speed_unit(phase: int) -> int:

@@ -3,30 +3,19 @@
 import math
 from dataclasses import dataclass
 
+from tauscope_drivers.feetech import registers
 from tauscope_drivers.feetech.configuration import ServoConfiguration
-from tauscope_drivers.feetech.registers import (
-    COUNTS_PER_RADIAN,
-    COUNTS_PER_TURN,
-    LARGEST_SPEED,
-    PERMILLE,
-    TORQUE_PER_VOLT,
-    VOLT,
-)
 
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class JointServo:
-    """A servo that a robot file speaks of.
+    """A servo that a robot file speaks of."""
 
-    `number`: of the joint, from 1.
-    `counts_per_speed_unit`: one unit of Present Speed and Goal Speed [counts/s].
-    """
-
-    number: int
+    number: int  # of the joint, from 1
     configuration: ServoConfiguration
-    counts_per_speed_unit: int = 1
+    counts_per_speed_unit: int = 1  # one unit of Present Speed and Goal Speed [counts/s]
 
     @property
     def servo(self) -> int:
@@ -41,7 +30,7 @@ class JointServo:
     @property
     def _counts_per_unit(self) -> float:
         """Counts for one radian (metre) of the joint, signed."""
-        return self.configuration.direction * self.configuration.reduction * COUNTS_PER_RADIAN
+        return self.configuration.direction * self.configuration.reduction * registers.COUNTS_PER_RADIAN
 
     def position(self, counts: int) -> float:
         """Joint position [rad or m]."""
@@ -59,7 +48,7 @@ class JointServo:
         ends = sorted((low * self._counts_per_unit, high * self._counts_per_unit))
         zero = self.configuration.zero_count
         lowest = 0 if ends[0] == -math.inf else max(0, math.ceil(ends[0] - _ROUNDING) + zero)
-        highest = COUNTS_PER_TURN - 1
+        highest = registers.COUNTS_PER_TURN - 1
         return lowest, highest if ends[1] == math.inf else min(highest, math.floor(ends[1] + _ROUNDING) + zero)
 
     def velocity(self, units: int) -> float:
@@ -72,7 +61,7 @@ class JointServo:
         `velocity`: positive, may be infinite [rad/s or m/s].
         """
         most = velocity * abs(self._counts_per_unit) / self.counts_per_speed_unit
-        return int(min(LARGEST_SPEED, max(1.0, most)))
+        return int(min(registers.LARGEST_SPEED, max(1.0, most)))
 
     def load(self, units: int) -> float:
         """Load, positive where the motor pushes the joint forward [‰ of full duty]."""
@@ -83,7 +72,7 @@ class JointServo:
         stated = self.configuration.torque_per_permille
         if stated is not None:
             return abs(stated)
-        return TORQUE_PER_VOLT * voltage * VOLT / PERMILLE * self.configuration.reduction
+        return registers.TORQUE_PER_VOLT * voltage * registers.VOLT / registers.PERMILLE * self.configuration.reduction
 
     def torque_limit(self, torque: float, voltage: int) -> int:
         """Torque Limit for a largest joint torque, full duty where there is no limit.
@@ -92,5 +81,5 @@ class JointServo:
         """
         unit = self.torque_per_permille(voltage)
         if torque == math.inf or unit == 0.0:
-            return PERMILLE
-        return int(min(PERMILLE, torque / unit + _ROUNDING))
+            return registers.PERMILLE
+        return int(min(registers.PERMILLE, torque / unit + _ROUNDING))

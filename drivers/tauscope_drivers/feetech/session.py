@@ -7,23 +7,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
+from tauscope_drivers.feetech import registers
 from tauscope_drivers.feetech.bus import FeetechBus
 from tauscope_drivers.feetech.configuration import ServoConfiguration
-from tauscope_drivers.feetech.registers import (
-    FEEDBACK,
-    IDENTITY,
-    SETTINGS,
-    TARGETS,
-    describe_device,
-    is_supported,
-    speed_unit,
-)
 from tauscope_drivers.feetech.servo import JointServo
-from tauscope_drivers.serial_servos.budget import RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S
-from tauscope_drivers.serial_servos.bus import PATIENCE_S, learn_latency
+from tauscope_drivers.serial_servos.bus import PATIENCE_S, RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S, learn_latency
 
-_PROBES = 3
-"""Answers by which the latency of an adapter is learnt."""
+_PROBES = 3  # answers by which the latency of an adapter is learnt
 
 _SILENCE = "no goal was sent in time; the servos hold their last one"
 _WATCHDOG = Fault("watchdog", None, _SILENCE, "make sure the host runs, then acknowledge")
@@ -107,13 +97,12 @@ class Health:
 class Session:
     """An arm's servos, reached.
 
-    `settings`: EEPROM of each servo.
     `unsure`: joints whose servo has missed an answer since its torque and limits were read: it may have restarted.
     """
 
     bus: FeetechBus
     servos: tuple[JointServo, ...]
-    settings: list[dict[str, int]]
+    settings: list[dict[str, int]]  # EEPROM of each servo
     health: Health
     unsure: set[int] = field(default_factory=set)
     turn: int = 0
@@ -126,7 +115,7 @@ class Session:
     def read_targets(self, joint: int) -> dict[str, int]:
         """Torque, targets and limits of one servo. `joint`: index of the joint, from 0."""
         with naming(self.servos[joint]):
-            alarms, values = self.bus.read(self.servos[joint].servo, TARGETS)
+            alarms, values = self.bus.read(self.servos[joint].servo, registers.TARGETS)
         self.health.take_alarms(joint, alarms)
         self.health.take_targets(joint, values)
         self.unsure.discard(joint)
@@ -135,7 +124,7 @@ class Session:
     def read_feedback(self, joint: int) -> dict[str, int]:
         """Position, speed, load, voltage and temperature of one servo. `joint`: index of the joint, from 0."""
         with naming(self.servos[joint]):
-            alarms, values = self.bus.read(self.servos[joint].servo, FEEDBACK)
+            alarms, values = self.bus.read(self.servos[joint].servo, registers.FEEDBACK)
         self.health.take_alarms(joint, alarms)
         return values
 
@@ -150,10 +139,10 @@ class Session:
         turns = [(self.turn + step) % count for step in range(count)]
         joint = next((one for one in turns if one in self.unsure), self.turn)
         self.turn = (joint + 1) % count
-        answer = self.bus.read_once(self.servos[joint].servo, TARGETS)
+        answer = self.bus.read_once(self.servos[joint].servo, registers.TARGETS)
         if answer is not None:
             self.health.take_alarms(joint, answer.alarms)
-            self.health.take_targets(joint, TARGETS.decode(answer.data))
+            self.health.take_targets(joint, registers.TARGETS.decode(answer.data))
             self.unsure.discard(joint)
 
     def follows(self, joint: int) -> bool:
@@ -180,7 +169,7 @@ def open_session(bus: FeetechBus, configurations: Sequence[ServoConfiguration]) 
     """
     found = [reach(bus, number, servo) for number, servo in enumerate(configurations, 1)]
     session = make_session(bus, found)
-    answers = [bus.sync_read(session.identifiers, FEEDBACK, PATIENCE_S) for _ in range(_PROBES)]
+    answers = [bus.sync_read(session.identifiers, registers.FEEDBACK, PATIENCE_S) for _ in range(_PROBES)]
     learn_latency(bus.port, answers)
     return session
 
@@ -208,9 +197,9 @@ def reach(bus: FeetechBus, number: int, configuration: ServoConfiguration) -> tu
             "check its power, cable, ID and baud rate"
         )
     with naming(servo):
-        identity = bus.read(servo.servo, IDENTITY)[1]
-        if not is_supported(servo.servo, identity):
-            device = describe_device(servo.servo, identity)
+        identity = bus.read(servo.servo, registers.IDENTITY)[1]
+        if not registers.is_supported(servo.servo, identity):
+            device = registers.describe_device(servo.servo, identity)
             raise DriverError.no_connection(f"is {device}; this driver knows the STS3215 alone")
-        settings = bus.read(servo.servo, SETTINGS)[1]
-    return replace(servo, counts_per_speed_unit=speed_unit(settings["Phase"])), settings
+        settings = bus.read(servo.servo, registers.SETTINGS)[1]
+    return replace(servo, counts_per_speed_unit=registers.speed_unit(settings["Phase"])), settings

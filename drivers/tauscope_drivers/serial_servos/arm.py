@@ -14,7 +14,7 @@ from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
 from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.limits import require_finite
 from tauscope_drivers.serial_port import SerialPort
-from tauscope_drivers.serial_servos.budget import BusTiming, CycleTraffic, require_rate
+from tauscope_drivers.serial_servos.bus import BusTiming, CycleTraffic, require_rate
 from tauscope_drivers.serial_servos.configuration import BusConfiguration
 from tauscope_drivers.state import ArmState, Setpoint
 

@@ -1,4 +1,4 @@
-"""What questions and answers on a serial bus have in common: whose answer may still come, and how late one is."""
+"""Buses of serial servos: how many cycles they carry, whose answer may still come, and how late one is."""
 
 import time
 from abc import ABC, abstractmethod
@@ -7,48 +7,97 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from tauscope_drivers.clock import AnswerTime, Clock, MonotonicClock
+from tauscope_drivers.errors import DriverError
 from tauscope_drivers.serial_port import BITS_PER_BYTE, SerialPort
 
-FACTORY_RETURN_DELAY_S = 500e-6
-"""Return Delay Time of a servo as delivered: 250 units [s]."""
+# share of a cycle that the bus may take; the rest is for the servos' own turnaround and for the host
+LARGEST_LOAD = 0.85
+RETURN_DELAY_UNIT_S = 2e-6  # one unit of Return Delay Time [s]
+SHORTEST_RETURN_DELAY_S = 2e-6  # of a servo whose Return Delay Time is 0 [s]
 
-ATTEMPTS = 3
-"""How often a single servo is asked outside the control loop."""
 
-PATIENCE_S = 0.02
-"""How much longer a single servo is waited for there [s]."""
+@dataclass(frozen=True)
+class CycleTraffic:
+    """What goes over the bus in one cycle."""
 
+    servos: int
+    bytes: int  # without stuffing; `answers`: packets that wait for a return delay; `reads`: that wait for the adapter
+    answers: int
+    reads: int
+    delay_remedy: str  # what to do about a long return delay
+
+
+@dataclass(frozen=True)
+class BusTiming:
+    """How fast a bus is."""
+
+    baud: float
+    return_delay_s: float  # largest Return Delay Time of the servos [s]
+    latency_s: float  # latency timer of the adapter; 0 on a plain serial line [s]
+
+
+def cycle_parts(traffic: CycleTraffic, timing: BusTiming) -> dict[str, float]:
+    """Time of one cycle by what takes it [s]."""
+    return {
+        f"the wire at {timing.baud:g} baud": traffic.bytes * BITS_PER_BYTE / timing.baud,
+        f"a Return Delay Time of {timing.return_delay_s * 1e6:.0f} µs": traffic.answers * timing.return_delay_s,
+        f"the adapter's latency timer of {timing.latency_s * 1e3:g} ms": traffic.reads * timing.latency_s,
+    }
+
+
+def largest_rate_hz(traffic: CycleTraffic, timing: BusTiming, load: float = LARGEST_LOAD) -> float:
+    """Most cycles a second [Hz]."""
+    return load / sum(cycle_parts(traffic, timing).values())
+
+
+def require_rate(rate_hz: float, traffic: CycleTraffic, timing: BusTiming) -> None:
+    """Refuse a rate that the bus does not carry, and say what limits it.
+
+    Raises DriverError ``refused``, which names the limit and the rate that is possible.
+    """
+    most = largest_rate_hz(traffic, timing)
+    if rate_hz <= most:
+        return
+    reason, remedy = largest_part(traffic, timing)
+    raise DriverError.refusal(
+        f"{rate_hz:g} Hz: {reason} and {traffic.servos} servos get {most:.0f} Hz at most; {remedy}, or ask for less"
+    )
+
+
+def largest_part(traffic: CycleTraffic, timing: BusTiming) -> tuple[str, str]:
+    """What takes most of a cycle, and what to do about it."""
+    parts = cycle_parts(traffic, timing)
+    longest = max(parts, key=parts.__getitem__)
+    remedies = "use a higher baud rate", traffic.delay_remedy, "write 1 to its latency_timer in /sys/class/tty"
+    return f"{longest} takes {parts[longest] * 1e3:.2f} ms of each cycle", remedies[list(parts).index(longest)]
+
+
+FACTORY_RETURN_DELAY_S = 500e-6  # Return Delay Time of a servo as delivered: 250 units [s]
+ATTEMPTS = 3  # how often a single servo is asked outside the control loop
+PATIENCE_S = 0.02  # how much longer a single servo is waited for there [s]
+
+# answers have come 133 ms late where a machine stood still; a control loop gives an arm up long before this
 _LATEST_ANSWER_NS = 500_000_000
-"""Answers have come 133 ms late where a machine stood still; a control loop gives an arm up long before this."""
-
-_PING_SLOT_S = 0.003
-"""Time that a ping to all leaves each ID [s]."""
+_PING_SLOT_S = 0.003  # time that a ping to all leaves each ID [s]
 
 _Status = TypeVar("_Status")
 
 
 @dataclass(frozen=True)
 class Answers(Generic[_Status]):
-    """Answers to one question to many servos.
+    """Answers to one question to many servos."""
 
-    `asked_ns`: instant at which the question had left [ns, by the bus' clock].
-    `late_ns`: how much later than usual the last answer came [ns].
-    `statuses`: by ID.
-    `beyond_ns`: how much longer than bus and adapter should take for it [ns].
-    """
-
-    asked_ns: int
-    late_ns: int
-    statuses: dict[int, _Status]
-    beyond_ns: int = 0
+    asked_ns: int  # instant at which the question had left [ns, by the bus' clock]
+    late_ns: int  # how much later than usual the last answer came [ns]
+    statuses: dict[int, _Status]  # by ID
+    beyond_ns: int = 0  # how much longer than bus and adapter should take for it [ns]
 
 
 class FrameParser(ABC):
     """Finds whole frames in what comes from a port; noise and damaged frames are passed over, and counted."""
 
     header: bytes
-    fixed_bytes: int
-    """Bytes from which a frame's end is known."""
+    fixed_bytes: int  # bytes from which a frame's end is known
 
     def __init__(self, longest: int) -> None:
         """Begin with nothing.

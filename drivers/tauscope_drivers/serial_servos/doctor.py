@@ -8,12 +8,17 @@ from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError
 from tauscope_drivers.inspection import Finding, FoundDevice, Severity, failure
 from tauscope_drivers.serial_port import SerialPort, latency_finding
-from tauscope_drivers.serial_servos.budget import BusTiming, CycleTraffic, largest_part, largest_rate_hz
-from tauscope_drivers.serial_servos.bus import Answers, SerialServoBus
+from tauscope_drivers.serial_servos.bus import (
+    Answers,
+    BusTiming,
+    CycleTraffic,
+    SerialServoBus,
+    largest_part,
+    largest_rate_hz,
+)
 from tauscope_drivers.serial_servos.configuration import BusConfiguration
 
-MEASURED_CYCLES = 50
-"""Reads of which the loop rate is measured."""
+MEASURED_CYCLES = 50  # reads of which the loop rate is measured
 
 _Servo = TypeVar("_Servo")
 _Bus = TypeVar("_Bus", bound=SerialServoBus[Any])

@@ -3,14 +3,15 @@
 Time is passed in, frames go in and come out; what moves is behind `AxisDemand` and `AxisMeasurement`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile
-from tauscope_sim.canopen_bus.object_dictionary import Abort, AbortError, ObjectDictionary, answer_request, apply_sheet
+from tauscope_sim.canopen_bus import object_dictionary
+from tauscope_sim.canopen_bus.object_dictionary import ProcessData
 from tauscope_sim.canopen_bus.power_state import PowerState, PowerStateMachine
-from tauscope_sim.canopen_bus.process_data import ProcessData
 
 
 class AxisMode(Enum):
@@ -26,43 +27,32 @@ class AxisMode(Enum):
 class AxisDemand:
     """What a drive wants of its joint until the next demand.
 
-    `position`: target where the mode is position [rad or m].
-    `torque`: target where the mode is torque [Nm or N].
-    `torque_cap`: most that it exerts; nothing where it is released [Nm or N].
     `interpolation_s`: time in which it goes from one target to the next, where the mode is position; 0 where nobody
         told it [s].
     """
 
     mode: AxisMode
-    position: float = 0.0
-    torque: float = 0.0
-    torque_cap: float = 0.0
+    position: float = 0.0  # target where the mode is position [rad or m]
+    torque: float = 0.0  # target where the mode is torque [Nm or N]
+    torque_cap: float = 0.0  # most that it exerts; nothing where it is released [Nm or N]
     interpolation_s: float = 0.0
 
 
 @dataclass(frozen=True)
 class AxisMeasurement:
-    """What a drive's sensors tell of its joint.
+    """What a drive's sensors tell of its joint."""
 
-    `position`: [rad or m].
-    `velocity`: [rad/s or m/s].
-    `torque`: [Nm or N].
-    """
-
-    position: float
-    velocity: float
-    torque: float
+    position: float  # [rad or m]
+    velocity: float  # [rad/s or m/s]
+    torque: float  # [Nm or N]
 
 
 @dataclass(frozen=True)
 class AxisScale:
-    """Counts and per mille of an emulated drive.
-
-    `rated_torque_mnm`: object 0x6076, at the motor shaft [mNm].
-    """
+    """Counts and per mille of an emulated drive."""
 
     counts_per_radian: float
-    rated_torque_mnm: int
+    rated_torque_mnm: int  # object 0x6076, at the motor shaft [mNm]
     gear_ratio: float
 
     @property
@@ -72,6 +62,7 @@ class AxisScale:
 
 
 Frame = tuple[int, bytes]
+REMOTE = 1 << 30  # flag of a remote frame's identifier, as the kernel has it
 
 INTERPOLATED_POSITION = 7
 CYCLIC_POSITION = 8
@@ -84,11 +75,7 @@ _SYNC, _NMT = 0x080, 0x000
 _PRE_OPERATIONAL, _OPERATIONAL, _STOPPED = 0x7F, 0x05, 0x04
 _NMT_COMMANDS = {0x01: _OPERATIONAL, 0x02: _STOPPED, 0x80: _PRE_OPERATIONAL}
 _NMT_RESETS = (0x81, 0x82)
-_RATED = 1000
 _QUICK_STOP_STAYS = range(5, 9)
-_ABORT_QUICK_STOP = 3
-_ABORT_DISABLE = 2
-_ABORT_FAULT = 1
 _STANDING = 1e-3
 _INTERPOLATE = 0x10
 _EXPONENTS = range(-6, 1)
@@ -110,25 +97,31 @@ class EmulatedDrive:
         self.dictionary = self._dictionary()
         self.process_data = ProcessData(self.dictionary, self.node_id)
         if self._file is not None:
-            apply_sheet(self.dictionary, self._file)
+            object_dictionary.apply_sheet(self.dictionary, self._file)
         self.power.quick_stop_stays = self.dictionary.get(0x605A) in _QUICK_STOP_STAYS
         self._nmt = _PRE_OPERATIONAL
         self._is_off_bus = False
         self._mode_taken = 0
         self._next_heartbeat_s = 0.0
         self._last_master_s: float | None = None
+        self._last_guard_s: float | None = None
+        self._toggle = 0
         self._outbox: list[Frame] = [(0x700 + self.node_id, b"\0")]
 
     def receive(self, frame: Frame, now_s: float) -> list[Frame]:
-        """Answers to a frame of the bus. `now_s`: when it came [s]."""
+        """Answers to a frame of the bus. it came [s]."""
         identifier, payload = frame
         if identifier == _NMT and len(payload) == 2 and payload[1] in (0, self.node_id):
             self._follow_network(payload[0])
         elif identifier == 0x600 + self.node_id and self._nmt != _STOPPED:
-            answer = answer_request(self.dictionary, payload)
+            answer = object_dictionary.answer_request(self.dictionary, payload)
             return [] if answer is None else [(0x580 + self.node_id, answer)]
         elif identifier == 0x700 + self._watched_node:
             self._last_master_s = now_s
+        elif identifier == REMOTE | 0x700 + self.node_id and not self.dictionary.get(0x1017):
+            self._last_guard_s = now_s
+            self._toggle ^= 0x80
+            return [(0x700 + self.node_id, bytes([self._toggle ^ 0x80 | self._nmt]))]
         elif self._nmt == _OPERATIONAL and identifier == _SYNC:
             return self.process_data.synchronise()
         elif self._nmt == _OPERATIONAL:
@@ -136,10 +129,7 @@ class EmulatedDrive:
         return []
 
     def tick(self, now_s: float) -> list[Frame]:
-        """What the drive sends by itself by an instant: boot-up, heartbeat, emergencies.
-
-        `now_s`: present instant [s].
-        """
+        """What the drive sends by itself by an instant: boot-up, heartbeat, emergencies."""
         self._watch_master(now_s)
         frames, self._outbox = self._outbox, []
         period_s = self.dictionary.get(0x1017) / 1e3
@@ -159,7 +149,10 @@ class EmulatedDrive:
             low, high = (self.dictionary.get(0x607D, end) for end in (1, 2))
             target = min(max(self._target_count, low), high)
             place = target / self.scale.counts_per_radian
-            return AxisDemand(AxisMode.POSITION, position=place, torque_cap=cap, interpolation_s=self._interpolation_s)
+            period_s = 0.0
+            if self.dictionary.has(0x60C2, 1):
+                period_s = self.dictionary.get(0x60C2, 1) * 10.0 ** self.dictionary.get(0x60C2, 2)
+            return AxisDemand(AxisMode.POSITION, position=place, torque_cap=cap, interpolation_s=period_s)
         if self._mode_taken == CYCLIC_TORQUE:
             torque = self.dictionary.get(0x6071) * self.scale.torque_per_permille
             return AxisDemand(AxisMode.TORQUE, torque=min(max(torque, -cap), cap), torque_cap=cap)
@@ -204,38 +197,34 @@ class EmulatedDrive:
         word = self.dictionary.get(0x1016, 1)
         return (word >> 16 & 0x7F) if word & 0xFFFF and word >> 16 & 0x7F else -1
 
-    @property
-    def _interpolation_s(self) -> float:
-        if not self.dictionary.has(0x60C2, 1):
-            return 0.0
-        return self.dictionary.get(0x60C2, 1) * 10.0 ** self.dictionary.get(0x60C2, 2)
-
     def _watch_master(self, now_s: float) -> None:
-        """React to a master that stays away, also to one that was never heard since the watch began."""
-        timeout_s = (self.dictionary.get(0x1016, 1) & 0xFFFF) / 1e3
-        if self._watched_node < 0:
+        """React to a master that stays away.
+
+        A heartbeat is missed also where none was ever heard since the watch began; guarding begins with a remote frame.
+        """
+        heartbeat_s = (self.dictionary.get(0x1016, 1) & 0xFFFF) / 1e3 if self._watched_node >= 0 else 0.0
+        life_s = self.dictionary.get(0x100C) * self.dictionary.get(0x100D) / 1e3
+        if not heartbeat_s:
             self._last_master_s = None
-            return
-        if self._last_master_s is None:
+        elif self._last_master_s is None:
             self._last_master_s = now_s
-        if now_s - self._last_master_s <= timeout_s:
+        if not life_s:
+            self._last_guard_s = None
+        watches = ((self._last_master_s, heartbeat_s), (self._last_guard_s, life_s))
+        if all(heard_s is None or now_s - heard_s <= limit_s for heard_s, limit_s in watches):
             return
-        self._last_master_s = now_s
+        self._last_master_s, self._last_guard_s = now_s, None
         if self.power.state is PowerState.OPERATION_ENABLED:
             self._abort_connection()
             self._report(HEARTBEAT_LOST)
         self._nmt = _PRE_OPERATIONAL
 
     def _abort_connection(self) -> None:
-        if self.power.state is not PowerState.OPERATION_ENABLED:
-            return
-        match self.dictionary.get(0x6007):
-            case value if value == _ABORT_QUICK_STOP:
-                self.power.quick_stop()
-            case value if value == _ABORT_DISABLE:
-                self.power.disable()
-            case value if value == _ABORT_FAULT:
-                self.power.fail()
+        """Do what 0x6007 says."""
+        reactions = {1: self.power.fail, 2: self.power.disable, 3: self.power.quick_stop}
+        reaction = reactions.get(self.dictionary.get(0x6007))
+        if reaction and self.power.state is PowerState.OPERATION_ENABLED:
+            reaction()
 
     def _report(self, error_code: int) -> None:
         self.dictionary.put(0x603F, error_code)
@@ -263,71 +252,82 @@ class EmulatedDrive:
     def _take_controlword(self, word: int) -> None:
         was = self.power.state
         self.power.command(word)
-        if was is PowerState.FAULT and self.power.state is not PowerState.FAULT:
-            self.dictionary.put(0x603F, 0)
-            self.dictionary.put(0x1001, 0)
-        if self.power.state is PowerState.OPERATION_ENABLED and was is not PowerState.OPERATION_ENABLED:
+        is_new = self.power.state is not was
+        if is_new and (was is PowerState.FAULT or self.power.state is PowerState.OPERATION_ENABLED):
             self.dictionary.put(0x603F, 0)
             self.dictionary.put(0x1001, 0)
         self._show_status()
 
-    def _take_consumer(self, _: int) -> None:
-        """The time of silence is counted anew from here."""
-        self._last_master_s = None
-
     def _take_mode(self, mode: int) -> None:
         known = (INTERPOLATED_POSITION, CYCLIC_POSITION, CYCLIC_TORQUE)
         if mode not in known or not self.dictionary.get(0x6502) >> (mode - 1) & 1:
-            raise AbortError(Abort.VALUE_RANGE)
+            raise object_dictionary.AbortError(object_dictionary.Abort.VALUE_RANGE)
         self._mode_taken = mode
         self.dictionary.put(0x6061, mode)
 
-    def _take_quick_stop_option(self, option: int) -> None:
-        self.power.quick_stop_stays = option in _QUICK_STOP_STAYS
-
-    def _take_interpolation(self, value: int) -> None:
-        if value == 0:
-            raise AbortError(Abort.VALUE_RANGE)
-
-    def _take_exponent(self, exponent: int) -> None:
-        if exponent not in _EXPONENTS:
-            raise AbortError(Abort.VALUE_RANGE)
-
-    def _dictionary(self) -> ObjectDictionary:
+    def _dictionary(self) -> object_dictionary.ObjectDictionary:
         """Entries at power-up; the target position is stale on purpose, as it is on a real drive after a run."""
-        dictionary = ObjectDictionary()
-        for place in self._entries():
-            dictionary.add(*place[:4], signed=place[4], writable=place[5], hook=place[6])
+        dictionary = object_dictionary.ObjectDictionary()
+        for index, subindex, size, value, signed, writable in _ENTRIES:
+            dictionary.add(index, subindex, size, value, signed=signed, writable=writable)
+        for (index, subindex), hook in self._hooks().items():
+            dictionary.entries[index, subindex].hook = hook
+        dictionary.put(0x6076, self.scale.rated_torque_mnm)
         dictionary.put(0x6041, PowerState.SWITCH_ON_DISABLED.value | 0x0200)
         return dictionary
 
-    def _entries(self) -> Iterator[tuple]:
-        """Index, subindex, bytes, value, signed, writable, hook."""
-        yield from (
-            (0x1000, 0, 4, 0x00020192, False, False, None),
-            (0x1001, 0, 1, 0, False, False, None),
-            (0x1016, 1, 4, 0, False, True, self._take_consumer),
-            (0x1017, 0, 2, 0, False, True, None),
-            (0x1018, 1, 4, 0x00000000, False, False, None),
-            (0x6007, 0, 2, 1, True, True, None),
-            (0x603F, 0, 2, 0, False, False, None),
-            (0x6040, 0, 2, 0, False, True, self._take_controlword),
-            (0x6041, 0, 2, 0, False, False, None),
-            (0x605A, 0, 2, 2, True, True, self._take_quick_stop_option),
-            (0x605E, 0, 2, 0, True, True, None),
-            (0x6060, 0, 1, 0, True, True, self._take_mode),
-            (0x6061, 0, 1, 0, True, False, None),
-            (0x6064, 0, 4, 0, True, False, None),
-            (0x606C, 0, 4, 0, True, False, None),
-            (0x6071, 0, 2, 0, True, True, None),
-            (0x6072, 0, 2, 3 * _RATED, False, True, None),
-            (0x6075, 0, 4, 1000, False, False, None),
-            (0x6076, 0, 4, self.scale.rated_torque_mnm, False, False, None),
-            (0x6077, 0, 2, 0, True, False, None),
-            (0x607A, 0, 4, 0x00100000, True, True, None),
-            (0x607D, 1, 4, -(2**31), True, True, None),
-            (0x607D, 2, 4, 2**31 - 1, True, True, None),
-            (0x60C2, 1, 1, 1, False, True, self._take_interpolation),
-            (0x60C2, 2, 1, -3, True, True, self._take_exponent),
-            (0x6502, 0, 4, 1 << (CYCLIC_POSITION - 1) | 1 << (CYCLIC_TORQUE - 1), False, False, None),
-        )
+    def _hooks(self) -> dict[tuple[int, int], object_dictionary.WriteHook]:
+        """What a master's write does."""
+
+        def count_silence_anew(_: int) -> None:
+            self._last_master_s = None
+
+        def take_option(option: int) -> None:
+            self.power.quick_stop_stays = option in _QUICK_STOP_STAYS
+
+        return {
+            (0x1016, 1): count_silence_anew,
+            (0x6040, 0): self._take_controlword,
+            (0x605A, 0): take_option,
+            (0x6060, 0): self._take_mode,
+            (0x60C2, 1): partial(_require, lambda value: value != 0),
+            (0x60C2, 2): partial(_require, lambda exponent: exponent in _EXPONENTS),
+        }
+
+
+def _require(is_taken: Callable[[int], bool], value: int) -> None:
+    if not is_taken(value):
+        raise object_dictionary.AbortError(object_dictionary.Abort.VALUE_RANGE)
+
+
+_ENTRIES = (
+    # index, subindex, bytes, value, signed, writable
+    (0x1000, 0, 4, 0x00020192, False, False),
+    (0x1001, 0, 1, 0, False, False),
+    (0x100C, 0, 2, 0, False, True),
+    (0x100D, 0, 1, 0, False, True),
+    (0x1016, 1, 4, 0, False, True),
+    (0x1017, 0, 2, 0, False, True),
+    (0x1018, 1, 4, 0x00000000, False, False),
+    (0x6007, 0, 2, 1, True, True),
+    (0x603F, 0, 2, 0, False, False),
+    (0x6040, 0, 2, 0, False, True),
+    (0x6041, 0, 2, 0, False, False),
+    (0x605A, 0, 2, 2, True, True),
+    (0x605E, 0, 2, 0, True, True),
+    (0x6060, 0, 1, 0, True, True),
+    (0x6061, 0, 1, 0, True, False),
+    (0x6064, 0, 4, 0, True, False),
+    (0x606C, 0, 4, 0, True, False),
+    (0x6071, 0, 2, 0, True, True),
+    (0x6072, 0, 2, 3000, False, True),
+    (0x6075, 0, 4, 1000, False, False),
+    (0x6076, 0, 4, 0, False, False),
+    (0x6077, 0, 2, 0, True, False),
+    (0x607A, 0, 4, 0x00100000, True, True),
+    (0x607D, 1, 4, -(2**31), True, True),
+    (0x607D, 2, 4, 2**31 - 1, True, True),
+    (0x60C2, 1, 1, 1, False, True),
+    (0x60C2, 2, 1, -3, True, True),
+    (0x6502, 0, 4, 1 << (CYCLIC_POSITION - 1) | 1 << (CYCLIC_TORQUE - 1), False, False),
+)

@@ -13,15 +13,14 @@ from tauscope_sim.scenario import Scenario
 
 Array = NDArray[np.float64]
 
-FASTEST = 1.25
-"""Of a joint's speed limit: the voltage of its motor lets it turn no faster."""
+FASTEST = 1.25  # of a joint's speed limit: the voltage of its motor lets it turn no faster
 
+# what is done by tracking a target: the master's, or the place where the joint comes to rest
 TRACKING = (AxisMode.POSITION, AxisMode.HOLDING)
-"""What is done by tracking a target: the master's, or the place where the joint comes to rest."""
 
 
+# what a drive does, and over which time it interpolates: drives that agree in both share a target
 Kind = tuple[AxisMode, float]
-"""What a drive does, and over which time it interpolates: drives that agree in both share a target."""
 
 
 class DrivenArm:
@@ -73,7 +72,7 @@ class DrivenArm:
         return self._plant.motor_motion
 
     def take_targets(self, time_s: float) -> None:
-        """Let the drives take over the targets that SYNC made valid. `time_s`: when SYNC came [s]."""
+        """Let the drives take over the targets that SYNC made valid. SYNC came [s]."""
         demands = self._demands()
         for (mode, _), (joints, target) in self._targets.items():
             if mode is AxisMode.POSITION:

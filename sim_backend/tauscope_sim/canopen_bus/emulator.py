@@ -1,17 +1,23 @@
-"""Drives, the arm that they move, the wire and the adapter: everything but the port."""
+"""Drives, the arm that they move, the wire and the adapter, and the order that starts them as a process."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-from tauscope_sim.canopen_bus.drive import EmulatedDrive
+from tauscope.robot import read_robot
+from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
+from tauscope_sim.canopen_bus.drive import AxisScale, EmulatedDrive
 from tauscope_sim.canopen_bus.driven_arm import DrivenArm
-from tauscope_sim.canopen_bus.lines import SerialLine, SocketLine, Wire
+from tauscope_sim.canopen_bus.lines import CanSocket, SerialLine, SocketLine, Wire
 from tauscope_sim.canopen_bus.power_state import PowerState
-from tauscope_sim.emulation.emulator import STEP_S, Emulator
-from tauscope_sim.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault
+from tauscope_sim.emulation.emulator import STEP_S, Emulator, EmulatorOrder, Port
+from tauscope_sim.emulation.fault_kit import AnswerFaults, FaultKind, InjectedFault
+from tauscope_sim.scenario import Scenario
+from tauscope_sim.scenario_file import read_scenario
 
-_TICKS_PER_MEASUREMENT = 10
-"""While nobody asks: a drive that has stopped has to see that it stands."""
+_TICKS_PER_MEASUREMENT = 10  # while nobody asks: a drive that has stopped has to see that it stands
 
 _SYNC = 0x080
 _OVER_TEMPERATURE, _OVERLOAD = 0x4310, 0x7121
@@ -28,14 +34,10 @@ class CanEmulator(Emulator):
         bit_rate: float,
         line: SerialLine | SocketLine,
     ) -> None:
-        """Everything at rest.
-
-        `now_s`: present instant [s]; `bit_rate`: of the bus; infinite where frames shall arrive at once [bit/s].
-        """
+        """Everything at rest. `bit_rate`: of the bus; infinite where frames shall arrive at once [bit/s]."""
         super().__init__(now_s)
         self.drives = tuple(drives)
         self.driven = driven
-        self.schedule = FaultSchedule()
         self._wire = Wire(bit_rate)
         self._line = line
         self._answers = b""
@@ -46,7 +48,7 @@ class CanEmulator(Emulator):
     @property
     def next_due_s(self) -> float:
         """When the next frame reaches the master [s]."""
-        return self.now_s if self._answers else self._wire.next_arrival_s
+        return self.now_s if self._answers else self._wire.arriving.next_s
 
     def hears(self, baud: int) -> bool:
         """Any rate: an adapter on USB takes no notice of it. `baud`: of the master's port [bit/s]."""
@@ -57,8 +59,6 @@ class CanEmulator(Emulator):
 
         Drives hear it before they catch up: it may have waited while this process slept, and its sleep is no silence of
         the master. SYNC is different: they sample when it comes, and the time of interpolation is counted from then.
-
-        `now_s`: when [s].
         """
         frames, answers = self._line.take(data)
         self._answers += answers
@@ -77,9 +77,9 @@ class CanEmulator(Emulator):
         self.advance_to(now_s)
 
     def due(self, now_s: float) -> bytes:
-        """Text that has reached the host by now. `now_s`: present instant [s]."""
+        """Text that has reached the host by now."""
         text, self._answers = self._answers, b""
-        return text + b"".join(map(self._line.text, self._wire.take_arrived(now_s)))
+        return text + b"".join(map(self._line.text, self._wire.arriving.take_due(now_s)))
 
     def describe(self) -> dict[str, Any]:
         """Where the arm is and what its drives do."""
@@ -98,8 +98,7 @@ class CanEmulator(Emulator):
 
     def inject(self, faults: list[InjectedFault]) -> None:
         """Plan faults, and carry out those that are due."""
-        self.schedule.add(faults)
-        self.schedule.run(self.now_s, self._carry_out)
+        super().inject(faults)
         for drive in self.drives:
             self._let_ail(drive)
 
@@ -117,7 +116,7 @@ class CanEmulator(Emulator):
 
     def _step(self) -> None:
         now_s = self.now_s
-        self.schedule.run(now_s, self._carry_out)
+        self._run_faults()
         self.driven.step(self._clock.tick)
         if self._clock.tick % _TICKS_PER_MEASUREMENT == 0:
             self.driven.measure()
@@ -157,7 +156,7 @@ class CanEmulator(Emulator):
                     self.driven.encoder_offset[joint] += fault.counts / drive.scale.counts_per_radian
             case _:
                 for drive in concerned:
-                    self._wire.disturb(drive.node_id, fault.kind, fault.count, fault.seconds)
+                    self._wire.faults[drive.node_id] = AnswerFaults(fault.kind, fault.count, fault.seconds)
 
     def _let_ail(self, drive: EmulatedDrive) -> None:
         """A drive goes into fault, again and again, as long as its cause persists."""
@@ -174,3 +173,50 @@ class CanEmulator(Emulator):
 
     def _drive(self, node: int) -> EmulatedDrive:
         return next(drive for drive in self.drives if drive.node_id == node)
+
+
+_SOCKET = "socketcan:"
+
+
+@dataclass(frozen=True)
+class CanOrder(EmulatorOrder):
+    """What to emulate."""
+
+    robot: str
+    start: tuple[float, ...]  # where the joints stand [rad or m]
+    port: str
+    control: str
+    rated_torque_mnm: tuple[int, ...]  # object 0x6076 of each drive, at the motor shaft [mNm]
+    scenario: str | None = None
+    torque_noise: float = 0.0  # standard deviation of what the drives measure of the torque [Nm or N]
+    bit_rate: int = 1_000_000  # of the bus [bit/s]
+    stepped: bool = False
+    trace: str | None = None
+
+    def open_port(self) -> Port:
+        """A serial adapter on a pseudo terminal, or the kernel's CAN bus."""
+        return super().open_port() if self._interface is None else CanSocket(self._interface)
+
+    def build(self, now_s: float) -> CanEmulator:
+        """The emulator."""
+        robot = read_robot(Path(self.robot))
+        scenario = Scenario() if self.scenario is None else read_scenario(Path(self.scenario), robot)
+        drives = []
+        for joint, rated in zip(robot.joints, self.rated_torque_mnm, strict=True):
+            block, ratio = joint.drive or {}, joint.gear_ratio or 1.0
+            turns = block["counts_per_turn"] * ratio * block.get("direction", 1)
+            scale = AxisScale(turns / (2.0 * math.pi), rated, abs(ratio))
+            drives.append(EmulatedDrive(block["node_id"], scale, self._file(block)))
+        driven = DrivenArm(drives, robot, scenario, self.start, STEP_S, self.torque_noise)
+        # the kernel's virtual bus and a stepped clock take their time by themselves
+        bit_rate = math.inf if self.stepped or self._interface is not None else self.bit_rate
+        line = SerialLine() if self._interface is None else SocketLine()
+        return CanEmulator(drives, driven, now_s, bit_rate, line)
+
+    def _file(self, block: Mapping[str, Any]) -> DeviceFile | None:
+        eds = block.get("eds")
+        return None if eds is None else read_device_file(Path(self.robot).parent / eds, block["node_id"])
+
+    @property
+    def _interface(self) -> str | None:
+        return self.port.removeprefix(_SOCKET) if self.port.startswith(_SOCKET) else None

@@ -2,12 +2,11 @@
 
 import binascii
 import contextlib
-import heapq
 import socket
 import struct
 
-from tauscope_sim.canopen_bus.drive import Frame
-from tauscope_sim.emulation.fault_kit import FaultKind
+from tauscope_sim.canopen_bus.drive import REMOTE, Frame
+from tauscope_sim.emulation.fault_kit import AnswerFaults, FaultKind, TimedQueue
 
 _END, _ERROR = b"\r", b"\a"
 _STANDARD, _EXTENDED, _REMOTE, _EXTENDED_REMOTE = b"t", b"T", b"r", b"R"
@@ -29,16 +28,13 @@ class SerialLine:
     def take(self, data: bytes) -> tuple[list[Frame], bytes]:
         """Frames for the bus, and what the adapter answers.
 
-        Extended and remote frames are acknowledged and go nowhere: no drive listens to them.
+        Extended frames are acknowledged and go nowhere: no drive listens to them.
         """
         *lines, self._pending = (self._pending + data).split(_END)
         if len(self._pending) > _LONGEST_LINE:
             self._pending = b""
         frames: list[Frame] = []
-        answers = b""
-        for line in lines:
-            answers += self._obey(line, frames)
-        return frames, answers
+        return frames, b"".join([self._obey(line, frames) for line in lines])
 
     def text(self, frame: Frame) -> bytes:
         """A frame of the bus as the host reads it; nothing where the channel is closed."""
@@ -64,6 +60,8 @@ class SerialLine:
                 return _ERROR
             if command == _STANDARD:
                 frames.append(frame)
+            elif command == _REMOTE:
+                frames.append((frame[0] | REMOTE, b""))
             return b"z" + _END
         return _ERROR
 
@@ -79,8 +77,7 @@ def _frame(line: bytes) -> Frame | None:
     return (identifier, payload) if sent == length <= 8 else None
 
 
-_FRAME = struct.Struct("=IB3x8s")
-"""The kernel's ``struct can_frame``: identifier with flags, length, padding, data."""
+_FRAME = struct.Struct("=IB3x8s")  # the kernel's ``struct can_frame``: identifier with flags, length, padding, data
 
 _HIGHEST_IDENTIFIER = 0x7FF
 _LONGEST = 8
@@ -124,11 +121,11 @@ class SocketLine:
     """Frames in the kernel's form; implements `Line`."""
 
     def take(self, data: bytes) -> tuple[list[Frame], bytes]:
-        """Standard data frames for the bus; others go nowhere, for no drive listens to them."""
+        """Standard frames for the bus; others go nowhere, for no drive listens to them."""
         frames = []
         for identifier, length, payload in _FRAME.iter_unpack(data):
-            if identifier <= _HIGHEST_IDENTIFIER and length <= _LONGEST:
-                frames.append((identifier, payload[:length]))
+            if identifier & ~REMOTE <= _HIGHEST_IDENTIFIER and length <= _LONGEST:
+                frames.append((identifier, b"" if identifier & REMOTE else payload[:length]))
         return frames, b""
 
     def text(self, frame: Frame) -> bytes:
@@ -137,8 +134,7 @@ class SocketLine:
         return _FRAME.pack(identifier, len(payload), payload)
 
 
-_FRAME_BITS = 47
-"""Of a standard frame without data, with the space behind it."""
+_FRAME_BITS = 47  # of a standard frame without data, with the space behind it
 
 _BITS_PER_STUFFED_BIT = 5.0
 
@@ -152,60 +148,27 @@ class Wire:
 
     def __init__(self, bit_rate: float) -> None:
         """Idle. `bit_rate`: infinite where frames arrive at once [bit/s]."""
+        self.faults: dict[int, AnswerFaults] = {}
+        self.arriving = TimedQueue[Frame]()
         self._bit_s = 1.0 / bit_rate
         self._free_s = 0.0
-        self._count = 0
-        self._arriving: list[tuple[float, int, Frame]] = []
-        self._faults: dict[int, tuple[FaultKind, int, float]] = {}
 
     def carry(self, frames: list[Frame], now_s: float) -> None:
-        """Send frames of the drives to the adapter.
-
-        `frames`: list of (int, bytes), that want to be sent now; `now_s`: present instant [s].
-        """
+        """Send frames of the drives, that want to be sent now, to the adapter."""
         for frame in sorted(frames):
-            self._free_s = max(now_s, self._free_s) + self.duration_s(frame)
-            for arrival_s in self._arrivals(frame):
-                self._count += 1
-                heapq.heappush(self._arriving, (arrival_s, self._count, frame))
+            self.occupy(frame, now_s)
+            faults = self.faults.get(frame[0] & 0x7F)
+            kind = faults.next_kind() if faults and 0x180 <= frame[0] < 0x580 else None
+            if kind is FaultKind.CORRUPT:  # an error frame, and the whole frame again
+                self._free_s += 2.0 * self.duration_s(frame)
+            for arrival_s in faults.arrivals(kind, self._free_s) if faults else [self._free_s]:
+                self.arriving.put(arrival_s, frame)
 
     def occupy(self, frame: Frame, now_s: float) -> None:
-        """Let a frame of the master take its time. `now_s`: present instant [s]."""
+        """Let a frame take its time."""
         self._free_s = max(now_s, self._free_s) + self.duration_s(frame)
-
-    def take_arrived(self, now_s: float) -> list[Frame]:
-        """Frames that have reached the adapter. `now_s`: present instant [s]."""
-        frames = []
-        while self._arriving and self._arriving[0][0] <= now_s:
-            frames.append(heapq.heappop(self._arriving)[2])
-        return frames
-
-    @property
-    def next_arrival_s(self) -> float:
-        """When the next frame reaches the adapter; infinite where none is under way [s]."""
-        return self._arriving[0][0] if self._arriving else float("inf")
-
-    def disturb(self, node_id: int, kind: FaultKind, count: int, seconds: float) -> None:
-        """Let something happen to the next process data of a node. `seconds`: how late [s]."""
-        self._faults[node_id] = (kind, count, seconds)
 
     def duration_s(self, frame: Frame) -> float:
         """Time of a frame on the wire, with as many stuffed bits as mixed data have [s]."""
         bits = _FRAME_BITS + 8 * len(frame[1])
         return (bits + bits / (4.0 * _BITS_PER_STUFFED_BIT)) * self._bit_s
-
-    def _arrivals(self, frame: Frame) -> list[float]:
-        node = frame[0] & 0x7F
-        kind, count, seconds = self._faults.get(node, (None, 0, 0.0))
-        if kind is None or count <= 0 or not 0x180 <= frame[0] < 0x580:
-            return [self._free_s]
-        self._faults[node] = (kind, count - 1, seconds)
-        match kind:
-            case FaultKind.LOSE:
-                return []
-            case FaultKind.CORRUPT:  # an error frame, and the whole frame again
-                self._free_s += 2.0 * self.duration_s(frame)
-                return [self._free_s]
-            case FaultKind.LATE:
-                return [self._free_s + seconds]
-        return [self._free_s, self._free_s]

@@ -18,8 +18,7 @@ from tauscope_sim.own_process import take_precedence
 from tauscope_sim.scenario import Scenario
 from tauscope_sim.scenario_file import read_scenario
 
-READY = "ready"
-"""Line on standard output once hosts can connect."""
+READY = "ready"  # line on standard output once hosts can connect
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -1,5 +1,6 @@
 """The simulated drives with the arm that they move: everything on the far side of the bus, in its own time."""
 
+import copy
 from collections import deque
 from dataclasses import dataclass, replace
 
@@ -10,23 +11,17 @@ from tauscope.errors import ScenarioError
 from tauscope.robot.robot import Robot
 from tauscope_drivers import ArmState, Capabilities, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
-from tauscope_sim.device.activity import COMMANDED, POWERED, Activity, commanded_by, stopped_by
-from tauscope_sim.device.drives import Drives, Motion
+from tauscope_drivers.limits import require_finite, require_sensible
+from tauscope_sim.device.drives import COMMANDED, POWERED, Activity, Drives, Motion, commanded_by, stopped_by
 from tauscope_sim.device.faults import Disturbances, FaultCode, FaultLatch, Injection, device_fault
-from tauscope_sim.device.limits import checked_limits, checked_setpoint
 from tauscope_sim.device.mechanism import Mechanism
 from tauscope_sim.scenario import Scenario
 
 Array = NDArray[np.float64]
 
-TICK_NS = 500_000
-"""Time between two ticks of the drives: 2 kHz [ns]."""
-
-HOTTEST = 85.0
-"""Temperature of a motor above which its drive reports a fault [°C]."""
-
-WATCHDOG_RANGE_S = (0.005, 10.0)
-"""Shortest and longest time of the watchdog [s]."""
+TICK_NS = 500_000  # time between two ticks of the drives: 2 kHz [ns]
+HOTTEST = 85.0  # temperature of a motor above which its drive reports a fault [°C]
+WATCHDOG_RANGE_S = (0.005, 10.0)  # shortest and longest time of the watchdog [s]
 
 _TICK_S = TICK_NS * 1e-9
 _TICKS_PER_TEMPERATURE = 64
@@ -104,10 +99,7 @@ class SimulatedDevice:
         return self._mechanism.true.link_position, self._mechanism.true.link_velocity
 
     def advance_to(self, time_ns: int) -> None:
-        """Let time pass: every tick up to and at an instant is carried out.
-
-        `time_ns`: device time; one that has passed changes nothing [ns].
-        """
+        """Carry out every tick up to and at an instant; one that has passed changes nothing."""
         last = (time_ns - self._start_ns) // TICK_NS
         while self._tick <= last:
             if self._activity is Activity.BRAKED and not self._disturbances.waiting:
@@ -144,7 +136,8 @@ class SimulatedDevice:
                 f"the watchdog's time {watchdog_s} s is not within {shortest} to {longest} s; choose another"
             )
         motion = self._motion()
-        self._drives.enable(self._activity, motion, checked_limits(limits, motion.position))
+        require_sensible(limits, motion.position, [f"joint {number + 1}" for number in range(len(motion.position))])
+        self._drives.enable(self._activity, motion, copy.deepcopy(limits))
         self._enabling = _Enabling(stop_policy, round(watchdog_s * 1e9))
         self._activity = commanded_by(mode)
         self._fed_ns = self._sample_ns
@@ -157,7 +150,8 @@ class SimulatedDevice:
         """
         if self._enabling is None:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the arm is not enabled; enable it before sending setpoints")
-        kept = checked_setpoint(setpoint, self.capabilities.joint_count)
+        require_finite(setpoint, self.capabilities.joint_count)
+        kept = copy.deepcopy(setpoint)
         if self._activity in COMMANDED:
             sent_ns = self._sample_ns if sent_ns is None else sent_ns
             # a device that makes up for lost time has not come as far as the host yet

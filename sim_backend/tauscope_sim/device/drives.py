@@ -1,17 +1,61 @@
-"""What the drives do with the joints in each activity: which torque, and where the position loop is to be."""
+"""What the drives do with the joints in each activity, and from which of it they may change to which."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.robot.robot import Robot
-from tauscope_drivers import DriveLimits, Setpoint
-from tauscope_sim.device.activity import Activity
+from tauscope_drivers import ControlMode, DriveLimits, Setpoint, StopPolicy
 from tauscope_sim.device.faults import FaultCode
 from tauscope_sim.device.servo import InertiaSchedule, Servo
 from tauscope_sim.device.target import STOP_TIME_S, Target, catching_up_acceleration
 from tauscope_sim.scenario import Scenario
+
+
+class Activity(StrEnum):
+    """What the drives do with the arm."""
+
+    BRAKED = "braked"  # never yet under power: the brakes carry the arm, which stands still
+    TRACKING = "tracking"  # following the host's positions
+    TORQUE = "torque"  # giving the torque that the host commands
+    HOLDING = "holding"  # stopped; under power where it stands
+    DAMPING = "damping"  # stopped; resisting motion in proportion to speed
+    FREE = "free"  # stopped; no torque and no brake: an arm that is not balanced falls
+
+
+# what needs the host's setpoints: here the watchdog is armed
+COMMANDED = frozenset({Activity.TRACKING, Activity.TORQUE})
+POWERED = COMMANDED | {Activity.HOLDING, Activity.DAMPING}  # where the drives hold or drive the joints
+
+# allowed changes. A stop never puts an arm under power that has none: a braked arm stays braked, a free one free.
+TRANSITIONS: dict[Activity, frozenset[Activity]] = {
+    Activity.BRAKED: COMMANDED,
+    Activity.TRACKING: frozenset({Activity.HOLDING, Activity.DAMPING, Activity.FREE}),
+    Activity.TORQUE: frozenset({Activity.HOLDING, Activity.DAMPING, Activity.FREE}),
+    Activity.HOLDING: COMMANDED | {Activity.DAMPING, Activity.FREE},
+    Activity.DAMPING: COMMANDED | {Activity.HOLDING, Activity.FREE},
+    Activity.FREE: COMMANDED,
+}
+_BY_MODE = {ControlMode.POSITION: Activity.TRACKING, ControlMode.TORQUE: Activity.TORQUE}
+_BY_POLICY = {
+    StopPolicy.HOLD: Activity.HOLDING,
+    StopPolicy.DAMP: Activity.DAMPING,
+    StopPolicy.TORQUE_OFF: Activity.FREE,
+}
+
+
+def commanded_by(mode: ControlMode) -> Activity:
+    """What enabling leads to."""
+    return _BY_MODE[mode]
+
+
+def stopped_by(activity: Activity, policy: StopPolicy) -> Activity:
+    """What a stop leads to; the activity itself where there is nothing to stop."""
+    asked = _BY_POLICY[policy]
+    return asked if asked in TRANSITIONS[activity] else activity
+
 
 Array = NDArray[np.float64]
 
@@ -20,14 +64,10 @@ _MARGIN = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What the drives' own loop sees of the motors.
+    """What the drives' own loop sees of the motors."""
 
-    `position`: (n,), in joint units, with the encoders' slip [rad or m].
-    `velocity`: (n,), likewise [rad/s or m/s].
-    """
-
-    position: Array
-    velocity: Array
+    position: Array  # (n,), in joint units, with the encoders' slip [rad or m]
+    velocity: Array  # (n,), likewise [rad/s or m/s]
 
 
 class Drives:

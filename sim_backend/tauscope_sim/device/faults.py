@@ -20,6 +20,7 @@ class FaultCode(StrEnum):
     UNSTABLE = "simulation-unstable"
 
 
+# what the user does next, by fault
 REMEDIES = {
     FaultCode.WATCHDOG: "find out why the host fell silent, then acknowledge the fault and enable again",
     FaultCode.OVER_TEMPERATURE: "let the motor cool down, then acknowledge the fault",
@@ -28,40 +29,30 @@ REMEDIES = {
     FaultCode.POSITION_LIMIT: "command torque that turns the joint back in time, then acknowledge the fault",
     FaultCode.UNSTABLE: "make the scenario less extreme; the simulated arm was put to rest",
 }
-"""What the user does next, by fault."""
 
 
 class Disturbance(StrEnum):
     """What a test can make happen to a joint."""
 
-    LOST_SAMPLE = "lost-sample"
-    """The joint does not answer: its readings are missing."""
-    OVER_TEMPERATURE = "over-temperature"
-    """The motor's temperature rises by the size [K]."""
-    OVERLOAD = "overload"
-    """The drive reports an overload."""
+    LOST_SAMPLE = "lost-sample"  # the joint does not answer: its readings are missing
+    OVER_TEMPERATURE = "over-temperature"  # the motor's temperature rises by the size [K]
+    OVERLOAD = "overload"  # the drive reports an overload
     ENCODER_JUMP = "encoder-jump"
     """The encoder slips by the size [rad or m], for the drive's own loop too, and stays so."""
 
 
 @dataclass(frozen=True)
 class Injection:
-    """One disturbance, for tests of what stands above the device.
-
-    `joint`: joint number, counted from 1.
-    `start_ns`: device time at which it begins; one that has passed means now [ns].
-    `duration_ns`: how long it lasts; None for ever [ns].
-    `size`: rise of the temperature or slip of the encoder [K; rad or m].
-    """
+    """One disturbance, for tests of what stands above the device."""
 
     kind: Disturbance
-    joint: int
-    start_ns: int = 0
-    duration_ns: int | None = None
-    size: float = 0.0
+    joint: int  # joint number, counted from 1
+    start_ns: int = 0  # device time at which it begins; one that has passed means now [ns]
+    duration_ns: int | None = None  # how long it lasts; None for ever [ns]
+    size: float = 0.0  # rise of the temperature or slip of the encoder [K; rad or m]
 
     def active_at(self, time_ns: int) -> bool:
-        """Whether it acts at an instant. `time_ns`: device time [ns]."""
+        """Whether it acts at an instant."""
         return self.start_ns <= time_ns and (self.duration_ns is None or time_ns < self.start_ns + self.duration_ns)
 
 
@@ -98,16 +89,12 @@ class Disturbances:
     """What acts now."""
 
     def __init__(self, joint_count: int) -> None:
-        self.slip: Array = np.zeros(joint_count)
-        """slip of the encoders so far [rad or m]"""
-        self.heat: Array = np.zeros(joint_count)
-        """rise of the motors' temperature [K]"""
-        self.lost: NDArray[np.bool_] = np.zeros(joint_count, dtype=np.bool_)
-        """joints that do not answer"""
+        self.slip: Array = np.zeros(joint_count)  # slip of the encoders so far [rad or m]
+        self.heat: Array = np.zeros(joint_count)  # rise of the motors' temperature [K]
+        self.lost: NDArray[np.bool_] = np.zeros(joint_count, dtype=np.bool_)  # joints that do not answer
         self.overloaded: NDArray[np.bool_] = np.zeros(joint_count, dtype=np.bool_)
         """joints whose drive reports an overload"""
-        self.any = False
-        """whether anything was ever injected"""
+        self.any = False  # whether anything was ever injected
         self._injections: list[Injection] = []
 
     @property
@@ -121,7 +108,7 @@ class Disturbances:
         self._injections.append(injection)
 
     def update(self, time_ns: int) -> None:
-        """Renew what acts at an instant. `time_ns`: device time [ns]."""
+        """Renew what acts at an instant."""
         if not self._injections:
             return
         for values in (self.heat, self.lost, self.overloaded):

@@ -17,8 +17,7 @@ LEAST_SHARE = 1e-3
 next to no inertia is no place to begin at."""
 
 POSTURES = 200
-REACH = 1.0
-"""Postures are looked for within so much of zero [rad or m]."""
+REACH = 1.0  # postures are looked for within so much of zero [rad or m]
 
 
 def resting_posture(robot: Robot) -> Array:
@@ -42,24 +41,18 @@ def _inertia(bodies: RigidBodies, posture: Array) -> Array:
     return bodies.mass_matrix().diagonal().copy()
 
 
+# bandwidth of the drives' velocity estimate: turns the encoder's error into that of the velocity [rad/s]
 VELOCITY_BANDWIDTH = 2.0 * np.pi * 20.0
-"""Bandwidth of the drives' velocity estimate: turns the encoder's error into that of the velocity [rad/s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """The true state that one reading is taken from.
+    """The true state that one reading is taken from."""
 
-    `time_s`: instant, by the plant's clock [s].
-    `position`: (n,), of the motors, in joint units [rad or m].
-    `velocity`: (n,), likewise [rad/s or m/s].
-    `torque`: (n,), of the motors on the joint's side [Nm or N].
-    """
-
-    time_s: float
-    position: Array
-    velocity: Array
-    torque: Array
+    time_s: float  # by the plant's clock [s]
+    position: Array  # (n,), of the motors, in joint units [rad or m]
+    velocity: Array  # (n,), likewise [rad/s or m/s]
+    torque: Array  # (n,), of the motors on the joint's side [Nm or N]
 
 
 class Readings:
@@ -109,8 +102,7 @@ class Mechanism:
         self._tick_s = tick_s
         self._zero = np.zeros(robot.joint_count)
         self._torque = self._zero
-        self.true = self._plant.state
-        """where the arm really is"""
+        self.true = self._plant.state  # where the arm really is
         self.rest(0)
 
     def reading(self) -> tuple[Array, Array, Array]:

@@ -1,7 +1,6 @@
 """What the bodies of frames hold: numbers of every cycle in binary, everything rare as JSON."""
 
 import json
-import math
 import struct
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -16,11 +15,8 @@ from tauscope_drivers import ArmState, ControlMode, DriveLimits, DriverError, Fa
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device.faults import Disturbance, Injection
 
-PROTOCOL = 1
-"""Version that host and device have to agree on."""
-
-LARGEST_BODY = 65536
-"""Longest body that is accepted [B]."""
+PROTOCOL = 1  # version that host and device have to agree on
+LARGEST_BODY = 65536  # longest body that is accepted [B]
 
 _HEADER = struct.Struct("<BxxxII")
 
@@ -82,16 +78,11 @@ class FrameBuffer:
             end = _HEADER.size + length
             if len(self._bytes) < end:
                 break
-            frames.append(Frame(_find_kind(kind), sequence, bytes(self._bytes[_HEADER.size : end])))
+            if kind not in iter(FrameKind):
+                raise BrokenFrameError(f"a frame of the unknown kind {kind}")
+            frames.append(Frame(FrameKind(kind), sequence, bytes(self._bytes[_HEADER.size : end])))
             del self._bytes[:end]
         return frames
-
-
-def _find_kind(kind: int) -> FrameKind:
-    try:
-        return FrameKind(kind)
-    except ValueError as error:
-        raise BrokenFrameError(f"a frame of the unknown kind {kind}") from error
 
 
 Array = NDArray[np.float64]
@@ -106,8 +97,8 @@ class BadMessageError(ValueError):
 
 
 def encode_document(document: Mapping[str, Any]) -> bytes:
-    """Plain data as JSON."""
-    return json.dumps(document, allow_nan=False).encode()
+    """Plain data as JSON, with Python's words for infinity and not-a-number."""
+    return json.dumps(document).encode()
 
 
 def decode_document(body: bytes) -> dict[str, Any]:
@@ -141,7 +132,7 @@ def decode_setpoint(body: bytes, joint_count: int) -> tuple[int, Setpoint]:
 def encode_state(state: ArmState) -> bytes:
     """Time, position, velocity, effort, temperature, enabled, and the faults as JSON where there are any."""
     numbers = np.concatenate([state.position, state.velocity, state.effort, state.temperature]).astype("<f8")
-    faults = json.dumps([_fault_document(fault) for fault in state.faults]).encode() if state.faults else b""
+    faults = json.dumps([vars(fault) for fault in state.faults]).encode() if state.faults else b""
     head = _STATE_HEAD.pack(state.time_ns, len(state.position))
     return b"".join((head, numbers.tobytes(), state.enabled.tobytes(), faults))
 
@@ -160,7 +151,7 @@ def decode_state(body: bytes) -> ArmState:
 
 def encode_error(error: DriverError) -> bytes:
     """A refusal."""
-    faults = [_fault_document(fault) for fault in error.faults]
+    faults = [vars(fault) for fault in error.faults]
     return encode_document({"kind": error.kind.value, "message": str(error), "faults": faults})
 
 
@@ -173,12 +164,12 @@ def decode_error(body: bytes) -> DriverError:
 
 
 def encode_enable(mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> bytes:
-    """A request to enable; infinite limits go as text. `watchdog_s`: time of the watchdog [s]."""
+    """A request to enable; `watchdog_s`: time of the watchdog [s]."""
     document = {
         "mode": mode.value,
         "stop_policy": stop_policy.value,
-        "watchdog_s": _number_out(watchdog_s),
-        "limits": {name: [_number_out(x) for x in np.ravel(getattr(limits, name))] for name in _LIMIT_FIELDS},
+        "watchdog_s": watchdog_s,
+        "limits": {name: np.ravel(getattr(limits, name)).tolist() for name in _LIMIT_FIELDS},
     }
     return encode_document(document)
 
@@ -187,11 +178,9 @@ def decode_enable(body: bytes) -> tuple[ControlMode, DriveLimits, StopPolicy, fl
     """The arguments of `encode_enable`. Raises BadMessageError where a field is missing or of the wrong kind."""
     document = decode_document(body)
     with _expecting("a request to enable"):
-        limits = DriveLimits(
-            **{name: np.array([_number_in(x) for x in document["limits"][name]]) for name in _LIMIT_FIELDS}
-        )
+        limits = DriveLimits(*(np.array(document["limits"][name], dtype=np.float64) for name in _LIMIT_FIELDS))
         mode, policy = ControlMode(document["mode"]), StopPolicy(document["stop_policy"])
-        return mode, limits, policy, _number_in(document["watchdog_s"])
+        return mode, limits, policy, float(document["watchdog_s"])
 
 
 def encode_stop(policy: StopPolicy) -> bytes:
@@ -236,30 +225,8 @@ def _expecting(what: str) -> Iterator[None]:
         raise BadMessageError(f"the body is not {what}") from error
 
 
-def _number_out(value: float) -> float | str:
-    """JSON knows no infinity and no not-a-number: they go as text."""
-    return float(value) if math.isfinite(value) else str(float(value))
-
-
-def _number_in(value: Any) -> float:
-    if isinstance(value, str) and value in ("inf", "-inf", "nan"):
-        return float(value)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TypeError(value)
-    return float(value)
-
-
-def _fault_document(fault: Fault) -> dict[str, Any]:
-    return {"code": fault.code, "joint": fault.joint, "detail": fault.detail, "remedy": fault.remedy}
-
-
 def _faults(documents: Any) -> tuple[Fault, ...]:
     return tuple(
-        Fault(
-            str(one["code"]),
-            None if one["joint"] is None else int(one["joint"]),
-            str(one["detail"]),
-            str(one["remedy"]),
-        )
+        Fault(str(one["code"]), one["joint"] and int(one["joint"]), str(one["detail"]), str(one["remedy"]))
         for one in documents
     )

@@ -9,24 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tauscope_drivers import DriverError
-from tauscope_sim.device.activity import Activity
+from tauscope_sim.device import messages
 from tauscope_sim.device.device import SimulatedDevice
-from tauscope_sim.device.messages import (
-    PROTOCOL,
-    BadMessageError,
-    BrokenFrameError,
-    Frame,
-    FrameBuffer,
-    FrameKind,
-    decode_document,
-    decode_enable,
-    decode_injection,
-    decode_setpoint,
-    decode_stop,
-    encode_document,
-    encode_error,
-    encode_state,
-)
+from tauscope_sim.device.drives import Activity
 
 _INTERVAL_NS = 4_000_000
 _INTERVAL_AT_REST_NS = 500_000_000
@@ -69,44 +54,34 @@ class TraceWriter:
         os.write(self._file, (line + "\n").encode())
 
 
-PASS_NS = 2_000_000
-"""The drives are carried forward at least this often [ns]."""
-
-PASS_AT_REST_NS = 20_000_000
-"""Likewise while the arm is braked [ns]."""
-
-LATE_NS = 6_000_000
-"""Being later than this counts as an overrun [ns]."""
-
-OLDEST_NS = 100_000_000
-"""A setpoint that claims to have been sent longer ago counts as sent this long ago [ns]."""
+PASS_NS = 2_000_000  # the drives are carried forward at least this often [ns]
+PASS_AT_REST_NS = 20_000_000  # likewise while the arm is braked [ns]
+LATE_NS = 6_000_000  # being later than this counts as an overrun [ns]
+OLDEST_NS = 100_000_000  # a setpoint that claims to have been sent longer ago counts as sent this long ago [ns]
 
 _PEER = struct.Struct("3i")
 
 
 @dataclass
 class Punctuality:
-    """How well the device kept to the machine's clock.
-
-    `largest_lag_ns`: the latest of them [ns].
-    """
+    """How well the device kept to the machine's clock."""
 
     overruns: int = 0
-    largest_lag_ns: int = 0
+    largest_lag_ns: int = 0  # the latest of them [ns]
 
 
 class _Host:
     def __init__(self, connection: socket.socket) -> None:
         connection.setblocking(False)
         self.connection = connection
-        self.buffer = FrameBuffer()
+        self.buffer = messages.FrameBuffer()
         self.process = peer_process(connection)
 
-    def send(self, frame: Frame) -> None:
+    def send(self, frame: messages.Frame) -> None:
         """Send a reply whole, or give the connection up: a host that reads nothing must not block the device."""
         data = frame.encode()
         if self.connection.send(data) != len(data):
-            raise BrokenFrameError("the host does not read its replies")
+            raise messages.BrokenFrameError("the host does not read its replies")
 
 
 class DeviceServer:
@@ -183,10 +158,10 @@ class DeviceServer:
         try:
             for frame in host.buffer.feed(data):
                 host.send(self._answer(frame))
-                if frame.kind is FrameKind.GOODBYE:
+                if frame.kind is messages.FrameKind.GOODBYE:
                     self._drop_host("the host's connection ended")
                     return
-        except (BrokenFrameError, OSError) as error:
+        except (messages.BrokenFrameError, OSError) as error:
             self._drop_host(f"the host's connection broke: {error}")
 
     def _accept(self) -> None:
@@ -205,7 +180,7 @@ class DeviceServer:
         with connection:
             connection.setblocking(False)
             try:
-                connection.send(Frame(FrameKind.ERROR, 0, encode_error(held)).encode())
+                connection.send(messages.Frame(messages.FrameKind.ERROR, 0, messages.encode_error(held)).encode())
             except OSError:
                 return
 
@@ -218,56 +193,56 @@ class DeviceServer:
         self._device.lose_host(reason)
         self._trace.note()
 
-    def _answer(self, frame: Frame) -> Frame:
+    def _answer(self, frame: messages.Frame) -> messages.Frame:
         """Carry out a request; whatever is wrong with it goes back as an error."""
         try:
             kind, body = self._carry_out(frame.kind, frame.body)
         except DriverError as error:
-            kind, body = FrameKind.ERROR, encode_error(error)
-        except BadMessageError as error:
+            kind, body = messages.FrameKind.ERROR, messages.encode_error(error)
+        except messages.BadMessageError as error:
             refusal = DriverError.refusal(f"the device does not understand the request: {error}")
-            kind, body = FrameKind.ERROR, encode_error(refusal)
-        return Frame(kind, frame.sequence, body)
+            kind, body = messages.FrameKind.ERROR, messages.encode_error(refusal)
+        return messages.Frame(kind, frame.sequence, body)
 
-    def _carry_out(self, kind: FrameKind, body: bytes) -> tuple[FrameKind, bytes]:
+    def _carry_out(self, kind: messages.FrameKind, body: bytes) -> tuple[messages.FrameKind, bytes]:
         """Carry out a request; returns the kind and the body of the reply."""
         device = self._device
-        if kind is FrameKind.HELLO:
-            return FrameKind.WELCOME, self._welcome(body)
-        if kind is FrameKind.STATUS:
-            return FrameKind.REPORT, self._report()
-        if kind is FrameKind.EXCHANGE:
-            sent_ns, setpoint = decode_setpoint(body, device.capabilities.joint_count)
+        if kind is messages.FrameKind.HELLO:
+            return messages.FrameKind.WELCOME, self._welcome(body)
+        if kind is messages.FrameKind.STATUS:
+            return messages.FrameKind.REPORT, self._report()
+        if kind is messages.FrameKind.EXCHANGE:
+            sent_ns, setpoint = messages.decode_setpoint(body, device.capabilities.joint_count)
             now_ns = time.monotonic_ns()
             device.command(setpoint, min(max(sent_ns, device.time_ns, now_ns - OLDEST_NS), now_ns))
-        elif kind is FrameKind.ENABLE:
-            device.enable(*decode_enable(body))
-        elif kind is FrameKind.STOP:
-            device.stop(decode_stop(body))
-        elif kind is FrameKind.ACKNOWLEDGE:
+        elif kind is messages.FrameKind.ENABLE:
+            device.enable(*messages.decode_enable(body))
+        elif kind is messages.FrameKind.STOP:
+            device.stop(messages.decode_stop(body))
+        elif kind is messages.FrameKind.ACKNOWLEDGE:
             device.acknowledge_faults()
-        elif kind is FrameKind.INJECT:
-            device.inject(decode_injection(body))
-        elif kind is FrameKind.PUT_BACK:
+        elif kind is messages.FrameKind.INJECT:
+            device.inject(messages.decode_injection(body))
+        elif kind is messages.FrameKind.PUT_BACK:
             device.put_back()
-        elif kind is FrameKind.GOODBYE:
+        elif kind is messages.FrameKind.GOODBYE:
             device.stop()
-        elif kind is FrameKind.SHUT_DOWN:
+        elif kind is messages.FrameKind.SHUT_DOWN:
             device.stop()
             self.finish()
-        elif kind is not FrameKind.READ:
-            raise BadMessageError(f"{kind.name} is no request")
-        return FrameKind.STATE, encode_state(device.read())
+        elif kind is not messages.FrameKind.READ:
+            raise messages.BadMessageError(f"{kind.name} is no request")
+        return messages.FrameKind.STATE, messages.encode_state(device.read())
 
     def _welcome(self, body: bytes) -> bytes:
-        if (asked := decode_document(body).get("protocol")) != PROTOCOL:
+        if (asked := messages.decode_document(body).get("protocol")) != messages.PROTOCOL:
             raise DriverError.no_connection(
-                f"the device speaks version {PROTOCOL} of its protocol, not {asked!r}; use one Tauscope for both"
+                f"the device speaks version {messages.PROTOCOL}, not {asked!r}; use one Tauscope for both"
             )
-        return encode_document({"joint_count": self._device.capabilities.joint_count, "process": os.getpid()})
+        return messages.encode_document({"joint_count": self._device.capabilities.joint_count, "process": os.getpid()})
 
     def _report(self) -> bytes:
-        return encode_document(
+        return messages.encode_document(
             {
                 "activity": self._device.activity.value,
                 "time_ns": self._device.time_ns,

@@ -24,11 +24,9 @@ from tauscope_sim.plant.term import PhysicalEffect
 
 Array = NDArray[np.float64]
 
+# the damping of a drive with a compliant transmission is tuned to at most this many times its rotor's inertia
 LARGEST_EXCESS = 4.0
-"""The damping of a drive with a compliant transmission is tuned to at most this many times its rotor's inertia."""
-
-STIFFNESS_EXCESS = 5.0
-"""Its stiffness may be tuned to so many times more."""
+STIFFNESS_EXCESS = 5.0  # its stiffness may be tuned to so many times more
 
 
 class InertiaSchedule:
@@ -47,8 +45,7 @@ class InertiaSchedule:
         for effect in effects:
             if (transmission := effect.transmission()) is not None:
                 self._largest[transmission.joint - 1] = LARGEST_EXCESS * transmission.rotor_inertia
-        self.compliant = np.isfinite(self._largest)
-        """joints with a compliant transmission, (n,)"""
+        self.compliant = np.isfinite(self._largest)  # joints with a compliant transmission, (n,)
         self._rigid = not self.compliant.any()
 
     def at(self, position: Array) -> tuple[Array, Array, Array]:
@@ -69,14 +66,9 @@ class InertiaSchedule:
         return matrix * np.multiply.outer(scale, scale)
 
 
-BANDWIDTH = 80.0
-"""ω of the position loop [rad/s]."""
-
-DAMPING = 200.0
-"""Deceleration a unit of speed when damping [1/s]."""
-
-YIELD = 0.4
-"""Error at which the stiffness k alone gives the full torque [rad or m]."""
+BANDWIDTH = 80.0  # ω of the position loop [rad/s]
+DAMPING = 200.0  # deceleration a unit of speed when damping [1/s]
+YIELD = 0.4  # error at which the stiffness k alone gives the full torque [rad or m]
 
 _PROPORTIONAL = 3.0 * BANDWIDTH**2
 _DERIVATIVE = 3.0 * BANDWIDTH

@@ -24,11 +24,10 @@ _MEMORY = 200
 _INTERVALS = 15
 _CHANGE_OF_PACE = 0.1
 _FIRST_PERIOD = 4.0
-_TOLD = 20
-"""A grid whose period was told begins as one that rests on so many arrivals."""
+_TOLD = 20  # a grid whose period was told begins as one that rests on so many arrivals
 
+# after so many arrivals in a row that are off the grid on the same side, it is the grid that is wrong
 _OFF_THE_GRID = 15
-"""After so many arrivals in a row that are off the grid on the same side, it is the grid that is wrong."""
 
 
 class SetpointSpline:
@@ -167,14 +166,11 @@ class SetpointSpline:
             self._period = max(1.0, self._period + 6.0 / (n * (n + 1)) * late / max(cycles, 1))
 
 
+# a hold brings every joint to rest in this time, all at once and so on the path that the arm is on [s]
 STOP_TIME_S = 0.1
-"""A hold brings every joint to rest in this time, all at once and so on the path that the arm is on [s]."""
-
+# with which a target catches up with setpoints that leapt, where the robot file states no limit [rad/s² or m/s²]
 DEFAULT_ACCELERATION = 20.0
-"""With which a target catches up with setpoints that leapt, where the robot file states no limit [rad/s² or m/s²]."""
-
-ROOM = 2.0
-"""Multiple of the robot file's acceleration that setpoints may have without counting as a leap."""
+ROOM = 2.0  # multiple of the robot file's acceleration that setpoints may have without counting as a leap
 
 _ROUNDING = 1e-9
 _LEAP = 0.02

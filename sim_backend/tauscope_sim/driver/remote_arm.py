@@ -1,14 +1,22 @@
-"""The simulated arm in real time: a host's connection to the device process."""
+"""The simulated arm in real time: its process, which outlives whoever started it, and a host's connection to it."""
 
 import contextlib
+import json
 import os
+import selectors
 import socket
+import subprocess
+import sys
 import time
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
 from typing import Any
 
 import numpy as np
 
+from tauscope.robot import Robot, robot_to_dict
 from tauscope_drivers import (
     ArmState,
     Capabilities,
@@ -21,28 +29,105 @@ from tauscope_drivers import (
     StopPolicy,
 )
 from tauscope_drivers.errors import DriverErrorKind
+from tauscope_drivers.limits import require_finite
+from tauscope_sim.device import messages
 from tauscope_sim.device.device import WATCHDOG_RANGE_S
 from tauscope_sim.device.faults import Injection
-from tauscope_sim.device.limits import checked_setpoint
-from tauscope_sim.device.messages import (
-    PROTOCOL,
-    BadMessageError,
-    BrokenFrameError,
-    Frame,
-    FrameBuffer,
-    FrameKind,
-    decode_document,
-    decode_error,
-    decode_state,
-    encode_document,
-    encode_enable,
-    encode_injection,
-    encode_setpoint,
-    encode_stop,
-)
+from tauscope_sim.own_process import process_environment
 
-LARGEST_RATE_HZ = 1000.0
-"""Cycles a second that a connection carries with some time to spare [Hz]."""
+START_TIMEOUT_S = 60.0  # time within which the process has to be ready [s]
+
+_LONGEST_SOCKET_PATH = 107
+
+
+@dataclass(frozen=True, eq=False)
+class DeviceProcess:
+    """A running device process."""
+
+    process: "subprocess.Popen[bytes]"
+    socket: Path
+    trace: Path
+
+    def __enter__(self) -> "DeviceProcess":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.end()
+
+    def end(self) -> None:
+        """Ask the process to end and wait for it; one that does not is killed."""
+        self.process.terminate()
+        try:
+            self.process.wait(timeout=10.0)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+
+def start_device(
+    robot: Robot | Path,
+    folder: Path,
+    *,
+    scenario: Path | None = None,
+    start_position: Sequence[float] | None = None,
+    linger_s: float = 60.0,
+) -> DeviceProcess:
+    """Start a simulated arm in real time, in a session of its own: signals to the caller's group do not reach it.
+
+    Raises DriverError ``cannot-connect`` where the process did not start, with its own message.
+    `start_position`: where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m];
+    `linger_s`: how long the process goes on without a host [s].
+    """
+    socket, trace, log = folder / "device.sock", folder / "device.csv", folder / "device.log"
+    if len(os.fsencode(socket)) > _LONGEST_SOCKET_PATH:
+        raise DriverError.no_connection(
+            f"{socket}: longer than a socket's path can be; choose a folder with a shorter path"
+        )
+    command = [sys.executable, "-m", "tauscope_sim.device", "--linger", str(linger_s)]
+    command += ["--robot", str(_robot_file(robot, folder)), "--socket", str(socket), "--trace", str(trace)]
+    if scenario is not None:
+        command += ["--scenario", str(scenario)]
+    if start_position is not None:
+        command += ["--start-position", json.dumps([float(number) for number in start_position])]
+    with log.open("wb") as messages:
+        process = subprocess.Popen(  # noqa: S603 (our own module with our own arguments)
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=messages,
+            env=process_environment(),
+            start_new_session=True,
+        )
+    device = DeviceProcess(process, socket, trace)
+    _await_ready(device, log)
+    return device
+
+
+def _robot_file(robot: Robot | Path, folder: Path) -> Path:
+    if isinstance(robot, Path):
+        return robot
+    file = folder / "device-robot.json"
+    file.write_text(json.dumps(robot_to_dict(robot)), encoding="utf-8")
+    return file
+
+
+def _await_ready(device: DeviceProcess, log: Path) -> None:
+    word = b""
+    if (output := device.process.stdout) is not None:
+        with output, selectors.DefaultSelector() as selector:
+            selector.register(output, selectors.EVENT_READ)
+            word = output.readline() if selector.select(START_TIMEOUT_S) else b""
+    if word:
+        return
+    device.end()
+    lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    reason = lines[-1].removeprefix("error: ") if lines else f"not ready within {START_TIMEOUT_S:.0f} s"
+    raise DriverError.no_connection(f"the simulated arm's process did not start: {reason}")
+
+
+LARGEST_RATE_HZ = 1000.0  # cycles a second that a connection carries with some time to spare [Hz]
 
 _PATIENCE_S = 2.0
 
@@ -60,7 +145,7 @@ class RemoteSimulatedArm:
         self._path, self._count, self._reply_timeout_s = path, joint_count, reply_timeout_s
         self._clock = MonotonicClock()
         self._socket: socket.socket | None = None
-        self._buffer = FrameBuffer()
+        self._buffer = messages.FrameBuffer()
         self._sequence = 0
         self._enabled = np.zeros(joint_count, dtype=np.bool_)
 
@@ -98,23 +183,23 @@ class RemoteSimulatedArm:
             raise DriverError.no_connection(
                 f"{self._path}: no simulated arm answers there ({error.strerror}); start it"
             ) from error
-        self._socket, self._buffer = connection, FrameBuffer()
+        self._socket, self._buffer = connection, messages.FrameBuffer()
         try:
-            hello = encode_document({"protocol": PROTOCOL, "process": os.getpid()})
-            welcome = decode_document(self._request(FrameKind.HELLO, hello).body)
+            hello = messages.encode_document({"protocol": messages.PROTOCOL, "process": os.getpid()})
+            welcome = messages.decode_document(self._request(messages.FrameKind.HELLO, hello).body)
             if welcome.get("joint_count") != self._count:
                 raise DriverError.no_connection(
                     f"{self._path}: the simulated arm has {welcome.get('joint_count')} joints, the robot file "
                     f"{self._count}; start the device with this robot file"
                 )
-            return self._state_after(FrameKind.READ)
-        except (DriverError, BadMessageError) as error:
+            return self._state_after(messages.FrameKind.READ)
+        except (DriverError, messages.BadMessageError) as error:
             self._close()
             raise DriverError.no_connection(str(error)) from error
 
     def acknowledge_faults(self) -> ArmState:
         """Clear the latched faults; see `drivers.Backend`."""
-        return self._state_after(FrameKind.ACKNOWLEDGE)
+        return self._state_after(messages.FrameKind.ACKNOWLEDGE)
 
     def enable(
         self,
@@ -129,13 +214,16 @@ class RemoteSimulatedArm:
         `watchdog_s`: time without `exchange` after which it does [s].
         """
         del cycle_s
-        return self._state_after(FrameKind.ENABLE, encode_enable(mode, limits, stop_policy, watchdog_s))
+        return self._state_after(
+            messages.FrameKind.ENABLE, messages.encode_enable(mode, limits, stop_policy, watchdog_s)
+        )
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
         """Write the setpoints, read the arm; see `drivers.Backend`."""
-        body = encode_setpoint(self._clock.now_ns(), checked_setpoint(setpoint, self._count))
+        require_finite(setpoint, self._count)
+        body = messages.encode_setpoint(self._clock.now_ns(), setpoint)
         try:
-            reply = self._request(FrameKind.EXCHANGE, body, self._reply_timeout_s)
+            reply = self._request(messages.FrameKind.EXCHANGE, body, self._reply_timeout_s)
         except TimeoutError:
             return self._miss()
         return self._state_of(reply)
@@ -145,44 +233,48 @@ class RemoteSimulatedArm:
 
         Raises DriverError: ``lost`` where the device does not confirm.
         """
-        return self._miss() if self._socket is None else self._state_after(FrameKind.STOP, encode_stop(policy))
+        return (
+            self._miss()
+            if self._socket is None
+            else self._state_after(messages.FrameKind.STOP, messages.encode_stop(policy))
+        )
 
     def disconnect(self) -> None:
         """Let go of the device, which stops an arm that is still enabled by its own policy."""
         if self._socket is None:
             return
         with contextlib.suppress(DriverError):
-            self._state_after(FrameKind.GOODBYE)
+            self._state_after(messages.FrameKind.GOODBYE)
         self._close()
 
     def status(self) -> dict[str, Any]:
         """What the device says of itself: ``activity``, ``time_ns``, ``overruns``, ``largest_lag_ns``."""
-        return decode_document(self._patiently(FrameKind.STATUS).body)
+        return messages.decode_document(self._patiently(messages.FrameKind.STATUS).body)
 
     def inject(self, injection: Injection) -> ArmState:
         """Make a disturbance happen, for a test."""
-        return self._state_after(FrameKind.INJECT, encode_injection(injection))
+        return self._state_after(messages.FrameKind.INJECT, messages.encode_injection(injection))
 
     def put_back(self) -> ArmState:
         """Have the arm carried back to where it began; see `tauscope_sim.device.SimulatedDevice.put_back`."""
-        return self._state_after(FrameKind.PUT_BACK)
+        return self._state_after(messages.FrameKind.PUT_BACK)
 
     def shut_down_device(self) -> None:
         """Ask the device process to stop the arm and end."""
-        self._patiently(FrameKind.SHUT_DOWN)
+        self._patiently(messages.FrameKind.SHUT_DOWN)
         self._close()
 
-    def _state_after(self, kind: FrameKind, body: bytes = b"") -> ArmState:
+    def _state_after(self, kind: messages.FrameKind, body: bytes = b"") -> ArmState:
         return self._state_of(self._patiently(kind, body))
 
-    def _patiently(self, kind: FrameKind, body: bytes = b"") -> Frame:
+    def _patiently(self, kind: messages.FrameKind, body: bytes = b"") -> messages.Frame:
         """Send a request outside the cycle; the device is lost if it takes longer than it ever should."""
         try:
             return self._request(kind, body)
         except TimeoutError as error:
             raise self._lose(f"no reply within {_PATIENCE_S:g} s") from error
 
-    def _request(self, kind: FrameKind, body: bytes, timeout_s: float = _PATIENCE_S) -> Frame:
+    def _request(self, kind: messages.FrameKind, body: bytes, timeout_s: float = _PATIENCE_S) -> messages.Frame:
         """Send a request and wait for its reply; raises TimeoutError, and what the device refuses."""
         connection = self._require_connection()
         self._sequence = (self._sequence + 1) % 2**32
@@ -191,14 +283,14 @@ class RemoteSimulatedArm:
             connection.settimeout(timeout_s)
             # A device that another host has says so and hangs up before it hears anything: its words can still be read.
             with contextlib.suppress(BrokenPipeError):
-                connection.sendall(Frame(kind, self._sequence, body).encode())
+                connection.sendall(messages.Frame(kind, self._sequence, body).encode())
             reply = self._await_reply(connection, deadline)
         except TimeoutError:
             raise
-        except (OSError, BrokenFrameError) as error:
+        except (OSError, messages.BrokenFrameError) as error:
             raise self._lose(str(error)) from error
-        if reply.kind is FrameKind.ERROR:
-            raise decode_error(reply.body)
+        if reply.kind is messages.FrameKind.ERROR:
+            raise messages.decode_error(reply.body)
         return reply
 
     def _require_connection(self) -> socket.socket:
@@ -206,7 +298,7 @@ class RemoteSimulatedArm:
             raise DriverError(DriverErrorKind.NOT_CONNECTED, "the arm is not connected; connect it first")
         return self._socket
 
-    def _await_reply(self, connection: socket.socket, deadline: float) -> Frame:
+    def _await_reply(self, connection: socket.socket, deadline: float) -> messages.Frame:
         """The reply to the last request; replies to those before it came too late and are passed over."""
         while (remaining := deadline - time.monotonic()) > 0.0:
             connection.settimeout(remaining)
@@ -214,15 +306,15 @@ class RemoteSimulatedArm:
             if not data:
                 raise ConnectionResetError("the device closed the connection")
             for frame in self._buffer.feed(data):
-                refused_at_the_door = frame.sequence == 0 and frame.kind is FrameKind.ERROR
+                refused_at_the_door = frame.sequence == 0 and frame.kind is messages.FrameKind.ERROR
                 if frame.sequence == self._sequence or refused_at_the_door:
                     return frame
         raise TimeoutError
 
-    def _state_of(self, reply: Frame) -> ArmState:
+    def _state_of(self, reply: messages.Frame) -> ArmState:
         try:
-            state = decode_state(reply.body)
-        except BadMessageError as error:
+            state = messages.decode_state(reply.body)
+        except messages.BadMessageError as error:
             raise self._lose(str(error)) from error
         self._enabled = state.enabled
         return state

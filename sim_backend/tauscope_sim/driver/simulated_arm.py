@@ -27,10 +27,7 @@ class VirtualClock:
         return self._now_ns
 
     def wait_until_ns(self, deadline_ns: int) -> int:
-        """Let the device live up to a deadline, and return there; at once where it has passed.
-
-        `deadline_ns`: absolute instant [ns].
-        """
+        """Let the device live up to a deadline, and return there; at once where it has passed."""
         if deadline_ns > self._now_ns:
             self._now_ns = deadline_ns
             self._advance(deadline_ns)

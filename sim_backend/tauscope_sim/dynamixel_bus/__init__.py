@@ -2,8 +2,7 @@
 
 from tauscope_sim.dynamixel_bus.bus import EmulatedBus
 from tauscope_sim.dynamixel_bus.control_memory import ServoSpecification
-from tauscope_sim.dynamixel_bus.emulator import DynamixelEmulator
-from tauscope_sim.dynamixel_bus.order import DynamixelOrder
+from tauscope_sim.dynamixel_bus.emulator import DynamixelEmulator, DynamixelOrder
 from tauscope_sim.dynamixel_bus.servo import EmulatedServo
 
 __all__ = ["DynamixelEmulator", "DynamixelOrder", "EmulatedBus", "EmulatedServo", "ServoSpecification"]

@@ -9,8 +9,7 @@ from tauscope_sim.dynamixel_bus.servo import Demand
 
 Array = NDArray[np.float64]
 
-BANDWIDTH_HZ = 8.0
-"""Of the pendulums' position loops [Hz]."""
+BANDWIDTH_HZ = 8.0  # of the pendulums' position loops [Hz]
 
 
 class Pendulums:
@@ -58,10 +57,7 @@ class Pendulums:
         return torque
 
     def advance(self, torque: Array, duration_s: float) -> None:
-        """Move on under a constant torque, by the semi-implicit Euler method.
-
-        `torque`: (n,) [Nm]; `duration_s`: for how long [s].
-        """
+        """Move on under a constant torque, by the semi-implicit Euler method. `torque`: (n,) [Nm]."""
         load = self._damping * self._velocity + self._weight * np.sin(self._position)
         self._velocity += duration_s * (torque - load) / self._inertia
         self._position += duration_s * self._velocity

@@ -2,46 +2,105 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
+
+from dynamixel_sdk import Protocol2PacketHandler
 
 from tauscope_sim.dynamixel_bus.control_memory import WriteRefusedError
-from tauscope_sim.dynamixel_bus.framing import (
-    BROADCAST_ID,
-    Instruction,
-    InstructionParser,
-    fast_status_frame,
-    status_frame,
-)
 from tauscope_sim.dynamixel_bus.servo import EmulatedServo
-from tauscope_sim.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault
+from tauscope_sim.emulation.fault_kit import AnswerFaults, FaultKind, InjectedFault
+
+BROADCAST_ID = 0xFE
+_HEADER = b"\xff\xff\xfd\x00"
+_STATUS = 0x55
+_LONGEST = 1024
+_library = Protocol2PacketHandler()
 
 
-@dataclass
-class AnswerFaults:
-    """What is to happen to the next answers of one servo.
+@dataclass(frozen=True)
+class Instruction:
+    """What a master asks."""
 
-    `kind`: None for nothing.
+    servo: int
+    code: int
+    parameters: bytes
+    length: int  # of the frame on the wire [bytes]
+
+
+def status_frame(servo: int, error: int, data: bytes) -> bytes:
+    """A status packet with stuffing and checksum."""
+    length = len(data) + 4
+    packet = [*_HEADER, servo, length & 0xFF, length >> 8, _STATUS, error, *data, 0, 0]
+    packet = _library.addStuffing(packet)
+    crc = _library.updateCRC(0, packet, len(packet) - 2)
+    return bytes(packet[:-2]) + crc.to_bytes(2, "little")
+
+
+def fast_status_frame(answers: list[tuple[int, int, bytes]], servos: int, length: int) -> bytes:
+    """The common packet of a Fast Sync Read, cut off after the last answer; it is never stuffed.
+
+    `length`: data of each [bytes].
     """
-
-    kind: FaultKind | None = None
-    count: int = 0
-    seconds: float = 0.0
-
-    def apply(self, frame: bytes, due_s: float) -> list[tuple[float, bytes]]:
-        """An answer as it arrives: not at all, once or twice. `due_s`: when it would arrive [s]."""
-        if self.kind is None or self.count <= 0:
-            return [(due_s, frame)]
-        self.count -= 1
-        if self.kind is FaultKind.LOSE:
-            return []
-        if self.kind is FaultKind.CORRUPT:
-            return [(due_s, frame[:-3] + bytes([frame[-3] ^ 0x10]) + frame[-2:])]
-        if self.kind is FaultKind.LATE:
-            return [(due_s + self.seconds, frame)]
-        return [(due_s, frame), (due_s, frame)]
+    total = 1 + servos * (length + 4)
+    frame = bytearray([*_HEADER, BROADCAST_ID, total & 0xFF, total >> 8, _STATUS])
+    for servo, error, data in answers:
+        frame += bytes([error, servo]) + data
+        frame += _library.updateCRC(0, frame, len(frame)).to_bytes(2, "little")
+    return bytes(frame)
 
 
-Delivery = tuple[float, bytes]
-"""When bytes arrive at the master [s], and which."""
+class InstructionParser:
+    """Finds instructions in what a master sends; answers of other servos are passed over."""
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+
+    def feed(self, received: bytes) -> list[Instruction]:
+        """Instructions that are complete now."""
+        self._buffer += received
+        found: list[Instruction] = []
+        while True:
+            start = self._buffer.find(_HEADER)
+            if start < 0:
+                del self._buffer[: max(0, len(self._buffer) - 3)]
+                return found
+            del self._buffer[:start]
+            if len(self._buffer) < 7:
+                return found
+            length = int.from_bytes(self._buffer[5:7], "little")
+            end = 7 + length
+            if length < 3 or end > _LONGEST:
+                del self._buffer[0]
+            elif len(self._buffer) < end:
+                return found
+            elif _library.updateCRC(0, self._buffer, end - 2) != int.from_bytes(self._buffer[end - 2 : end], "little"):
+                del self._buffer[0]
+            else:
+                frame = list(self._buffer[:end])
+                del self._buffer[:end]
+                if frame[7] != _STATUS:
+                    found.append(_instruction(frame))
+
+
+def _instruction(frame: list[int]) -> Instruction:
+    body = _remove_stuffing(frame[7:-2])
+    return Instruction(frame[4], body[0], bytes(body[1:]), len(frame))
+
+
+def _remove_stuffing(stuffed: list[int]) -> list[int]:
+    """Byte by byte: FD after FF FF FD is left out."""
+    plain: list[int] = []
+    skipped = False
+    for byte in stuffed:
+        skipped = byte == 0xFD and not skipped and plain[-3:] == [0xFF, 0xFF, 0xFD]
+        if not skipped:
+            plain.append(byte)
+    return plain
+
+
+Delivery = tuple[float, bytes]  # when bytes arrive at the master [s], and which
+
+Part = tuple[EmulatedServo, int, bytes]  # a servo, and the error and the data of its answer
 
 PING, READ, WRITE, REG_WRITE, ACTION, REBOOT, CLEAR = 0x01, 0x02, 0x03, 0x04, 0x05, 0x08, 0x10
 SYNC_READ, SYNC_WRITE, FAST_SYNC_READ, BULK_READ, BULK_WRITE, FAST_BULK_READ = 0x82, 0x83, 0x8A, 0x92, 0x93, 0x9A
@@ -55,7 +114,6 @@ class EmulatedBus:
 
     def __init__(self, servos: Sequence[EmulatedServo], *, fast_sync_read: bool = True, paced: bool = True) -> None:
         self.servos = {servo.servo: servo for servo in servos}
-        self.schedule = FaultSchedule()
         self._fast = fast_sync_read
         self._paced = paced
         self._parser = InstructionParser()
@@ -79,10 +137,7 @@ class EmulatedBus:
             self._handlers |= {FAST_SYNC_READ: self._fast_sync_read}
 
     def hear(self, data: bytes, now_s: float) -> list[Instruction]:
-        """Instructions in the bytes of a master; every servo that is there hears them, which contents its watchdog.
-
-        `now_s`: when [s].
-        """
+        """Instructions in the bytes of a master; every servo that is there hears them, which contents its watchdog."""
         instructions = self._parser.feed(data)
         if instructions:
             for servo in self._present(now_s):
@@ -90,7 +145,7 @@ class EmulatedBus:
         return instructions
 
     def answer(self, instructions: Iterable[Instruction], now_s: float) -> list[Delivery]:
-        """Carry instructions out and answer them. `now_s`: present instant [s]."""
+        """Carry instructions out and answer them."""
         deliveries: list[Delivery] = []
         for instruction in instructions:
             end_s = max(now_s, self._free_s) + self._wire_s(instruction.length)
@@ -102,11 +157,8 @@ class EmulatedBus:
     def _obey(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         return self._handlers.get(instruction.code, self._refuse)(instruction, end_s)
 
-    def run_faults(self, now_s: float) -> None:
-        """Let the faults happen that are due. `now_s`: present instant [s]."""
-        self.schedule.run(now_s, lambda fault: self._carry_out(fault, now_s))
-
-    def _carry_out(self, fault: InjectedFault, now_s: float) -> None:
+    def carry_out(self, fault: InjectedFault, now_s: float) -> None:
+        """Let a fault happen now."""
         if fault.kind is FaultKind.POWER_DIP:
             for servo in self.servos:
                 self._restart(servo, now_s + fault.seconds)
@@ -150,7 +202,7 @@ class EmulatedBus:
         due = after_s + servo.return_delay_s + self._wire_s(len(frame))
         return self._answer_faults[servo.servo].apply(frame, due)
 
-    def _answers(self, parts: list[tuple[EmulatedServo, int, bytes]], after_s: float) -> list[Delivery]:
+    def _answers(self, parts: list[Part], after_s: float) -> list[Delivery]:
         deliveries: list[Delivery] = []
         for servo, error, data in parts:
             deliveries += self._answer(servo, error, data, after_s)
@@ -169,7 +221,7 @@ class EmulatedBus:
         ]
         return self._answers([self._value(servo, *_words(instruction.parameters)) for servo in servos], end_s)
 
-    def _value(self, servo: EmulatedServo, address: int, length: int) -> tuple[EmulatedServo, int, bytes]:
+    def _value(self, servo: EmulatedServo, address: int, length: int) -> Part:
         try:
             return servo, 0, servo.memory.read(address, length)
         except WriteRefusedError as refusal:
@@ -177,48 +229,41 @@ class EmulatedBus:
 
     def _write(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         address, data = int.from_bytes(instruction.parameters[:2], "little"), instruction.parameters[2:]
-        deliveries: list[Delivery] = []
         for servo in self._followers(instruction.servo, end_s):
             if servo.servo != instruction.servo:
-                self._write_quietly(servo, address, data)
+                _attempt(partial(servo.write, address, data))
+        deliveries: list[Delivery] = []
         for servo in self._find_addressed(instruction, end_s):
-            level, error = servo.memory.get("Status Return Level"), 0
-            try:
-                (servo.write if instruction.code == WRITE else servo.register)(address, data)
-            except WriteRefusedError as refusal:
-                error = refusal.error
+            level = servo.memory.get("Status Return Level")
+            write = servo.write if instruction.code == WRITE else servo.register
+            error = _attempt(partial(write, address, data))
             if instruction.servo != BROADCAST_ID and level == 2:
                 deliveries += self._answer(servo, error, b"", end_s)
         return deliveries
 
     def _act(self, instruction: Instruction, end_s: float) -> list[Delivery]:
-        return self._try(instruction, end_s, EmulatedServo.act)
+        servos = self._find_addressed(instruction, end_s)
+        return self._confirm(instruction, [(servo, _attempt(servo.act), b"") for servo in servos], end_s)
 
     def _clear(self, instruction: Instruction, end_s: float) -> list[Delivery]:
-        return self._try(instruction, end_s, lambda servo: servo.clear(instruction.parameters))
+        clear, servos = EmulatedServo.clear, self._find_addressed(instruction, end_s)
+        errors = [_attempt(partial(clear, servo, instruction.parameters)) for servo in servos]
+        return self._confirm(instruction, [(one, error, b"") for one, error in zip(servos, errors, strict=True)], end_s)
 
-    def _try(self, instruction: Instruction, end_s: float, attempt: Callable[[EmulatedServo], None]) -> list[Delivery]:
-        parts: list[tuple[EmulatedServo, int, bytes]] = []
-        for servo in self._find_addressed(instruction, end_s):
-            error = 0
-            try:
-                attempt(servo)
-            except WriteRefusedError as refusal:
-                error = refusal.error
-            parts.append((servo, error, b""))
+    def _confirm(self, instruction: Instruction, parts: list[Part], end_s: float) -> list[Delivery]:
+        """Answers to an instruction; none to one that concerns all."""
         return [] if instruction.servo == BROADCAST_ID else self._answers(parts, end_s)
 
     def _reboot(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         servos = self._find_addressed(instruction, end_s)
-        heard = [] if instruction.servo == BROADCAST_ID else servos
-        answers = self._answers([(servo, 0, b"") for servo in heard], end_s)
+        answers = self._confirm(instruction, [(servo, 0, b"") for servo in servos], end_s)
         for servo in servos:
             self._restart(servo.servo, end_s + _REBOOT_S)
         return answers
 
     def _refuse(self, instruction: Instruction, end_s: float) -> list[Delivery]:
-        servos = [] if instruction.servo == BROADCAST_ID else self._find_addressed(instruction, end_s)
-        return self._answers([(servo, _UNKNOWN_INSTRUCTION, b"") for servo in servos], end_s)
+        servos = self._find_addressed(instruction, end_s)
+        return self._confirm(instruction, [(servo, _UNKNOWN_INSTRUCTION, b"") for servo in servos], end_s)
 
     def _sync_read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         address, length = _words(instruction.parameters)
@@ -250,12 +295,12 @@ class EmulatedBus:
         data = instruction.parameters[4:]
         for start in range(0, len(data) - length, 1 + length):
             for servo in self._followers(data[start], end_s):
-                self._write_quietly(servo, address, data[start + 1 : start + 1 + length])
+                _attempt(partial(servo.write, address, data[start + 1 : start + 1 + length]))
         return []
 
     def _bulk_read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         data = instruction.parameters
-        parts: list[tuple[EmulatedServo, int, bytes]] = []
+        parts: list[Part] = []
         for start in range(0, len(data) - 4, 5):
             for servo in self._find_present(data[start : start + 1], end_s):
                 parts.append(self._value(servo, *_words(data[start + 1 : start + 5])))
@@ -267,7 +312,7 @@ class EmulatedBus:
         while start + 5 <= len(data):
             address, length = _words(data[start + 1 : start + 5])
             for servo in self._followers(data[start], end_s):
-                self._write_quietly(servo, address, data[start + 5 : start + 5 + length])
+                _attempt(partial(servo.write, address, data[start + 5 : start + 5 + length]))
             start += 5 + length
         return []
 
@@ -275,11 +320,14 @@ class EmulatedBus:
         """Servos that carry out what is written to an ID: its own, and those whose Secondary ID it is."""
         return [servo for servo in self._present(now_s) if number in (servo.servo, servo.secondary)]
 
-    def _write_quietly(self, servo: EmulatedServo, address: int, data: bytes) -> None:
-        try:
-            servo.write(address, data)
-        except WriteRefusedError:
-            return
+
+def _attempt(act: Callable[[], None]) -> int:
+    """Error of what a servo was asked to do; 0 where it did."""
+    try:
+        act()
+    except WriteRefusedError as refusal:
+        return refusal.error
+    return 0
 
 
 def _words(data: bytes) -> tuple[int, int]:

@@ -8,25 +8,17 @@ from dynamixel_easy_sdk import ControlTable
 
 @dataclass(frozen=True)
 class ModelFigures:
-    """What distinguishes one model of servo from another.
-
-    `velocity_unit`: one unit of Present Velocity [rad/s].
-    `milliampere`: one unit of Present Current [mA].
-    `current_limit`: largest Goal Current [units].
-    `velocity_limit`: [units].
-    `pwm_limit`: [units].
-    `goal_current_caps_position`: whether Goal Current is the cap of mode 3 (P, Y); in mode 5 it always is.
-    """
+    """What distinguishes one model of servo from another."""
 
     counts_per_turn: int
     zero_count: int
-    velocity_unit: float
-    milliampere: float
-    current_limit: int
-    velocity_limit: int
-    pwm_limit: int
+    velocity_unit: float  # one unit of Present Velocity [rad/s]
+    milliampere: float  # one unit of Present Current [mA]
+    current_limit: int  # largest Goal Current [units]
+    velocity_limit: int  # [units]
+    pwm_limit: int  # [units]
     modes: tuple[int, ...]
-    goal_current_caps_position: bool
+    goal_current_caps_position: bool  # whether Goal Current is the cap of mode 3 (P, Y); in mode 5 it always is
     eeprom: tuple[tuple[int, int], ...]
     gear_ratio: int = 1
 
@@ -37,6 +29,7 @@ _P = ModelFigures(1_003_846, 0, 0.0010471976, 1.0, 22_740, 2_900, 2_009, (0, 1, 
 _Y_EEPROM = ((0, 8), (10, 15), (32, 152), (256, 512))
 _Y = ModelFigures(524_288, 0, 0.0010471976, 10.0, 2_080, 2_020, 1_000, (0, 1, 3), True, _Y_EEPROM, 99)
 
+# XM430-W350, XM540-W270, XL430-W250 (senses no current), XL330-M288, PH54-200-S500 and YM070-210-R099
 MODELS: dict[int, ModelFigures] = {
     1020: _X,
     1120: replace(_X, current_limit=2047, velocity_limit=128),
@@ -45,27 +38,20 @@ MODELS: dict[int, ModelFigures] = {
     2020: _P,
     4030: _Y,
 }
-"""XM430-W350, XM540-W270, XL430-W250 (senses no current), XL330-M288, PH54-200-S500 and YM070-210-R099."""
 
 
 @dataclass(frozen=True)
 class ServoSpecification:
-    """One emulated servo and the joint that it moves.
-
-    `baud`: [bit/s].
-    `torque_per_milliampere`: at the joint [Nm/mA or N/mA].
-    `reduction`: turns of the horn per turn of the joint.
-    `current_noise_ma`: standard deviation of what Present Current reads while there is torque [mA].
-    """
+    """One emulated servo and the joint that it moves."""
 
     servo: int
     model_number: int = 1020
     firmware: int = 52
-    baud: int = 1_000_000
-    torque_per_milliampere: float = 0.01
+    baud: int = 1_000_000  # [bit/s]
+    torque_per_milliampere: float = 0.01  # at the joint [Nm/mA or N/mA]
     direction: int = 1
-    reduction: float = 1.0
-    current_noise_ma: float = 1.0
+    reduction: float = 1.0  # turns of the horn per turn of the joint
+    current_noise_ma: float = 1.0  # standard deviation of what Present Current reads while there is torque [mA]
     registers: dict[str, int] = field(default_factory=dict)
 
     @property

@@ -1,21 +1,23 @@
-"""Servos, the arm that they move, and a clock: everything of the emulator but its pseudo terminal."""
+"""Servos, the arm that they move and a clock, and the orders that start them as a process."""
 
-import heapq
-from typing import TYPE_CHECKING, Any
+from abc import abstractmethod
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauscope_sim.dynamixel_bus.arm import Pendulums
 from tauscope_sim.dynamixel_bus.bus import EmulatedBus
+from tauscope_sim.dynamixel_bus.control_memory import ServoSpecification
 from tauscope_sim.dynamixel_bus.servo import EmulatedServo
-from tauscope_sim.emulation.emulator import ALL_STEPS, STEP_S, Emulator
-from tauscope_sim.emulation.fault_kit import InjectedFault
+from tauscope_sim.emulation.emulator import ALL_STEPS, STEP_S, Emulator, EmulatorOrder
+from tauscope_sim.emulation.fault_kit import InjectedFault, TimedQueue
 
 if TYPE_CHECKING:
-    from tauscope_sim.dynamixel_bus.arm import Pendulums
     from tauscope_sim.dynamixel_bus.plant_arm import PlantArm
 
-Array = NDArray[np.float64]
+_Servo = TypeVar("_Servo")
 
 
 class DynamixelEmulator(Emulator):
@@ -24,7 +26,7 @@ class DynamixelEmulator(Emulator):
     def __init__(self, bus: EmulatedBus, arm: "Pendulums | PlantArm", now_s: float, *, latency_s: float = 0.0) -> None:
         """Everything at rest. The arm stands on a stand until all its servos have had torque once.
 
-        `now_s`: present instant [s]; `latency_s`: how much later than over the wire an answer reaches the master: the
+        `latency_s`: how much later than over the wire an answer reaches the master: the
         latency of an adapter [s].
         """
         super().__init__(now_s)
@@ -35,8 +37,7 @@ class DynamixelEmulator(Emulator):
         self._servos = list(bus.servos.values())
         self._bauds = {servo.specification.baud for servo in self._servos}
         self._latency_s = latency_s
-        self._outgoing: list[tuple[float, int, bytes]] = []
-        self._count = 0
+        self._outgoing = TimedQueue[bytes]()
         self._look()
 
     @property
@@ -53,28 +54,22 @@ class DynamixelEmulator(Emulator):
 
         They are heard before the device catches up with the clock: they may have waited while this process slept, and
         its sleep is no silence of the master.
-
-        `now_s`: when [s].
         """
         instructions = self.bus.hear(data, now_s)
         self._clock.catch_up(now_s, self._step, ALL_STEPS)
         for servo in self._servos:
             servo.sense(self.now_s, min(1.0, max(0.0, now_s - self.now_s) / STEP_S))
         for due_s, frame in self.bus.answer(instructions, now_s):
-            self._count += 1
-            heapq.heappush(self._outgoing, (due_s + self._latency_s, self._count, frame))
+            self._outgoing.put(due_s + self._latency_s, frame)
 
     def due(self, now_s: float) -> bytes:
-        """Bytes that have reached the master by now. `now_s`: present instant [s]."""
-        arrived = b""
-        while self._outgoing and self._outgoing[0][0] <= now_s:
-            arrived += heapq.heappop(self._outgoing)[2]
-        return arrived
+        """Bytes that have reached the master by now."""
+        return b"".join(self._outgoing.take_due(now_s))
 
     @property
     def next_due_s(self) -> float:
         """When the next bytes reach the master; infinite where none are under way [s]."""
-        return self._outgoing[0][0] if self._outgoing else float("inf")
+        return self._outgoing.next_s
 
     def describe(self) -> dict[str, Any]:
         """Where the arm is and what its servos do."""
@@ -93,11 +88,6 @@ class DynamixelEmulator(Emulator):
             "lost": self._clock.lost_s,
         }
 
-    def inject(self, faults: list[InjectedFault]) -> None:
-        """Plan faults, and carry out those that are due."""
-        self.bus.schedule.add(faults)
-        self.bus.run_faults(self.now_s)
-
     def get(self, device: int, place: str) -> int:
         """Value of an item."""
         return self.bus.servos[device].memory.get(place)
@@ -111,7 +101,7 @@ class DynamixelEmulator(Emulator):
         self.stands_on_stand = is_there
 
     def _step(self) -> None:
-        self.bus.run_faults(self.now_s)
+        self._run_faults()
         position, _ = self.arm.motion
         demands = [
             servo.demand(float(place), self.now_s, STEP_S) for servo, place in zip(self._servos, position, strict=True)
@@ -123,7 +113,70 @@ class DynamixelEmulator(Emulator):
             self.arm.advance(self.torque, STEP_S)
         self._look()
 
+    def _carry_out(self, fault: InjectedFault) -> None:
+        self.bus.carry_out(fault, self.now_s)
+
     def _look(self) -> None:
         position, velocity = self.arm.motion
         for servo, *seen in zip(self._servos, position, velocity, self.torque, strict=True):
             servo.take_motion(*map(float, seen))
+
+
+@dataclass(frozen=True)
+class ServoOrder(EmulatorOrder, Generic[_Servo]):
+    """An arm of servos, whoever made them."""
+
+    specification: ClassVar[type]
+
+    servos: tuple[_Servo, ...]
+    start: tuple[float, ...]  # where the joints stand [rad or m]
+    port: str
+    control: str
+    robot: str | None = None
+    scenario: str | None = None
+    weight: float = 0.5  # m g l of the pendulums that they move where there is no robot file [Nm]
+    paced: bool = True
+    latency_s: float = 0.0  # latency of the adapter [s]
+    stepped: bool = False
+    trace: str | None = None
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """The order in a text."""
+        order: Any = super().from_json(text)
+        return replace(order, servos=tuple(cls.specification(**servo) for servo in order.servos))
+
+    @abstractmethod
+    def make_bus(self) -> EmulatedBus:
+        """The servos on their bus."""
+
+    def build(self, now_s: float) -> DynamixelEmulator:
+        """The emulator."""
+        return DynamixelEmulator(self.make_bus(), self._arm(), now_s, latency_s=self.latency_s)
+
+    def _arm(self) -> "Pendulums | PlantArm":
+        if self.robot is None:
+            return Pendulums(self.start, weight=self.weight)
+        # The physics take seconds to import; a test of the bus alone does without.
+        from tauscope.robot import read_robot
+        from tauscope_sim.dynamixel_bus.plant_arm import PlantArm
+        from tauscope_sim.scenario import Scenario
+        from tauscope_sim.scenario_file import read_scenario
+
+        robot = read_robot(Path(self.robot))
+        scenario = Scenario() if self.scenario is None else read_scenario(Path(self.scenario), robot)
+        return PlantArm(robot, scenario, self.start)
+
+
+@dataclass(frozen=True)
+class DynamixelOrder(ServoOrder[ServoSpecification]):
+    """Dynamixel servos."""
+
+    specification: ClassVar[type] = ServoSpecification
+
+    fast_sync_read: bool = True
+
+    def make_bus(self) -> EmulatedBus:
+        """Servos with measurements of their own noise."""
+        servos = [EmulatedServo(servo, seed=joint) for joint, servo in enumerate(self.servos)]
+        return EmulatedBus(servos, fast_sync_read=self.fast_sync_read, paced=self.paced and not self.stepped)

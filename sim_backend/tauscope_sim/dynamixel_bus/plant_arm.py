@@ -12,8 +12,7 @@ from tauscope_sim.scenario import Scenario
 
 Array = NDArray[np.float64]
 
-BANDWIDTH = 40.0
-"""ω of the position loops [rad/s]."""
+BANDWIDTH = 40.0  # ω of the position loops [rad/s]
 
 _TICKS_PER_INERTIA = 4
 
@@ -61,7 +60,7 @@ class PlantArm:
         return self._own_inertia * (BANDWIDTH**2 * error - 2.0 * BANDWIDTH * self._velocity) + self._load
 
     def advance(self, torque: Array, duration_s: float) -> None:
-        """Move on under a constant torque. `torque`: (n,) [Nm or N]; `duration_s`: for how long [s]."""
+        """Move on under a constant torque. `torque`: (n,) [Nm or N]."""
         self._plant.advance(torque, duration_s)
         self._look()
 

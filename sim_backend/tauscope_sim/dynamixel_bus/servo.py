@@ -25,23 +25,16 @@ CURRENT_MODE, POSITION_MODE, EXTENDED_MODE, CURRENT_BASED_MODE = 0, 3, 4, 5
 
 @dataclass(frozen=True)
 class Demand:
-    """What a servo wants of its joint until its loop runs again.
-
-    `position`: target [rad or m].
-    `speed`: of the target [rad/s or m/s].
-    `torque`: where it does not track [Nm or N].
-    `cap`: most that it exerts [Nm or N].
-    """
+    """What a servo wants of its joint until its loop runs again."""
 
     tracks: bool
-    position: float = 0.0
-    speed: float = 0.0
-    torque: float = 0.0
-    cap: float = 0.0
+    position: float = 0.0  # target [rad or m]
+    speed: float = 0.0  # of the target [rad/s or m/s]
+    torque: float = 0.0  # where it does not track [Nm or N]
+    cap: float = 0.0  # most that it exerts [Nm or N]
 
 
-RELEASED = Demand(tracks=False)
-"""No torque."""
+RELEASED = Demand(tracks=False)  # no torque
 
 
 class ServoLoop:
@@ -120,8 +113,8 @@ _Y_WATCHDOG_CODE = 18
 _Y_LASTING = (7, 9, 10, 11, 12, 13, 14, 15)
 _ERROR_TO_CLEAR = bytes.fromhex("02 45 52 43 4C")
 _TICKS = 32_768
+# measurements are means of as many periods of the servo's loop: goals that come in steps make current ripple
 _FILTERED_STEPS = 5
-"""Measurements are means of as many periods of the servo's loop: goals that come in steps make current ripple."""
 
 
 class EmulatedServo:
@@ -182,7 +175,7 @@ class EmulatedServo:
         return self.memory.get("Return Delay Time") * 2e-6
 
     def hear(self, now_s: float) -> None:
-        """An instruction went over the bus: the watchdog begins anew. `now_s`: when [s]."""
+        """An instruction went over the bus: the watchdog begins anew."""
         self._heard_s = now_s
 
     def write(self, address: int, data: bytes) -> None:
@@ -253,7 +246,7 @@ class EmulatedServo:
     def demand(self, position: float, now_s: float, duration_s: float) -> Demand:
         """What the servo wants of its joint for the next stretch of time.
 
-        `position`: of the joint [rad or m]; `now_s`: present instant [s]; `duration_s`: since the last call [s].
+        `position`: of the joint [rad or m]; `duration_s`: since the last call [s].
         """
         if not self.has_torque:
             self._heard_s = now_s
@@ -276,10 +269,7 @@ class EmulatedServo:
         self._motion = (position, velocity)
 
     def sense(self, now_s: float, part: float = 1.0) -> None:
-        """Show the present measurement in the control table: position, velocity and current of one instant.
-
-        `now_s`: present instant [s].
-        """
+        """Show the present measurement in the control table: position, velocity and current of one instant."""
         older, newer = self._means(0), self._means(1)
         position, velocity, current = ((1.0 - part) * old + part * new for old, new in zip(older, newer, strict=True))
         figures = self.specification.figures

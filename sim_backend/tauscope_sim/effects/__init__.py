@@ -18,7 +18,6 @@ def _entries() -> Iterator[type[ScenarioEntry]]:
                 yield each
 
 
+# class of each effect, by its id
 EFFECTS: Mapping[str, type[ScenarioEntry]] = MappingProxyType({entry.effect_id: entry for entry in _entries()})
-"""Class of each effect, by its id."""
-
 __all__ = ["EFFECTS", "Channel", "Effect", "ScenarioEntry", "SensorEffect"]

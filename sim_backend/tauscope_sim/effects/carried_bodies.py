@@ -42,7 +42,6 @@ class Payload(Effect):
         return LinkInertia(self.mass, self.mass * offset, about_origin).to_vector()
 
     def alter(self, robot: Robot) -> Robot:
-        """The arm with the body on its last link."""
         if robot.model.links is None:
             return robot
         *others, last = robot.model.links
@@ -73,11 +72,9 @@ class PayloadChange(Payload):
             raise self.refused("end", f"is {self.end:g} s, not after start ({self.start:g} s); state a later instant")
 
     def alter(self, robot: Robot) -> Robot:
-        """The arm itself: the body comes later."""
         return robot
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The changes."""
         return (_Change(self),)
 
 
@@ -102,7 +99,6 @@ class RotorInertia(JointEffect):
     inertia: Positive
 
     def added_rotor_inertia(self, robot: Robot) -> Array:
-        """J at its joint, (n,) [kg m² or kg]."""
         inertia = np.zeros(robot.joint_count)
         inertia[self.index] = self.inertia
         return inertia

@@ -1,5 +1,6 @@
 """What every concealed effect of the plant has in common; the hooks of which each overrides those that it needs."""
 
+import math
 from collections.abc import Callable
 from enum import StrEnum
 from typing import Annotated, Any, ClassVar
@@ -14,32 +15,22 @@ from tauscope.robot.messages import shown
 from tauscope.robot.robot import Joint, Robot
 from tauscope_sim.plant.term import Coordinates, Forces, Moment, Slopes, Term, Transmission
 
-LARGEST_EXPONENT = 10.0
-"""Of a power law in speed or angle."""
+LARGEST_EXPONENT = 10.0  # of a power law in speed or angle
 
 
-def _not_negative(value: float) -> float:
-    if value < 0.0:
-        raise refusal(f"must be zero or more, but is {value:g}")
-    return value
+def _must_be(words: str, is_right: Callable[[Any], bool]) -> Callable[[Any], Any]:
+    """Refuse a value that is none of these."""
+
+    def check(value: Any) -> Any:
+        if not is_right(value):
+            raise refusal(f"must be {words}, but is {shown(value)}")
+        return value
+
+    return check
 
 
-def _exponent(value: float) -> float:
-    if not 0.0 < value <= LARGEST_EXPONENT:
-        raise refusal(f"must be above 0 and at most {LARGEST_EXPONENT:g}, but is {value:g}")
-    return value
-
-
-def _whole(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise refusal(f"must be a number counted from 1 or a joint's name, but is {shown(value)}")
-    return value
-
-
-def _seed(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**63:
-        raise refusal(f"must be a whole number of zero or more, but is {shown(value)}")
-    return value
+def _is_whole(least: int, below: float) -> Callable[[Any], bool]:
+    return lambda value: isinstance(value, int) and not isinstance(value, bool) and least <= value < below
 
 
 def _list(value: Any) -> Any:
@@ -50,23 +41,23 @@ def _list(value: Any) -> Any:
     return [value]
 
 
-NotNegative = Annotated[Number, AfterValidator(_not_negative)]
-Exponent = Annotated[Number, AfterValidator(_exponent)]
-JointNumber = Annotated[int, BeforeValidator(_whole)]
+NotNegative = Annotated[Number, AfterValidator(_must_be("zero or more", lambda value: value >= 0.0))]
+Exponent = Annotated[
+    Number,
+    AfterValidator(
+        _must_be(f"above 0 and at most {LARGEST_EXPONENT:g}", lambda value: 0.0 < value <= LARGEST_EXPONENT)
+    ),
+]
+_WHOLE = _must_be("a number counted from 1 or a joint's name", _is_whole(1, math.inf))
+JointNumber = Annotated[int, BeforeValidator(_WHOLE)]
 Numbers = Annotated[list[Number], BeforeValidator(_list)]
 NotNegativeNumbers = Annotated[list[NotNegative], BeforeValidator(_list)]
-Seed = Annotated[int, BeforeValidator(_seed)]
+Seed = Annotated[int, BeforeValidator(_must_be("a whole number of zero or more", _is_whole(0, 2**63)))]
 
 
 def one_of(*words: str) -> Any:
     """Validator of a key that is one of a few words."""
-
-    def check(value: Any) -> str:
-        if not isinstance(value, str) or value not in words:
-            raise refusal(f"must be {' or '.join(words)}, but is {shown(value)}")
-        return value
-
-    return BeforeValidator(check)
+    return BeforeValidator(_must_be(" or ".join(words), lambda value: isinstance(value, str) and value in words))
 
 
 def zero_vector() -> list[float]:
@@ -85,8 +76,7 @@ Array = NDArray[np.float64]
 class ScenarioEntry(Document):
     """One entry of a scenario's list of effects: its fields are the entry's keys."""
 
-    effect_id: ClassVar[str] = ""
-    """id of CONTRACT.md, the entry's key ``effect``"""
+    effect_id: ClassVar[str] = ""  # id of CONTRACT.md, the entry's key ``effect``
 
     def check(self, robot: Robot) -> None:
         """Refuse an entry that this robot cannot have. Raises ScenarioError naming effect and key."""
@@ -162,19 +152,16 @@ class SmoothSignEffect(JointEffect):
         return k_v
 
 
+# τ(q, v) [Nm or N], and its derivatives with respect to q and v
 Law = tuple[Callable[[float, float], float], Callable[[float, float], tuple[float, float]]]
-"""τ(q, v) [Nm or N], and its derivatives with respect to q and v."""
 
 
 class Side(StrEnum):
     """Where in the joint a torque acts."""
 
-    FRICTION = "friction"
-    """on the motor's side, as friction that heats the joint"""
-    MOTOR = "motor"
-    """on the motor's side"""
-    LINK = "link"
-    """on the link's side: part of the load that the transmission carries"""
+    FRICTION = "friction"  # on the motor's side, as friction that heats the joint
+    MOTOR = "motor"  # on the motor's side
+    LINK = "link"  # on the link's side: part of the load that the transmission carries
 
 
 class JointLaw(JointEffect):

@@ -22,19 +22,15 @@ class JointElasticity(JointEffect):
     rotor_inertia: Positive
 
     def transmission(self) -> Transmission:
-        """Itself."""
         return self
 
     def torque(self, twist: float, twist_rate: float) -> float:
-        """T [Nm or N]. `twist`: θ - q [rad or m]; `twist_rate`: θ̇ - q̇ [rad/s or m/s]."""
         return self.stiffness * twist + self.damping * twist_rate
 
     def torque_slopes(self, twist: float, twist_rate: float) -> tuple[float, float]:
-        """K and D. `twist`: θ - q [rad or m]; `twist_rate`: θ̇ - q̇ [rad/s or m/s]."""
         return self.stiffness, self.damping
 
     def twist_at_rest(self, torque: float) -> float:
-        """Twist T / K [rad or m]. `torque`: T [Nm or N]."""
         return torque / self.stiffness
 
 
@@ -54,18 +50,15 @@ class Backlash(JointEffect):
     rotor_inertia: Positive
 
     def transmission(self) -> Transmission:
-        """Itself."""
         return self
 
     def torque(self, twist: float, twist_rate: float) -> float:
-        """T [Nm or N]. `twist`: δ [rad or m]; `twist_rate`: δ̇ [rad/s or m/s]."""
         overlap = abs(twist) - 0.5 * self.gap
         if overlap <= 0.0:
             return 0.0
         return math.copysign(self.contact_stiffness * overlap * self._damping(twist, twist_rate), twist)
 
     def torque_slopes(self, twist: float, twist_rate: float) -> tuple[float, float]:
-        """Derivatives of T with respect to δ and δ̇. `twist`: δ [rad or m]; `twist_rate`: δ̇ [rad/s or m/s]."""
         overlap = abs(twist) - 0.5 * self.gap
         damping = self._damping(twist, twist_rate)
         if overlap <= 0.0 or damping == 0.0:
@@ -73,7 +66,6 @@ class Backlash(JointEffect):
         return self.contact_stiffness * damping, self.contact_stiffness * overlap * self.contact_damping
 
     def twist_at_rest(self, torque: float) -> float:
-        """Twist at which resting teeth hold a torque [rad or m]. `torque`: T [Nm or N]."""
         return math.copysign(0.5 * self.gap, torque) + torque / self.contact_stiffness if torque else 0.0
 
     def _damping(self, twist: float, twist_rate: float) -> float:

@@ -54,7 +54,6 @@ class ExternalContact(Effect):
             raise self.refused("force", "is missing; state it, or joint and torque")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The contact."""
         return (_Contact(self),)
 
 

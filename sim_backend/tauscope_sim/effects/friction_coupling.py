@@ -37,7 +37,6 @@ class FrictionCoupling(SmoothSignEffect):
             raise self.refused("other_joint", f"is {self.joint} too; name the joint that it is coupled with")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The coupling."""
         joints = (self.index, self.other_joint - 1)
         places = (coordinates.motor(joints[0]), coordinates.motor(joints[1]))
         sign = 1.0 if self.of == "sum" else -1.0

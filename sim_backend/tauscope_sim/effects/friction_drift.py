@@ -24,8 +24,7 @@ from tauscope_sim.plant.term import AMBIENT, Coordinates, Forces, Moment, Slopes
 
 Array = NDArray[np.float64]
 
-LARGEST_EXPONENT = 20.0
-"""Beyond any oil: keeps nonsense coefficients from overflowing."""
+LARGEST_EXPONENT = 20.0  # beyond any oil: keeps nonsense coefficients from overflowing
 
 
 class FrictionDrift(JointEffect):
@@ -52,7 +51,6 @@ class FrictionDrift(JointEffect):
             raise self.refused("joint", "has no friction in the robot file that could drift; state model.friction")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The warming joint."""
         friction = (robot.model.friction or ())[self.index]
         shape = shape_constants([friction], [self.joint_of(robot).friction_shape])[0]
         place = coordinates.motor(self.index)

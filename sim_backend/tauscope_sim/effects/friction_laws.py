@@ -19,16 +19,8 @@ class CoulombFriction(FrictionLaw):
     level: Number
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives."""
-        k_v = self.steepness(robot)
-
-        def torque(q: float, v: float) -> float:
-            return self.level * smooth_sign(v, k_v)
-
-        def slopes(q: float, v: float) -> tuple[float, float]:
-            return 0.0, self.level * smooth_sign_slope(v, k_v)
-
-        return torque, slopes
+        c, k_v = self.level, self.steepness(robot)
+        return (lambda q, v: c * smooth_sign(v, k_v)), (lambda q, v: (0.0, c * smooth_sign_slope(v, k_v)))
 
 
 class ViscousFriction(JointLaw):
@@ -42,7 +34,6 @@ class ViscousFriction(JointLaw):
     coefficient: Number
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives."""
         return (lambda q, v: self.coefficient * v), (lambda q, v: (0.0, self.coefficient))
 
 
@@ -59,14 +50,10 @@ class StribeckFriction(FrictionLaw):
     exponent: Exponent = 2.0
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives."""
         k_v = self.steepness(robot)
 
         def decay(v: float) -> float:
             return math.exp(-((abs(v) / self.velocity) ** self.exponent))
-
-        def torque(q: float, v: float) -> float:
-            return self.amplitude * smooth_sign(v, k_v) * decay(v)
 
         def slopes(q: float, v: float) -> tuple[float, float]:
             # d exp(-x^α)/dv = -α x^α / v exp(-x^α), taken as zero at rest where A(v) vanishes too
@@ -74,7 +61,7 @@ class StribeckFriction(FrictionLaw):
             fall = smooth_sign(v, k_v) * power / v if v else 0.0
             return 0.0, self.amplitude * decay(v) * (smooth_sign_slope(v, k_v) - fall)
 
-        return torque, slopes
+        return (lambda q, v: self.amplitude * smooth_sign(v, k_v) * decay(v)), slopes
 
 
 class AsymmetricCoulomb(FrictionLaw):
@@ -87,16 +74,11 @@ class AsymmetricCoulomb(FrictionLaw):
     amplitude: Number
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives."""
-        k_v = self.steepness(robot)
-
-        def torque(q: float, v: float) -> float:
-            return self.amplitude * smooth_sign(v, k_v) if v > 0.0 else 0.0
-
-        def slopes(q: float, v: float) -> tuple[float, float]:
-            return 0.0, self.amplitude * smooth_sign_slope(v, k_v) if v > 0.0 else 0.0
-
-        return torque, slopes
+        c, k_v = self.amplitude, self.steepness(robot)
+        return (
+            lambda q, v: c * smooth_sign(v, k_v) if v > 0.0 else 0.0,
+            lambda q, v: (0.0, c * smooth_sign_slope(v, k_v) if v > 0.0 else 0.0),
+        )
 
 
 class AsymmetricViscous(JointLaw):
@@ -110,12 +92,10 @@ class AsymmetricViscous(JointLaw):
     amplitude: Number
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives."""
         return (lambda q, v: self.amplitude * max(v, 0.0), lambda q, v: (0.0, self.amplitude if v > 0.0 else 0.0))
 
 
-LEAST_SPEED = 1e-3
-"""Below this the slope of a root is taken as here: it has none at zero [rad/s or m/s]."""
+LEAST_SPEED = 1e-3  # below this the slope of a root is taken as here: it has none at zero [rad/s or m/s]
 
 
 class NonlinearViscous(JointLaw):
@@ -130,15 +110,11 @@ class NonlinearViscous(JointLaw):
     exponent: Exponent
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives."""
-
-        def torque(q: float, v: float) -> float:
-            return math.copysign(self.amplitude * abs(v) ** self.exponent, self.amplitude * v)
-
-        def slopes(q: float, v: float) -> tuple[float, float]:
-            return 0.0, self.amplitude * self.exponent * max(abs(v), LEAST_SPEED) ** (self.exponent - 1.0)
-
-        return torque, slopes
+        c, p = self.amplitude, self.exponent
+        return (
+            lambda q, v: math.copysign(c * abs(v) ** p, c * v),
+            lambda q, v: (0.0, c * p * max(abs(v), LEAST_SPEED) ** (p - 1.0)),
+        )
 
 
 class PositionDependentFriction(FrictionLaw):
@@ -154,15 +130,11 @@ class PositionDependentFriction(FrictionLaw):
     phase: Number = 0.0
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives."""
-        k_v = self.steepness(robot)
-
-        def torque(q: float, v: float) -> float:
-            return self.amplitude * smooth_sign(v, k_v) * math.sin(self.order * q + self.phase)
+        c, k_v = self.amplitude, self.steepness(robot)
 
         def slopes(q: float, v: float) -> tuple[float, float]:
             angle = self.order * q + self.phase
-            by_position = self.amplitude * smooth_sign(v, k_v) * self.order * math.cos(angle)
-            return by_position, self.amplitude * smooth_sign_slope(v, k_v) * math.sin(angle)
+            by_position = c * smooth_sign(v, k_v) * self.order * math.cos(angle)
+            return by_position, c * smooth_sign_slope(v, k_v) * math.sin(angle)
 
-        return torque, slopes
+        return (lambda q, v: c * smooth_sign(v, k_v) * math.sin(self.order * q + self.phase)), slopes

@@ -31,7 +31,6 @@ class BaseTilt(Effect):
             raise self.refused("about_x", "and about_y are zero; state one of them [rad]")
 
     def alter(self, robot: Robot) -> Robot:
-        """The arm on its tilted base."""
         turned = rotation_about_x(self.about_x) @ rotation_about_y(self.about_y) @ robot.gravity
         return replace(robot, gravity=turned)
 
@@ -58,7 +57,6 @@ class KinematicError(Effect):
             raise self.refused("translation", "and rotation are zero; state one of them")
 
     def alter(self, robot: Robot) -> Robot:
-        """The arm as it was built."""
         index = self.link - 1
         segment = robot.segments[index]
         rotation = Rotation.from_rotvec(self.rotation).as_matrix() @ segment.after.rotation

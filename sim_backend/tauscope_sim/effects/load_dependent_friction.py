@@ -29,7 +29,6 @@ class LoadDependentFriction(SmoothSignEffect):
             raise self.refused("mu", f"is {self.mu:g}: the transmission locks itself; make it at most {LARGEST_GAIN:g}")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The friction of the load."""
         return (_LoadFriction(self.index, coordinates.motor(self.index), self.mu, self.steepness(robot)),)
 
 

@@ -41,14 +41,10 @@ class AngleHarmonics(JointEffect):
         count = len(self.order)
         amplitude, phase = (value * count if len(value) == 1 else value for value in (self.amplitude, self.phase))
         parts = [(a, ratio * k, p) for a, k, p in zip(amplitude, self.order, phase, strict=True)]
-
-        def sine(q: float) -> float:
-            return sum(a * math.sin(k * q + p) for a, k, p in parts)
-
-        def slope(q: float) -> float:
-            return sum(a * k * math.cos(k * q + p) for a, k, p in parts)
-
-        return sine, slope
+        return (
+            lambda q: sum(a * math.sin(k * q + p) for a, k, p in parts),
+            lambda q: sum(a * k * math.cos(k * q + p) for a, k, p in parts),
+        )
 
 
 class Cogging(AngleHarmonics, JointLaw):
@@ -61,7 +57,6 @@ class Cogging(AngleHarmonics, JointLaw):
     effect_id: ClassVar[str] = "cogging"
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives."""
         sine, slope = self.sine_and_slope(robot)
         return (lambda q, v: sine(q)), (lambda q, v: (slope(q), 0.0))
 
@@ -84,7 +79,6 @@ class TorqueRipple(AngleHarmonics):
             raise self.refused("amplitude", f"adds up to {total:g} of the load; make it at most {LARGEST_GAIN:g}")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The gain of the load."""
         return (_Ripple(self.index, coordinates.motor(self.index), *self.sine_and_slope(robot)),)
 
 
@@ -115,12 +109,10 @@ class JointSpring(JointLaw):
     rest: Number = 0.0
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives."""
         return (lambda q, v: self.stiffness * (q - self.rest)), (lambda q, v: (self.stiffness, 0.0))
 
 
-LEAST_STRETCH = 1e-6
-"""Below this the slope of a root is taken as here [rad or m]."""
+LEAST_STRETCH = 1e-6  # below this the slope of a root is taken as here [rad or m]
 
 
 class CableForce(JointLaw):
@@ -138,7 +130,6 @@ class CableForce(JointLaw):
     exponent: Exponent = 1.5
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives."""
         sign = 1.0 if self.side_of_angle == "above" else -1.0
 
         def torque(q: float, v: float) -> float:
@@ -164,5 +155,4 @@ class TorqueOffset(JointLaw):
     torque: Number
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives."""
         return (lambda q, v: self.torque), (lambda q, v: (0.0, 0.0))

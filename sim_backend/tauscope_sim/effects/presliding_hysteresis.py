@@ -48,7 +48,6 @@ class PreslidingHysteresis(JointEffect):
             raise self.refused("damping", "belongs to the LuGre model; state bristles: lugre or remove it")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The bristles."""
         friction = (robot.model.friction or ())[self.index]
         shape = shape_constants([friction], [self.joint_of(robot).friction_shape])[0]
         levels = (friction.stiction, friction.stribeck if self.bristles == "lugre" else 0.0)

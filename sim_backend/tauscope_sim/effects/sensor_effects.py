@@ -1,6 +1,7 @@
 """What sensors and drives make of the torque and the time: gains, limits, delays."""
 
 from collections import deque
+from collections.abc import Callable
 from typing import Annotated, ClassVar, Protocol
 
 import numpy as np
@@ -40,18 +41,19 @@ class TorqueGainError(SensorEffect):
     gain: Nonzero
 
     def channel(self, joint_count: int) -> Channel:
-        """The scaling."""
-        gains = np.ones(joint_count)
-        gains[self.joint - 1] = self.gain
-        return _Gain(gains)
+        return _Recorded(self.joint - 1, lambda torque: self.gain * torque)
 
 
-class _Gain:
-    def __init__(self, gains: Array) -> None:
-        self._gains = gains
+class _Recorded:
+    """One joint's torque, recorded as something else."""
+
+    def __init__(self, joint: int, record: Callable[[float], float]) -> None:
+        self._joint, self._record = joint, record
 
     def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        return position, self._gains * torque
+        recorded = torque.copy()
+        recorded[self._joint] = self._record(torque[self._joint])
+        return position, recorded
 
 
 class TorqueSaturation(SensorEffect):
@@ -66,23 +68,11 @@ class TorqueSaturation(SensorEffect):
     shape: Annotated[str, one_of("compression", "clip")] = "compression"
 
     def channel(self, joint_count: int) -> Channel:
-        """The saturation."""
-        return _Saturation(self.joint - 1, self.level, self.shape == "clip")
+        shrink = (lambda ratio: np.clip(ratio, -1.0, 1.0)) if self.shape == "clip" else np.tanh
+        return _Recorded(self.joint - 1, lambda torque: self.level * shrink(torque / self.level))
 
 
-class _Saturation:
-    def __init__(self, joint: int, level: float, clip: bool) -> None:
-        self._joint, self._level, self._clip = joint, level, clip
-
-    def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        recorded, joint, level = torque.copy(), self._joint, self._level
-        ratio = torque[joint] / level
-        recorded[joint] = level * (np.clip(ratio, -1.0, 1.0) if self._clip else np.tanh(ratio))
-        return position, recorded
-
-
-LONGEST_DELAY = 1.0
-"""What is late by more is no delay of a channel [s]."""
+LONGEST_DELAY = 1.0  # what is late by more is no delay of a channel [s]
 
 
 class TimeDelay(SensorEffect):
@@ -103,7 +93,6 @@ class TimeDelay(SensorEffect):
             raise self.refused("delay", f"is {self.delay:g} s; state at most {LONGEST_DELAY:g} s")
 
     def channel(self, joint_count: int) -> Channel:
-        """The delay line."""
         columns = slice(None) if self.joint is None else slice(self.joint - 1, self.joint)
         return _DelayLine(self.delay, columns)
 

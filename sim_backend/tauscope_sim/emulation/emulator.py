@@ -13,19 +13,14 @@ from dataclasses import asdict
 from math import ceil
 from typing import Any, Protocol, Self
 
-from tauscope_sim.emulation.fault_kit import InjectedFault, faults_from
+from tauscope_sim.emulation.fault_kit import FaultSchedule, InjectedFault, faults_from
 
-STEP_S = 1e-3
-"""Period of the devices' own loops and of the physics [s]."""
+STEP_S = 1e-3  # period of the devices' own loops and of the physics [s]
+MOST_STEPS = 10  # steps that are taken in a row while nothing is asked
 
-MOST_STEPS = 10
-"""Steps that are taken in a row while nothing is asked."""
-
+# where the machine stood still for longer than this, the device's clock has lost the rest [s]
 LONGEST_CATCH_UP_S = 0.25
-"""Where the machine stood still for longer than this, the device's clock has lost the rest [s]."""
-
-ALL_STEPS = ceil(LONGEST_CATCH_UP_S / STEP_S)
-"""As many as can be due."""
+ALL_STEPS = ceil(LONGEST_CATCH_UP_S / STEP_S)  # as many as can be due
 
 
 class DeviceClock:
@@ -35,7 +30,7 @@ class DeviceClock:
     """
 
     def __init__(self, now_s: float) -> None:
-        """Begin. `now_s`: present instant [s]."""
+        """Begin."""
         self.tick = round(now_s / STEP_S)
         self.lost_s = 0.0
 
@@ -45,10 +40,7 @@ class DeviceClock:
         return self.tick * STEP_S + self.lost_s
 
     def catch_up(self, now_s: float, step: Callable[[], None], most_steps: int = MOST_STEPS) -> None:
-        """Take the steps that are due: not all at once where there are many, so that a master is heard in between.
-
-        `now_s`: present instant [s].
-        """
+        """Take the steps that are due: not all at once where there are many, so that a master is heard in between."""
         if now_s - self.now_s > LONGEST_CATCH_UP_S:
             self.lost_s += now_s - self.now_s - LONGEST_CATCH_UP_S
         for _ in range(most_steps):
@@ -64,6 +56,7 @@ class Emulator(ABC):
     def __init__(self, now_s: float) -> None:
         """Everything at rest; the arm stands on a stand until all its devices have had torque once."""
         self._clock = DeviceClock(now_s)
+        self.schedule = FaultSchedule()
 
     @property
     def now_s(self) -> float:
@@ -81,18 +74,15 @@ class Emulator(ABC):
 
     @abstractmethod
     def receive(self, data: bytes, now_s: float) -> None:
-        """Take bytes of the master. `now_s`: when [s]."""
+        """Take bytes of the master."""
 
     def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
-        """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
-
-        `now_s`: present instant [s].
-        """
+        """Let time pass: not all at once where the machine stood still, so that the master is heard in between."""
         self._clock.catch_up(now_s, self._step, most_steps)
 
     @abstractmethod
     def due(self, now_s: float) -> bytes:
-        """Bytes that have reached the master by now. `now_s`: present instant [s]."""
+        """Bytes that have reached the master by now."""
 
     @abstractmethod
     def describe(self) -> dict[str, Any]:
@@ -115,9 +105,18 @@ class Emulator(ABC):
             self.set_stand(request["stand"])
         return None
 
-    @abstractmethod
     def inject(self, faults: list[InjectedFault]) -> None:
         """Plan faults, and carry out those that are due."""
+        self.schedule.add(faults)
+        self._run_faults()
+
+    def _run_faults(self) -> None:
+        for fault in self.schedule.take_due(self.now_s):
+            self._carry_out(fault)
+
+    @abstractmethod
+    def _carry_out(self, fault: InjectedFault) -> None:
+        """Let a fault happen now."""
 
     @abstractmethod
     def get(self, device: int, place: Any) -> int:
@@ -249,4 +248,4 @@ class EmulatorOrder(ABC):
 
     @abstractmethod
     def build(self, now_s: float) -> Emulator:
-        """The emulator. `now_s`: present instant [s]."""
+        """The emulator."""

@@ -15,14 +15,9 @@ from typing import Any, Self
 from tauscope_sim.emulation.emulator import MOST_STEPS, EmulatorOrder, Port
 from tauscope_sim.own_process import take_precedence
 
-_SWITCH_S = 5e-5
-"""How long the thread waits for the interpreter at most [s]."""
-
-_AWAY_S = 0.001
-"""How often it is looked for a master that is not there [s]."""
-
-_NICE = -20
-"""No real-time priority: what carries bytes through a pseudo terminal is a thread of the kernel without one."""
+_SWITCH_S = 5e-5  # how long the thread waits for the interpreter at most [s]
+_AWAY_S = 0.001  # how often it is looked for a master that is not there [s]
+_NICE = -20  # no real-time priority: what carries bytes through a pseudo terminal is a thread of the kernel without one
 
 
 class Arrivals:
@@ -79,11 +74,8 @@ class Arrivals:
 _PERIOD_S = 0.001
 _TRACE_PERIOD_S = 0.002
 _LONGEST_MESSAGE = 65_536
-_ROUNDING_S = 1e-9
-"""What is due is not put off because a sum of steps falls short of it by its rounding."""
-
-_AT_ONCE_S = 0.02
-"""Where time is stepped, a master that waits lets none pass: what is due so soon arrives at once."""
+_ROUNDING_S = 1e-9  # what is due is not put off because a sum of steps falls short of it by its rounding
+_AT_ONCE_S = 0.02  # where time is stepped, a master that waits lets none pass: what is due so soon arrives at once
 
 
 class EmulatorServer:

@@ -16,11 +16,9 @@ from tauscope_sim.plant.term import AMBIENT, PhysicalEffect
 Array = NDArray[np.float64]
 
 
+# the twist shrinks by the ratio of gravity's gradient to stiffness each time; a few rounds are usual
 MOST_ITERATIONS = 200
-"""The twist shrinks by the ratio of gravity's gradient to stiffness each time; a few rounds are usual."""
-
-SETTLED = 1e-13
-"""Change of a link's position that ends the iteration [rad or m]."""
+SETTLED = 1e-13  # change of a link's position that ends the iteration [rad or m]
 
 
 def settled(equations: EquationsOfMotion, motor_position: Array) -> Array:
@@ -60,34 +58,21 @@ def _narrow(low: Array, high: Array, place: Array, hanging: Array) -> tuple[Arra
     return np.where(crossed & down, -np.inf, low), np.where(crossed & up, np.inf, high)
 
 
-STEP = 5e-4
-"""Longest step of the integration where none is asked for [s]."""
-
-TOLERANCE = 2e-5
-"""Error of one step of length `STEP` that is let pass: velocity [rad/s or m/s], internal states [1]."""
-
-SHORTEST_PART = 2.0**-12
-"""Shortest sub-step, as a part of the step."""
+STEP = 5e-4  # longest step of the integration where none is asked for [s]
+TOLERANCE = 2e-5  # Error of one step of length `STEP` that is let pass: velocity [rad/s or m/s], internal states [1]
+SHORTEST_PART = 2.0**-12  # shortest sub-step, as a part of the step
 
 
 @dataclass(frozen=True, eq=False)
 class PlantState:
-    """Where the plant is, in joint units; every array a copy.
+    """Where the plant is, in joint units; every array a copy."""
 
-    `time`: since the arm was placed [s].
-    `motor_position`: (n,), of the motors, divided by the gear ratio [rad or m].
-    `motor_velocity`: (n,), likewise [rad/s or m/s].
-    `link_position`: (n,), q; the motor's own where the transmission is rigid [rad or m].
-    `link_velocity`: (n,), q̇ [rad/s or m/s].
-    `temperature`: (n,), of the joints [°C].
-    """
-
-    time: float
-    motor_position: Array
-    motor_velocity: Array
-    link_position: Array
-    link_velocity: Array
-    temperature: Array
+    time: float  # since the arm was placed [s]
+    motor_position: Array  # (n,), of the motors, divided by the gear ratio [rad or m]
+    motor_velocity: Array  # (n,), likewise [rad/s or m/s]
+    link_position: Array  # (n,), q; the motor's own where the transmission is rigid [rad or m]
+    link_velocity: Array  # (n,), q̇ [rad/s or m/s]
+    temperature: Array  # (n,), of the joints [°C]
 
 
 class Plant:
@@ -159,7 +144,7 @@ class Plant:
         """Let time pass under constant torque.
 
         Raises ScenarioError where the duration is negative, or the motion grows beyond all bounds.
-        `motor_torque`: (n,), of the drives, on the joint's side of the gear [Nm or N]; `duration_s`: how long [s].
+        `motor_torque`: (n,), of the drives, on the joint's side of the gear [Nm or N].
         """
         if not duration_s >= 0.0:
             raise ScenarioError(f"duration_s is {duration_s}; time passes forwards only")

@@ -19,11 +19,10 @@ from tauscope_sim.plant.equations import EquationsOfMotion
 
 Array = NDArray[np.float64]
 
-GAMMA = 1.0 - float(np.sqrt(0.5))
-"""γ: L-stable, with the smaller of the two error constants."""
+GAMMA = 1.0 - float(np.sqrt(0.5))  # γ: L-stable, with the smaller of the two error constants
 
+# Velocity or internal state at which twice the tolerance passes [rad/s, m/s, 1]: reversals of friction lie below
 UNIT = 0.1
-"""Velocity or internal state at which twice the tolerance passes [rad/s, m/s, 1]: reversals of friction lie below."""
 
 
 class Attempt(NamedTuple):

@@ -27,12 +27,10 @@ class Coordinates:
     Link j has place j. The motor of a rigid joint moves with its link and shares its place; the motors of compliant
     joints stand behind the links: N = n + number of compliant joints. All in joint units: a motor's angle is divided by
     its gear ratio.
-
-    `compliant`: joints whose transmission gives way, counted from 0, ascending.
     """
 
     joint_count: int
-    compliant: tuple[int, ...] = ()
+    compliant: tuple[int, ...] = ()  # joints whose transmission gives way, counted from 0, ascending
 
     @property
     def size(self) -> int:
@@ -53,8 +51,7 @@ class Coordinates:
 
 Array = NDArray[np.float64]
 
-AMBIENT = 25.0
-"""Temperature of joints that no effect heats [°C]."""
+AMBIENT = 25.0  # temperature of joints that no effect heats [°C]
 
 
 class Moment:
@@ -62,14 +59,10 @@ class Moment:
 
     def __init__(self, coordinates: Coordinates, bodies: RigidBodies) -> None:
         self.bodies = bodies
-        self.time = 0.0
-        """instant since the arm was placed [s]"""
-        self.position = [0.0] * coordinates.size
-        """p, by coordinate [rad or m]"""
-        self.velocity = [0.0] * coordinates.size
-        """v, by coordinate [rad/s or m/s]"""
-        self.states: list[float] = []
-        """internal states of the terms"""
+        self.time = 0.0  # instant since the arm was placed [s]
+        self.position = [0.0] * coordinates.size  # p, by coordinate [rad or m]
+        self.velocity = [0.0] * coordinates.size  # v, by coordinate [rad/s or m/s]
+        self.states: list[float] = []  # internal states of the terms
         self.load = [0.0] * coordinates.joint_count
         """L, by joint: known to `Term.linearise` and `Term.rates`, not yet to `Term.act` [Nm or N]"""
         self.friction = [0.0] * coordinates.joint_count
@@ -85,16 +78,11 @@ class Forces:
 
     def clear(self) -> None:
         """Begin a sum."""
-        self.friction = self._none.copy()
-        """friction on the motor's side [Nm or N]"""
-        self.motor = self._none.copy()
-        """anything else on the motor's side [Nm or N]"""
-        self.link = self._none.copy()
-        """on the link's side: part of the load [Nm or N]"""
-        self.load_gain = self._none.copy()
-        """g, torque a unit of load"""
-        self.load_friction = self._none.copy()
-        """f, torque a unit of the load's magnitude; counts as friction"""
+        self.friction = self._none.copy()  # friction on the motor's side [Nm or N]
+        self.motor = self._none.copy()  # anything else on the motor's side [Nm or N]
+        self.link = self._none.copy()  # on the link's side: part of the load [Nm or N]
+        self.load_gain = self._none.copy()  # g, torque a unit of load
+        self.load_friction = self._none.copy()  # f, torque a unit of the load's magnitude; counts as friction
 
 
 class Slopes:
@@ -105,27 +93,20 @@ class Slopes:
         self.all = np.zeros((3, total, total))
         self.by_position: Array = self.all[0, :size, :size]
         """derivative of each coordinate's torque with respect to p, (N, N)"""
-        self.by_velocity: Array = self.all[1, :size, :size]
-        """with respect to v, (N, N)"""
-        self.by_state: Array = self.all[2, :size, size:]
-        """with respect to the internal states, (N, m)"""
+        self.by_velocity: Array = self.all[1, :size, :size]  # with respect to v, (N, N)
+        self.by_state: Array = self.all[2, :size, size:]  # with respect to the internal states, (N, m)
         self.rate_by_position: Array = self.all[0, size:, :size]
         """derivative of the internal states' rates with respect to p, (m, N)"""
-        self.rate_by_velocity: Array = self.all[1, size:, :size]
-        """with respect to v, (m, N)"""
-        self.rate_by_state: Array = self.all[2, size:, size:]
-        """with respect to the internal states, (m, m)"""
+        self.rate_by_velocity: Array = self.all[1, size:, :size]  # with respect to v, (m, N)
+        self.rate_by_state: Array = self.all[2, size:, size:]  # with respect to the internal states, (m, m)
 
 
 class Term:
     """One contribution to the equations of motion; a subclass overrides the hooks that it needs."""
 
-    state_count: int = 0
-    """number of internal states"""
-    first_state: int = 0
-    """place of the first of them in `Moment.states`, set by the equations of motion"""
-    depends_on_load: bool = False
-    """whether `act` fills in `Forces.load_gain` or `Forces.load_friction`"""
+    state_count: int = 0  # number of internal states
+    first_state: int = 0  # place of the first of them in `Moment.states`, set by the equations of motion
+    depends_on_load: bool = False  # whether `act` fills in `Forces.load_gain` or `Forces.load_friction`
     event_times: tuple[float, ...] = ()
     """instants at which the term changes abruptly; the integration never steps across one [s]"""
 
@@ -204,11 +185,8 @@ class PhysicalEffect(Protocol):
         ...
 
 
-MOST_SIGN_CHANGES = 60
-"""Sign patterns that are tried; a handful is needed, and the solution exists and is unique."""
-
-LARGEST_GAIN = 0.95
-"""Largest torque a unit of load that a transmission may lose: at 1 it is self-locking."""
+MOST_SIGN_CHANGES = 60  # sign patterns that are tried; a handful is needed, and the solution exists and is unique
+LARGEST_GAIN = 0.95  # largest torque a unit of load that a transmission may lose: at 1 it is self-locking
 
 
 def loaded_accelerations(

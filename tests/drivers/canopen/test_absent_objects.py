@@ -97,6 +97,7 @@ def test_a_drive_that_would_go_on_without_its_host_is_refused(bus: EmulatedBus) 
     with pytest.raises(DriverError, match=r"joint 2 .*stays 0: it goes on when the host is gone"):
         enable_arm(bus)
     hide(bus, 0x1016)
+    hide(bus, 0x100C)
     with pytest.raises(DriverError, match=r"joint 2 .*it would not notice that the host is gone"):
         enable_arm(bus)
 

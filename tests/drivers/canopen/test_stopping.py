@@ -8,10 +8,10 @@ from tauscope_drivers.canopen.configuration import NodeConfiguration
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import DriveObject
+from tauscope_drivers.canopen.power import PROMPT_CYCLES, dropped_faults, has_stopped, stop_one_by_one, stop_promptly
 from tauscope_drivers.canopen.process_data import MEASURED, MEASURED_WHERE_THERE
 from tauscope_drivers.canopen.session import Session, arm_faults
 from tauscope_drivers.canopen.state_machine import Goal
-from tauscope_drivers.canopen.stopping import PROMPT_CYCLES, dropped_faults, has_stopped, stop_one_by_one, stop_promptly
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
 from tauscope_drivers.state import ArmState
 
@@ -39,7 +39,7 @@ class Dictionary:
 
 def drive(joint: int, statusword: int, failure: DriverErrorKind | None = None) -> tuple[DriveNode, Dictionary]:
     dictionary = Dictionary(statusword, failure)
-    return DriveNode(NodeConfiguration(joint, 65536.0, 1.0), joint, dictionary), dictionary  # pyright: ignore[reportArgumentType]
+    return DriveNode(NodeConfiguration(joint, 65536.0, 1.0), joint, dictionary, bus=dictionary), dictionary  # pyright: ignore[reportArgumentType]
 
 
 FORGET_MASTER = (objects.CONSUMER_HEARTBEAT, 0)

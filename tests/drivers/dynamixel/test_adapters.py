@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.dynamixel.bus_budget import planned_budget
+from tauscope_drivers.dynamixel.bus import planned_budget
 from tauscope_drivers.dynamixel.configuration import read_configuration
 from tauscope_drivers.inspection import Severity
 from tauscope_drivers.serial_port import latency_finding, read_latency_timer_ms, serial_adapters

@@ -12,7 +12,7 @@ from tauscope_drivers.dynamixel.bus import ServoBus
 from tauscope_drivers.dynamixel.control_table import BYTES_BEFORE_STATE, family_of, find_model, model_names
 from tauscope_drivers.dynamixel.packets import encode_write
 from tauscope_drivers.errors import DriverError, DriverErrorKind
-from tauscope_sim.dynamixel_bus.framing import status_frame
+from tauscope_sim.dynamixel_bus.bus import status_frame
 
 BLOCK = find_model(1020).state_block
 SERVOS = (1, 2, 3)

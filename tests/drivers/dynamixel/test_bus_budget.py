@@ -2,9 +2,9 @@
 
 import pytest
 
-from tauscope_drivers.dynamixel.bus_budget import count_traffic
+from tauscope_drivers.dynamixel.bus import count_traffic
 from tauscope_drivers.errors import DriverError, DriverErrorKind
-from tauscope_drivers.serial_servos.budget import BusTiming, cycle_parts, largest_rate_hz, require_rate
+from tauscope_drivers.serial_servos.bus import BusTiming, cycle_parts, largest_rate_hz, require_rate
 
 # Whole cycle of Sync Write of a current and (Fast) Sync Read of ten bytes: servos, baud, fast, return delay [s],
 # latency timer [s], cycles a second. Worked out from the frames' lengths in the protocol's description.

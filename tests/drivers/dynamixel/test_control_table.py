@@ -4,7 +4,15 @@ import math
 
 import pytest
 
-from tauscope_drivers.dynamixel.control_table import family_of, find_model, find_model_by_name, model_names
+from tauscope_drivers.dynamixel.configuration import ServoConfiguration
+from tauscope_drivers.dynamixel.control_table import (
+    describe_model,
+    family_of,
+    find_model,
+    find_model_by_name,
+    model_names,
+)
+from tauscope_drivers.dynamixel.servo import make_servo
 from tauscope_drivers.errors import DriverError
 
 # ROBOTIS e-Manual: number, label, torque, goal current, present current, watchdog, counts a turn, mA a unit.
@@ -44,7 +52,7 @@ def test_every_model_of_a_known_family_has_what_a_cycle_needs() -> None:
         model = find_model(number)
         if model.senses_current:
             assert model.state_block.length == 10
-            assert model.current_unit is not None, name
+            assert (model.current_unit is None) is (name == "xc335_t332"), name
             assert all(block.length <= 48 for block in model.health_blocks)
             lengths = [block.length for block in model.watched_blocks]
             assert len(set(lengths)) == len(lengths), "a late answer cannot be taken for another"
@@ -72,6 +80,30 @@ def test_model_by_the_name_on_its_case(name: str) -> None:
 def test_unknown_model_is_refused(number: int) -> None:
     with pytest.raises(DriverError, match=f"model number {number}.*no control table"):
         find_model(number)
+
+
+@pytest.mark.parametrize(("number", "name"), [(1280, "XW430-T200"), (1700, "XC335-T332")])
+def test_the_newest_models_are_known_by_number_and_name(number: int, name: str) -> None:
+    model = find_model(number, 55)
+    assert model.label == describe_model(number) == name
+    assert find_model_by_name(f"{name}-T") == find_model(number)
+    assert model.senses_current
+    assert (model.items["Operating Mode"].address, model.items["Bus Watchdog"].address) == (11, 98)
+    assert model.items["Goal Current"].address == 102
+    assert model.state_block.address == 126
+
+
+def test_a_model_without_a_known_unit_of_current_needs_it_stated() -> None:
+    with pytest.raises(DriverError, match=r"no unit of current is known for the XC335-T332; state drive.milliampere"):
+        make_servo(1, ServoConfiguration("elbow", 1), (1700, 55))
+    servo = make_servo(1, ServoConfiguration("elbow", 1, milliampere_per_unit=1.0), (1700, 55))
+    assert servo.units.milliampere == 1.0
+
+
+def test_a_pro_servo_with_legacy_firmware_is_named() -> None:
+    assert describe_model(54024) == "H54-200-S500-R (PRO with legacy firmware, not supported)"
+    with pytest.raises(DriverError, match=r"H54-200-S500-R \(PRO with legacy firmware.*update its firmware"):
+        find_model(54024)
 
 
 def test_unknown_name_is_refused() -> None:

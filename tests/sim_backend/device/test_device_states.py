@@ -8,7 +8,7 @@ import pytest
 from arm_rigs import START, bench_robot, wide_limits
 from tauscope_drivers import ControlMode, DriverError, Setpoint, StopPolicy
 from tauscope_sim.device import HOTTEST, Activity, Disturbance, FaultCode, Injection, SimulatedDevice
-from tauscope_sim.device.activity import COMMANDED, POWERED, TRANSITIONS, commanded_by, stopped_by
+from tauscope_sim.device.drives import COMMANDED, POWERED, TRANSITIONS, commanded_by, stopped_by
 from tauscope_sim.device.faults import REMEDIES, FaultLatch, device_fault
 from tauscope_sim.device.mechanism import resting_posture
 from tauscope_sim.driver import SimulatedArm

@@ -9,7 +9,7 @@ import pytest
 import tauscope_sim.examples
 from emulator_process import EmulatorProcess
 from hardware_emulated.canopen_robot import RATED_TORQUE_MNM, write_canopen_robot
-from tauscope_sim.canopen_bus.order import CanOrder
+from tauscope_sim.canopen_bus.emulator import CanOrder
 from tauscope_sim.dynamixel_bus import DynamixelOrder, ServoSpecification
 from tauscope_sim.emulation import FaultKind, InjectedFault
 

@@ -1,6 +1,8 @@
 """An EDS or DCF file: which objects its maker says a drive has, who it is, and the values that a DCF gives it."""
 
+import codecs
 import configparser
+import contextlib
 import io
 import logging
 import re
@@ -11,6 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from canopen.objectdictionary import ObjectDictionary, ObjectDictionaryError, ODVariable, datatypes, eds
+
+from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen.objects import DriveObject
 
 _KEYWORDS = {
     word.lower(): word
@@ -24,12 +29,17 @@ _NUMBERS = (
     *("VendorNumber", "ProductNumber", "RevisionNumber", "NodeID"),
 )
 _OBJECT = re.compile(r"([0-9a-f]{1,4})(?:sub([0-9a-f]{1,2})|(value|name))?", re.IGNORECASE | re.ASCII)
-_DEVICE = {"deviceinfo": "DeviceInfo", "devicecomissioning": "DeviceComissioning"}  # CiA 306 spells it so
+_DEVICE = {
+    "deviceinfo": "DeviceInfo",
+    "devicecomissioning": "DeviceComissioning",  # CiA 306 spells it so
+    "devicecommissioning": "DeviceComissioning",
+}
+_LONGEST_NUMBER = 64  # digits of 64 bits, in whatever base
+_NODE_ID = re.compile(r"\+?\$NODEID\+?")
 _OF_COMPACT = ("DataType", "AccessType", "PDOMapping", "DefaultValue")
 _MOST_SUBINDICES = 254
 
-Sections = dict[str, dict[str, str]]
-"""Keywords and values of each section."""
+Sections = dict[str, dict[str, str]]  # keywords and values of each section
 
 
 class DataSheetError(ValueError):
@@ -55,8 +65,9 @@ def read_sections(text: str) -> Sections:
         if name in sections:
             raise DataSheetError(f"[{name}] stands twice; remove one")
         # What stands for nothing counts as left out: many makers' tools write every keyword.
-        sections[name] = {_KEYWORDS.get(key, key): value for key, value in parser.items(given) if value}
-        _require_numbers(name, sections[name])
+        entries = {_KEYWORDS.get(key, key): value for key, value in parser.items(given) if value}
+        # The library reads fewer ways of writing a number, and does not know the place of a wrong one.
+        sections[name] = entries | {key: str(_number(name, key, entries[key])) for key in _NUMBERS if key in entries}
     _write_out_compact(sections)
     sections.setdefault("DeviceInfo", {})
     return sections
@@ -83,25 +94,36 @@ def _section_name(given: str) -> str | None:
     return name + (match[3] or "").capitalize()
 
 
-def _require_numbers(section: str, entries: dict[str, str]) -> None:
-    """Refuse numbers that are none, by their place: the library does not know it any more."""
-    for key in _NUMBERS:
-        if key in entries:
-            _number(section, key, entries[key])
+def parse_number(text: str, node_id: int | None = None) -> int | None:
+    """A whole number as files write it; None where it is none.
+
+    Decimal, ``0x`` hexadecimal, octal by a leading zero (CiA 306), hexadecimal digits without ``0x``, and ``$NODEID``
+    alone or added to one of these.
+    """
+    number = text.replace(" ", "").upper()
+    if "$NODEID" in number:
+        if node_id is None:
+            return None
+        offset = parse_number(_NODE_ID.sub("", number, count=1) or "0")
+        return None if offset is None else offset + node_id
+    for base in (0, 8, 10, 16) if len(number) <= _LONGEST_NUMBER else ():
+        with contextlib.suppress(ValueError):
+            return int(number, base)
+    return None
 
 
 def _number(section: str, key: str, text: str) -> int:
-    try:
-        return int(text, 0)
-    except ValueError as error:
-        raise DataSheetError(f"{key} in [{section}] is {text[:40]!a}, which is no number; correct it") from error
+    number = parse_number(text)
+    if number is None:
+        raise DataSheetError(f"{key} in [{section}] is {text[:40]!a}, which is no number; correct it")
+    return number
 
 
 def _write_out_compact(sections: Sections) -> None:
     """Subindices of compact arrays as sections of their own, each with its own name and value where it has one."""
     for name in [name for name in sections if _number(name, "CompactSubObj", sections[name].get("CompactSubObj", "0"))]:
         entries = sections[name]
-        count = int(entries.pop("CompactSubObj"), 0)
+        count = int(entries.pop("CompactSubObj"))
         if not 1 <= count <= _MOST_SUBINDICES:
             raise DataSheetError(f"CompactSubObj in [{name}] is {count}; give 1 to {_MOST_SUBINDICES}")
         names, values = (sections.pop(f"{name}{kind}", {}) for kind in ("Name", "Value"))
@@ -133,16 +155,14 @@ def _place(error: configparser.Error) -> str:
     return "is no EDS or DCF file; give one"
 
 
-LARGEST_FILE = 8 * 1024 * 1024
-"""Makers' files of drives have some hundred kilobytes [bytes]."""
+LARGEST_FILE = 8 * 1024 * 1024  # makers' files of drives have some hundred kilobytes [bytes]
 
 _TYPE_NAMES = (
     *("BOOLEAN", "INTEGER8", "INTEGER16", "INTEGER32", "UNSIGNED8", "UNSIGNED16", "UNSIGNED32", "REAL32"),
     *("VISIBLE_STRING", "OCTET_STRING", "UNICODE_STRING", "DOMAIN", "REAL64", "INTEGER64", "UNSIGNED64"),
 )
+# data types of CiA 301 by their number
 TYPE_NAMES: Mapping[int, str] = {getattr(datatypes, name): name for name in _TYPE_NAMES}
-"""Data types of CiA 301 by their number."""
-
 _LONGEST_NAME = 60
 
 # The library warns of each of a maker's own data types, on the terminal where nobody listens; the driver needs none.
@@ -151,11 +171,7 @@ logging.getLogger(eds.__name__).setLevel(logging.ERROR)
 
 @dataclass(frozen=True)
 class DescribedObject:
-    """One entry of the object dictionary as a file describes it.
-
-    `value`: the same as it is transferred, little end first; None where it is not of its type.
-    `default`: value as delivered; None where the file states none, or no whole number.
-    """
+    """One entry of the object dictionary as a file describes it."""
 
     name: str
     index: int
@@ -164,8 +180,8 @@ class DescribedObject:
     access: str
     is_mappable: bool
     value_text: str | None = None
-    value: bytes | None = None
-    default: int | None = None
+    value: bytes | None = None  # the same as it is transferred, little end first; None where it is not of its type
+    default: int | None = None  # value as delivered; None where the file states none, or no whole number
 
     @property
     def type_name(self) -> str:
@@ -177,17 +193,15 @@ class DescribedObject:
 class DeviceFile:
     """What a file says of a drive.
 
-    `objects`: of (index, subindex) to DescribedObject.
     `vendor`, `product`, `revision`: identity; None where it states none.
-    `node_id`: that a DCF is made for; None where it states none.
     """
 
     name: str
-    objects: Mapping[tuple[int, int], DescribedObject]
+    objects: Mapping[tuple[int, int], DescribedObject]  # by index and subindex
     vendor: int | None = None
     product: int | None = None
     revision: int | None = None
-    node_id: int | None = None
+    node_id: int | None = None  # that a DCF is made for; None where it states none
 
 
 def read_device_file(path: Path, node_id: int) -> DeviceFile:
@@ -199,7 +213,8 @@ def read_device_file(path: Path, node_id: int) -> DeviceFile:
     except (SectionError, LookupError, ValueError, TypeError, AttributeError, OverflowError) as error:
         reason = " ".join(str(error.args[0] if error.args else error).split())[:120]
         raise DataSheetError(f"is no whole EDS or DCF file ({reason!a}); get it anew from the maker") from error
-    entries = {(variable.index, variable.subindex): _describe(variable) for variable in _variables(dictionary)}
+    variables = list(_variables(dictionary))
+    entries = {(variable.index, variable.subindex): _describe(variable, node_id) for variable in variables}
     device = dictionary.device_information
     made_for = sections.get("DeviceComissioning", {}).get("NodeID")
     return DeviceFile(
@@ -208,7 +223,7 @@ def read_device_file(path: Path, node_id: int) -> DeviceFile:
         vendor=device.vendor_number or _default(dictionary, 1),
         product=device.product_number or _default(dictionary, 2),
         revision=device.revision_number or _default(dictionary, 3),
-        node_id=None if made_for is None else int(made_for, 0),
+        node_id=None if made_for is None else int(made_for),
     )
 
 
@@ -223,7 +238,7 @@ def _content(path: Path) -> str:
     except OSError as error:
         raise DataSheetError(f"cannot be read ({error.strerror or error}); check its permissions") from error
     try:
-        return data.decode("utf-8-sig")
+        return data.decode("utf-16" if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig")
     except UnicodeDecodeError:
         return data.decode("latin-1")
 
@@ -237,8 +252,8 @@ def _variables(dictionary: ObjectDictionary) -> Iterator[ODVariable]:
             yield from entry.subindices.values()
 
 
-def _describe(variable: ODVariable) -> DescribedObject:
-    text = getattr(variable, "value_raw", None)
+def _describe(variable: ODVariable, node_id: int) -> DescribedObject:
+    text, default = (getattr(variable, name, None) for name in ("value_raw", "default_raw"))
     return DescribedObject(
         name=_printable(variable.name),
         index=variable.index,
@@ -247,8 +262,8 @@ def _describe(variable: ODVariable) -> DescribedObject:
         access=variable.access_type,
         is_mappable=variable.pdo_mappable,
         value_text=None if text is None else _printable(text),
-        value=None if text is None else _encode_value(variable, text),
-        default=variable.default if isinstance(variable.default, int) else None,
+        value=None if text is None else _encode_value(variable, text, node_id),
+        default=parse_number(default, node_id) if default and _is_whole(variable) else None,
     )
 
 
@@ -256,12 +271,16 @@ def _printable(name: str) -> str:
     return "".join(letter if letter.isprintable() else "?" for letter in name)[:_LONGEST_NAME]
 
 
-def _encode_value(variable: ODVariable, text: str) -> bytes | None:
+def _is_whole(variable: ODVariable) -> bool:
+    return variable.data_type in (datatypes.BOOLEAN, *datatypes.INTEGER_TYPES)
+
+
+def _encode_value(variable: ODVariable, text: str, node_id: int) -> bytes | None:
     """A DCF's value as it goes over the bus; None where it is not of the object's type."""
-    value = variable.value
+    value = parse_number(text, node_id) if _is_whole(variable) else variable.value
     if value is None:
         return None
-    if isinstance(value, int) and variable.data_type in datatypes.SIGNED_TYPES and "x" in text.lower():
+    if isinstance(value, int) and variable.data_type in datatypes.SIGNED_TYPES and not text.isdecimal():
         bits = len(variable)
         value -= (1 << bits) if 1 << bits - 1 <= value < 1 << bits else 0  # makers write -1 as 0xFFFF
     try:
@@ -275,3 +294,90 @@ def _default(dictionary: ObjectDictionary, subindex: int) -> int | None:
     variable = dictionary.get_variable(0x1018, subindex)
     default = None if variable is None else variable.default
     return default if isinstance(default, int) and default else None
+
+
+_COMMUNICATION = range(0x1000, 0x2000)
+_OWN = frozenset(
+    entry.index
+    for entry in (
+        *(objects.MODE_OF_OPERATION, objects.QUICK_STOP_OPTION, objects.ABORT_CONNECTION),
+        *(objects.FAULT_REACTION_OPTION, objects.LARGEST_TORQUE, objects.LOWEST_POSITION, objects.INTERPOLATION_VALUE),
+    )
+)
+# controlword, targets, offsets to them, and outputs, among which is the brake: nobody asked to move
+_COMMANDS = frozenset((0x6040, 0x6042, 0x6071, 0x607A, 0x60B0, 0x60B1, 0x60B2, 0x60C1, 0x60FE, 0x60FF))
+_LINE = re.compile(r"node.?id|baud|bit.?rate", re.IGNORECASE)
+_TEXTS = ("VISIBLE_STRING", "UNICODE_STRING", "OCTET_STRING")
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A value for a drive."""
+
+    entry: DriveObject
+    data: bytes
+    text: str
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The values of a DCF file; none of an EDS file.
+
+    `torque_cap`: largest torque (0x6072), which the driver sets itself and never above this [‰ of the rated torque].
+    """
+
+    written: tuple[Setting, ...]
+    left_out: Mapping[str, tuple[DescribedObject, ...]]
+    torque_cap: int | None = None
+
+
+def settings_of(file: DeviceFile) -> Settings:
+    """Values that a drive is given before it is commissioned.
+
+    Raises DataSheetError where a value is not of its object's type; names both.
+    """
+    written: list[Setting] = []
+    left_out: dict[str, tuple[DescribedObject, ...]] = {}
+    for _, described in sorted(file.objects.items()):
+        if described.value_text is None:
+            continue
+        reason = _reason_against(described)
+        if reason is None:
+            written.append(_setting(described, described.value_text))
+        else:
+            left_out[reason] = (*left_out.get(reason, ()), described)
+    return Settings(tuple(written), left_out, _torque_cap(file))
+
+
+def _torque_cap(file: DeviceFile) -> int | None:
+    described = file.objects.get((objects.LARGEST_TORQUE.index, objects.LARGEST_TORQUE.subindex))
+    if described is None or described.value_text is None:
+        return None
+    return int.from_bytes(_setting(described, described.value_text).data, "little")
+
+
+def _reason_against(described: DescribedObject) -> str | None:
+    if "w" not in described.access:
+        return "read-only"
+    if described.access == "wo":
+        return "write-only, cannot be read back"
+    if described.index in _COMMUNICATION:
+        return "communication, the driver's own"
+    if described.index in _OWN:
+        return "set by the driver"
+    if described.index in _COMMANDS:
+        return "a command, no setting"
+    if _LINE.search(described.name):
+        return "node ID or bit rate"
+    return None
+
+
+def _setting(described: DescribedObject, text: str) -> Setting:
+    is_text = described.type_name in _TEXTS
+    size = 0 if is_text or described.value is None else 8 * len(described.value)
+    entry = DriveObject(described.name, described.index, described.subindex, size)
+    if described.value is None:
+        raise DataSheetError(
+            f"ParameterValue {text[:40]!a} of {entry} is no {described.type_name} that can be written; correct it"
+        )
+    return Setting(entry, described.value, text[:40])

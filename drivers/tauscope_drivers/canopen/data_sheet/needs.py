@@ -1,20 +1,9 @@
 """Whether a drive is what the driver needs and what its EDS or DCF file states."""
 
-from collections.abc import Iterator
-
 from tauscope_drivers.backend import ControlMode
-from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen import objects, process_data
 from tauscope_drivers.canopen.data_sheet.device_file import TYPE_NAMES, DataSheetError, DescribedObject, DeviceFile
 from tauscope_drivers.canopen.objects import SUBSTITUTES, TARGETS, WRITTEN, DriveObject, select_modes
-from tauscope_drivers.canopen.process_data import (
-    MEASURED,
-    MEASURED_WHERE_THERE,
-    PDO_COUNT,
-    PdoSlot,
-    PdoSlots,
-    decode_mapping,
-    plan_pdos,
-)
 from tauscope_drivers.canopen.sdo import NodeDictionary
 from tauscope_drivers.errors import DriverError
 
@@ -30,15 +19,23 @@ def present_objects(file: DeviceFile) -> frozenset[DriveObject]:
 def find_flaws(file: DeviceFile, *, reads_rated_torque: bool) -> list[str]:
     """Everything for which the driver cannot use a drive, each as a clause that names the object; empty if none."""
     flaws = [flaw for entry in _READ if (flaw := _flaw(file, entry))]
-    flaws += [flaw for entry in _WRITTEN if (flaw := _flaw(file, entry, is_written=True))]
-    if flaw := _flaw(file, objects.CONSUMER_HEARTBEAT, is_written=True):
-        flaws.append(f"{flaw}: the drive would not notice that the host is gone")
+    flaws += [flaw for entry in _WRITTEN if (flaw := _unwritable(file, entry))]
+    if needs_guarding(file) and (
+        unguarded := [flaw for entry in objects.GUARDING if (flaw := _unwritable(file, entry))]
+    ):
+        heartbeat = _unwritable(file, objects.CONSUMER_HEARTBEAT)
+        flaws.append(f"{heartbeat}, and {unguarded[0]}: the drive would not notice that the host is gone")
     flaws += [flaw for entry in SUBSTITUTES if _find(file, entry) and (flaw := _flaw(file, entry))]
-    flaws += [flaw for entry in MEASURED if (flaw := _flaw(file, entry, is_mapped=True))]
+    flaws += [flaw for entry in process_data.MEASURED if (flaw := _flaw(file, entry, is_mapped=True))]
     flaws += _target_flaws(file, ControlMode.POSITION)
     if flaws and reads_rated_torque and not states_rated_torque(file):
         flaws.append(f"{objects.RATED_TORQUE} is missing: give drive.rated_torque_nm")
     return flaws
+
+
+def needs_guarding(file: DeviceFile) -> bool:
+    """Whether a drive watches no heartbeat that the driver could send it."""
+    return _unwritable(file, objects.CONSUMER_HEARTBEAT) is not None
 
 
 def states_rated_torque(file: DeviceFile) -> bool:
@@ -56,11 +53,13 @@ def require_target(file: DeviceFile, mode: ControlMode) -> None:
     _refuse(_target_flaws(file, mode))
 
 
-def pdo_slots(file: DeviceFile) -> PdoSlots:
+def pdo_slots(file: DeviceFile) -> process_data.PdoSlots:
     """The PDOs of a drive, and which of them can be mapped."""
-    received = (_slot(file, number, 0x1400 + number, 0x1600 + number) for number in range(PDO_COUNT))
-    sent = (_slot(file, number, 0x1800 + number, 0x1A00 + number) for number in range(PDO_COUNT))
-    return PdoSlots(tuple(slot for slot in received if slot), tuple(slot for slot in sent if slot))
+    received, sent = (
+        tuple(slot for number in range(process_data.PDO_COUNT) if (slot := _slot(file, number, direction)))
+        for direction in (process_data.RECEIVED, process_data.SENT)
+    )
+    return process_data.PdoSlots(received, sent)
 
 
 def _target_flaws(file: DeviceFile, mode: ControlMode) -> list[str]:
@@ -75,33 +74,30 @@ def _target_flaws(file: DeviceFile, mode: ControlMode) -> list[str]:
         return [flaw]
     if mode is ControlMode.TORQUE and not _find(file, objects.VELOCITY_ACTUAL):
         return [f"{objects.VELOCITY_ACTUAL} is missing, by which a runaway is noticed"]
-    optional = (entry for entry in MEASURED_WHERE_THERE if _is_mappable(file, entry))
-    missing = plan_pdos(pdo_slots(file), target, optional).missing
-    return [f"{entry} is in none of its PDOs, and their mapping cannot be written" for entry in missing]
+    optional = (entry for entry in process_data.MEASURED_WHERE_THERE if _is_mappable(file, entry))
+    missing = process_data.plan_pdos(pdo_slots(file), target, optional).missing
+    there = (entry for entry in missing if _find(file, entry))
+    return [f"{entry} is in none of its PDOs, and their mapping cannot be written" for entry in there]
 
 
-def _slot(file: DeviceFile, number: int, communication: int, mapping: int) -> PdoSlot | None:
+def _slot(file: DeviceFile, number: int, direction: process_data.PdoDirection) -> process_data.PdoSlot | None:
     """A PDO as the file describes it; None where it has none of this number."""
+    mapping = direction.mapping + number
     count = file.objects.get((mapping, 0))
-    if (communication, 1) not in file.objects or count is None:
+    if (direction.communication + number, 1) not in file.objects or count is None:
         return None
-    entries = list(_entries(file, mapping))
+    entries: list[DescribedObject] = []
+    while entry := file.objects.get((mapping, len(entries) + 1)):
+        entries.append(entry)
     if "w" in count.access and entries and all("w" in entry.access for entry in entries):
-        return PdoSlot(number, entries=len(entries))
+        return process_data.PdoSlot(number, entries=len(entries))
     words = [entry.default or 0 for entry in entries[: count.default or 0]]
-    return PdoSlot(number, decode_mapping(words) or ())
-
-
-def _entries(file: DeviceFile, mapping: int) -> Iterator[DescribedObject]:
-    subindex = 1
-    while (entry := file.objects.get((mapping, subindex))) is not None:
-        yield entry
-        subindex += 1
+    return process_data.PdoSlot(number, process_data.decode_mapping(words) or ())
 
 
 def _is_there(file: DeviceFile, entry: DriveObject) -> bool:
     """Whether an optional object is there, and can be written where the driver writes it."""
-    if entry in MEASURED_WHERE_THERE:
+    if entry in process_data.MEASURED_WHERE_THERE:
         return _is_mappable(file, entry)
     return _flaw(file, entry, is_written=entry in WRITTEN) is None
 
@@ -124,6 +120,10 @@ def _flaw(file: DeviceFile, entry: DriveObject, *, is_mapped: bool = False, is_w
     if is_written and "w" not in described.access:
         return f"{entry} cannot be written (AccessType {described.access[:20]!a})"
     return None
+
+
+def _unwritable(file: DeviceFile, entry: DriveObject) -> str | None:
+    return _flaw(file, entry, is_written=True)
 
 
 def _is_mapped_always(file: DeviceFile, entry: DriveObject) -> bool:

@@ -13,7 +13,6 @@ from tauscope_drivers import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.configuration import (
     BusConfiguration,
-    DriveJoint,
     NodeConfiguration,
     check_blocks,
     read_configuration,
@@ -23,6 +22,7 @@ from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, Devi
 from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects
 from tauscope_drivers.canopen.objects import describe_absent
 from tauscope_drivers.canopen.process_data import MEASURED_WHERE_THERE, plan_pdos
+from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.inspection import Severity
 
@@ -61,6 +61,19 @@ def test_the_file_of_the_emulated_drive_is_what_the_driver_needs(tmp_path: Path)
     assert (0x607D, 3) not in file.objects
 
 
+@pytest.mark.parametrize("access", [None, "ro"])
+def test_a_drive_that_watches_no_heartbeat_is_guarded(tmp_path: Path, access: str | None) -> None:
+    content = sections()
+    if access is None:
+        remove(content, "1016")
+    else:
+        content["1016sub1"]["AccessType"] = access
+    block = {"interface": "virtual", "channel": "none", "node_id": 5, "counts_per_turn": 4096}
+    block |= {"eds": write_file(tmp_path, content)}
+    said = [finding.detail for finding in check_blocks([DriveJoint("elbow", block, gear_ratio=50.0)])]
+    assert any("Consumer heartbeat time (0x1016:01): the host guards it by remote frames" in line for line in said)
+
+
 def test_no_file_is_needed() -> None:
     assert configured(None).nodes[0].device_file is None
 
@@ -77,7 +90,7 @@ def remove(content: Sections, *sections: str) -> None:
 @pytest.mark.parametrize("section", NEEDED)
 def test_a_missing_object_is_named(tmp_path: Path, section: str) -> None:
     content = sections()
-    remove(content, section)
+    remove(content, section, *(["100D"] if section.startswith("1016") else []))
     path = write_file(tmp_path, content)
     index = section[:4]
     message = refusal(path)
@@ -87,11 +100,14 @@ def test_a_missing_object_is_named(tmp_path: Path, section: str) -> None:
 
 def test_all_flaws_are_named_at_once(tmp_path: Path) -> None:
     content = sections()
-    remove(content, *NEEDED)
-    remove(content, "6076")
+    remove(content, *NEEDED, "100C", "6076")
     content["6072"]["DataType"] = "0x20"
     message = refusal(write_file(tmp_path, content))
-    assert message.count(" is missing") == len(NEEDED)
+    assert message.count(" is missing") == len(NEEDED) + 1
+    watchdog = (
+        "heartbeat time (0x1016:01) is missing, and Guard time (0x100C:00) is missing: the drive would not notice"
+    )
+    assert watchdog in message
     assert "Motor rated torque (0x6076:00) is missing: give drive.rated_torque_nm" in message
     assert "Max torque (0x6072:00) is DOMAIN" in message
 
@@ -262,6 +278,57 @@ def test_values_are_those_of_their_type_and_node(tmp_path: Path) -> None:
     file = read(tmp_path, content)
     values = [file.objects[index, 0].value for index in (0x2001, 0x2002, 0x2003, 0x2005)]
     assert values == [bytes.fromhex("8501"), bytes.fromhex("FEFF"), b"Arm 1", bytes.fromhex("000000BF")]
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        *[("$NODEID", 5), ("$NODEID+0x180", 0x185), ("0x180+$NodeID", 0x185), ("0x180 + $NODEID", 0x185), ("19", 19)],
+        *[("0X1f", 31), ("1F", 31), ("00ff", 255), ("017", 15), ("0019", 19), ("0", 0), ("00000000", 0)],
+    ],
+)
+def test_numbers_are_read_as_makers_write_them(tmp_path: Path, text: str, value: int) -> None:
+    content = sections()
+    content[GAIN] |= {"ParameterValue": text, "DefaultValue": text}
+    described = read(tmp_path, content).objects[0x2001, 0]
+    assert (described.value, described.default) == (value.to_bytes(2, "little"), value)
+
+
+@pytest.mark.parametrize(
+    "text", ["0x", "12 apples", "$NODE", "1.5", "G0", "--3", pytest.param("9" * 5000, id="5000 digits")]
+)
+def test_a_value_that_is_no_number_is_refused(tmp_path: Path, text: str) -> None:
+    content = sections()
+    content[GAIN]["ParameterValue"] = text
+    assert "ParameterValue" in refusal(write_file(tmp_path, content))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "utf-16"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_encodings_and_line_ends_of_any_system_are_read(tmp_path: Path, encoding: str, end: str) -> None:
+    content = sections()
+    content["6077"]["ParameterName"] = "Drehmoment [µNm] für Möller"
+    path = tmp_path / "drive.eds"
+    path.write_bytes(text_of(content).replace("\n", end).encode(encoding))
+    (node,) = configured(str(path)).nodes
+    assert node.device_file is not None
+    assert node.device_file.objects[0x6077, 0].name == "Drehmoment [µNm] für Möller"
+
+
+@pytest.mark.parametrize("section", ["DeviceComissioning", "DeviceCommissioning"])
+def test_a_dcf_of_another_node_is_refused_however_its_section_is_spelt(tmp_path: Path, section: str) -> None:
+    content = sections() | {section: {"NodeID": "0x06"}}
+    assert "is made for node 6" in refusal(write_file(tmp_path, content))
+
+
+def test_leading_zeros_and_digits_without_a_prefix_are_numbers(tmp_path: Path) -> None:
+    content = sections(VendorNumber="000003A1", RevisionNumber="00020005")
+    for keys in content.values():
+        if "DataType" in keys:
+            keys["DataType"] = f"{int(keys['DataType'], 16):04d}"
+    (node,) = configured(write_file(tmp_path, content)).nodes
+    assert node.device_file is not None
+    assert node.device_file.vendor == 0x3A1
 
 
 def test_the_identity_is_that_of_the_device_or_of_its_object(tmp_path: Path) -> None:

@@ -19,9 +19,9 @@ from tauscope_sim.canopen_bus.power_state import PowerState
 pytestmark = needs_shared_cases
 
 FOLDER = SHARED_CASES / "eds"
-ACCEPTED = ("maxon-epos4.eds", "maxon-epos4-50-15.dcf", "zeroerr-erob.eds", "eyou-v1.4.eds", "pilz-prbt.dcf")
+GUARDED = "ingenia-everest-xcr.eds"
+ACCEPTED = ("maxon-epos4.eds", "maxon-epos4-50-15.dcf", "zeroerr-erob.eds", "eyou-v1.4.eds", "pilz-prbt.dcf", GUARDED)
 REFUSED = {
-    "ingenia-everest-xcr.eds": ["Consumer heartbeat time (0x1016:01) is missing"],
     "maxon-epos2.eds": ["Torque actual value (0x6077:00) is missing"],
     "xeryon-xla5.eds": ["Consumer heartbeat time (0x1016:01) is missing", "Torque actual value (0x6077:00) is missing"],
 }
