@@ -16,18 +16,15 @@ from tauscope.tasks.task import ReadingOptions
 
 
 def name_output(words: str, metavar: str = "OUT", *names: str) -> Any:
-    """An option that names a file to write."""
     return typer.Option(*names, metavar=metavar, dir_okay=False, help=words)
 
 
 def name_input(words: str, metavar: str | None = None, kind: Any = typer.Option, *names: str, **more: Any) -> Any:
-    """An option or an argument that names a file to read."""
     stated: dict[str, Any] = {"exists": True, "dir_okay": False, "show_default": False, **more}
     return kind(*names, metavar=metavar, help=words, **stated)
 
 
 def name_recordings(words: str) -> Any:
-    """An argument that names recordings."""
     return name_input(words, "RECORDING", typer.Argument, dir_okay=True)
 
 

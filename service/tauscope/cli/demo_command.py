@@ -66,8 +66,6 @@ and how its joints rub is left out. Of the friction curve only the shape constan
 
 @dataclass(frozen=True)
 class Comparison:
-    """A parameter's truth beside its estimate."""
-
     name: str
     truth: float
     value: float
@@ -75,7 +73,6 @@ class Comparison:
 
     @property
     def z(self) -> float:
-        """The error in standard errors."""
         return (self.value - self.truth) / self.std
 
 
@@ -139,8 +136,6 @@ def run_demo(folder: Path, page: PageShown) -> None:
 
 
 def design_motion(robot: Path, out: Path, options: ExcitationOptions, told: Told) -> None:
-    """Design a motion and write it as a trajectory file."""
-
     def tell(progress: OptimiserProgress) -> None:
         told(f"design {out.stem} motion", 100.0 * progress.fraction)
 

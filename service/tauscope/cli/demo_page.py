@@ -66,8 +66,6 @@ _LOOK_S = 0.5
 
 
 class PageShown(Enum):
-    """Who shows the page after the demo."""
-
     HERE = auto()
     """The demo itself, until interrupted."""
     LEFT = auto()
@@ -83,8 +81,6 @@ def show_page(folder: Path) -> None:
 
 @dataclass(frozen=True)
 class LeftPage:
-    """A page that another process serves."""
-
     address: str
     process: subprocess.Popen[str]
 

@@ -168,7 +168,6 @@ def _drives(path: Path, backend: str | None) -> Sequence[Finding]:
 
 
 def show_finding(console: Console, finding: Finding) -> None:
-    """Show one finding on a line."""
     remedy = f"; {finding.remedy}" if finding.remedy else ""
     line = f"{_MARKS[finding.severity]}: {finding.subject}: {finding.detail}{remedy}"
     console.print(plain(line), soft_wrap=True)

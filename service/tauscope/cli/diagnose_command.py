@@ -128,7 +128,6 @@ def parse_against(words: list[str]) -> dict[str, Any]:
 
 
 def show_diagnosis(console: Console, document: DiagnosisDocument) -> None:
-    """Show the verdict, the findings, and what they change."""
     console.print(plain(f"Robot {document.robot}: {document.headline}"), soft_wrap=True)
     console.print(plain(f"Verdict {document.verdict}: {VERDICTS[document.verdict]}"), soft_wrap=True)
     console.print(plain(f"Noise: {noise_words(document.noise_method)}"), soft_wrap=True)

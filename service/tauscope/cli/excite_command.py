@@ -67,7 +67,6 @@ CRITERIA = {"cond-f": "Cond_F(LᵀL)", "log-det": "-ln det(LᵀL)/p", "cond-2": 
 
 
 def show_design(console: Console, design: ExcitationDesign, robot: Robot) -> None:
-    """Show what a design is good for, what it leaves of the limits, and what limits it."""
     trajectory = design.trajectory
     console.print(
         plain(

@@ -80,7 +80,6 @@ def run_fleet(verb: Literal["identify", "diagnose"], manifest: Path, out: Path, 
 
 
 def _run(verb: str, manifest: Path, out: Path, workers: int, total: int) -> int:
-    """Do the work, and write each row as it comes; how many failed."""
     columns, work = (
         (IDENTIFICATION_COLUMNS, identify_robot) if verb == "identify" else (DIAGNOSIS_COLUMNS, diagnose_robot)
     )

@@ -70,7 +70,6 @@ def identify(
 
 
 def show_identification(console: Console, document: IdentificationDocument, robot: Robot) -> None:
-    """Show parameters, friction, noise and fit."""
     console.print(
         plain(f"Robot {document.robot}: {counted(len(document.joints), 'joint')}, {document.estimator.upper()}")
     )

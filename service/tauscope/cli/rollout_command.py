@@ -59,7 +59,6 @@ def rollout(
 
 
 def show_rollout(console: Console, document: RolloutDocument) -> None:
-    """Show the errors of all models."""
     joints, recordings = len(document.joints), len(document.recordings)
     console.print(plain(f"Robot {document.robot}: {counted(joints, 'joint')}, {counted(recordings, 'recording')}"))
     for warning in document.warnings:

@@ -189,7 +189,6 @@ def _folder_beside(out: Path) -> Path:
 
 
 def show_run(console: Console, record: RunRecord, robot: Robot) -> None:
-    """Show how a run went, and how it kept its time."""
     reason = f": {record.problem.detail}" if record.problem is not None else ""
     console.print(plain(f"Robot {record.robot} on {record.backend}: {record.state}{reason}"), soft_wrap=True)
     for line in record.drives:

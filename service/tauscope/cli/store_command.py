@@ -55,8 +55,6 @@ _OWN_FILES = "its state, its order or its result"
 
 @dataclass(frozen=True, eq=False)
 class OpenStore:
-    """A data folder that is this process's own for a while."""
-
     folder: Path
     database: Database
     keeper: Indexer

@@ -45,12 +45,10 @@ def run_task(
 
 
 def list_files(request: Any) -> list[Path]:
-    """Recordings and models that a request names."""
     return [Path(name) for names in getattr(request, "inputs", {}).values() for name in names]
 
 
 def name_files(paths: Iterable[Path] | None) -> tuple[str, ...]:
-    """Files as a request names them."""
     return tuple(map(str, paths or ()))
 
 

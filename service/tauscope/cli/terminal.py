@@ -17,7 +17,6 @@ PIPE_WIDTH = 240  # columns where nobody looks: wide enough for every table
 
 
 def output() -> Console:
-    """Standard output."""
     if sys.stdout.isatty():
         return Console(highlight=False, emoji=False)
     return Console(highlight=False, emoji=False, width=PIPE_WIDTH)

@@ -45,7 +45,6 @@ class SeveralValuesCommand(TyperCommand):
     """A command of which some options take several values: those whose metavar ends in ``...``."""
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:
-        """Parse the command line after its options were repeated before each value."""
         several = [p for p in self.params if isinstance(p, TyperOption) and (p.metavar or "").endswith(SEVERAL)]
         return super().parse_args(ctx, spread_values(args, {name for option in several for name in option.opts}))
 
@@ -81,7 +80,6 @@ class OptionsOf:
 
     @property
     def fields(self) -> dict[str, FieldInfo]:
-        """The fields, in their order."""
         known = self.model.model_fields
         return {name: known[name] for name in self.only or known if name not in self.without}
 
@@ -156,7 +154,6 @@ _EDGES = (("min", "ge"), ("max", "le"))
 
 
 def describe_field(field: FieldInfo) -> str:
-    """What a field is, as a command's help says it."""
     words = re.sub(r"[;,] null(?: for|:)? (.*)", r" (by default \1)", field.description or "")
     return f"{words[:1].upper()}{words[1:]}."
 

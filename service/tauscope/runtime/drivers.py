@@ -48,7 +48,6 @@ _UNSTATED_CONSTANT = 1.0  # A robot file that states no torque constant reads so
 
 @cache
 def _entries() -> Mapping[str, EntryPoint]:
-    """Every registered driver by its name, the default first."""
     found = sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda one: (one.name != DEFAULT_BACKEND, one.name))
     if not found:
         raise AcquisitionError("no driver is registered; install tauscope again (pip install -e . in a source tree)")
@@ -83,7 +82,6 @@ def find_driver(name: str) -> Driver:
 
 
 def bus_drivers() -> Mapping[str, BusDriver]:
-    """Every driver of a field bus by its name."""
     drivers = map(find_driver, driver_names())
     return {driver.name: driver for driver in drivers if isinstance(driver, BusDriver)}
 

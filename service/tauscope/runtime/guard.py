@@ -13,8 +13,6 @@ from tauscope_drivers import ArmState, DriveLimits, Setpoint
 
 
 class Rule(StrEnum):
-    """What a command and a state have to satisfy."""
-
     NOT_FINITE = "not-finite"
     """every target is a number"""
     POSITION = "position"
@@ -107,7 +105,6 @@ class GuardLimits:
 
     @property
     def drive_limits(self) -> DriveLimits:
-        """What the drives enforce: the same, with the room that the arm itself is given."""
         return DriveLimits(
             position_low=self.position_low - self.position_margin,
             position_high=self.position_high + self.position_margin,

@@ -72,7 +72,6 @@ class Cycles:
     late: NDArray[np.int64] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Make the one row that all cycles are written into."""
         n = self.plan.position.shape[1]
         self.worst_following = np.zeros(n)
         self.late = np.zeros(n, dtype=np.int64)
@@ -93,7 +92,6 @@ class Cycles:
 
     @property
     def mode(self) -> ControlMode:
-        """Who closes the loop."""
         return ControlMode.POSITION if self.control is None else ControlMode.TORQUE
 
     def play(self) -> None:
@@ -142,12 +140,10 @@ INTERVAL_S = 0.2  # time between two words about progress
 
 
 def state_event(state: RunState, at: datetime) -> dict[str, Any]:
-    """The event of a transition."""
     return {"event": "state", "state": state.value, "at": at.isoformat()}
 
 
 def end_event(record: RunRecord) -> dict[str, Any]:
-    """The last event of a run."""
     problem = None if record.problem is None else record.problem.detail
     samples = 0 if record.recording is None else record.recording.samples
     return {"event": "end", "state": record.state.value, "problem": problem, "stop": record.stop, "samples": samples}
@@ -193,7 +189,6 @@ class ProgressReporter:
         self._last_cycle = 0
 
     def __call__(self, cycles: Cycles, state: RunState) -> None:
-        """Report where it is time to."""
         now = time.monotonic()
         if now - self._last < INTERVAL_S:
             return

@@ -145,15 +145,11 @@ ORDER_FILE = "order.json"
 
 
 class BackendOrder(StrictModel):
-    """Which backend, and its own settings."""
-
     name: str = Field(default=DEFAULT_BACKEND, description="name of a driver")
     settings: dict[str, Any] = Field(default_factory=dict, description="the driver's own options")
 
 
 class RunOrder(StrictModel):
-    """One run."""
-
     form: Literal["tauscope.order/1"] = Field(default="tauscope.order/1", description="name and version of this form")
     robot: str = Field(description="path of the robot file")
     trajectory: str = Field(description="path of the trajectory file")

@@ -88,12 +88,10 @@ class Plan:
 
     @property
     def cycles(self) -> int:
-        """Number of cycles N."""
         return len(self.position)
 
     @property
     def ramp_cycles(self) -> int:
-        """Number of cycles before the motion."""
         return int(np.count_nonzero(self.phase == Phase.RAMP))
 
     @property
@@ -166,7 +164,6 @@ def _require_fitting(robot: Robot, trajectory: Trajectory, start: Array, capabil
 
 
 def _ramp(robot: Robot, start: Array, trajectory: Trajectory, rate_hz: float) -> MoveSegment:
-    """The way to the motion's start, a whole number of cycles long."""
     way = ramp(start, trajectory.start, motion_limits(robot))
     return MoveSegment(way.start, way.end, float(np.ceil(way.duration_s * rate_hz)) / rate_hz)
 

@@ -38,8 +38,6 @@ _POLL_S = 0.02
 
 
 class RunLock:
-    """Holds a run's folder for this process."""
-
     def __init__(self, folder: Path) -> None:
         """Take the folder. Raises AcquisitionError where another process holds it."""
         self._descriptor = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
@@ -50,7 +48,6 @@ class RunLock:
             raise AcquisitionError(f"{folder}: another process carries this run out; wait for it or stop it") from None
 
     def release(self) -> None:
-        """Let go of the folder."""
         os.close(self._descriptor)
 
 

@@ -32,12 +32,10 @@ class ProcessName(StrictModel):
 
     @staticmethod
     def of(pid: int) -> "ProcessName":
-        """The name of a living process."""
         return ProcessName(pid=pid, start=read_process_start(pid))
 
     @property
     def is_alive(self) -> bool:
-        """Whether it still runs, or is stopped and might."""
         start = read_process_start(self.pid)
         return start is not None and self.start in (None, start)
 
@@ -59,15 +57,11 @@ def read_process(folder: Path) -> ProcessName | None:
 
 
 class Transition(StrictModel):
-    """When a run came into a state."""
-
     state: RunState = Field(description="the state")
     at: AwareDatetime = Field(description="the moment")
 
 
 class RunProblem(StrictModel):
-    """Why a run did not finish."""
-
     code: str = Field(description="code of the error, as in tauscope.errors, or of the way the run ended")
     detail: str = Field(description="one line: what is wrong, where, and what to do")
     rule: str | None = Field(default=None, description="the guard's rule, where the guard objected")
@@ -77,7 +71,6 @@ class RunProblem(StrictModel):
 
     @staticmethod
     def of(violation: Violation) -> "RunProblem":
-        """The problem that a violation is."""
         return RunProblem(
             code=AcquisitionError.code,
             detail=str(violation),
@@ -89,8 +82,6 @@ class RunProblem(StrictModel):
 
 
 class RecordingFiles(StrictModel):
-    """What a run left behind."""
-
     samples: int = Field(description="samples of the motion, without the ramp")
     partial: bool = Field(description="whether the motion was not played to its end, or samples were lost")
     lost_rows: int = Field(
@@ -101,8 +92,6 @@ class RecordingFiles(StrictModel):
 
 
 class RunRecord(StrictModel):
-    """A run's state and what is known of it."""
-
     form: Literal["tauscope.run/1"] = Field(default="tauscope.run/1", description="name and version of this form")
     state: RunState = Field(description="where the run stands")
     robot: str = Field(description="name of the arm")
@@ -140,7 +129,6 @@ class RunRecord(StrictModel):
 
 
 def new_record(robot: str, backend: str, mode: str, now: datetime | None = None) -> RunRecord:
-    """The record of a run that has not begun."""
     created = Transition(state=RunState.CREATED, at=now or datetime.now(UTC))
     owner = ProcessName.of(os.getpid())
     return RunRecord(state=RunState.CREATED, robot=robot, backend=backend, mode=mode, history=(created,), owner=owner)
@@ -183,7 +171,6 @@ class RecordKeeper:
         self._thread.start()
 
     def keep(self, record: RunRecord) -> None:
-        """Have a record written; returns at once."""
         with self._changed:
             self._newest = record
             self._changed.notify_all()

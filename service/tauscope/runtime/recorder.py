@@ -75,12 +75,10 @@ class DirectRecorder:
             self._write()
 
     def event(self, time_ns: int, event: Mapping[str, Any]) -> None:
-        """Take an event. `time_ns`: when, by the clock of the rows [ns]."""
         self._write()
         self._writer.write_event(time_ns, event)
 
     def close(self) -> str | None:
-        """Bring everything to the file; why that did not work, None where it did."""
         try:
             self._write()
             self._writer.close()
@@ -149,7 +147,6 @@ class RecorderProcess:
         self._send(self._buffer)
 
     def event(self, time_ns: int, event: Mapping[str, Any]) -> None:
-        """Take an event. `time_ns`: when, by the clock of the rows [ns]."""
         content = event_frame(time_ns, dict(event))
         if len(content) <= _LARGEST_FRAME:
             self._send(content)
@@ -178,7 +175,6 @@ class RecorderProcess:
 
 
 def _last_answer(said: bytes) -> dict[str, Any]:
-    """The last line that the writer said, empty where it said nothing."""
     lines = said.splitlines()
     return json.loads(lines[-1]) if lines else {}
 

@@ -42,8 +42,6 @@ class Keeper(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class RunTask:
-    """What is to be run."""
-
     robot: Robot
     trajectory: Trajectory
     options: RunOptions
@@ -52,8 +50,6 @@ class RunTask:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What a run talks to while it runs."""
-
     folder: Path
     stops: Stops
     keeper: Keeper
@@ -118,8 +114,6 @@ INTERNAL = "internal"  # code of a problem that is a fault of Tauscope's own
 
 
 class Run:
-    """Takes a run through its states."""
-
     def __init__(self, task: RunTask, record: RunRecord, around: Surroundings) -> None:
         """Prepare; nothing happens before `execute`."""
         self.record = record
@@ -136,7 +130,6 @@ class Run:
         self._progress = ProgressReporter(self._tell)
 
     def execute(self) -> RunRecord:
-        """Run to the end, whatever that is."""
         cause: BaseException | None = None
         try:
             self._move()

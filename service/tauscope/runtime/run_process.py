@@ -112,7 +112,6 @@ def _see_to_its_end(control: ProcessName, patience_s: float) -> None:
 
 
 def _interrupt(folder: Path, record: RunRecord) -> RunRecord:
-    """Save what there is and write the end of a run whose process is gone."""
     recording = None
     journal = folder / JOURNAL_FILE
     if journal.exists():
@@ -182,7 +181,6 @@ class RunProcess:
 
     @property
     def pid(self) -> int:
-        """Number of the control process."""
         return self._process.pid
 
     @property
@@ -191,7 +189,6 @@ class RunProcess:
         return self._has_ended.is_set()
 
     def beat(self) -> None:
-        """Say that the owner is alive."""
         self._send(BEAT)
 
     def stop(self) -> None:

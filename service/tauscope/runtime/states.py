@@ -23,7 +23,6 @@ class RunState(StrEnum):
 
     @property
     def is_end(self) -> bool:
-        """Whether nothing will happen to the run any more."""
         return not TRANSITIONS[self]
 
 
@@ -49,7 +48,6 @@ gone: that is `interrupted`, and the device's watchdog has stopped the arm."""
 
 
 def may_follow(before: RunState, after: RunState) -> bool:
-    """Whether a run may go from one state to another."""
     return after in TRANSITIONS[before]
 
 
@@ -59,8 +57,6 @@ def after_stop(state: RunState) -> RunState:
 
 
 class StopSource(StrEnum):
-    """Who wants the run to stop."""
-
     OPERATOR = "operator"
     """a byte on the pipe, the stop file, or a signal"""
     OWNER_GONE = "owner-gone"
@@ -69,14 +65,11 @@ class StopSource(StrEnum):
 
 @dataclass(frozen=True)
 class StopRequest:
-    """One request."""
-
     source: StopSource
     detail: str
 
     @property
     def end(self) -> RunState:
-        """The state in which the run ends for it."""
         return RunState.STOPPED if self.source is StopSource.OPERATOR else RunState.INTERRUPTED
 
 
@@ -98,8 +91,7 @@ class Stops(Protocol):
     def enter_real_time(self) -> None:
         """The arm moves by the wall clock: apply the limits of real time from here on."""
 
-    def acknowledge(self) -> None:
-        """The run has begun to stop."""
+    def acknowledge(self) -> None: ...
 
     def done(self) -> None:
         """The arm is stopped, or nothing more can be done for it: nobody breaks into the run any more."""
@@ -113,19 +105,15 @@ class ManualStop:
         self.acknowledged = False
 
     def request(self, detail: str = "asked to stop", source: StopSource = StopSource.OPERATOR) -> None:
-        """Ask; the first request counts."""
         if self.requested is None:
             self.requested = StopRequest(source, detail)
 
-    def enter_real_time(self) -> None:
-        """A caller in this process has no limits."""
+    def enter_real_time(self) -> None: ...
 
     def acknowledge(self) -> None:
-        """The run has begun to stop."""
         self.acknowledged = True
 
-    def done(self) -> None:
-        """The arm is stopped."""
+    def done(self) -> None: ...
 
 
 def raise_if_requested(stops: Stops) -> None:

@@ -32,10 +32,6 @@ class StopListener:
     """Requests to stop a run in a process of its own; made and used in the main thread."""
 
     def __init__(self, command_pipe: int, stop_file: Path, heartbeat_s: float) -> None:
-        """Start to listen.
-
-        `heartbeat_s`: silence on the pipe after which the owner counts as gone, in real time [s].
-        """
         self.requested: StopRequest | None = None
         self.is_real_time = False
         self._pipe, self._stop_file, self._heartbeat_s = command_pipe, stop_file, heartbeat_s
@@ -50,7 +46,6 @@ class StopListener:
         threading.Thread(target=self._watch_file, name="stop-file", daemon=True).start()
 
     def enter_real_time(self) -> None:
-        """The arm moves by the wall clock: apply the limits of real time from here on."""
         self.is_real_time = True
 
     def acknowledge(self) -> None:
@@ -62,7 +57,6 @@ class StopListener:
         self._is_done = True
 
     def request(self, source: StopSource, detail: str) -> None:
-        """Ask; the first request counts."""
         if self.requested is None:
             self.requested = StopRequest(source, detail)
             self._asked_at = time.monotonic()

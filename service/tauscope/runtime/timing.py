@@ -71,7 +71,6 @@ def _enter_real_time(priority: int) -> str | None:
 
 
 def _threads() -> list[int]:
-    """The threads of this process; none where the system does not list them."""
     try:
         return [int(task.name) for task in _TASKS.iterdir()]
     except OSError:

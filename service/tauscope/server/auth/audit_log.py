@@ -37,11 +37,7 @@ def chain_line(previous: Mapping[str, Any] | None, content: Mapping[str, Any]) -
 
 @dataclass(frozen=True)
 class Verification:
-    """What a log is worth.
-
-    `head`: hash of the last one; None where there is none.
-    `fault`: the first thing that is wrong, one line; None where nothing is.
-    """
+    """`head`: hash of the last entry, None without one; `fault`: the first thing that is wrong, None without one."""
 
     entries: int
     head: str | None
@@ -49,7 +45,6 @@ class Verification:
 
 
 def verify_lines(lines: Iterable[bytes], noted: str | None = None) -> Verification:
-    """Check every line against the one before."""
     count, head, is_noted_there = 0, GENESIS, noted is None
     torn: bytes | None = None
     for place, line in enumerate(lines, start=1):
@@ -102,7 +97,6 @@ def _fault(entry: dict[str, Any] | None, number: int, previous: str, torn: bytes
 
 
 def _digest(entry: Mapping[str, Any]) -> str:
-    """The hash of everything that an entry says, the hash of the entry before included."""
     return hashlib.sha256(_canonical(entry)).hexdigest()
 
 

@@ -55,8 +55,6 @@ FAILURES_PER_S, FAILURE_BURST = 0.5, 20.0
 
 @dataclass(frozen=True, eq=False)
 class Access:
-    """Who may call, how often, and how much they may send [bytes]."""
-
     ring: KeyRing
     rate: RateLimit
     limits_local: bool = False
@@ -66,8 +64,6 @@ class Access:
 
 @dataclass(frozen=True)
 class _Refusal:
-    """Why a request goes no further."""
-
     code: str
     detail: str
     headers: dict[str, str] = field(default_factory=dict)
@@ -80,11 +76,9 @@ class HttpMiddleware:
         self.app = app
 
     async def __call__(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
-        """Answer a request, or pass it on."""
         await (self.answer if scope["type"] == "http" else self.app)(scope, receive, send)
 
     async def answer(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
-        """Answer a request over HTTP."""
         raise NotImplementedError
 
 
@@ -103,7 +97,6 @@ class Gate(HttpMiddleware):
 
 
 def find_caller(scope: AsgiScope) -> Caller:
-    """Who makes a request."""
     return cast(Caller, scope.get(CALLER, LOCAL))
 
 
@@ -143,12 +136,7 @@ def _key(headers: Headers) -> str | None:
 
 
 def require_upload_quota(scope: AsgiScope) -> Callable[[int], None]:
-    """Refuse an upload of a caller who has sent enough for now.
-
-    Raises ProblemError if the caller has to wait.
-
-    Returns callable: counts what is sent [bytes].
-    """
+    """Counts what a caller sends [bytes]. Raises ProblemError if it has sent enough for now."""
     access, caller = cast(Access, scope["app"].state.services.access), find_caller(scope)
     quota, key = access.uploads, caller.key or caller.name
     if quota is None or (caller.key is None and not access.limits_local):
@@ -169,8 +157,6 @@ _log = logging.getLogger("tauscope.audit")
 
 
 class AuditedRequests(HttpMiddleware):
-    """Notes who asked for what, and what was answered."""
-
     @override
     async def answer(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
         if not is_audited(scope["method"], scope["path"]):

@@ -37,7 +37,6 @@ class Scope(StrEnum):
     """remove what was measured, take an arm from somebody else"""
 
     def includes(self, other: "Scope") -> bool:
-        """Whether this scope is the other one, or a higher one."""
         order = list(Scope)
         return order.index(self) >= order.index(other)
 
@@ -115,15 +114,12 @@ class ApiKey(StrictModel):
     revoked: AwareDatetime | None = Field(default=None, description="when it was taken back")
 
     def state(self, now: datetime) -> Literal["valid", "expired", "revoked"]:
-        """What the key is worth."""
         if self.revoked is not None:
             return "revoked"
         return "expired" if self.expires is not None and now >= self.expires else "valid"
 
 
 class _KeyList(StrictModel):
-    """What the file holds."""
-
     form: Literal["tauscope.keys/1"] = "tauscope.keys/1"
     keys: tuple[ApiKey, ...] = ()
 
@@ -216,8 +212,6 @@ CHECK_S = 1.0
 
 @dataclass(frozen=True)
 class Caller:
-    """Who makes a request."""
-
     name: str
     key: str | None
     scope: Scope
@@ -242,15 +236,12 @@ class KeyRing:
 
     @property
     def is_required(self) -> bool:
-        """Whether a key is asked for."""
         return self._is_required or bool(self._keys)
 
     def has_valid_key(self) -> bool:
-        """Whether anybody could get in."""
         return any(key.state(self._clock()) == "valid" for key in self._keys)
 
     def caller(self, text: str | None, *, may_be_expired: bool = False) -> Caller | str:
-        """Who calls, or why that is nobody."""
         if not self.is_required:
             return LOCAL
         if text is None:

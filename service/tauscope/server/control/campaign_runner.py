@@ -48,8 +48,6 @@ RETRY_S = 0.5  # how often a queue, or a disk, that is full is asked again [s]
 
 @dataclass(frozen=True, eq=False)
 class CampaignDependencies:
-    """What a campaign works with."""
-
     jobs: JobQueue
     excitations: JobKind
     identifications: JobKind
@@ -82,7 +80,6 @@ class CampaignRunner:
 
     @property
     def holder(self) -> str:
-        """By what name it has the arm."""
         return f"campaign {self._workspace.folder.name}"
 
     def stop(self) -> None:
@@ -156,7 +153,6 @@ class CampaignRunner:
             self._analyse("diagnosis", kinds.diagnoses, DiagnosisWorkspace, order.diagnosis)
 
     def _design(self, options: ExcitationDesignOptions, link: str) -> str:
-        """Have a motion designed; returns at once."""
         order = ExcitationOrder(**self._robot, options=options)
         identifier = self._submit(self._dependencies.excitations, ExcitationWorkspace, order)
         self._record(**{link: identifier})
@@ -180,7 +176,6 @@ class CampaignRunner:
         require_succeeded(record, f"{noun} {identifier}")
 
     def _run_motion(self, excitation: str, link: str) -> str:
-        """Run a motion to its end; the name of its recording."""
         order, dependencies = self._order, self._dependencies
         request = RunRequestRecord(
             **self._robot,
@@ -208,7 +203,6 @@ class CampaignRunner:
         return name
 
     def _follow(self, run: str) -> None:
-        """Tell the progress of a run until it is over."""
         told = None
         while (live := self._dependencies.runs.live(run)) is not None:
             if live.percent is not None and live.percent != told:
@@ -241,7 +235,6 @@ class CampaignRunner:
         return None if record is None or record.state in requeue else identifier
 
     def _begin(self, step: str) -> None:
-        """Tell a step, unless nobody wants to know any more."""
         if self._stop_requested.is_set():
             raise StoppedError
         self._workspace.write_step(step)
@@ -283,24 +276,15 @@ def _run_problem(identifier: str, record: RunRecord | None) -> JobProblem:
 
 
 class CampaignManager(Manager[CampaignRunner]):
-    """The active campaigns, and the folders of all campaigns."""
-
     def __init__(self, items: ItemStore, dependencies: CampaignDependencies) -> None:
-        """Continue the analysis of unfinished campaigns whose motions were all recorded.
-
-        The others become `interrupted`: nothing moves by itself.
-        """
+        """Continue the analysis of campaigns that recorded all motions; the others become interrupted."""
         super().__init__(items)
         self._dependencies = dependencies
         for identifier in items.identifiers():
             self._resume(CampaignWorkspace(items.folder(identifier)))
 
     def submit(self, staged: Path, permit: Permit = FREE) -> str:
-        """Start a campaign; it claims the arm until its motions are done.
-
-        Raises BusyError if somebody else has the arm; the folder stays staged. Raises LeaseError if the arm may not be
-        moved by that leave; the folder stays staged.
-        """
+        """Start a campaign. Raises BusyError or LeaseError if the arm may not move; the folder stays staged."""
         workspace = CampaignWorkspace(staged)
         order = workspace.read_order()
         if order is None:
@@ -324,10 +308,7 @@ class CampaignManager(Manager[CampaignRunner]):
         return identifier
 
     def stop(self, identifier: str) -> JobState | None:
-        """Stop a campaign: takes no lock, waits for nothing, may be called any number of times.
-
-        Returns JobState or None: where the campaign stood; None where nothing of it goes on.
-        """
+        """Stop a campaign without any lock; returns where it stood, None where nothing of it goes on."""
         runner = self._threads.find(identifier)
         if runner is None:
             return None

@@ -42,16 +42,12 @@ class DeviceClaims:
             self._holders[device] = holder
 
     def require_free(self, device: str) -> None:
-        """Say at once that somebody has an arm, before work is begun for whoever wants it.
-
-        Raises BusyError if somebody has it.
-        """
+        """Refuse an arm before work is begun for it. Raises BusyError if somebody has it."""
         holder = self._holders.get(device)
         if holder is not None:
             raise self._busy(device, holder)
 
     def release(self, device: str, holder: str) -> None:
-        """Let go of an arm; nothing happens where somebody else has it."""
         with self._lock:
             if self._holders.get(device) == holder:
                 del self._holders[device]
@@ -77,15 +73,12 @@ class Permit(Protocol):
 class FreePermit:
     """Leave to move an arm that nobody has a lease of, where no lease is asked for."""
 
-    def require(self) -> None:
-        """Nothing to refuse."""
+    def require(self) -> None: ...
 
     def find_end_reason(self) -> str | None:
-        """The motion may go on."""
         return None
 
-    def disarm(self) -> None:
-        """Nothing to take back."""
+    def disarm(self) -> None: ...
 
 
 FREE = FreePermit()  # leave that is never taken back
@@ -116,13 +109,7 @@ LONGEST_TTL_S = 60.0  # longest time for which a lease may be given without a si
 
 @dataclass(eq=False)
 class Lease:
-    """One lease.
-
-    Attributes are replaced one at a time and never need a lock to be read.
-
-    `ttl_s`: how long it lasts without a sign of life [s].
-    `ends`: when it ends, on the clock of `Leases` [s].
-    """
+    """`ttl_s`: time without a heartbeat after which it ends, at `ends` [s]. Attributes are read without a lock."""
 
     id: str
     number: int
@@ -137,18 +124,14 @@ class Lease:
 
     @property
     def token(self) -> str:
-        """What its holder shows."""
         return f"{self.number}-{self.secret}"
 
 
 class LeasePermit:
-    """Leave by a lease that was shown."""
-
     def __init__(self, lease: Lease, find_end_reason: Callable[[Lease], str | None]) -> None:
         self._lease, self._end_of = lease, find_end_reason
 
     def require(self) -> None:
-        """Refuse what its end would stop at once."""
         lost = self._end_of(self._lease)
         if lost is not None:
             raise LeaseLostError(one_line(f"{self._lease.device}: lease {self._lease.number} ended: {lost}"))
@@ -157,14 +140,12 @@ class LeasePermit:
             raise NotArmedError(one_line(f"{self._lease.device}: its lease is not armed; {hint}"))
 
     def find_end_reason(self) -> str | None:
-        """Why the motion has to end."""
         lost = self._end_of(self._lease)
         if lost is not None:
             return f"lease {self._lease.number} of {self._lease.holder} ended: {lost}"
         return None if self._lease.is_armed else f"lease {self._lease.number} of {self._lease.holder} was disarmed"
 
     def disarm(self) -> None:
-        """A stop disarms."""
         self._lease.is_armed = False
 
 
@@ -176,7 +157,6 @@ class UnleasedPermit(FreePermit):
 
     @override
     def require(self) -> None:
-        """Refuse an arm that is leased."""
         self._require_unleased(self._device)
 
 
@@ -196,7 +176,6 @@ class Leases:
         self._active: Mapping[str, Lease] = {}
 
     def active(self) -> list[Lease]:
-        """Leases that hold, the newest first."""
         leases = [lease for lease in self._active.values() if self.find_end_reason(lease) is None]
         return sorted(leases, key=lambda lease: -lease.number)
 
@@ -205,12 +184,7 @@ class Leases:
         return max(0.0, lease.ends - self._clock())
 
     def acquire(self, device: str, holder: str, owner: str, ttl_s: float, *, take: bool = False) -> Lease:
-        """Lease an arm that nobody has.
-
-        Raises LeasedError if somebody has it and it is not taken. Raises BusyError if it moves without a lease.
-
-        `ttl_s`: how long it lasts without a sign of life [s].
-        """
+        """Lease an arm. Raises LeasedError if it is leased and not taken, BusyError if it moves without a lease."""
         with self._lock:
             present = self._present(device)
             if present is not None:
@@ -240,10 +214,7 @@ class Leases:
         return lease
 
     def renew(self, device: str, token: str, owner: str) -> Lease:
-        """Take a sign of life.
-
-        Raises LeaseLostError if that is not the present lease: one that has ended is not renewed.
-        """
+        """Take a heartbeat. Raises LeaseLostError if that is not the present lease: one that has ended stays so."""
         with self._lock:
             lease = self.require(device, token, owner)
             lease.ends = self._clock() + lease.ttl_s
@@ -257,10 +228,7 @@ class Leases:
         return lease
 
     def release(self, device: str, token: str, owner: str) -> None:
-        """Give an arm back; what moves by the lease stops.
-
-        Raises LeaseLostError if that is not the present lease; nothing happens to the present one.
-        """
+        """Give an arm back; what moves by the lease stops. Raises LeaseLostError if that is not the present lease."""
         with self._lock:
             self._finish(self.require(device, token, owner), "it was released")
 
@@ -270,7 +238,6 @@ class Leases:
             lease.is_armed = False
 
     def find(self, identifier: str) -> Lease | None:
-        """The lease of an identifier, while it holds."""
         return next((lease for lease in self.active() if lease.id == identifier), None)
 
     def require(self, device: str, token: str, owner: str) -> Lease:

@@ -40,8 +40,6 @@ from tauscope.tasks.task import LocalFiles
 
 
 class RunRequestRecord(StrictModel):
-    """What was asked for."""
-
     form: Literal["tauscope.run-request/1"] = Field(
         default="tauscope.run-request/1", description="name and version of this form"
     )
@@ -64,7 +62,6 @@ class RunWorkspace(JobFolder):
     """
 
     def __init__(self, folder: Path) -> None:
-        """Look at a run's folder; nothing is opened yet."""
         super().__init__(folder)
         self.robot = folder / "robot"
         self.trajectories = folder / "trajectory"
@@ -73,13 +70,11 @@ class RunWorkspace(JobFolder):
         self._request = folder / "request.json"
 
     def prepare(self) -> None:
-        """Make the folders that hold a run's input."""
         self.robot.mkdir()
         self.trajectories.mkdir()
 
     @property
     def trajectory(self) -> Path | None:
-        """The file of the motion; None before there is one."""
         return next(iter(sorted(self.trajectories.glob("*"))), None)
 
     def recording(self, format_: str) -> Path:
@@ -87,20 +82,16 @@ class RunWorkspace(JobFolder):
         return recording_file(self.control, format_)
 
     def read_order(self) -> RunRequestRecord | None:
-        """What was asked for, or None where the file is missing or damaged."""
         return read_stored(self._request, RunRequestRecord)
 
     def write_request(self, request: RunRequestRecord) -> None:
-        """Keep what was asked for."""
         write_stored(self._request, request)
 
     def create(self, request: RunRequestRecord) -> None:
-        """Write the record of a run that has not begun."""
         backend, mode = request.backend.name, request.options.mode.value
         write_record(self.folder, new_record(request.robot_name, backend, mode))
 
     def read_run(self) -> RunRecord | None:
-        """State and findings of the run, or None where the file is missing or damaged."""
         try:
             return read_record(self.control if self._has_begun else self.folder)
         except AcquisitionError:
@@ -119,10 +110,7 @@ class RunWorkspace(JobFolder):
         write_record(self.folder, record.moved(RunState.STOPPING).moved(state, problem=problem))
 
     def recover(self) -> None:
-        """Show a run that nobody carries out any more as interrupted; nothing happens to one that has ended.
-
-        Raises AcquisitionError if its record is damaged, or its control process does not end.
-        """
+        """Interrupt a run that nobody carries out. Raises AcquisitionError if its control process does not end."""
         if self._has_begun:
             recover_run(self.control)
             return
@@ -137,11 +125,9 @@ class RunWorkspace(JobFolder):
         return JobProblem(code=record.problem.code, detail=self.in_user_terms(record.problem.detail))
 
     def in_user_terms(self, text: str) -> str:
-        """A message without the server's folders."""
         return without_folders(text, self.control, self.trajectories, self.robot, self.folder)
 
     def tell_end(self) -> None:
-        """Tell that the run has ended, once."""
         record = self.read_run()
         if record is not None and record.state.is_end and not self.has_told_end():
             time = record.history[-1].at.astimezone(UTC)
@@ -153,11 +139,7 @@ class RunWorkspace(JobFolder):
 
 
 def start_control(workspace: RunWorkspace, report: Report, *, sim_socket: Path | None = None) -> RunProcess:
-    """Start the control process of a run whose folder holds everything that it needs.
-
-    Raises RobotFileError if the robot file was damaged meanwhile. Raises AcquisitionError if files are missing, or the
-    process cannot be started.
-    """
+    """Start the control process. Raises RobotFileError or AcquisitionError if files are damaged or it cannot start."""
     order, trajectory = workspace.read_order(), workspace.trajectory
     if order is None or trajectory is None:
         raise AcquisitionError("files of the run are missing or damaged; hand it in again")
@@ -185,14 +167,11 @@ POLL_S = 0.05  # how often the state of a job is looked at by whoever waits for 
 
 
 def ready_motion(run: RunWorkspace, stop: threading.Event) -> bool:
-    """The motion of a run whose trajectory is in its folder."""
     return run.trajectory is not None and not stop.is_set()
 
 
 @dataclass(frozen=True, eq=False)
 class DesignedMotion:
-    """A motion that a job designs meanwhile."""
-
     jobs: JobQueue
     excitations: JobKind
     excitation: str
@@ -211,12 +190,7 @@ class DesignedMotion:
 
 
 def wait_for_end(workspace: Workspace, stop: threading.Event) -> JobRecord | None:
-    """Wait until a job has ended.
-
-    Raises AcquisitionError if the job's state is damaged, or the job was removed.
-
-    Returns JobRecord or None: in an end state; None where the event came first.
-    """
+    """The end of a job, None where `stop` came first. Raises AcquisitionError if it was removed or is damaged."""
     while not stop.is_set():
         record = workspace.read_record()
         if record is None:
@@ -243,10 +217,7 @@ def require_succeeded(record: JobRecord, name: str) -> None:
 
 
 def take_trajectory(excitation: TaskWorkspace[Any], run: RunWorkspace) -> None:
-    """Give a run the trajectory of an excitation that succeeded.
-
-    Raises AcquisitionError if the trajectory is not there any more.
-    """
+    """Copy the trajectory of an excitation. Raises AcquisitionError if it is not there any more."""
     try:
         shutil.copyfile(excitation.trajectory, run.trajectories / excitation.trajectory.name)
     except FileNotFoundError:

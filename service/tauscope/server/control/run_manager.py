@@ -36,12 +36,7 @@ class ControlProcess(Protocol):
         """Say that the owner is alive."""
 
     def wait(self, timeout_s: float | None = None) -> RunRecord:
-        """Wait for the end of the run.
-
-        Raises TimeoutError if it has not come by then.
-
-        `timeout_s`: how long; for good where None [s].
-        """
+        """Wait for the end of the run [s], for good where None. Raises TimeoutError if it has not come by then."""
         ...
 
 
@@ -51,18 +46,13 @@ StartControl = Callable[[RunWorkspace, Report], ControlProcess]
 
 @dataclass(frozen=True)
 class Live:
-    """What is known of a run that goes on."""
-
     state: RunState
     percent: float | None
     figures: Mapping[str, Any]
 
 
 class RunSupervisor:
-    """One run on its way.
-
-    `stop` takes no lock and touches no disk: whatever else is stuck, it reaches the control process.
-    """
+    """`stop` takes no lock and touches no disk: whatever else is stuck, it reaches the control process."""
 
     def __init__(
         self,
@@ -87,7 +77,6 @@ class RunSupervisor:
         self._halt()
 
     def interrupt(self) -> None:
-        """Stop because the service ends."""
         self.stop()
 
     def _halt(self) -> None:
@@ -115,7 +104,6 @@ class RunSupervisor:
             self._end(RunState.FAILED, "internal", "the run met a fault of Tauscope's own; the service's log says more")
 
     def _supervise(self) -> None:
-        """Start the control process, and stay with it until it has ended."""
         self._control = control = self._start(self._workspace, self._handle_event)
         if self._stop_requested.is_set():
             control.stop()
@@ -173,8 +161,6 @@ class RunSupervisor:
 
 
 class RunManager(Manager[RunSupervisor]):
-    """The active runs, and the folders of all runs."""
-
     def __init__(
         self,
         items: ItemStore,
@@ -195,13 +181,7 @@ class RunManager(Manager[RunSupervisor]):
             self._end(RunWorkspace(items.folder(identifier)), None)
 
     def submit(self, staged: Path, motion: Motion, holder: str | None = None, permit: Permit = FREE) -> str:
-        """Start a run.
-
-        Raises BusyError if somebody else has the arm; the folder stays staged. Raises LeaseError if the arm may not be
-        moved by that leave; the folder stays staged.
-
-        `holder`: who has the arm already, to whom the run belongs; None where the run takes the arm itself.
-        """
+        """Start a run; `holder` has the arm already. Raises BusyError or LeaseError; the folder stays staged then."""
         workspace = RunWorkspace(staged)
         request = workspace.read_order()
         if request is None:
@@ -226,10 +206,7 @@ class RunManager(Manager[RunSupervisor]):
         return identifier
 
     def stop(self, identifier: str) -> Live | None:
-        """Stop a run, in whatever state it is: takes no lock, waits for nothing, may be called any number of times.
-
-        Returns Live or None: where the run stood; None where it does not go on.
-        """
+        """Stop a run without any lock; returns where it stood, None where it does not go on."""
         supervisor = self._threads.find(identifier)
         if supervisor is None:
             return None
@@ -242,19 +219,14 @@ class RunManager(Manager[RunSupervisor]):
         return None if supervisor is None else supervisor.live
 
     def list_live(self) -> list[Live]:
-        """The status of each active run."""
         return [supervisor.live for supervisor in self._threads.supervisors()]
 
     def settle(self) -> None:
-        """Keep the recordings that a full disk did not take; to be called again and again.
-
-        Raises OSError if the disk is in the way still.
-        """
+        """Keep recordings that a full disk did not take. Raises OSError if it still does not."""
         for workspace in list(self._pending.values()):
             self._conclude(workspace)
 
     def _end_supervised(self, workspace: RunWorkspace, claim: tuple[str, str] | None) -> None:
-        """Put everything in its place, and tell whoever counts."""
         self._end(workspace, claim)
         record = workspace.read_run()
         if record is not None:
@@ -288,7 +260,6 @@ class RunManager(Manager[RunSupervisor]):
         self._pending.pop(identifier, None)
 
     def _keep_recording(self, workspace: RunWorkspace) -> None:
-        """Give the CSV of a run a name among the recordings; both names share the bytes on the disk."""
         path, record = workspace.recording("csv"), workspace.read_run()
         if record is not None and record.state.is_end and path.is_file():
             name = run_recording_name(workspace.folder.name)
@@ -296,5 +267,4 @@ class RunManager(Manager[RunSupervisor]):
 
 
 def run_recording_name(identifier: str) -> str:
-    """What the recording of a run is called among the recordings."""
     return f"run-{identifier}.csv"

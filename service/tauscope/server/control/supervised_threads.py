@@ -12,8 +12,6 @@ CLOSE_TIMEOUT_S = 15.0
 
 
 class Supervisor(Protocol):
-    """Supervises one run or one campaign."""
-
     def run(self) -> None:
         """Supervise to the end; never raises."""
 
@@ -58,16 +56,13 @@ class SupervisedThreads(Generic[S]):
         thread.start()
 
     def find(self, identifier: str) -> S | None:
-        """The supervisor of an active run or campaign, or None."""
         entry = self._active.get(identifier)
         return None if entry is None else entry.supervisor
 
     def identifiers(self) -> tuple[str, ...]:
-        """Identifiers of all that is active."""
         return tuple(self._active)
 
     def supervisors(self) -> tuple[S, ...]:
-        """Supervisors of all that is active."""
         return tuple(entry.supervisor for entry in self._active.values())
 
     def join(self, timeout_s: float) -> None:
@@ -87,12 +82,7 @@ class Manager(Generic[S]):
         items.tidy()
 
     def remove(self, identifier: str) -> bool:
-        """Remove an item that has ended, with all its files; its recordings stay.
-
-        Raises NotFoundError if there is no such item.
-
-        Returns bool: False where the item is active.
-        """
+        """Remove an item that has ended, False where it is active. Raises NotFoundError if there is none."""
         if self._threads.find(identifier) is not None:
             return False
         self.items.remove(identifier)

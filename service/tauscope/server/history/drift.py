@@ -15,12 +15,7 @@ _LINK = re.compile(r"\d+$")
 
 @dataclass(frozen=True)
 class NamedParameter:
-    """An identified parameter.
-
-    `value`: estimate [SI].
-    `std`: its standard error [SI].
-    `scale`: what a change is a part of [SI]: the value itself, or what is larger where the value is next to nothing.
-    """
+    """`value` and its standard error `std` [SI]; `scale`: what a change is a part of [SI]."""
 
     name: str
     joint: str
@@ -64,7 +59,6 @@ def _friction(document: IdentificationDocument) -> Iterator[NamedParameter]:
 
 
 def _rotors(document: IdentificationDocument) -> Iterator[NamedParameter]:
-    """Reflected rotor inertias."""
     for entry in document.rotor_inertia:
         if entry.std is not None and entry.std > 0.0:
             scale = max(abs(entry.value), 3.0 * entry.std)
@@ -77,11 +71,7 @@ def _value(entry: FrictionEntry, term: str) -> float:
 
 @dataclass(frozen=True)
 class Drift:
-    """The change of one parameter.
-
-    `before`, `after`: values [SI].
-    `std`: standard error of the difference [SI]; of two identifications that share no recording.
-    """
+    """Values `before` and `after`, and the standard error `std` of their difference [SI]."""
 
     name: str
     joint: str
@@ -93,13 +83,11 @@ class Drift:
 
 
 def compute_drift(before: Sequence[NamedParameter], after: Sequence[NamedParameter]) -> tuple[Drift, ...]:
-    """The change of every parameter that both identifications tell."""
     later = {parameter.name: parameter for parameter in after}
     return tuple(_drift(parameter, later[parameter.name]) for parameter in before if parameter.name in later)
 
 
 def find_largest_by_joint(drifts: Sequence[Drift]) -> Mapping[str, Drift]:
-    """For each joint its most significant change."""
     largest: dict[str, Drift] = {}
     for drift in drifts:
         if drift.joint not in largest or abs(drift.in_std) > abs(largest[drift.joint].in_std):
@@ -108,12 +96,10 @@ def find_largest_by_joint(drifts: Sequence[Drift]) -> Mapping[str, Drift]:
 
 
 def is_beyond(drift: Drift, policy: ModelPolicy) -> bool:
-    """Whether a change is both significant and large."""
     return abs(drift.in_std) > policy.drift_std and abs(drift.share) > policy.drift_share
 
 
 def _drift(before: NamedParameter, after: NamedParameter) -> Drift:
-    """The change of one parameter."""
     difference, std = after.value - before.value, math.hypot(before.std, after.std)
     return Drift(before.name, before.joint, before.value, after.value, std, difference / std, difference / before.scale)
 
@@ -128,7 +114,6 @@ _NOUNS = {
 
 
 def describe_drift(drift: Drift, elapsed: timedelta) -> str:
-    """A change in one sentence."""
     term = drift.name.partition(" ")[0]
     noun = _NOUNS.get(term, drift.name) if drift.name == f"{term} {drift.joint}" else drift.name
     difference = drift.after - drift.before
@@ -139,7 +124,6 @@ def describe_drift(drift: Drift, elapsed: timedelta) -> str:
 
 
 def duration_words(elapsed: timedelta) -> str:
-    """A length of time, as people say it."""
     for unit, length, most in (("hour", 3600, 48), ("day", 86400, 14), ("week", 7 * 86400, 9)):
         count = round(elapsed.total_seconds() / length)
         if count < most:

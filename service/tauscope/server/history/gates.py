@@ -37,8 +37,6 @@ class ModelPolicy(ResultModel):
 
 @dataclass(frozen=True)
 class Gate:
-    """One condition."""
-
     name: str
     passed: bool
     reason: str
@@ -47,13 +45,11 @@ class Gate:
 def check_gates(
     document: IdentificationDocument, policy: ModelPolicy, active: IdentificationDocument | None = None
 ) -> tuple[Gate, ...]:
-    """Judge a model."""
     gates = [_held_out(document, policy), _consistency(document, policy), _excitation(document, policy)]
     return tuple(gates if active is None else [*gates, _structure(document, active)])
 
 
 def passes(gates: Sequence[Gate]) -> bool:
-    """Whether all gates are met."""
     return all(gate.passed for gate in gates)
 
 

@@ -42,7 +42,6 @@ _LIVING = {"state.json", "events.jsonl", "progress", "cancel", "run.json", "stop
 
 
 def read_metadata(kind: str, folder: Path) -> ItemMetadata:
-    """What an item's folder shows."""
     facts = _read_run(folder) if kind == "run" else _read_job(kind, folder)
     if not facts.is_final:
         return facts
@@ -65,10 +64,7 @@ def stamp(kind: str, folder: Path) -> str:
 
 
 def find_changed_file(folder: Path, artefacts: tuple[FileMetadata, ...], *, deep: bool) -> str | None:
-    """The first file of an item that is not what it was when the item ended.
-
-    Returns str or None: its path below the folder; None where all are as they were.
-    """
+    """Path, below the folder, of the first file that is not what it was when the item ended; None without one."""
     for file in artefacts:
         path = folder / file.path
         if path.is_symlink() or not path.is_file() or path.stat().st_size != file.size:
@@ -79,7 +75,6 @@ def find_changed_file(folder: Path, artefacts: tuple[FileMetadata, ...], *, deep
 
 
 def _artefacts(folder: Path) -> Iterator[FileMetadata]:
-    """Every regular file of an item that stays as it is; links are not followed."""
     for root, folders, names in os.walk(folder):
         folders.sort()
         for name in sorted(names):
@@ -90,7 +85,6 @@ def _artefacts(folder: Path) -> Iterator[FileMetadata]:
 
 
 def _read_job(kind: str, folder: Path) -> ItemMetadata:
-    """What every job in the queue, and a campaign, shows."""
     workspace = WORKSPACES[kind](folder)
     mark, record, order = stamp(kind, folder), workspace.read_record(), workspace.read_order()
     if record is None or order is None:
@@ -176,8 +170,6 @@ LONGEST_WAIT_S = 1.0
 
 @dataclass(frozen=True)
 class ChangedItem:
-    """An item of which a file is not what it was when the item ended; or a recording that is not what was kept."""
-
     kind: str
     identifier: str
     path: str
@@ -201,10 +193,7 @@ class Indexer:
         self._is_closing = threading.Event()
 
     def sync(self, *, thorough: bool = False) -> None:
-        """Bring the index up to date.
-
-        Raises StoreError if the database does not answer; the next call goes on where this one ended.
-        """
+        """Bring the index up to date. Raises StoreError if the database does not answer; the next call goes on."""
         with self._lock:
             thorough = thorough or not self._is_whole
             if thorough:
@@ -219,10 +208,7 @@ class Indexer:
         self._is_closing.set()
 
     def refresh(self) -> None:
-        """Bring the index up to date, unless that takes long because somebody else is at it.
-
-        Raises StoreError if the database does not answer.
-        """
+        """As `sync`, unless another thread is at it for long. Raises StoreError if the database does not answer."""
         if self._lock.acquire(timeout=LONGEST_WAIT_S):
             self._lock.release()
             self.sync()
@@ -284,7 +270,6 @@ class Indexer:
     def _read_changed(
         self, kind: str, store: ItemStore, identifier: str, indexed: tuple[str, bool] | None
     ) -> ItemMetadata | None:
-        """What one item shows, where its state is another than the indexed one."""
         try:
             identifier_time(identifier)
             folder = store.folder(identifier)
@@ -308,9 +293,6 @@ class Indexer:
 
 
 def open_index(index: Index, items: Mapping[str, ItemStore], recordings: RecordingStore, label: str) -> Indexer:
-    """Open the index of a data folder; `Indexer.sync` fills it from the folders, and upgrades an old one so.
-
-    Raises StoreError if the database does not answer.
-    """
+    """Register the data folder; `Indexer.sync` fills its index. Raises StoreError if the database does not answer."""
     index.register(label, datetime.now(UTC))
     return Indexer(index, items, recordings)

@@ -20,8 +20,6 @@ Document = TypeVar("Document", bound=BaseModel)
 
 
 class NamedFinding(BaseModel):
-    """A finding of a diagnosis."""
-
     effect: str
     joint: str | None
 
@@ -45,11 +43,7 @@ class OwnDiagnosis(BaseModel):
 
 @dataclass(frozen=True)
 class Candidate:
-    """An identification that is to be judged.
-
-    `result`: its document; None where it cannot be read.
-    `diagnosis`: document of the diagnosis of the same recordings; None where there is none.
-    """
+    """`result` and `diagnosis` of the same recordings: their documents, None where there is none to be read."""
 
     identifier: str
     site: str
@@ -61,7 +55,6 @@ class Candidate:
 
 
 def judge(session: Session, robot: Robot, candidate: Candidate, policy: ModelPolicy, now: datetime) -> Model:
-    """Judge an identification, and write down what came of it."""
     document = _parse(candidate.result, IdentificationDocument)
     active, reference = _current(session, robot, is_active=True), _current(session, robot, is_active=False)
     model = Model(
@@ -111,7 +104,6 @@ def choose(session: Session, model: Model, role: str, reason: str, now: datetime
 
 
 def compare_models(before: IdentificationDocument, after: IdentificationDocument) -> tuple[Drift, ...]:
-    """The change of every parameter that two models tell."""
     return compute_drift(extract_parameters(before), extract_parameters(after))
 
 

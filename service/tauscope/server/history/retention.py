@@ -16,8 +16,6 @@ _ALL = 10**9
 
 @dataclass(frozen=True)
 class RetentionRule:
-    """What may go."""
-
     older_than: timedelta
     kinds: frozenset[str]
     recordings: bool = False
@@ -25,8 +23,6 @@ class RetentionRule:
 
 @dataclass(frozen=True)
 class Removal:
-    """What goes."""
-
     items: tuple[ItemEntry, ...]
     recordings: tuple[str, ...]
 
@@ -61,10 +57,7 @@ def plan_removal(
 def remove(
     removal: Removal, removers: Mapping[str, Callable[[str], object]], recordings: RecordingStore, indexer: Indexer
 ) -> Removal:
-    """Remove what was planned; what somebody else removed meanwhile is left out.
-
-    Raises OSError if something cannot be removed; what was removed before is gone.
-    """
+    """Remove what was planned and is still there. Raises OSError if something cannot be removed."""
     items = tuple(entry for entry in removal.items if _is_gone(removers[entry.kind], entry.identifier))
     names = tuple(name for name in removal.recordings if _is_gone(recordings.remove, name))
     indexer.sync(thorough=True)
@@ -95,11 +88,7 @@ class RetentionSweeper:
         self._recordings, self._removers, self._on_removed = recordings, removers, on_removed
 
     def tidy(self) -> None:
-        """Remove what the rule lets go.
-
-        Raises StoreError if the database does not answer; nothing goes then. Raises OSError if something cannot be
-        removed.
-        """
+        """Remove what the rule lets go. Raises StoreError, before anything goes, or OSError."""
         plan = plan_removal(self._indexer, self._history, self._recordings, self._rule, utc_now())
         gone = remove(plan, self._removers, self._recordings, self._indexer)
         for entry in gone.items:

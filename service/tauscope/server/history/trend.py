@@ -16,10 +16,7 @@ WEEK_S = 7 * 86400.0
 
 @dataclass(frozen=True)
 class TrendPoint:
-    """A parameter in one identification.
-
-    `value`, `std`: estimate and its standard error [SI].
-    """
+    """`value`, `std`: estimate and its standard error [SI]."""
 
     time: datetime
     value: float
@@ -28,11 +25,7 @@ class TrendPoint:
 
 @dataclass(frozen=True)
 class Trend:
-    """The line through all points.
-
-    `slope`: change a week [SI/week].
-    `change`: of the line from the first point to the last [SI].
-    """
+    """`slope`: change a week [SI/week]; `change`: of the line from the first point to the last [SI]."""
 
     count: int
     slope: float
@@ -42,15 +35,11 @@ class Trend:
 
     @property
     def in_std(self) -> float:
-        """The slope in its standard errors."""
         return self.slope / self.slope_std
 
 
 def fit_trend(points: Sequence[TrendPoint]) -> Trend | None:
-    """The line through all points, by weighted least squares.
-
-    Returns Trend or None: None where fewer than three points, or all at one time, tell no slope.
-    """
+    """The line by weighted least squares; None where fewer than three points, or all at one time, tell no slope."""
     if len(points) < 3:
         return None
     start = min(point.time for point in points)
@@ -70,10 +59,7 @@ def fit_trend(points: Sequence[TrendPoint]) -> Trend | None:
 
 @dataclass(frozen=True)
 class ParameterTrend:
-    """One parameter over time.
-
-    `points`: tuple of (str, TrendPoint), identifier of each model, and what it says; the oldest first.
-    """
+    """`points`: identifier of each model, and what it says; the oldest first."""
 
     name: str
     joint: str
@@ -82,10 +68,7 @@ class ParameterTrend:
 
 
 def parameter_trends(models: Sequence[tuple[ModelEntry, IdentificationDocument]]) -> list[ParameterTrend]:
-    """Every parameter that the newest model tells, over all models that tell it.
-
-    `models`: sequence of (ModelEntry, IdentificationDocument), every model that was ever active, the oldest first.
-    """
+    """Every parameter of the newest model, over all `models` that tell it, the oldest first."""
     told = [(entry, {each.name: each for each in extract_parameters(document)}) for entry, document in models]
     trends = []
     for name, newest in told[-1][1].items() if told else ():

@@ -69,8 +69,6 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 
 
 class CampaignStepAnswer(AnswerModel):
-    """One step of a campaign."""
-
     name: Literal["design", "run", "held-out design", "held-out run", "identify", "diagnose"] = Field(
         description="of the step"
     )
@@ -79,8 +77,6 @@ class CampaignStepAnswer(AnswerModel):
 
 
 class CampaignLinksAnswer(MotionLinks):
-    """Where to go on from a campaign."""
-
     recordings: tuple[str, ...] = Field(default=(), description="recordings that the model is made from")
     held_out: tuple[str, ...] = Field(default=(), description="recordings that it is judged by")
     identification: str | None = Field(default=None, description="its identification, exports included")
@@ -89,16 +85,12 @@ class CampaignLinksAnswer(MotionLinks):
 
 
 class CampaignAnswer(JobAnswer):
-    """The state of a campaign."""
-
     backend: BackendChoice | None = Field(default=None, description="which arm is moved")
     steps: tuple[CampaignStepAnswer, ...] = Field(default=(), description="in their order")
     links: CampaignLinksAnswer = Field(description="where to go on")
 
 
 class CampaignResult(AnswerModel):
-    """What came of a campaign."""
-
     schema_: Literal["tauscope.campaign/1"] = Field(
         default="tauscope.campaign/1", alias="schema", description="name and version of this form"
     )
@@ -111,8 +103,6 @@ class CampaignResult(AnswerModel):
 
 
 class CampaignStopAnswer(AnswerModel):
-    """What became of the wish to stop a campaign."""
-
     id: str = Field(description="identifier of the campaign")
     state: JobState = Field(description="where it stood; it stops unless that is an end state")
 
@@ -122,12 +112,10 @@ WAITING, GONE = "waiting", "gone"
 
 
 def find_campaign(services: Services, identifier: str) -> CampaignWorkspace:
-    """The folder of a campaign. Raises NotFoundError if there is none."""
     return CampaignWorkspace(services.campaigns.items.folder(identifier))
 
 
 def describe(services: Services, identifier: str, root: str) -> CampaignAnswer:
-    """The state of a campaign; one whose files are damaged is said to be so. Raises NotFoundError if there is none."""
     workspace = find_campaign(services, identifier)
     here, made, order = f"{root}/campaigns/{identifier}", workspace.read_made(), workspace.read_order()
     if order is None:
@@ -140,11 +128,6 @@ def describe(services: Services, identifier: str, root: str) -> CampaignAnswer:
 
 
 def result_of(services: Services, identifier: str, root: str) -> CampaignResult:
-    """What came of a campaign that succeeded.
-
-    Raises NotFoundError if there is none, or its identification was removed. Raises ProblemError if it has not
-    succeeded.
-    """
     require_success(find_campaign(services, identifier))
     answer = describe(services, identifier, root)
     made = find_campaign(services, identifier).read_made()
@@ -201,11 +184,6 @@ def _links(here: str, root: str, made: CampaignLinks, *, has_result: bool) -> Ca
 
 
 async def submit_campaign(request: Request, services: Services) -> str:
-    """Take a request for a campaign.
-
-    Raises ProblemError if the request is not as documented. Raises TauscopeError if the robot is not valid, somebody
-    else has the arm, or the lease does not let it move.
-    """
     async with stage_request(services.campaigns.items, CampaignWorkspace) as workspace:
         received = await receive_request(request, CampaignRequest, services.settings, workspace.robot)
         robot_file = await run_in_threadpool(keep_robot, received, workspace.robot, services.robots)
@@ -265,7 +243,6 @@ def get_result(request: Request, identifier: Identifier, services: ServicesDep) 
 
 
 def _read_state(services: Services, identifier: str) -> JobState | None:
-    """Where a campaign stands; None where its record is damaged."""
     record = find_campaign(services, identifier).read_record()
     return None if record is None else record.state
 

@@ -83,8 +83,6 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 
 
 class DiagnosisLinksAnswer(JobLinks):
-    """Where to go on from a diagnosis."""
-
     plots: str | None = Field(default=None, description="data of its figures, once it succeeded")
     report: str | None = Field(default=None, description="its report as a page, once it succeeded")
     model: str | None = Field(default=None, description="the model with all findings, once it succeeded")
@@ -97,8 +95,6 @@ class DiagnosisLinksAnswer(JobLinks):
 
 
 class DiagnosisAnswer(JobAnswer):
-    """The state of a diagnosis."""
-
     recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what is explained")
     held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what findings are confirmed by")
     simulated: tuple[OrderedRecording, ...] = Field(default=(), description="what the user's simulator recorded")
@@ -113,11 +109,7 @@ YAML = "text/yaml"  # an alias of application/yaml (RFC 9512), which generators 
 
 
 def place_model(received: Received[DiagnosisRequest], services: Services, workspace: Any) -> dict[str, str | None]:
-    """Put the model that is compared with into its place; what is compared with and what was sent belong together.
-
-    Raises ProblemError where they do not, or the model came twice. Raises NotFoundError if there is no diagnosis of
-    that identifier.
-    """
+    """Put the model into its place. Raises ProblemError if it came twice or is not `against`, or NotFoundError."""
     document, file = received.document, received.form.file("model")
     against, has_simulated = document.options.against, bool(received.form.files.get("simulated") or document.simulated)
     if (against == "simulation") != has_simulated:

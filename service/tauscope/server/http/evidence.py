@@ -11,25 +11,18 @@ from tauscope.server.store.robots import hash_robot
 
 
 def require_no_model(services: Services, identifier: str) -> None:
-    """Refuse to remove an identification that is an active model or a reference. Raises ProblemError if it is one."""
     _judge_new(services)
     _require_free(services, identifier, {identifier})
 
 
 def require_no_evidence(services: Services, recording: str) -> None:
-    """Refuse to remove a recording that an active model or a reference was made from or judged by.
-
-    Raises ProblemError if one was.
-    """
+    """Raises ProblemError if an active model or a reference was made from or judged by a recording."""
     _judge_new(services)
     _require_free(services, recording, services.index.index.list_users(recording))
 
 
 def require_no_identification(services: Services, version: str) -> None:
-    """Refuse to remove a robot with which an active model or a reference was identified.
-
-    Raises ProblemError if one was.
-    """
+    """Raises ProblemError if an active model or a reference was identified with a robot."""
     _judge_new(services)
     users = set()
     for identifier in services.models.history.list_protected():

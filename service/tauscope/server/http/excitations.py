@@ -40,15 +40,11 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 
 
 class ExcitationLinks(JobLinks):
-    """Where to go on from an excitation."""
-
     result: str | None = Field(default=None, description="its document, once it succeeded")
     trajectory: str | None = Field(default=None, description="its trajectory, once it succeeded")
 
 
 class ExcitationAnswer(JobAnswer):
-    """The state of an excitation."""
-
     options: ExcitationDesignOptions | None = Field(default=None, description="how the motion is designed")
     links: ExcitationLinks = Field(description="where to go on")
 

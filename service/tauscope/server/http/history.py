@@ -33,23 +33,17 @@ class ReasonRequest(StrictModel):
 
 
 class GateAnswer(AnswerModel):
-    """A condition for becoming the active model."""
-
     name: str = Field(description="held_out, consistency, excitation, structure, newer or source")
     passed: bool = Field(description="whether it is met")
     reason: str = Field(description="what was found, what is allowed, and what to do where it is not met")
 
 
 class ModelLinksAnswer(AnswerModel):
-    """Where to go on from a model."""
-
     self_: str = Field(alias="self", description="the model")
     document: str = Field(description="what it says: the identification's document")
 
 
 class ModelAnswer(AnswerModel):
-    """A model of a robot: an identification that was judged."""
-
     id: str = Field(description="identifier of the identification", examples=["20261103T101502Z-1f2e3d4c"])
     site: str = Field(description="identifier of the data folder that holds the identification")
     robot: str = Field(description="name of the robot")
@@ -65,14 +59,10 @@ class ModelAnswer(AnswerModel):
 
 
 class ModelListAnswer(AnswerModel):
-    """Models of a robot."""
-
     models: list[ModelAnswer] = Field(description="the newest first")
 
 
 class DriftAnswer(AnswerModel):
-    """The change of a parameter."""
-
     name: str = Field(description="of the parameter", examples=["viscous joint3"])
     joint: str = Field(description="that it belongs to")
     before: float = Field(description="in the model that it is compared with [SI]")
@@ -83,8 +73,6 @@ class DriftAnswer(AnswerModel):
 
 
 class ComparisonAnswer(AnswerModel):
-    """One model compared with another."""
-
     before: str = Field(description="identifier of the model that it is compared with")
     after: str = Field(description="identifier of this model")
     parameters: list[DriftAnswer] = Field(description="every parameter that both tell")
@@ -92,8 +80,6 @@ class ComparisonAnswer(AnswerModel):
 
 
 class TrendPointAnswer(AnswerModel):
-    """A parameter in one model."""
-
     time: datetime = Field(description="when its identification was handed in, UTC")
     value: float = Field(description="estimate [SI]")
     std: float = Field(description="its standard error [SI]")
@@ -101,8 +87,6 @@ class TrendPointAnswer(AnswerModel):
 
 
 class LineAnswer(AnswerModel):
-    """The straight line through the points."""
-
     count: int = Field(description="number of points")
     slope: float = Field(description="change a week [SI]")
     slope_std: float = Field(description="its standard error, scatter of the points included [SI]")
@@ -112,8 +96,6 @@ class LineAnswer(AnswerModel):
 
 
 class ParameterTrendAnswer(AnswerModel):
-    """A parameter over time."""
-
     name: str = Field(description="of the parameter")
     joint: str = Field(description="that it belongs to")
     points: list[TrendPointAnswer] = Field(description="in every model that was ever active, the oldest first")
@@ -121,15 +103,11 @@ class ParameterTrendAnswer(AnswerModel):
 
 
 class TrendAnswer(AnswerModel):
-    """Every parameter of a robot over time."""
-
     robot: str = Field(description="name of the robot")
     parameters: list[ParameterTrendAnswer] = Field(description="in the order of the newest model")
 
 
 class EventAnswer(AnswerModel):
-    """Something about a robot that people should know."""
-
     number: int = Field(description="of the event")
     robot: str = Field(description="name of the robot")
     kind: str = Field(description="drift", examples=["drift"])
@@ -144,13 +122,10 @@ class EventAnswer(AnswerModel):
 
 
 class EventListAnswer(AnswerModel):
-    """What people should know."""
-
     events: list[EventAnswer] = Field(description="the newest first")
 
 
 def make_model_answer(entry: ModelEntry, collection: str) -> ModelAnswer:
-    """The answer that holds a model."""
     here = f"{collection}/{entry.identifier}"
     links = ModelLinksAnswer(self=here, document=f"{here}/document")
     return ModelAnswer.describe(entry, id=entry.identifier, links=links)
@@ -159,7 +134,6 @@ def make_model_answer(entry: ModelEntry, collection: str) -> ModelAnswer:
 def comparison_answer(
     before: str, earlier: IdentificationDocument, after: str, later: IdentificationDocument
 ) -> ComparisonAnswer:
-    """The answer that compares two models."""
     drifts = compare_models(earlier, later)
     return ComparisonAnswer(
         before=before,
@@ -170,10 +144,6 @@ def comparison_answer(
 
 
 def trend_answer(robot: str, models: Sequence[tuple[ModelEntry, IdentificationDocument]]) -> TrendAnswer:
-    """The answer that shows a robot's parameters over time.
-
-    `models`: sequence of (ModelEntry, IdentificationDocument), every model that was ever active, the oldest first.
-    """
     parameters = []
     for trend in parameter_trends(models):
         points = [TrendPointAnswer(**asdict(point), model=model) for model, point in trend.points]

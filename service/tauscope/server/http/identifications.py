@@ -47,8 +47,6 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 
 
 class LinksAnswer(JobLinks):
-    """Where to go on from an identification."""
-
     plots: str | None = Field(default=None, description="data of its figures, once it succeeded")
     report: str | None = Field(default=None, description="its report as a page, once it succeeded")
     model: str | None = Field(default=None, description="the identified model, once it succeeded")
@@ -56,8 +54,6 @@ class LinksAnswer(JobLinks):
 
 
 class IdentificationAnswer(JobAnswer):
-    """The state of an identification."""
-
     recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what the model is made from")
     held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what it is judged by")
     options: IdentificationOptions | None = Field(default=None, description="how it is identified")

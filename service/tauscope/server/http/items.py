@@ -15,8 +15,6 @@ from tauscope.server.store.database.index import ItemEntry, ItemQuery
 
 
 class ItemAnswer(AnswerModel):
-    """Something that is kept, as a search finds it."""
-
     kind: str = Field(description="excitation, run, identification, diagnosis, rollout or campaign", examples=["run"])
     id: str = Field(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])
     site: str = Field(description="identifier of the data folder that holds it")
@@ -34,23 +32,17 @@ class ItemAnswer(AnswerModel):
 
 
 class ItemListAnswer(AnswerModel):
-    """What a search found."""
-
     items: list[ItemAnswer] = Field(description="the newest first")
     before: datetime | None = Field(description="to be given as `before` for the next ones; null where there are none")
 
 
 class KnownRobotAnswer(AnswerModel):
-    """A robot that something is kept about."""
-
     name: str = Field(description="as in its file")
     first_seen: datetime = Field(description="when the first item about it was handed in, UTC")
     last_seen: datetime = Field(description="when the last one was, UTC")
 
 
 class RobotListAnswer(AnswerModel):
-    """Robots that something is kept about."""
-
     robots: list[KnownRobotAnswer] = Field(description="by name")
     versions: list[RobotVersionAnswer] = Field(description="robots that were sent to be kept, the newest first")
 

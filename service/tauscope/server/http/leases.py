@@ -42,8 +42,6 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 
 
 class LeaseLinks(AnswerModel):
-    """What its holder does with a lease."""
-
     self_: str = Field(alias="self", description="the lease; DELETE gives it back")
     heartbeat: str = Field(description="where a POST is a sign of life")
     arm: str = Field(description="where a POST lets the arm move")
@@ -51,8 +49,6 @@ class LeaseLinks(AnswerModel):
 
 
 class LeaseAnswer(AnswerModel):
-    """A lease that holds."""
-
     id: str = Field(description="identifier", examples=["lease-7"])
     number: int = Field(description="above that of every earlier lease since the service started")
     token: str | None = Field(
@@ -67,14 +63,10 @@ class LeaseAnswer(AnswerModel):
 
 
 class LeaseListAnswer(AnswerModel):
-    """Leases that hold."""
-
     leases: list[LeaseAnswer] = Field(description="the newest first")
 
 
 class StopAllAnswer(AnswerModel):
-    """What was stopped."""
-
     runs: list[str] = Field(description="identifiers of the runs that were asked to stop")
     campaigns: list[str] = Field(description="identifiers of the campaigns that were asked to stop")
     time: datetime = Field(description="when, UTC")
@@ -93,7 +85,6 @@ LeaseToken = Annotated[
 
 
 def find_owner(request: Request) -> str:
-    """Whose a lease is that this request takes or uses."""
     return find_caller(request.scope).key or "local"
 
 

@@ -45,20 +45,16 @@ class Metrics:
         )
 
     def run_ended(self, record: RunRecord) -> None:
-        """Count a run."""
         self.runs.labels(record.backend, record.state.value).inc()
         self.loops.add(record)
 
     def watch_drift(self, drift: DriftMonitor) -> None:
-        """Have it told how models drift."""
         self.registry.register(ModelDrift(drift))
 
     def watch(self, name: str, text: str, value: Callable[[], float]) -> None:
-        """Have a number asked for whenever somebody looks."""
         self.registry.register(_Watched(name, text, value))
 
     def text(self) -> bytes:
-        """Everything, in Prometheus' text format."""
         return generate_latest(self.registry)
 
 
@@ -73,7 +69,6 @@ class LoopTimes(Collector):
         self._stale: Tally[str] = Tally()
 
     def add(self, record: RunRecord) -> None:
-        """Count the cycles of a run that has ended."""
         if record.timing is None:
             return
         with self._lock:
@@ -84,7 +79,6 @@ class LoopTimes(Collector):
             self._stale[record.backend] += sum(record.timing.stale_samples)
 
     def collect(self) -> Iterator[Metric]:
-        """Everything that is known of the loops."""
         histogram = HistogramMetricFamily(
             "tauscope_loop_lateness_seconds", "Lateness of control cycles behind their deadlines", labels=["backend"]
         )
@@ -117,7 +111,6 @@ class ModelDrift(Collector):
         self._watch = watch
 
     def collect(self) -> Iterator[Metric]:
-        """Everything that is known of the models."""
         labels = ["robot", "parameter"]
         share = GaugeMetricFamily(
             "tauscope_model_drift_ratio", "Change of a parameter since the reference, in parts of it", labels=labels
@@ -137,13 +130,10 @@ class ModelDrift(Collector):
 
 
 class TimedExecutor(Executor):
-    """An executor whose work is timed; what it does is another executor's."""
-
     def __init__(self, executor: Executor, seconds: Histogram) -> None:
         self._executor, self._seconds = executor, seconds
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
-        """Have a function called."""
         began = time.monotonic()
         kind = getattr(getattr(fn, "func", fn), "__name__", "work").removeprefix("run_")
         future = self._executor.submit(fn, *args, **kwargs)
@@ -156,7 +146,6 @@ class TimedExecutor(Executor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the work."""
         self._executor.shutdown(wait=wait, cancel_futures=cancel_futures)
 
 

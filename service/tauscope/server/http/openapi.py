@@ -60,7 +60,6 @@ def share_parts(document: dict[str, Any]) -> None:
 
 
 def format_address(name: str) -> str:
-    """Where the schema of a file's format is read."""
     return f"/docs/schemas/{name}"
 
 
@@ -79,7 +78,6 @@ def _refer_to_formats(document: dict[str, Any]) -> None:
 
 
 def _drop_unused(document: dict[str, Any]) -> None:
-    """Remove schemas to which nothing leads."""
     schemas = document["components"]["schemas"]
     used = _find_schemas(schemas, document["paths"])
     document["components"]["schemas"] = {name: schema for name, schema in schemas.items() if name in used}
@@ -196,7 +194,6 @@ def _refer(
 
 
 def merge_problems(answers: dict[str, Any], status: str, answer: dict[str, Any]) -> None:
-    """Add problems to those that a status has."""
     present = answers.setdefault(status, answer)
     if present is not answer:
         examples = present["content"][MEDIA_TYPE]["examples"]
@@ -270,13 +267,11 @@ Examples = Mapping[str, tuple[str, Any]]  # for each example its summary and its
 
 
 def json_body(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
-    """A JSON body of an operation. `examples`: mapping of str to (str, plain data), summary and value by name."""
     shown = {name: {"summary": summary, "value": value} for name, (summary, value) in examples.items()}
     return {"application/json": {"schema": refer_to_model(model), "examples": shown}}
 
 
 def json_request(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
-    """The further entries of an operation that takes JSON alone."""
     return {"requestBody": {"required": True, "content": json_body(model, examples)}}
 
 
@@ -294,12 +289,10 @@ _FILE = {"type": "string", "format": "binary", "contentMediaType": _BYTES}
 
 
 def binary_part(description: str) -> dict[str, Any]:
-    """The schema of a file in a form."""
     return {**_FILE, "description": description}
 
 
 def binary_parts(description: str) -> dict[str, Any]:
-    """The schema of several files in a form."""
     return {"type": "array", "items": _FILE, "description": description}
 
 
@@ -315,7 +308,6 @@ def file_contents(*media_types: str) -> dict[str, Any]:
 
 
 def file_responses(media_types: Sequence[str], *problems: str, description: str = "the file") -> dict[int | str, Any]:
-    """The answers of a route that sends a file, and its problems by their codes."""
     return {200: {"content": file_contents(*media_types), "description": description}, **problem_responses(*problems)}
 
 
@@ -323,13 +315,11 @@ _referred: set[type[BaseModel]] = {Problem}  # models of bodies that the framewo
 
 
 def refer_to_model(model: type[BaseModel]) -> dict[str, str]:
-    """A reference to a model, which the document then holds."""
     _referred.add(model)
     return {"$ref": _REFERENCE.format(model=model.__name__)}
 
 
 def resolve_reference(document: Mapping[str, Any], node: dict[str, Any]) -> dict[str, Any]:
-    """A part of a document, or that to which it refers."""
     while "$ref" in node:
         _, *steps = node["$ref"].split("/")
         node = reduce(getitem, steps, document)

@@ -31,8 +31,6 @@ _markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
 
 @dataclass(frozen=True)
 class Chapter:
-    """A page as it is shown."""
-
     title: str
     html: str
 
@@ -108,7 +106,6 @@ def get_style() -> Response:
 
 @router.get("/errors/{code}")
 def show_problem_kind(code: str) -> Response:
-    """What a code means."""
     kind = KINDS.get(code)
     if kind is None:
         raise NotFoundError(one_line(f"there is no error code {shown(code)}; /docs lists them"))
@@ -118,7 +115,6 @@ def show_problem_kind(code: str) -> Response:
 
 @router.get("/how-to/{name}")
 def show_guide(name: str) -> Response:
-    """How something is done."""
     chapter = load_chapters().get(f"how-to/{name}")
     if chapter is None:
         raise NotFoundError(one_line(f"there is no page {shown(name)}; /docs lists them"))

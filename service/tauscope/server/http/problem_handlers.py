@@ -31,10 +31,7 @@ from tauscope.server.store.recordings import NameTakenError
 
 
 async def require_known_query(request: Request) -> None:
-    """Refuse a request with a query parameter that its route does not know; a stop is never refused.
-
-    Raises ProblemError naming the parameter.
-    """
+    """Raises ProblemError for a query parameter that the route does not know; a stop is never refused."""
     if not request.query_params or is_stop(request.method, request.url.path):
         return
     known = set(_find_names(request.scope["route"].dependant))
@@ -56,7 +53,7 @@ Methods = Sequence[tuple[re.Pattern[str], frozenset[str]]]  # for each route the
 
 
 def collect_methods(routers: Iterable[tuple[str, APIRouter]]) -> Methods:
-    """The methods of all routes. `routers`: iterable of (str, APIRouter), each with the prefix of its paths."""
+    """The methods of all routes; `routers` with the prefix of their paths."""
     return tuple(
         (compile_path(prefix + route.path)[0], frozenset(route.methods or ()))
         for prefix, router in routers
@@ -66,7 +63,6 @@ def collect_methods(routers: Iterable[tuple[str, APIRouter]]) -> Methods:
 
 
 def find_methods(methods: Methods, path: str) -> list[str]:
-    """The methods that an address knows, sorted."""
     return sorted({method for pattern, known in methods if pattern.match(path) for method in known})
 
 
@@ -82,7 +78,6 @@ _OF_STATUS: Mapping[int, str] = {404: "not-found", 405: "method-not-allowed", 41
 
 
 def install_problem_handlers(app: FastAPI) -> None:
-    """Have every exception of a route answered with a problem."""
     app.add_exception_handler(TauscopeError, _tauscope_error)
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(HTTPException, _http_exception)

@@ -24,8 +24,6 @@ REQUEST_ID = "X-Request-Id"
 
 
 class RequestLog(HttpMiddleware):
-    """Counts, times and logs requests."""
-
     @override
     async def answer(self, scope: Scope, receive: Receive, send: Send) -> None:
         number, began, status, answered = uuid.uuid4().hex, time.monotonic(), 500, None
@@ -150,7 +148,6 @@ class BodyLimit(HttpMiddleware):
     """
 
     def __init__(self, app: ASGIApp, limit: int) -> None:
-        """Limit bodies to `limit` [bytes]."""
         super().__init__(app)
         self.limit = limit
 
@@ -186,8 +183,6 @@ class BodyLimit(HttpMiddleware):
 
 
 class _CountedBody:
-    """The body of a request on its way to the application."""
-
     def __init__(self, headers: Headers, receive: Receive, limit: int) -> None:
         self._receive = receive
         self._limit = limit
@@ -199,7 +194,6 @@ class _CountedBody:
         self.is_pending = (length > 0 or "transfer-encoding" in headers) and "expect" not in headers
 
     async def receive(self) -> Message:
-        """The next part, unless it is one too many."""
         message = await self._next()
         if self._count > self._limit:
             self.is_exceeded = True

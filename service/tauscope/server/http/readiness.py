@@ -24,18 +24,14 @@ SILENCE_S = 2.0  # silence of the event loop after which it counts as stuck [s]
 
 
 class Heartbeat:
-    """The last sign of life of the event loop."""
-
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self._last = clock()
 
     def beat(self) -> None:
-        """Show a sign of life."""
         self._last = self._clock()
 
     def is_alive(self) -> bool:
-        """Whether the last sign of life is recent."""
         return self._clock() - self._last < SILENCE_S
 
     @asynccontextmanager
@@ -65,7 +61,6 @@ async def _repeat(call: Callable[[], object], interval_s: float | None) -> Async
 
 
 def notify(state: str, environment: Mapping[str, str] = os.environ) -> bool:
-    """Tell systemd a state."""
     address = environment.get("NOTIFY_SOCKET", "")
     if not address.startswith(("/", "@")):
         return False
@@ -106,10 +101,7 @@ MOST_SETBACK_S = 60.0  # how far the clock may be set back while the service run
 
 @dataclass(frozen=True, eq=False)
 class Readiness:
-    """Everything that may stand in the way of work.
-
-    `checks`: what is asked, by name; each tells an obstacle in a few words, or None, and may hang.
-    """
+    """`checks`: what is asked, by name; each tells an obstacle in a few words, or None, and may hang."""
 
     checks: Mapping[str, Callable[[], str | None]]
     limiter: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(8))
@@ -130,13 +122,10 @@ class Readiness:
 
 
 class ReadyMetrics(Collector):
-    """Whether each part can work, as a gauge."""
-
     def __init__(self, readiness: Readiness) -> None:
         self._readiness = readiness
 
     def collect(self) -> Iterator[Metric]:
-        """Ask every part."""
         family = GaugeMetricFamily("tauscope_ready", "Whether a part can work: 1, or 0", labels=["part"])
         for name, check in self._readiness.checks.items():
             family.add_metric([name], float(check() is None))
@@ -158,7 +147,6 @@ def check_disk(folder: Path) -> str | None:
 
 
 def check_database(check: Callable[[], None]) -> str | None:
-    """What is wrong with the database."""
     try:
         check()
     except StoreError as error:
@@ -175,7 +163,6 @@ class Clock:
         self._lock = threading.Lock()
 
     def check(self) -> str | None:
-        """What is wrong with the clock."""
         now = self._now()
         if now < EARLIEST.timestamp():
             return f"the clock says {datetime.fromtimestamp(now, UTC):%Y-%m-%d}; set it (NTP)"

@@ -38,11 +38,7 @@ class ReadingQueue:
     async def call(
         self, request: Request, function: Callable[Arguments, Result], *args: Arguments.args, **kwargs: Arguments.kwargs
     ) -> Result:
-        """Call a function in a process, for the caller of a request.
-
-        Raises ProblemError if too many requests wait, or the process died. Raises LimitExceededError if it takes too
-        long, or too much memory. Raises ClientDisconnect if the client has gone; the process is ended then.
-        """
+        """Call in a process that ends with its client. Raises ProblemError, LimitExceededError or ClientDisconnect."""
         who = find_caller(request.scope)
         caller = who.key or who.name
         if len(self) >= MOST_WAITING + WIDTH or self._waiting[caller] > MOST_WAITING_EACH:
@@ -70,7 +66,6 @@ class ReadingQueue:
 
 
 async def _await_unless_gone(request: Request, answer: Coroutine[Any, Any, Result]) -> Result:
-    """The answer to a request, unless its client goes."""
     task = asyncio.ensure_future(answer)
     try:
         while not (await asyncio.wait({task}, timeout=POLL_S))[0]:

@@ -24,8 +24,6 @@ from tauscope.tasks.task import ReadingOptions
 
 
 class RecordingAnswer(AnswerModel):
-    """A recording that lies on the server."""
-
     name: str = Field(description="by which requests refer to it", examples=["log-2026-11-03.csv"])
     size: int = Field(description="number of bytes", examples=[1830221])
     modified: datetime = Field(description="when it was last written, UTC")
@@ -34,8 +32,6 @@ class RecordingAnswer(AnswerModel):
 
 
 class RecordingListAnswer(PageAnswer):
-    """Recordings on the server."""
-
     recordings: list[RecordingAnswer] = Field(description="by name")
 
 
@@ -58,16 +54,12 @@ class GapsAnswer(AnswerModel):
 
 
 class PeriodsAnswer(AnswerModel):
-    """Repeats of the excitation."""
-
     count: int = Field(description="how many are marked")
     shortest: int = Field(description="samples of the shortest")
     longest: int = Field(description="samples of the longest")
 
 
 class ChannelsAnswer(AnswerModel):
-    """One joint's channels."""
-
     position: tuple[Measured, Measured] = Field(description="least and greatest value [rad or m]; null without samples")
     effort: tuple[Measured, Measured] = Field(description="least and greatest value [Nm, N or drive units]")
     position_step: float | None = Field(description="step in multiples of which the position moves [rad or m]")
@@ -79,8 +71,6 @@ class ChannelsAnswer(AnswerModel):
 
 
 class RecordingReportAnswer(AnswerModel):
-    """What a recording holds, and what to look at before trusting it."""
-
     name: str = Field(description="of the recording")
     samples: int = Field(description="number of samples")
     duration_s: float = Field(description="from the first to the last sample [s]")
@@ -101,8 +91,6 @@ class ReadingRequest(ReadingOptions):
 
 
 class MappingAnswer(AnswerModel):
-    """Which columns of a file are read as which."""
-
     header: tuple[str, ...] = Field(description="names of the file's columns; numbers from 1 where it has no names")
     columns: dict[str, str] = Field(description="the file's column for t, q1, tau1, …; only those that were found")
     units: dict[str, str] = Field(description="of t, q, qd and tau")

@@ -28,15 +28,12 @@ LIFE_S = 24 * 3600.0  # how long an answer is kept [s]
 
 
 class KeptAnswer(StrictModel):
-    """What was answered."""
-
     fingerprint: str = Field(description="of the request's body, in hexadecimal")
     status: int = Field(description="of the answer")
     headers: tuple[tuple[str, str], ...] = Field(description="of the answer")
     body: str = Field(description="of the answer, in base64")
 
     def content(self) -> bytes:
-        """The body as it was sent."""
         return base64.b64decode(self.body)
 
 
@@ -52,7 +49,6 @@ class StoredAnswers:
     """Answers that outlast the service, each request durably claimed."""
 
     def __init__(self, folder: Path, clock: Callable[[], float] = time.time) -> None:
-        """Open the store; its folder is made where it is missing, and answers that are too old go."""
         self._folder, self._clock = folder, clock
         self._lock = threading.Lock()
         self._begun = 0
@@ -60,12 +56,7 @@ class StoredAnswers:
         self._tidy()
 
     def begin(self, name: str) -> bool:
-        """Claim a request before anything is done.
-
-        Raises OSError if that has to be written down and cannot be.
-
-        Raises OSError if that cannot be written down. Returns bool: False where the request was begun before.
-        """
+        """Claim a request before anything is done; False where it was begun before. Raises OSError."""
         with self._lock:
             self._begun += 1
             if self._begun % _TIDY_EVERY == 0:
@@ -93,7 +84,6 @@ class StoredAnswers:
             return None
 
     def _tidy(self) -> None:
-        """Remove what is too old."""
         for entry in self._folder.iterdir():
             try:
                 if self._clock() - entry.stat().st_mtime > LIFE_S:
@@ -112,7 +102,6 @@ class Fingerprint:
         self._held = b""
 
     def add(self, piece: bytes) -> None:
-        """Take the next bytes."""
         if not self._boundary:
             self._hash.update(piece)
             return
@@ -123,7 +112,6 @@ class Fingerprint:
         self._held = text[len(text) - keep :]
 
     def digest(self) -> str:
-        """The hash of everything so far, in hexadecimal."""
         whole = self._hash.copy()
         whole.update(self._held)
         return whole.hexdigest()
@@ -140,8 +128,6 @@ _KEY = re.compile(rf"[\x21-\x7e]{{1,{LONGEST_KEY}}}")
 
 
 class IdempotentRequests(HttpMiddleware):
-    """Answers a request that came before with the answer of then."""
-
     def __init__(self, app: ASGIApp) -> None:
         super().__init__(app)
         self._underway: set[str] = set()

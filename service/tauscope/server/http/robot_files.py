@@ -48,8 +48,6 @@ class RobotCheckRequest(StrictModel):
 
 
 class RobotVersionAnswer(AnswerModel):
-    """A robot that is kept."""
-
     version: str = Field(description="of its content; a request's robot may be {version: …}")
     name: str = Field(description="as in its file")
     robot_file: str = Field(description="which of its files is the robot file")
@@ -58,7 +56,6 @@ class RobotVersionAnswer(AnswerModel):
 
     @classmethod
     def of(cls, robot: RobotVersion) -> "RobotVersionAnswer":
-        """The answer that holds a version."""
         return cls(**asdict(robot), link=f"/api/v1/robots/versions/{robot.version}")
 
 
@@ -72,8 +69,6 @@ class LimitsAnswer(AnswerModel):
 
 
 class JointAnswer(AnswerModel):
-    """One joint."""
-
     number: int = Field(description="from 1, base first")
     name: str = Field(description="of the joint")
     type: JointType = Field(description="how it moves")
@@ -91,16 +86,12 @@ class JointAnswer(AnswerModel):
 
 
 class FindingAnswer(AnswerModel):
-    """One remark."""
-
     severity: Severity = Field(description="warning: may spoil results; info: good to know")
     where: str = Field(description="file and place, or column, that it is about")
     text: str = Field(description="what is so, and what to do about it")
 
 
 class RobotReportAnswer(AnswerModel):
-    """A robot file at a glance."""
-
     name: str = Field(description="of the robot")
     gravity: tuple[float, float, float] = Field(description="in the base frame [m/s²]")
     total_mass: float | None = Field(description="of all moving links, as the model believes [kg]")
@@ -109,7 +100,6 @@ class RobotReportAnswer(AnswerModel):
 
     @classmethod
     def of(cls, report: RobotReport) -> "RobotReportAnswer":
-        """The answer that holds a report."""
         return cls.model_validate(report)
 
 
@@ -121,7 +111,6 @@ INLINE_NAME = "robot.json"  # file name of a robot that came as JSON; YAML reade
 
 
 def robot_part_rules(folder: Path) -> dict[str, PartRule]:
-    """Parts of a form that bring a robot."""
     return {
         "robot": PartRule(LARGEST_ROBOT_FILE, folder, default_name="robot.yaml"),
         "urdf": PartRule(LARGEST_XML, folder),
@@ -129,10 +118,7 @@ def robot_part_rules(folder: Path) -> dict[str, PartRule]:
 
 
 def keep_inline_robot(folder: Path, robot: Mapping[str, Any]) -> str:
-    """Write a robot that came as JSON to a robot file.
-
-    Raises RobotFileError if the content is not plain data, or larger than a robot file may be.
-    """
+    """Write a robot that came as JSON. Raises RobotFileError if it is not plain data, or too large."""
     text = to_json_text(robot)
     if text is None:
         raise RobotFileError("robot: holds NaN, infinity or text that is not Unicode; write plain numbers and text")
@@ -141,10 +127,7 @@ def keep_inline_robot(folder: Path, robot: Mapping[str, Any]) -> str:
 
 
 def read_received_robot(folder: Path, file_name: str) -> Robot:
-    """The robot of a received file.
-
-    Raises RobotFileError if it is not valid, or names a file that was not sent with it.
-    """
+    """Raises RobotFileError if it is not valid, or names a file that was not sent with it."""
     try:
         _confine_files(folder, file_name)
         return read_robot(folder / file_name)
@@ -153,10 +136,7 @@ def read_received_robot(folder: Path, file_name: str) -> Robot:
 
 
 def check_received_robot(folder: Path, file_name: str) -> RobotReport:
-    """The report on a received file.
-
-    Raises RobotFileError if it cannot be read at all, or names a file that was not sent with it.
-    """
+    """Raises RobotFileError if it cannot be read at all, or names a file that was not sent with it."""
     try:
         _confine_files(folder, file_name)
         report = check_robot(folder / file_name)

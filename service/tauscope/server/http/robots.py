@@ -109,7 +109,6 @@ def remove_robot_version(version: Version, services: ServicesDep) -> None:
 
 
 async def _receive_robot(request: Request, services: ServicesDep, folder: FilePath) -> str:
-    """Write the robot of a request into a folder; returns the robot file's name."""
     if media_type(request) == JSON:
         body = await read_document(request, RobotCheckRequest, services.settings.max_document_bytes)
         return await run_in_threadpool(keep_inline_robot, folder, body.robot)

@@ -94,15 +94,11 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 
 
 class RunLinks(MotionLinks):
-    """Where to go on from a run."""
-
     excitation: str | None = Field(default=None, description="the excitation that it plays")
     recordings: dict[RecordingFormat, str] = Field(default={}, description="its recording by format, once there is one")
 
 
 class RunRecordingAnswer(AnswerModel):
-    """What a run left behind."""
-
     name: str | None = Field(description="by which identifications refer to it; null where it is not on the server")
     samples: int = Field(description="samples of the motion, without the ramp")
     partial: bool = Field(description="whether the motion was not played to its end, or samples were lost")
@@ -111,8 +107,6 @@ class RunRecordingAnswer(AnswerModel):
 
 
 class RunAnswer(AnswerModel):
-    """The state of a run."""
-
     id: str = Field(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])
     state: RunState | Literal["damaged"] = Field(
         description="where it stands; interrupted: the service ended first; damaged: its files are missing or damaged"
@@ -148,8 +142,6 @@ class RunAnswer(AnswerModel):
 
 
 class StopAnswer(AnswerModel):
-    """What became of the wish to stop a run."""
-
     id: str = Field(description="identifier of the run")
     state: RunState = Field(description="where the run stood; it stops unless that is an end state")
 
@@ -158,7 +150,6 @@ FORMATS: tuple[RecordingFormat, ...] = ("mcap", "csv", "parquet")
 
 
 def find_run(services: Services, identifier: str) -> RunWorkspace:
-    """The folder of a run. Raises NotFoundError if there is none."""
     return RunWorkspace(services.runs.items.folder(identifier))
 
 
@@ -171,7 +162,7 @@ class FollowedRun:
 
 
 def follow_run(services: Services, identifier: str) -> FollowedRun:
-    """A run whose events are followed. Raises NotFoundError if there is none."""
+    """Raises NotFoundError if there is none."""
     workspace = find_run(services, identifier)
 
     def has_ended() -> bool:
@@ -208,10 +199,7 @@ def describe(services: Services, identifier: str, root: str) -> RunAnswer:
 
 
 def require_recording(services: Services, identifier: str, format_: RecordingFormat) -> RunWorkspace:
-    """The folder of a run that left a recording of a format.
-
-    Raises NotFoundError if there is no such run, or no such file. Raises ProblemError if the run goes on.
-    """
+    """A run that left a recording of a format. Raises NotFoundError, or ProblemError while it goes on."""
     workspace = find_run(services, identifier)
     if not workspace.has_ended() or services.runs.live(identifier) is not None:
         text = f"{identifier} goes on; ask for its recording when its state is an end state"
@@ -231,7 +219,6 @@ def _recording(services: Services, identifier: str, record: RunRecord) -> RunRec
 
 
 def _links(here: str, excitation: str | None, record: RunRecord | None, workspace: RunWorkspace) -> RunLinks:
-    """Where to go on: to the recording, once there is one."""
     has_ended = record is not None and record.state.is_end
     recordings: dict[RecordingFormat, str] = {
         name: f"{here}/recording?format={name}" for name in FORMATS if has_ended and workspace.recording(name).is_file()
@@ -245,11 +232,7 @@ LARGEST_TRAJECTORY = 64 * 2**20  # bytes of the largest trajectory file that is 
 
 
 async def submit_run(request: Request, services: Services) -> str:
-    """Take a request for a run.
-
-    Raises ProblemError if the request is not as documented. Raises TauscopeError if the robot or the motion is not
-    valid, somebody else has the arm, or the lease does not let it move.
-    """
+    """Take a request. Raises ProblemError or TauscopeError if it is not valid, or the arm may not be moved."""
     async with stage_request(services.runs.items, RunWorkspace) as workspace:
         most = min(LARGEST_TRAJECTORY, services.settings.max_upload_bytes)
         parts = {"trajectory": PartRule(most, workspace.trajectories, default_name="trajectory.json")}
@@ -267,8 +250,6 @@ async def submit_run(request: Request, services: Services) -> str:
 
 @dataclass(frozen=True, eq=False)
 class _Wanted:
-    """A request whose files are in their places."""
-
     document: RunRequest
     robot_file: str
     robot: Robot
@@ -277,7 +258,6 @@ class _Wanted:
 
 
 def _put_robot(received: Received[RunRequest], services: Services, workspace: RunWorkspace) -> str:
-    """Put the robot into its place; returns its file's name."""
     document, has_robot = received.document, received.form.file("robot") or received.document.robot
     if document.excitation is None or has_robot:
         return keep_robot(received, workspace.robot, services.robots)
@@ -370,13 +350,11 @@ router = make_router(RUNS)
 
 
 def _stop(services: Services, identifier: str) -> RunState | None:
-    """Stop a run; None where it does not go on."""
     live = services.runs.stop(identifier)
     return None if live is None else live.state
 
 
 def _read_state(services: Services, identifier: str) -> RunState | None:
-    """Where a run stands; None where its record is damaged."""
     record = find_run(services, identifier).read_run()
     return None if record is None else record.state
 

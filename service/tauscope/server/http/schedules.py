@@ -60,8 +60,6 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 
 
 class ScheduleAnswer(AnswerModel):
-    """A schedule."""
-
     name: str = Field(description="of it")
     site: str | None = Field(description="data folder whose service does it; null: whichever comes first")
     robot: str | None = Field(description="name of the robot")
@@ -72,14 +70,10 @@ class ScheduleAnswer(AnswerModel):
 
 
 class ScheduleListAnswer(AnswerModel):
-    """All schedules."""
-
     schedules: list[ScheduleAnswer] = Field(description="by name")
 
 
 class FiringAnswer(AnswerModel):
-    """One time that a schedule was due."""
-
     number: int = Field(description="of the firing")
     due: datetime = Field(description="when it was, UTC")
     is_asked: bool = Field(description="whether somebody asked for it")
@@ -92,8 +86,6 @@ class FiringAnswer(AnswerModel):
 
 
 class FiringListAnswer(AnswerModel):
-    """Firings of a schedule."""
-
     firings: list[FiringAnswer] = Field(description="the newest first")
 
 

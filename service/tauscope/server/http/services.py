@@ -51,8 +51,6 @@ _log = logging.getLogger("tauscope.jobs")
 
 @dataclass(frozen=True)
 class Services:
-    """What the routes work with."""
-
     settings: Settings
     recordings: RecordingStore
     robots: RobotStore
@@ -104,10 +102,7 @@ REQUESTS_PER_S = 200.0  # how often a key may call in the long run, where the op
 def open_services(
     settings: Settings, executor: Executor | None = None, start: StartControl | None = None
 ) -> Iterator[Services]:
-    """Take the data folder, and end all work on leaving: first what moves, then the rest.
-
-    Raises TauscopeError if another service works with the data folder, or its database cannot be used.
-    """
+    """Take the data folder; end all work on leaving. Raises TauscopeError if the folder or database is unusable."""
     settings.data_folder.mkdir(0o700, parents=True, exist_ok=True)
     access = _open_access(settings)
     lock = FolderLock(settings.data_folder)
@@ -170,8 +165,6 @@ def _fill_index(services: Services) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Ground:
-    """What everything else stands on."""
-
     settings: Settings
     access: Access
     database: Database
@@ -251,7 +244,6 @@ def _collect_checks(
 
 
 def open_readers(settings: Settings) -> Executor:
-    """Processes that read files of strangers; none is started before it is needed."""
     bounds = {"deadline_s": settings.reading_timeout_s, "memory_bytes": settings.reading_memory_bytes}
     return WorkerPool(WIDTH, **bounds)
 
@@ -267,7 +259,6 @@ def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind,
 
 
 def _retention(services: Services) -> list[Callable[[], object]]:
-    """What removes old items; nothing where the operator did not ask for it."""
     settings, jobs = services.settings, services.jobs
     if settings.prune_older_than_days is None:
         return []
@@ -325,11 +316,7 @@ def _open_access(settings: Settings) -> Access:
 
 
 def require_data_folder(settings: Settings) -> None:
-    """Make the data folder, and refuse one that cannot be worked with.
-
-    Raises TauscopeError if it cannot be made or written to, another service works with it, or it has no key where one
-    is needed.
-    """
+    """Raises TauscopeError if the folder cannot be used, another service has it, or a key is needed."""
     folder = settings.data_folder
     try:
         folder.mkdir(0o700, parents=True, exist_ok=True)

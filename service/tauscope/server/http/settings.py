@@ -89,12 +89,10 @@ class Settings(BaseModel):
 
     @property
     def recordings_folder(self) -> Path:
-        """Recordings that requests may name; an operator may put files here."""
         return self.data_folder / RECORDINGS
 
     @property
     def is_local(self) -> bool:
-        """Whether only this machine can reach the service."""
         return is_loopback(self.host)
 
     def answers_for(self, name: str | None) -> bool:
@@ -105,7 +103,6 @@ class Settings(BaseModel):
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach an address."""
     if host.lower() == "localhost":
         return True
     try:

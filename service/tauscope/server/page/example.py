@@ -49,7 +49,6 @@ MOTIONS = {"example-train.csv": (1, 1.5), "example-held-out.csv": (2, 1.1)}
 
 @cache
 def example_files() -> dict[str, bytes]:
-    """The files by name."""
     robot = _robot()
     made = {name: _recording(robot, reach, np.random.default_rng(seed)) for name, (seed, reach) in MOTIONS.items()}
     return {"example-arm.yaml": ROBOT.encode(), **made}

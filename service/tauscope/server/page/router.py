@@ -38,8 +38,6 @@ HEADERS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Asset:
-    """A file of the page."""
-
     content: bytes
     media_type: str
     tag: str
@@ -47,13 +45,11 @@ class Asset:
 
 @router.get("/")
 def show_page(request: Request) -> Response:
-    """The page."""
     return _answer(request, "index.html")
 
 
 @router.get("/page/{name}")
 def show_asset(request: Request, name: str) -> Response:
-    """A file of the page."""
     return _answer(request, name)
 
 
@@ -69,7 +65,6 @@ def _answer(request: Request, name: str) -> Response:
 
 @router.get("/example/{name}")
 def show_example(name: str) -> Response:
-    """A file of the example, for the page to fetch."""
     content = example_files().get(name)
     if content is None:
         raise NotFoundError(one_line(f"the example has no file {shown(name)}; it has {', '.join(example_files())}"))

@@ -21,8 +21,6 @@ from tauscope.trajectory.csv_format import write_trajectory_rows
 
 
 class IdentificationOrder(TaskOrder):
-    """Input of an identification job."""
-
     task = identify
 
     form: Literal["tauscope.order/1"] = Field(default="tauscope.order/1", description="name and version of this form")
@@ -32,8 +30,6 @@ class IdentificationOrder(TaskOrder):
 
 
 class IdentificationWorkspace(TaskWorkspace[IdentificationOrder]):
-    """Files of an identification job."""
-
     order_type = IdentificationOrder
     noun = "identification"
     roles = ("recordings", "held_out")
@@ -47,13 +43,10 @@ class IdentificationWorkspace(TaskWorkspace[IdentificationOrder]):
 
 
 def run_identification(folder: Path, server_recordings: Path) -> JobProblem | None:
-    """Do an identification job; returns why there is no result."""
     return perform_job(IdentificationWorkspace(folder), server_recordings)
 
 
 class DiagnosisOrder(TaskOrder):
-    """Input of a diagnosis job."""
-
     task = diagnose
 
     form: Literal["tauscope.diagnosis-order/1"] = Field(
@@ -67,8 +60,6 @@ class DiagnosisOrder(TaskOrder):
 
 
 class DiagnosisWorkspace(TaskWorkspace[DiagnosisOrder]):
-    """Files of a diagnosis job."""
-
     order_type = DiagnosisOrder
     noun = "diagnosis"
     roles = ("recordings", "held_out", "simulated")
@@ -86,13 +77,10 @@ class DiagnosisWorkspace(TaskWorkspace[DiagnosisOrder]):
 
 
 def run_diagnosis(folder: Path, server_recordings: Path) -> JobProblem | None:
-    """Do a diagnosis job; returns why there is no result."""
     return perform_job(DiagnosisWorkspace(folder), server_recordings)
 
 
 class RolloutOrder(TaskOrder):
-    """Input of a rollout job."""
-
     task = rollout
 
     form: Literal["tauscope.rollout-order/1"] = Field(
@@ -105,8 +93,6 @@ class RolloutOrder(TaskOrder):
 
 
 class RolloutWorkspace(TaskWorkspace[RolloutOrder]):
-    """Files of a rollout job."""
-
     order_type = RolloutOrder
     noun = "rollout"
     roles = ("recordings", "refine")
@@ -115,7 +101,6 @@ class RolloutWorkspace(TaskWorkspace[RolloutOrder]):
 
 
 def run_rollout(folder: Path, server_recordings: Path) -> JobProblem | None:
-    """Do a rollout job; returns why there is no result."""
     return perform_job(RolloutWorkspace(folder), server_recordings)
 
 
@@ -123,8 +108,6 @@ MOST_ROWS = 2_000_000  # rows of the longest CSV that is made on request
 
 
 class ExcitationOrder(TaskOrder):
-    """Input of an excitation job."""
-
     task = design_excitation
 
     form: Literal["tauscope.excitation-order/1"] = Field(
@@ -136,26 +119,17 @@ class ExcitationOrder(TaskOrder):
 
 
 class ExcitationWorkspace(TaskWorkspace[ExcitationOrder]):
-    """Files of an excitation job."""
-
     order_type = ExcitationOrder
     noun = "excitation"
     outputs: ClassVar[Mapping[str, str | None]] = {TRAJECTORY: None, "result.json": "tauscope.excitation/1"}
 
 
 def run_excitation(folder: Path) -> JobProblem | None:
-    """Do an excitation job; returns why there is no result."""
     return perform_job(ExcitationWorkspace(folder), folder)
 
 
 def write_trajectory_piece(workspace: TaskWorkspace[Any], rate_hz: float, start: int) -> bytes:
-    """Rows of the trajectory of an excitation that succeeded, as CSV; empty beyond the last one.
-
-    Raises NotFoundError if the file is missing. Raises ExcitationError if the file was damaged. Raises
-    LimitExceededError if the CSV would be too long.
-
-    `rate_hz`: samples a second [Hz].
-    """
+    """CSV rows at `rate_hz` [Hz]; empty beyond the last. Raises NotFoundError, ExcitationError, LimitExceededError."""
     try:
         content, order = workspace.trajectory.read_bytes(), workspace.read_order()
     except OSError:
@@ -172,10 +146,7 @@ def write_trajectory_piece(workspace: TaskWorkspace[Any], rate_hz: float, start:
 
 
 def check_trajectory(folder: Path, robot_file: Path) -> None:
-    """Read a trajectory that a client sent, as a worker process does it.
-
-    Raises ExcitationError if it is not valid, or was made for an arm of another number of joints.
-    """
+    """Read a trajectory as a worker does. Raises ExcitationError if it is not valid, or not for this arm."""
     (path,) = folder.iterdir()
     with hide_folders(folder, robot_file.parent):
         read_trajectory(path, read_robot(robot_file))

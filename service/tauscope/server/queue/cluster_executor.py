@@ -17,11 +17,7 @@ if TYPE_CHECKING:
 
 
 class LoopThread:
-    """One event loop for every client that reaches for a cluster, one after the other.
-
-    Dask gives each client a loop of its own otherwise, and one that does not reach its scheduler leaves it running:
-    a thread more with every attempt.
-    """
+    """One event loop for all clients: Dask leaves a loop running for each that does not reach its scheduler."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -45,10 +41,7 @@ class LoopThread:
         return self._loop
 
     def stop(self, within_s: float) -> None:
-        """End the thread, with whatever its clients still had under way.
-
-        `within_s`: how long to wait for its end [s].
-        """
+        """End the thread, with whatever its clients still had under way, within [s]."""
         if self._loop is not None:
             self._loop.add_callback(self._stopping.set)
             self._thread.join(within_s)
@@ -78,12 +71,7 @@ class ClusterExecutor(Executor):
     """
 
     def __init__(self, address: str, wait_s: float = 0.0) -> None:
-        """Reach the scheduler.
-
-        Raises StoreError if it does not answer, or Dask is not installed.
-
-        `wait_s`: how long `submit` waits for a scheduler that is away [s].
-        """
+        """`wait_s`: for a scheduler that is away [s]. Raises StoreError if it does not answer, or without Dask."""
         self._address, self._wait_s = address, wait_s
         self._width = 1
         self._closing = threading.Event()
@@ -111,10 +99,7 @@ class ClusterExecutor(Executor):
     def submit(
         self, fn: Callable[Arguments, Result], /, *args: Arguments.args, **kwargs: Arguments.kwargs
     ) -> "Future[Result]":
-        """Have a function called by a worker.
-
-        Raises ClusterUnavailableError if the scheduler is away. Raises RuntimeError after `shutdown`.
-        """
+        """Raises ClusterUnavailableError if the scheduler is away, RuntimeError after `shutdown`."""
         if self._closing.is_set():
             raise RuntimeError("the cluster was left")
         if not self.is_there():
@@ -131,7 +116,6 @@ class ClusterExecutor(Executor):
         return outer
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Leave the cluster."""
         self._closing.set()
         self._watcher.join(2 * TIMEOUT_S)
         try:
@@ -144,13 +128,11 @@ class ClusterExecutor(Executor):
             self._loop.stop(TIMEOUT_S)
 
     def _open_client(self) -> "Client":
-        """A connection of its own; raises what Dask raises."""
         from distributed import Client
 
         return Client(self._address, self._loop.open(), timeout=TIMEOUT_S, set_as_default=False)
 
     def _watch(self) -> None:
-        """Look at the scheduler until it is left."""
         while not self._closing.wait(CHECK_S):
             try:
                 self._look()
@@ -158,7 +140,6 @@ class ClusterExecutor(Executor):
                 _log.debug("the cluster could not be looked at", exc_info=True)
 
     def _look(self) -> None:
-        """Count the workers, or reach a scheduler anew that was given up."""
         if self._client.status == "closed":
             self._there.clear()
             self._client = self._open_client()

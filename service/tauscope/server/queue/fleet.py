@@ -27,8 +27,6 @@ AWAY = "the Dask cluster was away for too long; see to its scheduler, and give t
 
 @dataclass(frozen=True)
 class FleetEntry:
-    """A robot of a manifest."""
-
     row: int
     name: str
     robot: Path
@@ -38,8 +36,6 @@ class FleetEntry:
 
 @dataclass(frozen=True)
 class FleetResult:
-    """What came of a robot."""
-
     entry: FleetEntry
     figures: dict[str, str]
     error: str | None
@@ -100,12 +96,10 @@ def analyse_fleet(
 
 
 def identify_robot(entry: FleetEntry, folder: Path) -> FleetResult:
-    """Identify a robot."""
     return _time(identify, entry, folder)
 
 
 def diagnose_robot(entry: FleetEntry, folder: Path) -> FleetResult:
-    """Diagnose a robot, against the best model that its recordings allow."""
     return _time(diagnose, entry, folder)
 
 

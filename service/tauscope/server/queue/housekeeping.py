@@ -27,7 +27,6 @@ class Housekeeping:
         self._thread.start()
 
     def close(self) -> None:
-        """Do no further task, and wait for the one that is being done."""
         self._closing.set()
         if self._thread.is_alive():
             self._thread.join()

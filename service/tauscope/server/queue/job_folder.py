@@ -45,7 +45,6 @@ class JobState(StrEnum):
 
     @property
     def is_end(self) -> bool:
-        """Whether nothing will happen to the job any more."""
         return not TRANSITIONS[self]
 
 
@@ -64,7 +63,6 @@ TRANSITIONS: Mapping[JobState, frozenset[JobState]] = {
 
 
 def may_follow(before: JobState, after: JobState) -> bool:
-    """Whether a job may go from one state to another."""
     return after in TRANSITIONS[before]
 
 
@@ -76,8 +74,6 @@ class JobProblem(StrictModel):
 
 
 class JobRecord(StrictModel):
-    """A job's state and times."""
-
     form: Literal["tauscope.job/1"] = Field(default="tauscope.job/1", description="name and version of this form")
     state: JobState = Field(description="where the job stands")
     created: AwareDatetime = Field(description="when it was handed in")
@@ -87,7 +83,6 @@ class JobRecord(StrictModel):
     attempts: int = Field(default=0, ge=0, description="how often its work was begun and not given up in good order")
 
     def may_become(self, state: JobState) -> bool:
-        """Whether a state may follow."""
         return may_follow(self.state, state)
 
     def moved(self, state: JobState, now: datetime, problem: JobProblem | None = None) -> "JobRecord":
@@ -156,7 +151,6 @@ def read_stored(path: Path, kind: type[Stored]) -> Stored | None:
 
 
 def write_stored(path: Path, model: StrictModel) -> None:
-    """Keep a model."""
     write_atomically(path, model.model_dump_json(indent=1).encode())
 
 
@@ -182,8 +176,6 @@ _log = logging.getLogger("tauscope.jobs")
 
 
 class JobFolder:
-    """Step, events and the wish to stop."""
-
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.events = EventLog(folder / "events.jsonl")
@@ -191,7 +183,6 @@ class JobFolder:
         self._cancel = folder / "cancel"
 
     def read_step(self) -> str | None:
-        """The step that the work is in; None before it began."""
         try:
             return self._progress.read_text(encoding="utf-8")
         except (OSError, ValueError):
@@ -205,7 +196,6 @@ class JobFolder:
         self.tell(StepEvent(time=datetime.now(UTC), step=step))
 
     def write_progress(self, percent: float | None, figures: Mapping[str, JsonValue]) -> None:
-        """Tell how far the work is."""
         self.tell(ProgressEvent(time=datetime.now(UTC), percent=percent, figures=dict(figures)))
 
     def tell(self, event: JobEvent) -> None:
@@ -216,7 +206,6 @@ class JobFolder:
             _log.warning("an event of job %s could not be written", self.folder.name, exc_info=True)
 
     def has_told_end(self) -> bool:
-        """Whether the end was told."""
         last = self.events.last()
         if last is not None and last.get("kind") == "ended":
             return True
@@ -224,7 +213,6 @@ class JobFolder:
         return any(event.content.get("kind") == "ended" for event in self.events.follow().read())
 
     def ask_to_stop(self) -> None:
-        """Ask the work to stop at its next step."""
         self._cancel.touch()
 
     def is_asked_to_stop(self) -> bool:
@@ -240,12 +228,10 @@ class Workspace(JobFolder):
     """
 
     def __init__(self, folder: Path) -> None:
-        """Look at a job's folder; nothing is opened yet."""
         super().__init__(folder)
         self._record = folder / "state.json"
 
     def read_record(self) -> JobRecord | None:
-        """The job's state, or None where the file is missing or damaged."""
         return read_stored(self._record, JobRecord)
 
     def has_ended(self) -> bool:
@@ -254,7 +240,6 @@ class Workspace(JobFolder):
         return record is None or record.state.is_end
 
     def write_record(self, record: JobRecord) -> None:
-        """Keep the job's state, and tell it."""
         write_stored(self._record, record)
         self._tell_state(record)
 
@@ -284,10 +269,7 @@ class StoppedError(Exception):
 
 
 def do_work(workspace: Workspace, work: Callable[[], None], *folders: Path) -> JobProblem | None:
-    """Do the work of a job, and say why it has no result.
-
-    Returns JobProblem or None: why there is no result; None where there is one.
-    """
+    """Do the work of a job; returns why it has no result, None where it has one."""
     try:
         work()
     except StoppedError:

@@ -17,24 +17,14 @@ from tauscope.server.queue.job_folder import hide_folders, without_folders
 
 
 def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport:
-    """Report what a recording in the store holds.
-
-    Raises RecordingError if it cannot be read or breaks a rule; the message calls the file by its name alone.
-
-    `joint_count`: joints that it must have; None where any number is welcome.
-    """
+    """Report on a recording. Raises RecordingError, whose message calls the file by its name alone."""
     with hide_folders(path.parent):
         return replace(check_recording(path, joint_count), name=path.name)
 
 
 @dataclass(frozen=True)
 class Understanding:
-    """How a file is understood before anything is computed from it.
-
-    `mapping`: None for a log, which names its joints itself.
-    `report`: None where the file is refused.
-    `problem`: why it is refused.
-    """
+    """`mapping`: None for a log, which names its joints; `problem`: why the file is refused, without `report`."""
 
     mapping: ColumnMapping | None
     report: RecordingReport | None
@@ -90,7 +80,6 @@ def read_kept_samples(path: Path, most: int) -> bytes:
 
 
 def _choose_rows(values: Array, most: int) -> NDArray[np.intp]:
-    """Rows that keep every column's look."""
     if len(values) <= most:
         return np.arange(len(values))
     share = max(most // values.shape[1], 2)

@@ -29,10 +29,7 @@ TOO_OFTEN = JobProblem(
 
 @dataclass(frozen=True, eq=False)
 class JobKind:
-    """A kind of job: where its folders lie and what is done with them.
-
-    `is_heavy`: whether its work takes minutes: where there are several slots, one stays free of such work.
-    """
+    """`is_heavy`: whether its work takes minutes: of several slots one stays free of such work."""
 
     items: ItemStore
     work: Work
@@ -41,8 +38,6 @@ class JobKind:
 
 @dataclass(frozen=True)
 class QueuedJob:
-    """A job that has not ended."""
-
     kind: JobKind
     identifier: str
 
@@ -52,7 +47,6 @@ class QueuedJob:
         return self.kind.items.folder(self.identifier)
 
     def attempts(self) -> int:
-        """How often the work was begun and not given up in good order; 0 where nobody can tell."""
         try:
             record = Workspace(self.folder).read_record()
         except NotFoundError:
@@ -121,17 +115,12 @@ class QueueFullError(LimitExceededError):
 
 @dataclass(frozen=True)
 class _End:
-    """How a job ended."""
-
     state: JobState
     problem: JobProblem | None
 
 
 class JobQueue:
-    """Jobs waiting for an executor, and jobs in it; the only writer of their states.
-
-    Every method may be called from any thread.
-    """
+    """Jobs that wait, and jobs in an executor; the only writer of their states, called from any thread."""
 
     def __init__(
         self,
@@ -165,10 +154,7 @@ class JobQueue:
             self._go_on()
 
     def submit(self, kind: JobKind, staged: Path, caller: str = "") -> str:
-        """Take a job; what campaigns and schedules hand in has no caller.
-
-        Raises QueueFullError if too many jobs are waiting, or too many of the caller's; the folder stays staged.
-        """
+        """Take a job. Raises QueueFullError if too many wait, or too many of the caller's; it stays staged."""
         with self._lock:
             if self._is_closed or len(self._waiting) >= self._most_waiting:
                 raise QueueFullError(f"{len(self._waiting)} jobs are waiting already; try again when one has ended")
@@ -187,13 +173,7 @@ class JobQueue:
             raise QueueFullError(f"{open_jobs} jobs of {caller} have not ended; try again when one has")
 
     def cancel_or_remove(self, kind: JobKind, identifier: str) -> bool:
-        """Cancel a job that has not ended; remove one that has, or whose record is damaged.
-
-        Cancelled work stops at its next step; what it still does until then is dropped. Raises NotFoundError if there
-        is no such job.
-
-        Returns bool: True where the job was removed.
-        """
+        """Cancel a job, or remove one that has ended: True then. Raises NotFoundError if there is none."""
         with self._lock:
             if self.cancel(kind, identifier):
                 return False
@@ -202,12 +182,7 @@ class JobQueue:
             return True
 
     def cancel(self, kind: JobKind, identifier: str) -> bool:
-        """Cancel a job that has not ended.
-
-        Raises NotFoundError if there is no such job.
-
-        Returns bool: False where it had ended, or its record is damaged.
-        """
+        """Cancel a job; False where it had ended or is damaged. Raises NotFoundError if there is none."""
         with self._lock:
             job, workspace = QueuedJob(kind, identifier), Workspace(kind.items.folder(identifier))
             if workspace.has_ended() or not job.move(JobState.CANCELLED, CANCELLED):
@@ -220,19 +195,13 @@ class JobQueue:
             return True
 
     def waiting(self) -> int:
-        """How many jobs wait."""
         return len(self._waiting)
 
     def can_work(self) -> bool:
-        """Whether the executor can work at present; jobs wait where it cannot."""
         return self._is_there()
 
     def settle(self) -> None:
-        """Do what was hindered by a full disk or an executor that was away: write ends, and begin what waits.
-
-        To be called again and again; while nothing is in the way there is nothing to do. Raises OSError if the disk is
-        in the way still.
-        """
+        """Write ends, and begin what waits. Raises OSError if a full disk is still in the way."""
         with self._lock:
             try:
                 self._write_ends()

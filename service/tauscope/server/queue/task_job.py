@@ -35,16 +35,12 @@ TRAJECTORY, SAVED_MODEL = "trajectory.json", "against"
 
 
 class OrderedRecording(StrictModel):
-    """A recording of an order."""
-
     name: str = Field(description="its file name")
     origin: Literal["uploaded", "server"] = Field(description="sent with the request, or lying on the server")
     sha256: str = Field(description="of its bytes when the job was handed in, in hexadecimal")
 
 
 class TaskOrder(StrictModel):
-    """Input of a job: the request of a task, its files by their names in the job's folder."""
-
     robot_file: str = Field(description="name of the robot file in the job's robot folder")
     robot_name: str = Field(description="what the robot file calls the robot")
 
@@ -52,7 +48,6 @@ class TaskOrder(StrictModel):
 
     @property
     def request(self) -> Any:
-        """The request of the task; its files are called by their bare names."""
         fields: dict[str, Any] = {name: getattr(self, name) for name in ("model", "options") if hasattr(self, name)}
         for role in ROLES:
             if role != "model" and hasattr(self, role):
@@ -64,11 +59,7 @@ Order = TypeVar("Order", bound=TaskOrder)
 
 
 class TaskWorkspace(Workspace, Generic[Order]):
-    """Files of a job: ``order.json``, ``robot/`` and a folder for each role of recordings; the task's outputs.
-
-    `roles` are the order's lists of recordings; `outputs` the files that the job leaves, each JSON document with its
-    schema; `formats` its exports.
-    """
+    """`outputs`: the files that a job leaves, each JSON document with its schema; `formats`: its exports."""
 
     order_type: ClassVar[type[TaskOrder]]
     noun: ClassVar[str]
@@ -78,7 +69,6 @@ class TaskWorkspace(Workspace, Generic[Order]):
     formats: ClassVar[Mapping[ExportFormat, ExportFile]] = {}
 
     def __init__(self, folder: Path) -> None:
-        """Look at a job's folder; nothing is opened yet."""
         super().__init__(folder)
         self.robot = folder / "robot"
         self.exports = folder / "exports"
@@ -87,24 +77,19 @@ class TaskWorkspace(Workspace, Generic[Order]):
 
     @property
     def trajectory(self) -> Path:
-        """The motion that was designed or planned."""
         return self.folder / TRAJECTORY
 
     def prepare(self) -> None:
-        """Make the folders that hold a job's input."""
         for folder in (self.robot, *map(self.uploads, (*self.roles, *([SAVED_MODEL] if self.takes_model else [])))):
             folder.mkdir()
 
     def uploads(self, role: str) -> Path:
-        """The folder of files that came with the request."""
         return self.folder / role
 
     def read_order(self) -> Order | None:
-        """The job's input, or None where the file is missing or damaged."""
         return read_stored(self._order, self.order_type)  # type: ignore[return-value]
 
     def write_order(self, order: Order) -> None:
-        """Keep the job's input."""
         write_stored(self._order, order)
 
     def read_output(self, name: str) -> bytes | None:
@@ -113,7 +98,6 @@ class TaskWorkspace(Workspace, Generic[Order]):
         return read_bytes(self.folder / name) if schema is None else read_document(self.folder / name, schema)
 
     def read_result(self) -> bytes | None:
-        """The task's document, or None where the file is missing or damaged."""
         return self.read_output("result.json")
 
     def refused_exports(self) -> dict[str, str]:
@@ -150,17 +134,13 @@ class JobFiles:
     """Files of a request in a job's folder, or among the recordings of the server with the bytes that were ordered."""
 
     def __init__(self, workspace: TaskWorkspace[Any], order: TaskOrder, server_recordings: Path) -> None:
-        """Look at the folders; nothing is opened yet."""
         self._workspace = workspace
         self._order = order
         self._server_recordings = server_recordings
         self._checked: set[Path] = set()
 
     def find(self, role: str, name: str) -> Path:
-        """Where an input lies.
-
-        Raises RecordingError if a recording was changed or removed after the job was handed in.
-        """
+        """Where an input lies. Raises RecordingError if a recording was changed since the job was handed in."""
         if role in ("robot", "model"):
             return self._workspace.uploads("robot" if role == "robot" else SAVED_MODEL) / name
         entry = next(entry for entry in getattr(self._order, role) if entry.name == name)
@@ -183,10 +163,7 @@ class JobFiles:
 
 
 def perform_job(workspace: TaskWorkspace[Any], server_recordings: Path) -> JobProblem | None:
-    """Do a job, as a worker process does it.
-
-    Returns JobProblem or None: why there is no result; None where there is one.
-    """
+    """Do a job as a worker does; returns why there is no result, None where there is one."""
     folders = (*map(workspace.uploads, (*workspace.roles, SAVED_MODEL)), workspace.robot, server_recordings)
 
     def tell(step: str, percent: float | None = None, figures: Mapping[str, Any] = {}) -> None:
@@ -210,8 +187,7 @@ def perform_job(workspace: TaskWorkspace[Any], server_recordings: Path) -> JobPr
 class Preparable(Protocol):
     """A folder whose input has places of its own."""
 
-    def prepare(self) -> None:
-        """Make the folders that hold the input."""
+    def prepare(self) -> None: ...
 
 
 Staged = TypeVar("Staged", bound=Preparable)
@@ -232,12 +208,7 @@ def stage_workspace(items: ItemStore, kind: Callable[[Path], Staged]) -> Iterato
 def submit_job(
     jobs: JobQueue, kind: JobKind, workspace: type[TaskWorkspace[Order]], order: Order, put_robot: Callable[[Path], Any]
 ) -> str:
-    """Hand in a job whose files lie on the server already; returns its identifier.
-
-    Raises QueueFullError if too many jobs are waiting.
-
-    `put_robot`: writes the robot's files into a folder.
-    """
+    """Hand in a job whose files lie on the server; returns its identifier. Raises QueueFullError."""
     with stage_workspace(kind.items, workspace) as staged:
         put_robot(staged.robot)
         staged.write_order(order)

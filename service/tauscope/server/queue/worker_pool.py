@@ -45,7 +45,6 @@ def serve_connection(connection: Connection, memory_bytes: int | None) -> None:
 
 
 def _call(function: Callable[..., Any], arguments: tuple[Any, ...], options: dict[str, Any]) -> tuple[bool, Any]:
-    """What comes of a call: whether it succeeded, and its result or exception."""
     try:
         return True, function(*arguments, **options)
     except BaseException as error:
@@ -76,8 +75,6 @@ _environment = threading.Lock()
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """Work that was handed in."""
-
     future: "Future[Any]"
     call: tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
 
@@ -90,10 +87,7 @@ class WorkerPool(Executor):
     """
 
     def __init__(self, workers: int, *, deadline_s: float | None = None, memory_bytes: int | None = None) -> None:
-        """Make the pool; no process is started before it is needed.
-
-        `deadline_s`: how long a call may take [s]; `memory_bytes`: data that a process may hold [bytes].
-        """
+        """`deadline_s`: of a call [s]; `memory_bytes`: data that a process may hold. Processes start when needed."""
         self._deadline_s, self._memory_bytes = deadline_s, memory_bytes
         self._condition = threading.Condition()
         self._waiting: deque[_Task] = deque()
@@ -123,7 +117,6 @@ class WorkerPool(Executor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes."""
         with self._condition:
             self._is_closed = True
             if cancel_futures:
@@ -230,8 +223,6 @@ def _settle(future: "Future[Any]", error: BaseException | None, result: Any = No
 
 
 class _Worker:
-    """One process, and the connection to it."""
-
     def __init__(self, memory_bytes: int | None) -> None:
         context = get_context("spawn")
         self.connection: Connection
@@ -254,7 +245,6 @@ class _Worker:
         self.connection.send(call)
 
     def kill(self) -> None:
-        """End it; nothing happens where it has ended."""
         with suppress(ValueError):  # closed already
             self._process.kill()
 

@@ -34,7 +34,6 @@ class Window(StrictModel):
     end: ClockTime = Field(description="first moment after it; the same as `start` for the whole day")
 
     def holds(self, moment: datetime) -> bool:
-        """Whether work may be started."""
         start, end = time.fromisoformat(self.start), time.fromisoformat(self.end)
         now, today = moment.time(), DAYS[moment.weekday()]
         yesterday = DAYS[(moment - timedelta(days=1)).weekday()]
@@ -79,7 +78,6 @@ class ScheduleDefinition(StrictModel):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        """One trigger; recordings where they are needed."""
         if (self.cron is None) == (self.every_s is None):
             raise PydanticCustomError("trigger", "has to have either cron or every_s")
         if (self.kind == "campaign") == (self.recordings is not None):
@@ -100,7 +98,6 @@ class ScheduleDefinition(StrictModel):
         return None if found is None else found.astimezone(UTC)
 
     def is_open(self, now: datetime) -> bool:
-        """Whether the window holds a moment."""
         return self.window is None or self.window.holds(now.astimezone(ZoneInfo(self.timezone)))
 
     def _trigger(self, created: datetime) -> BaseTrigger:

@@ -32,19 +32,12 @@ class NothingToDoError(TauscopeError):
 
 @dataclass(frozen=True, eq=False)
 class Repeater:
-    """Starts the campaigns and analyses of schedules."""
-
     dependencies: CampaignDependencies
     campaigns: CampaignManager
     permit_for: Callable[[str], Permit] = field(default_factory=lambda: lambda _device: FREE)
 
     def start(self, entry: ScheduleEntry, since: datetime | None) -> tuple[str, str]:
-        """Start it; returns at once.
-
-        Raises NothingToDoError if there is no new recording. Raises TauscopeError if it cannot be started.
-
-        Returns (str, str), kind and identifier of what was started.
-        """
+        """Start it; returns kind and identifier. Raises NothingToDoError without a new recording, or TauscopeError."""
         definition = ScheduleDefinition.model_validate(dict(entry.definition), strict=False)
         if definition.kind == "campaign":
             return "campaign", self._campaign(entry)
@@ -60,7 +53,6 @@ class Repeater:
             return False
 
     def items(self, kind: str) -> ItemStore:
-        """The folders of what is repeated."""
         if kind == "campaign":
             return self.campaigns.items
         return (self.dependencies.identifications if kind == "identification" else self.dependencies.diagnoses).items
@@ -82,10 +74,7 @@ class Repeater:
 def newest_recordings(
     store: RecordingStore, choice: RecordingChoice, since: datetime | None
 ) -> tuple[tuple[OrderedRecording, ...], tuple[OrderedRecording, ...]]:
-    """The recordings that an analysis takes: those to judge by are the newest, the others come before them.
-
-    Raises NothingToDoError if there are too few, or none is new.
-    """
+    """Training, then held-out recordings; the newest are held out. Raises NothingToDoError if none is new."""
     found = [entry for entry in store.entries() if fnmatchcase(entry.name, choice.pattern)]
     wanted = sorted(found, key=lambda entry: (entry.modified, entry.name))[-(choice.train + choice.held_out) :]
     if len(wanted) < choice.train + choice.held_out:
@@ -98,7 +87,6 @@ def newest_recordings(
 
 
 def write_robot(folder: Path, entry: ScheduleEntry) -> None:
-    """Write a robot's files."""
     for name, text in entry.files.items():
         (folder / name).write_text(text, encoding="utf-8")
 
@@ -110,12 +98,7 @@ def _order(entry: ScheduleEntry, kind: type[Order]) -> Order:
 def make_schedule(
     name: str, like: str, definition: ScheduleDefinition, repeater: Repeater, site: str | None, now: datetime
 ) -> ScheduleEntry:
-    """A schedule that repeats an item of this site.
-
-    Raises NotFoundError if there is no such item, or its files are damaged.
-
-    `site`: of the data folder whose service does it; None for whichever comes first.
-    """
+    """Repeat an item, at any `site` where None. Raises NotFoundError if it is missing or damaged."""
     workspace = WORKSPACES[definition.kind](repeater.items(definition.kind).folder(like))
     order = workspace.read_order()
     if order is None:

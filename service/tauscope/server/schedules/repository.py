@@ -18,10 +18,7 @@ UNDECIDED = ("asked", "claimed")  # states of a firing that will become another 
 
 @dataclass(frozen=True)
 class ScheduleEntry:
-    """A schedule.
-
-    `site`: of the data folder whose service does it; None for whichever comes first.
-    """
+    """`site`: of the data folder whose service does it; None for whichever comes first."""
 
     name: str
     site: str | None
@@ -34,10 +31,7 @@ class ScheduleEntry:
 
 @dataclass(frozen=True)
 class FiringEntry:
-    """One time that a schedule was due.
-
-    `item`: (str, str), kind and identifier of what was started.
-    """
+    """`item`: kind and identifier of what was started."""
 
     number: int
     schedule: str
@@ -52,7 +46,6 @@ class FiringEntry:
 
 
 def schedule_entry(row: Schedule) -> ScheduleEntry:
-    """What is given out of a schedule."""
     return read_row(ScheduleEntry, row)
 
 
@@ -102,7 +95,6 @@ class ScheduleRepository:
             return schedule_entry(_schedule(session, name))
 
     def schedules(self) -> list[ScheduleEntry]:
-        """All schedules of all sites, by name."""
         with self._database.reading() as session:
             return [schedule_entry(row) for row in session.scalars(select(Schedule).order_by(Schedule.name))]
 
@@ -113,11 +105,7 @@ class ScheduleRepository:
             return [schedule_entry(row) for row in session.scalars(query)]
 
     def claim(self, entry: ScheduleEntry, next_due: datetime | None, now: datetime) -> int | None:
-        """Take the firing of a schedule on that is due; once only, whoever else tries.
-
-        Returns int or None: number of the firing; None where somebody else has it, or the schedule was changed
-        meanwhile.
-        """
+        """Number of the firing of a due schedule; None where another service has it, or it was changed."""
         with self._database.writing() as session:
             moved = session.execute(
                 update(Schedule)
@@ -142,10 +130,7 @@ class ScheduleRepository:
             return firing.id
 
     def claim_asked(self, now: datetime, number: int | None = None) -> tuple[int, ScheduleEntry] | None:
-        """Take a firing on that was asked for; once only, whoever else tries.
-
-        Returns (int, ScheduleEntry) or None, number and schedule; None where there is none.
-        """
+        """Number and schedule of a firing that was asked for and is taken now; None where there is none."""
         query = select(Firing).join(Schedule).where(Firing.state == "asked", self._is_mine()).order_by(Firing.id)
         if number is not None:
             query = query.where(Firing.id == number)
@@ -191,7 +176,6 @@ class ScheduleRepository:
         return or_(Schedule.site == self.site, Schedule.site.is_(None))
 
     def _move(self, where: ColumnElement[bool], before: str, **values: Any) -> int:
-        """Change firings of a state; how many there were."""
         statement = update(Firing).where(where, Firing.state == before).values(**values).returning(Firing.id)
         with self._database.writing() as session:
             return len(session.scalars(statement).all())

@@ -23,12 +23,7 @@ TIMEOUT_S = 10.0  # how long the program may take [s]
 
 
 def find_objection(data_folder: Path, name: str, robot: str, device: str) -> str | None:
-    """Ask whether an arm is free. Whatever goes wrong with asking counts as no.
-
-    Only programs in the folder are called, never a command that came over the network.
-
-    Returns str or None: one line: why it is not free; None where it is.
-    """
+    """Why an arm is not free, None where it is. Only the operator's programs in the folder are called."""
     path = data_folder / FOLDER / name
     fault = _fault(path)
     if fault is not None:
@@ -162,7 +157,6 @@ class Scheduler:
         return find_objection(self._data_folder, definition.interlock, robot, backend.device(robot))
 
     def _goes_on(self, firing: FiringEntry, kind: str, identifier: str) -> bool:
-        """Whether what was started has not ended; of another site only the index knows."""
         if firing.site == self.repository.site:
             return self.repeater.goes_on(kind, identifier)
         return firing.item_state is not None and not firing.is_final
@@ -172,7 +166,6 @@ class Scheduler:
 
 
 def read_definition(entry: ScheduleEntry) -> ScheduleDefinition:
-    """When a schedule is due."""
     return ScheduleDefinition.model_validate(dict(entry.definition), strict=False)
 
 

@@ -70,7 +70,6 @@ def load_lines(engine: Engine, lines: Iterable[bytes]) -> None:
 
 
 def _tables(connection: Connection) -> list[Table]:
-    """The tables as they are, each behind those that it refers to."""
     metadata = MetaData()
     metadata.reflect(connection)
     return [table for table in metadata.sorted_tables if table.name != _FORM]

@@ -15,10 +15,7 @@ _TAIL = 2**16
 
 @dataclass(frozen=True)
 class LoggedEvent:
-    """One line of a log.
-
-    `number`: of the line, from 1: who has read it goes on with the next.
-    """
+    """`number`: of the line, from 1."""
 
     number: int
     content: dict[str, Any]
@@ -35,10 +32,7 @@ class EventLog:
         self.path = path
 
     def append(self, content: Mapping[str, Any]) -> None:
-        """Add a line; a crash of the machine may lose the last ones.
-
-        Raises OSError if it cannot be written, or only in part; what is there of it is passed over by readers.
-        """
+        """Add a line; a crash may lose the last ones. Raises OSError if it cannot be written as a whole."""
         line = json.dumps(content, ensure_ascii=False, allow_nan=False).encode() + b"\n"
         with lock_file(self.path, os.O_APPEND, 0o640) as descriptor:
             size = os.fstat(descriptor).st_size
@@ -73,7 +67,6 @@ class LogFollower:
         self._offset = 0
 
     def read(self) -> list[LoggedEvent]:
-        """Every whole line that was added since the last call."""
         try:
             with self._path.open("rb") as file:
                 file.seek(self._offset)

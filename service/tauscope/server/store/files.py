@@ -29,12 +29,10 @@ def is_file_name(text: str) -> bool:
 
 
 def new_identifier(now: datetime) -> str:
-    """A new identifier; sorted as text, identifiers are sorted by the second of their creation."""
     return f"{now.astimezone(UTC):%Y%m%dT%H%M%SZ}-{secrets.token_hex(4)}"
 
 
 def is_identifier(text: str) -> bool:
-    """Whether a text has the form of an identifier."""
     return _IDENTIFIER.fullmatch(text) is not None
 
 
@@ -48,10 +46,7 @@ _PIECE = 2**20
 
 @dataclass(frozen=True)
 class KeptFile:
-    """A file that arrived as a whole.
-
-    `sha256`: of its bytes, in hexadecimal.
-    """
+    """`sha256`: of its bytes, in hexadecimal."""
 
     path: Path
     name: str
@@ -73,10 +68,7 @@ class IncomingFile:
         self.size = 0
 
     def write(self, piece: bytes) -> None:
-        """Append some bytes.
-
-        Raises LimitExceededError if the file grows beyond its limit; nothing more is written then.
-        """
+        """Raises LimitExceededError if the file grows beyond its limit; nothing more is written then."""
         self.size += len(piece)
         if self.size > self.limit:
             raise LimitExceededError(f"{self.name}: is larger than the {self.limit} bytes accepted here; send less")
@@ -109,7 +101,6 @@ def lock_file(path: Path, flags: int = 0, mode: int = 0o600) -> Iterator[int]:
 
 
 def hash_file(path: Path) -> str:
-    """The sha256 of a file's bytes, in hexadecimal."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while piece := file.read(_PIECE):

@@ -25,18 +25,13 @@ _log = logging.getLogger("tauscope.store")
 
 @dataclass(frozen=True)
 class KnownHash:
-    """What is known of a recording's bytes.
-
-    `sha256`: of the bytes, in hexadecimal.
-    `kept`: of the bytes that were sent or recorded; None for a file that an operator put there, and may change.
-    """
+    """`sha256`: of the present bytes; `kept`: of those that were sent or recorded, None for an operator's own file."""
 
     sha256: str
     kept: str | None
 
     @property
     def is_damaged(self) -> bool:
-        """Whether the bytes are not those that were kept."""
         return self.kept not in (None, self.sha256)
 
 
@@ -47,7 +42,6 @@ class RecordingHashes:
     """
 
     def __init__(self, root: Path) -> None:
-        """Open the memory; its folder is made where it is missing."""
         self._root = root
         root.mkdir(parents=True, exist_ok=True)
 
@@ -59,7 +53,6 @@ class RecordingHashes:
         return KnownHash(content["sha256"], content.get("kept"))
 
     def is_kept(self, name: str) -> bool:
-        """Whether it is known what a recording was in the beginning."""
         content = self._read(name)
         return content is not None and content.get("kept") is not None
 
@@ -78,7 +71,6 @@ class RecordingHashes:
         return known
 
     def forget(self, name: str) -> None:
-        """Forget a recording."""
         self._path(name).unlink(missing_ok=True)
 
     def tidy(self, is_there: Callable[[str], bool]) -> None:
@@ -98,7 +90,6 @@ class RecordingHashes:
         return self._root / f"{name}.json"
 
     def _read(self, name: str) -> dict[str, Any] | None:
-        """What is remembered; None where that is missing or damaged."""
         try:
             content = json.loads(self._path(name).read_bytes())
         except (OSError, ValueError, RecursionError):
@@ -126,10 +117,7 @@ class NameTakenError(RecordingError):
 
 @dataclass(frozen=True)
 class StoredRecording:
-    """A recording that lies on the server.
-
-    `sha256`: of its bytes, in hexadecimal; None where it was not computed yet.
-    """
+    """`sha256`: of its bytes, in hexadecimal; None where it was not computed yet."""
 
     name: str
     size: int
@@ -145,7 +133,6 @@ class RecordingStore:
     """
 
     def __init__(self, root: Path) -> None:
-        """Open the store; its folder is made where it is missing."""
         self.root = root
         self._hashes = RecordingHashes(root / _HASHES)
         self._naming = threading.Lock()
@@ -155,21 +142,10 @@ class RecordingStore:
         return Path(tempfile.mkdtemp(prefix=_INCOMING, dir=self.root))
 
     def discard(self, staged: Path) -> None:
-        """Remove a staged folder and what is in it."""
         shutil.rmtree(staged, ignore_errors=True)
 
     def keep(self, file: KeptFile) -> tuple[StoredRecording, bool]:
-        """Give a file in a staged folder its place among the recordings.
-
-        Raises RecordingError if the name is not allowed. Raises NameTakenError if other bytes are kept under that name.
-
-        Returns
-        -------
-        StoredRecording
-            the recording
-        bool
-            False where the very same bytes were already kept under that name
-        """
+        """Name a staged file; False where the same bytes were kept. Raises RecordingError or NameTakenError."""
         if not is_file_name(file.name):
             raise RecordingError(one_line(f"{shown(file.name)}: no name for a recording; {FILE_NAME_RULE}"))
         is_new = self._give_name(file)
@@ -181,7 +157,6 @@ class RecordingStore:
         return self.root / name
 
     def holds(self, name: str) -> bool:
-        """Whether there is a recording of a name."""
         try:
             self._status(name)
         except NotFoundError:
@@ -189,10 +164,7 @@ class RecordingStore:
         return True
 
     def find(self, name: str) -> StoredRecording:
-        """A recording with its sha256, which is computed where it is not known.
-
-        Raises NotFoundError if there is no such recording.
-        """
+        """A recording with its sha256, computed where it is not known. Raises NotFoundError if there is none."""
         status = self._status(name)
         known = self._hashes.of(name, status)
         if known is None:
@@ -200,10 +172,7 @@ class RecordingStore:
         return StoredRecording(name, status.st_size, _read_modified(status), known.sha256, known.is_damaged)
 
     def digest(self, name: str) -> str:
-        """The sha256 of a recording's bytes, in hexadecimal, for who will work with them.
-
-        Raises NotFoundError if there is no such recording. Raises RecordingError if it is damaged.
-        """
+        """The sha256 of a recording's bytes. Raises NotFoundError, or RecordingError if it is damaged."""
         found = self.find(name)
         if found.sha256 is None or found.is_damaged:
             hint = "restore it from a backup, or remove it and send it again"

@@ -16,16 +16,10 @@ LAST_WAIT_S = 3.0  # how long the end event of a job that has ended is waited fo
 
 
 class EventSource(Protocol):
-    """Anything that has events."""
-
     @property
-    def events(self) -> EventLog:
-        """What happened."""
-        ...
+    def events(self) -> EventLog: ...
 
-    def has_ended(self) -> bool:
-        """Whether nothing more will happen."""
-        ...
+    def has_ended(self) -> bool: ...
 
 
 class Feed:
@@ -55,7 +49,6 @@ class Feed:
         return has_ended, events[: next(ends, None)]
 
     def take(self, has_ended: bool, events: list[LoggedEvent]) -> None:
-        """Show what was read to all followers."""
         self.events += events
         self._waited_s += POLL_S if has_ended else 0.0
         is_ended = any(event.content.get("kind") == "ended" for event in events)
@@ -65,7 +58,6 @@ class Feed:
             self._wake()
 
     def end(self) -> None:
-        """Let the followers go."""
         self.is_over = True
         self._wake()
 
@@ -85,7 +77,6 @@ class EventFeeds:
 
     @contextmanager
     def follow(self, source: EventSource) -> Iterator[Feed]:
-        """The feed of a job, which is read as long as somebody follows it."""
         path = source.events.path
         feed = self._feeds.get(path)
         if feed is None or feed.is_over:

@@ -36,19 +36,12 @@ _SHOWN = ("recordings", "held_out", "simulated", "refine", "options")
 
 
 def no_further(_received: Received[Any], _services: Services, _workspace: Any) -> dict[str, Any]:
-    """No fields of an order but those that all have."""
     return {}
 
 
 @dataclass(frozen=True, eq=False)
 class QueuedTask:
-    """What is special about such a resource.
-
-    `further`: checks a request whose recordings are listed, and returns further fields of its order.
-    `further_parts`: mapping of str to (str, int), files of a form that are no recordings: their folder, and the largest
-        size [bytes].
-    `links`: further routes that it links to, once it succeeded.
-    """
+    """`further`: more fields of an order; `further_parts`: folder and limit [bytes] of other files; `links`: routes."""
 
     noun: str
     plural: str
@@ -68,21 +61,15 @@ class QueuedTask:
     further_parts: Mapping[str, tuple[str, int]] = field(default_factory=dict)
 
     def find(self, services: Services, identifier: str) -> TaskWorkspace[Any]:
-        """The folder of a job. Raises NotFoundError if there is none."""
         return self.workspace(self.kind(services).items.folder(identifier))
 
     def finished(self, services: Services, identifier: str) -> TaskWorkspace[Any]:
-        """The folder of a job that succeeded.
-
-        Raises NotFoundError if there is none. Raises ProblemError if it has not succeeded: the problem that it ended
-        in, or that it has not ended.
-        """
+        """Raises NotFoundError if there is none, ProblemError if it has not succeeded."""
         workspace = self.find(services, identifier)
         require_success(workspace)
         return workspace
 
     def router(self) -> APIRouter:
-        """All its routes."""
         resource = Resource(
             noun=self.noun,
             plural=self.plural,
@@ -126,11 +113,7 @@ class QueuedTask:
         return answer(**fields, robot=order.robot_name, links=links)
 
     async def submit(self, request: Request, services: Services) -> str:
-        """Take a request: what was sent is kept in a job's folder, and checked as far as that is quick.
-
-        Raises ProblemError if the request is not as documented. Raises TauscopeError if the robot is not valid, a
-        recording is not there, or something is too large.
-        """
+        """Keep what was sent in a job's folder. Raises ProblemError or TauscopeError if it is not valid."""
         settings = services.settings
         async with stage_request(self.kind(services).items, self.workspace) as workspace:
             most, largest = settings.max_recordings, settings.max_upload_bytes
@@ -162,11 +145,7 @@ class QueuedTask:
 
 
 def order_recordings(role: str, received: Received[Any], store: RecordingStore) -> tuple[OrderedRecording, ...]:
-    """The recordings of a role: each a file of the form, or else a recording on the server.
-
-    Raises ProblemError if a file was sent but is not listed. Raises NotFoundError if a recording is neither sent nor on
-    the server.
-    """
+    """Raises ProblemError if a file was sent but is not listed, NotFoundError if one is not there."""
     files: dict[str, KeptFile] = {file.name: file for file in received.form.files.get(role, [])}
     listed: Sequence[str] | None = getattr(received.document, role)
     names = list(files) if listed is None else listed
@@ -185,10 +164,7 @@ def order_recordings(role: str, received: Received[Any], store: RecordingStore) 
 
 
 def check_recordings(recordings: Mapping[str, Sequence[OrderedRecording]], most: int) -> None:
-    """There is something to work on, not too much, and no recording is its own judge.
-
-    Raises ProblemError naming the recording. Raises LimitExceededError for too many.
-    """
+    """Raises ProblemError if there is none or two are the same, LimitExceededError for too many."""
     if not recordings["recordings"]:
         text = "no recording was sent or named; send part recordings, or name recordings on the server"
         raise ProblemError("invalid-request", text)

@@ -47,15 +47,11 @@ PAGE_HEADERS = {"Content-Security-Policy": "default-src 'none'; style-src 'unsaf
 
 
 class RobotFileAnswer(AnswerModel):
-    """A file of a robot."""
-
     name: str = Field(description="its bare name")
     content: str = Field(description="its text")
 
 
 class JobRobotAnswer(AnswerModel):
-    """The robot of a job."""
-
     report: RobotReportAnswer = Field(description="the robot at a glance")
     robot_file: str = Field(description="which of the files is the robot file")
     files: list[RobotFileAnswer] = Field(description="robot file and URDF as they were sent")
@@ -63,11 +59,7 @@ class JobRobotAnswer(AnswerModel):
 
 @dataclass(frozen=True)
 class JobDocument:
-    """An output of a task that has a route of its own.
-
-    `output`: its name among the outputs.
-    `missing`: what is said where the task made none; None where it always makes one.
-    """
+    """`output`: its name among the outputs; `missing`: what is said where the task may make none, and made none."""
 
     name: str
     output: str
@@ -86,14 +78,12 @@ def text_document(name: str, output: str, media_type: str, summary: str, words: 
 
 
 def result_document(noun: str, verb: str, model: type[BaseModel]) -> JobDocument:
-    """The result of a command that has ``--json``."""
     answer = {"model": model, "description": f"the same document as `tauscope {verb} --json`"}
     words = f"The result of {noun} that succeeded; else the problem that it ended in."
     return JobDocument("result", "result.json", "Fetch the result", words, answer)
 
 
 def report_document(verb: str) -> JobDocument:
-    """The page of a command that has ``--report``."""
     words = "The report as one page: no script, no request to anywhere, ready to print."
     return text_document(
         "report", "report.html", HTML, "Fetch the report", words, f"page as `tauscope {verb} --report`"
@@ -101,7 +91,6 @@ def report_document(verb: str) -> JobDocument:
 
 
 def plots_document(noun: str, model: type[BaseModel], words: str) -> JobDocument:
-    """Data of the figures."""
     answer, summary = {"model": model, "description": words}, "Fetch the data of its figures"
     return JobDocument("plots", "plots.json", summary, f"What figures of {noun} are drawn from.", answer)
 
@@ -111,24 +100,14 @@ class Folder(Protocol):
 
     robot: FilePath
 
-    def read_order(self) -> Any:
-        """What was asked for; None where that is damaged."""
+    def read_order(self) -> Any: ...
 
-    def has_ended(self) -> bool:
-        """Whether nothing more will happen."""
-        ...
+    def has_ended(self) -> bool: ...
 
 
 @dataclass(frozen=True, eq=False)
 class Resource:
-    """What is special about a resource.
-
-    `submit`: takes a request; returns the identifier.
-    `describe`: the answer, from services, identifier and the path of the interface.
-    `followed`: what has events.
-    `summary`, `words`: of handing in.
-    `parts`: files of a form beside the robot's.
-    """
+    """`submit` returns an identifier; `describe` takes the path of the interface; `parts`: files beside the robot's."""
 
     noun: str
     plural: str
@@ -147,7 +126,6 @@ class Resource:
 
     @property
     def singular(self) -> str:
-        """The noun without its article."""
         return self.noun.rpartition(" ")[2]
 
 
@@ -249,13 +227,7 @@ def add_stopping(
     remove: Callable[[Services, str], bool],
     words: tuple[str, str],
 ) -> None:
-    """Give a resource that moves an arm the routes ``POST /{identifier}/stop`` and ``DELETE /{identifier}``.
-
-    `stop`: the state in which it was stopped; None where it does not go on.
-    `read_state`: the state in its folder; None where that is damaged.
-    `remove`: False where it goes on.
-    `words`: (str, str), what is said of either route.
-    """
+    """Add ``POST /{identifier}/stop`` and ``DELETE /{identifier}``; `words` describe them."""
 
     @router.post(
         "/{identifier}/stop",
@@ -290,8 +262,6 @@ def add_stopping(
 def add_document_route(
     router: APIRouter, finished: Callable[[Services, str], Any], document: JobDocument, problems: Sequence[str]
 ) -> None:
-    """Give a resource the route of a document."""
-
     @router.get(
         f"/{{identifier}}/{document.name}",
         name=f"get_{document.name.replace('-', '_')}_of_{router.prefix.strip('/')}",
@@ -350,7 +320,6 @@ def add_export_route(
 
 
 async def describe_robot(request: Request, services: Services, folder: FilePath, robot_file: str) -> JobRobotAnswer:
-    """A robot at a glance, and its files."""
     report = await services.reading.call(request, check_received_robot, folder, robot_file)
     files = await run_in_threadpool(_read_files, folder)
     return JobRobotAnswer(report=RobotReportAnswer.of(report), robot_file=robot_file, files=files)

@@ -49,13 +49,7 @@ def keep_model(
     workspace: TaskWorkspace[Any],
     read: Callable[[str], bytes],
 ) -> str | None:
-    """Put a model into its place in a job's folder; returns its name there.
-
-    Raises ProblemError where it came twice. Raises IdentificationError where it holds what JSON cannot.
-
-    `model`: identifier or document, as the request has it; `file`: part of the form, which lies in its place; `read`:
-    the model of an identifier.
-    """
+    """Put a model, or that of an identifier, into its place; its name. Raises ProblemError, IdentificationError."""
     if file is not None and model is not None:
         raise ProblemError("invalid-request", "the model came twice, as part model and in part request; send it once")
     if file is not None or model is None:
@@ -113,8 +107,6 @@ Document = TypeVar("Document", bound=RobotRequest)
 
 @dataclass(frozen=True)
 class Received(Generic[Document]):
-    """A request as it arrived."""
-
     document: Document
     form: ReceivedForm
 
@@ -138,10 +130,7 @@ async def receive_request(
     robot_folder: Path,
     further_parts: Mapping[str, PartRule] | None = None,
 ) -> Received[Document]:
-    """Read the body, whichever of the two media types it is.
-
-    Raises ProblemError if the request is not as documented. Raises LimitExceededError if something is too large.
-    """
+    """Read JSON or a form. Raises ProblemError or LimitExceededError."""
     if media_type(request) == JSON:
         return Received(await read_document(request, kind, settings.max_document_bytes), ReceivedForm())
     if media_type(request) != FORM:
@@ -156,11 +145,7 @@ async def receive_request(
 
 
 def keep_robot(received: Received[Any], folder: Path, robots: RobotStore) -> str:
-    """Name of the robot file in the job's folder, written there if it came as JSON or is a kept one.
-
-    Raises ProblemError if there is no robot, or two. Raises RobotFileError if its content is not plain data.
-    Raises NotFoundError if it names a version that is not kept.
-    """
+    """Name of the robot file. Raises ProblemError without one or with two, RobotFileError, NotFoundError."""
     file, inline = received.form.file("robot"), received.document.robot
     if file is not None and inline is not None:
         raise ProblemError("invalid-request", "the robot came twice, as part robot and in part request; send it once")
@@ -178,10 +163,6 @@ def keep_robot(received: Received[Any], folder: Path, robots: RobotStore) -> str
 def request_body(
     kind: type[RobotRequest], examples: Examples, further_parts: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
-    """The body of such a request, for the OpenAPI document.
-
-    `examples`: mapping of str to (str, plain data), summary and value by name.
-    """
     parts = {
         "request": refer_to_model(kind),
         "robot": binary_part("the robot file (YAML)"),
@@ -214,11 +195,7 @@ class BackendRequest(StrictModel):
 
 
 def choose_backend(settings: Settings, request: BackendRequest, robot: Robot) -> BackendChoice:
-    """The backend of a request.
-
-    Raises ScenarioError if the scenario is no plain data. Raises RobotFileError if a drive block names a file that the
-    driver would open: no path of the server is opened for a client; or if an arm without a model is to be simulated.
-    """
+    """Raises ScenarioError, or RobotFileError if a drive names a file or a simulated arm has no model."""
     if request.scenario is not None and to_json_text(request.scenario) is None:
         raise ScenarioError("scenario: holds NaN, infinity or text that is not Unicode; write plain numbers and text")
     name = request.name or settings.backend

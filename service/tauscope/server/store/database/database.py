@@ -82,10 +82,7 @@ _ADVISORY_LOCK = 7_283_462_001
 
 
 def upgrade(engine: Engine, target: str = "head") -> None:
-    """Bring the tables to this program's form; nothing happens where they have it.
-
-    Raises StoreError if the tables have a form that this program does not know.
-    """
+    """Bring the tables to this program's form. Raises StoreError if they have a form that it does not know."""
     with engine.execution_options(**{WRITES: True}).begin() as connection:
         if connection.dialect.name == "postgresql":
             connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _ADVISORY_LOCK})
@@ -137,10 +134,7 @@ class Database:
     """An open database. Every method may be called from any thread."""
 
     def __init__(self, address: Path | str) -> None:
-        """Open a database, and bring its tables to this program's form.
-
-        Raises StoreError if it cannot be reached, is damaged, or was written by a newer program.
-        """
+        """Open and upgrade. Raises StoreError if it cannot be reached, is damaged, or of a newer program."""
         self._engine = open_engine(address)
         try:
             if isinstance(address, Path) and address.parent.is_dir():
@@ -155,7 +149,6 @@ class Database:
 
     @property
     def engine(self) -> Engine:
-        """Of SQLAlchemy, for tests and backups."""
         return self._engine
 
     @contextmanager
@@ -177,10 +170,7 @@ class Database:
             yield session
 
     def check(self) -> None:
-        """Look whether it can be used now.
-
-        Raises StoreError if it does not answer, is damaged, or is another one than was opened.
-        """
+        """Raises StoreError if it does not answer, is damaged, or is another one than was opened."""
         with self._own_words():
             if self._engine.url.get_backend_name() == "sqlite":
                 _check_file(self._engine.url)
@@ -191,7 +181,6 @@ class Database:
             raise StoreError(f"{show_address(self._engine)}: its tables are gone or were changed; {hint}")
 
     def close(self) -> None:
-        """Close every connection."""
         self._engine.dispose()
 
     @contextmanager

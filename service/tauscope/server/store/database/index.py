@@ -14,10 +14,7 @@ from tauscope.server.store.recordings import StoredRecording
 
 @dataclass(frozen=True)
 class FileMetadata:
-    """A file of an item.
-
-    `sha256`: of its bytes, in hexadecimal.
-    """
+    """`sha256`: of its bytes, in hexadecimal."""
 
     path: str
     size: int
@@ -26,8 +23,6 @@ class FileMetadata:
 
 @dataclass(frozen=True)
 class RecordingRole:
-    """A recording that an item works with."""
-
     role: str
     name: str
     origin: str
@@ -36,10 +31,7 @@ class RecordingRole:
 
 @dataclass(frozen=True)
 class ItemMetadata:
-    """An item as its folder shows it.
-
-    `problem`: (str, str), code and detail: why it has no result.
-    """
+    """`problem`: code and detail, why it has no result."""
 
     kind: str
     identifier: str
@@ -57,8 +49,6 @@ class ItemMetadata:
 
 @dataclass(frozen=True)
 class ItemEntry:
-    """An item as a search finds it."""
-
     kind: str
     identifier: str
     site: str
@@ -86,8 +76,6 @@ class ItemQuery:
 
 @dataclass(frozen=True)
 class RobotEntry:
-    """A robot that items are about."""
-
     name: str
     first_seen: datetime
     last_seen: datetime
@@ -114,10 +102,7 @@ class Index:
             session.merge(Site(identifier=self.site, label=label, last_seen=now))
 
     def stamps(self, kind: str) -> dict[str, tuple[str, bool]]:
-        """What is indexed of this site.
-
-        Returns dict of str to (str,), stamp of each item, and whether it is final, by identifier.
-        """
+        """Stamp of each item of this site, and whether it is final, by identifier."""
         query = select(Item.identifier, Item.stamp, Item.is_final).where(Item.site == self.site, Item.kind == kind)
         with self._database.reading() as session:
             return {identifier: (stamp, is_final) for identifier, stamp, is_final in session.execute(query)}
@@ -152,25 +137,21 @@ class Index:
                     session.execute(insert(table), values)
 
     def forget(self, kind: str, identifiers: Collection[str]) -> None:
-        """Take items out of the index whose folders are gone."""
         with self._database.writing() as session:
             for identifier in identifiers:
                 session.execute(delete(Item).where(*self._match(kind, identifier)))
 
     def damaged(self, kind: str) -> frozenset[str]:
-        """Identifiers of the damaged items of this site."""
         query = select(Item.identifier).where(Item.site == self.site, Item.kind == kind, Item.state == "damaged")
         with self._database.reading() as session:
             return frozenset(session.scalars(query))
 
     def mark_damaged(self, kind: str, identifier: str, detail: str) -> None:
-        """Say of an item that a file of it is not what it was."""
         values = {"state": "damaged", "problem_code": "damaged", "problem_detail": detail}
         with self._database.writing() as session:
             session.execute(update(Item).where(*self._match(kind, identifier)).values(**values))
 
     def artefacts(self, kind: str, identifier: str) -> tuple[FileMetadata, ...]:
-        """The files of an item as they were when it ended."""
         query = select(Artefact).join(Item).where(*self._match(kind, identifier))
         with self._database.reading() as session:
             rows = session.scalars(query.order_by(Artefact.path))
@@ -194,10 +175,7 @@ class Index:
                 row.size, row.modified, row.sha256 = entry.size, entry.modified, entry.sha256
 
     def list_used_recordings(self, except_by: Collection[tuple[str, str]] = ()) -> frozenset[str]:
-        """Names of the recordings on the server that items of this site were made from or judged by.
-
-        `except_by`: collection of (str, str), kind and identifier of items that do not count.
-        """
+        """Recordings on the server that items of this site use, `except_by` those of some kinds and identifiers."""
         query = select(Item.kind, Item.identifier, RecordingUse.name).join(RecordingUse)
         query = query.where(Item.site == self.site, RecordingUse.origin == "server")
         with self._database.reading() as session:

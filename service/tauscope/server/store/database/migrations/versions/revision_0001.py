@@ -8,7 +8,6 @@ down_revision = None
 
 
 def upgrade() -> None:
-    """Take the step."""
     op.create_table(
         "robots",
         sa.Column("id", sa.Integer(), nullable=False),

@@ -10,7 +10,6 @@ down_revision = "0001"
 
 
 def upgrade() -> None:
-    """Take the step."""
     op.create_table(
         "model_events",
         sa.Column("id", sa.Integer(), nullable=False),

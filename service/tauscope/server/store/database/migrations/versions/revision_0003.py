@@ -10,7 +10,6 @@ down_revision = "0002"
 
 
 def upgrade() -> None:
-    """Take the step."""
     op.create_table(
         "schedules",
         sa.Column("id", sa.Integer(), nullable=False),
