@@ -32,12 +32,8 @@ class RunOptions(StrictModel, strict=False):
         description="hold, damp, torque_off, or release (hold, then let go once the arm stands still); "
         "null for what the robot file's drives say, else hold",
     )
-    watchdog_s: Positive = Field(
-        default=0.1, le=10, description="time without a cycle after which the device stops itself"
-    )
-    heartbeat_s: Positive = Field(
-        default=1.0, le=60, description="silence of its owner after which a run in real time is interrupted"
-    )
+    watchdog_s: Positive = Field(default=0.1, le=10, description="time without a cycle until the device stops itself")
+    heartbeat_s: Positive = Field(default=1.0, le=60, description="silence of the owner until a real-time run ends")
     following_error: Positive | None = Field(
         default=None, description="allowed distance of arm and target, rad or m; null for 0.2 rad or 0.05 m"
     )
@@ -54,24 +50,15 @@ class RunOptions(StrictModel, strict=False):
         validation_alias=AliasChoices("lost_s", "stale_s"),
         description="time after which a joint that does not answer counts as lost",
     )
-    stale_ms: Positive = Field(
-        default=1.0, le=1000, description="how much later than usual an answer may come and still be a sample"
-    )
+    stale_ms: Positive = Field(default=1.0, le=1000, description="how late an answer may come and still be a sample")
     least_kept: Annotated[FiniteFloat, Field(ge=0.0, le=1.0)] = Field(
         default=0.98, description="share of the motion's samples that has to be kept, else the run ends as degraded"
     )
     temperature_c: Positive = Field(default=80.0, description="hottest motor that is allowed")
-    feed_forward: bool = Field(
-        default=True, description="whether the drives get the torque that the robot's model predicts"
-    )
+    feed_forward: bool = Field(default=True, description="whether the drives get the model's predicted torque")
     bandwidth_rad_s: Positive = Field(default=25.0, description="of the host's loop in torque mode")
-    settle_s: Annotated[FiniteFloat, Field(ge=0.0, le=60)] = Field(
-        default=0.25, description="pause between the ramp and the motion"
-    )
-    acknowledge_faults: bool = Field(
-        default=False,
-        description="whether faults that the drives have latched are cleared first, on the operator's word",
-    )
+    settle_s: Annotated[FiniteFloat, Field(ge=0.0, le=60)] = Field(default=0.25, description="pause after the ramp")
+    acknowledge_faults: bool = Field(default=False, description="whether latched drive faults are cleared first")
 
 
 def choose_rate_hz(options: RunOptions, capabilities: Capabilities) -> float:

@@ -84,9 +84,7 @@ class RunProblem(StrictModel):
 class RecordingFiles(StrictModel):
     samples: int = Field(description="samples of the motion, without the ramp")
     partial: bool = Field(description="whether the motion was not played to its end, or samples were lost")
-    lost_rows: int = Field(
-        description="cycles that the journal did not take because its disk was behind; -1 where unknown"
-    )
+    lost_rows: int = Field(description="cycles that the journal did not take: its disk was behind; -1 where unknown")
     files: tuple[str, ...] = Field(description="files of the recording in the run's folder, beside the journal")
     remarks: tuple[str, ...] = Field(default=(), description="what is missing, and why; one line each")
 
@@ -103,19 +101,13 @@ class RunRecord(StrictModel):
     stop_policy: str | None = Field(default=None, description="how the arm is stopped")
     ramp_s: float | None = Field(default=None, description="time from the first cycle to the motion's start")
     motion_s: float | None = Field(default=None, description="length of the motion")
-    drives: tuple[str, ...] = Field(
-        default=(), description="what the drives do not have, and what is done in place of it; one line each"
-    )
-    holds: bool | None = Field(
-        default=None, description="whether drives were under power when the run let go of the bus; null where unknown"
-    )
+    drives: tuple[str, ...] = Field(default=(), description="what the drives lack, and what is done instead")
+    holds: bool | None = Field(default=None, description="whether drives were powered at the end; null: unknown")
     played: float = Field(default=0.0, description="part of ramp and motion that was played, 0 to 1")
     kept: float | None = Field(default=None, description="part of the motion's samples that was kept, 0 to 1")
     timing: Timing | None = Field(default=None, description="how well the run kept its time")
     real_time: RealTime | None = Field(default=None, description="what the loop was given of what it asked for")
-    worst_following: tuple[float, ...] = Field(
-        default=(), description="largest distance of arm and target, one number a joint"
-    )
+    worst_following: tuple[float, ...] = Field(default=(), description="largest distance of arm and target, by joint")
     stop: str | None = Field(default=None, description="who asked for the stop, and how; null where nobody did")
     problem: RunProblem | None = Field(default=None, description="why the run did not finish")
     recording: RecordingFiles | None = Field(default=None, description="what the run left behind")

@@ -102,17 +102,11 @@ class Timing(StrictModel):
     """How well a run kept its time."""
 
     rate_hz: float = Field(description="cycles a second that were asked for")
-    achieved_rate_hz: float | None = Field(
-        description="cycles that took place, by the time they took; null for less than two"
-    )
+    achieved_rate_hz: float | None = Field(description="cycles by the time they took; null for less than two")
     cycles: int = Field(description="cycles that took place")
     missed_periods: int = Field(description="cycles that were left out because the loop was late")
-    stale_samples: tuple[int, ...] = Field(
-        description="readings that a joint did not answer in time to tell their instant, one number a joint"
-    )
-    lateness_us: Mapping[str, float] = Field(
-        description="lateness of the cycles behind their deadlines: p50, p99, p99.9, max"
-    )
+    stale_samples: tuple[int, ...] = Field(description="readings that did not come in time, one number a joint")
+    lateness_us: Mapping[str, float] = Field(description="lateness behind the deadlines: p50, p99, p99.9, max")
     histogram_us: tuple[tuple[float | None, int], ...] = Field(
         description="upper edge and number of cycles of each bin of the lateness; the last bin has no edge"
     )

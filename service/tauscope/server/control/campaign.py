@@ -12,9 +12,7 @@ from tauscope.tasks.run import BackendChoice
 
 
 class CampaignOrder(CampaignOptions):
-    form: Literal["tauscope.campaign-order/1"] = Field(
-        default="tauscope.campaign-order/1", description="name and version of this form"
-    )
+    form: Literal["tauscope.campaign-order/1"] = "tauscope.campaign-order/1"
     robot_file: str = Field(description="name of the robot file in the campaign's robot folder")
     robot_name: str = Field(description="what the robot file calls the robot")
     backend: BackendChoice = Field(default=BackendChoice(), description="which arm is moved")

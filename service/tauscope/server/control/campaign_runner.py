@@ -307,15 +307,6 @@ class CampaignManager(Manager[CampaignRunner]):
             self._threads.start(identifier, runner)
         return identifier
 
-    def stop(self, identifier: str) -> JobState | None:
-        """Stop a campaign without any lock; returns where it stood, None where nothing of it goes on."""
-        runner = self._threads.find(identifier)
-        if runner is None:
-            return None
-        state = runner.state
-        runner.stop()
-        return state
-
     def _resume(self, workspace: CampaignWorkspace) -> None:
         record, order = workspace.read_record(), workspace.read_order()
         if record is None or record.state.is_end:

@@ -40,16 +40,12 @@ from tauscope.tasks.task import LocalFiles
 
 
 class RunRequestRecord(StrictModel):
-    form: Literal["tauscope.run-request/1"] = Field(
-        default="tauscope.run-request/1", description="name and version of this form"
-    )
+    form: Literal["tauscope.run-request/1"] = "tauscope.run-request/1"
     robot_file: str = Field(description="name of the robot file in the run's robot folder")
     robot_name: str = Field(description="what the robot file calls the robot")
     backend: BackendChoice = Field(default=BackendChoice(), description="which arm is moved")
     device: str = Field(description="names the arm: one run at a time has it")
-    excitation: str | None = Field(
-        default=None, description="identifier of the excitation that is played; null for a trajectory from elsewhere"
-    )
+    excitation: str | None = Field(default=None, description="excitation that is played; null: a motion from elsewhere")
     campaign: str | None = Field(default=None, description="identifier of the campaign that it belongs to")
     options: RunOptions = Field(default=RunOptions(), description="how it is run")
 

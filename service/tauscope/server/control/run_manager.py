@@ -71,6 +71,10 @@ class RunSupervisor:
         self._control: ControlProcess | None = None
         self._stop_requested = threading.Event()
 
+    @property
+    def state(self) -> RunState:
+        return self.live.state
+
     def stop(self) -> None:
         """Stop the run, in whatever state it is; the arm has to be armed again before it moves again."""
         self._permit.disarm()
@@ -204,14 +208,6 @@ class RunManager(Manager[RunSupervisor]):
             supervisor = RunSupervisor(workspace, self._start, motion, self._is_alive, permit)
             self._threads.start(identifier, supervisor, lambda: self._end_supervised(workspace, claim))
         return identifier
-
-    def stop(self, identifier: str) -> Live | None:
-        """Stop a run without any lock; returns where it stood, None where it does not go on."""
-        supervisor = self._threads.find(identifier)
-        if supervisor is None:
-            return None
-        supervisor.stop()
-        return supervisor.live
 
     def live(self, identifier: str) -> Live | None:
         """The status of an active run; None for any other."""

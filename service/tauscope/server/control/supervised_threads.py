@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from tauscope.server.store.data_folder import ItemStore
 
@@ -12,6 +12,9 @@ CLOSE_TIMEOUT_S = 15.0
 
 
 class Supervisor(Protocol):
+    @property
+    def state(self) -> Any: ...
+
     def run(self) -> None:
         """Supervise to the end; never raises."""
 
@@ -87,6 +90,15 @@ class Manager(Generic[S]):
             return False
         self.items.remove(identifier)
         return True
+
+    def stop(self, identifier: str) -> Any:
+        """Stop an item without any lock; returns the state in which it stood, None where it is not active."""
+        supervisor = self._threads.find(identifier)
+        if supervisor is None:
+            return None
+        state = supervisor.state
+        supervisor.stop()
+        return state
 
     def stop_all(self) -> list[str]:
         """Stop all that is active, and accept further items; takes no lock. Returns the identifiers."""

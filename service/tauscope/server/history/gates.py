@@ -17,22 +17,12 @@ Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 class ModelPolicy(ResultModel):
     """Bounds for one robot."""
 
-    held_out_error: Positive = Field(
-        default=0.2, description="largest relative error on held-out recordings with which a model may become active"
-    )
-    held_out_ratio: Ratio = Field(
-        default=1.5, description="largest residual on held-out recordings, in residuals of the training (or its noise)"
-    )
-    consistency_ratio: Ratio = Field(
-        default=1.2, description="largest residual of the model with bodies, in residuals of the free estimate"
-    )
+    held_out_error: Positive = Field(default=0.2, description="largest relative error on held-out recordings")
+    held_out_ratio: Ratio = Field(default=1.5, description="largest held-out residual, in training residuals or noise")
+    consistency_ratio: Ratio = Field(default=1.2, description="largest residual with bodies, in free residuals")
     condition_number: Ratio = Field(default=500.0, description="largest condition number of the regressor")
-    drift_std: Positive = Field(
-        default=6.0, description="change of a parameter beyond which it is told, in joint standard errors"
-    )
-    drift_share: Positive = Field(
-        default=0.25, description="and in parts of its earlier value: both bounds have to be passed"
-    )
+    drift_std: Positive = Field(default=6.0, description="change that counts as drift, in joint standard errors")
+    drift_share: Positive = Field(default=0.25, description="and in parts of the earlier value: both have to be passed")
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,13 @@ from urllib.parse import quote
 from fastapi import Request
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
+from typing_extensions import override
 
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
 from tauscope.server.control.campaign import CampaignLinks, CampaignOrder, CampaignWorkspace
+from tauscope.server.control.campaign_runner import CampaignManager
 from tauscope.server.control.run import RunWorkspace
 from tauscope.server.http.answers import (
     ENDINGS,
@@ -30,9 +32,9 @@ from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.identifications import IDENTIFICATIONS
 from tauscope.server.http.leases import permit_of
 from tauscope.server.http.robot_files import EXAMPLE_ROBOT, read_received_robot
-from tauscope.server.http.runs import find_run
+from tauscope.server.http.runs import RUNS
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
+from tauscope.server.http.tasks.router import MovingResource
 from tauscope.server.http.tasks.submission import (
     BackendRequest,
     RobotRequest,
@@ -91,13 +93,9 @@ class CampaignAnswer(JobAnswer):
 
 
 class CampaignResult(AnswerModel):
-    schema_: Literal["tauscope.campaign/1"] = Field(
-        default="tauscope.campaign/1", alias="schema", description="name and version of this form"
-    )
+    schema_: Literal["tauscope.campaign/1"] = Field(default="tauscope.campaign/1", alias="schema", description="form")
     identification: IdentificationDocument = Field(description="the same document as `tauscope identify --json`")
-    diagnosis: DiagnosisDocument | None = Field(
-        default=None, description="the same document as `tauscope diagnose --json`, where one was asked for"
-    )
+    diagnosis: DiagnosisDocument | None = Field(default=None, description="as `tauscope diagnose --json`, if asked for")
     steps: tuple[CampaignStepAnswer, ...] = Field(description="how it came about")
     links: CampaignLinksAnswer = Field(description="everything that was made on the way")
 
@@ -111,26 +109,10 @@ StepName = Literal["design", "run", "held-out design", "held-out run", "identify
 WAITING, GONE = "waiting", "gone"
 
 
-def find_campaign(services: Services, identifier: str) -> CampaignWorkspace:
-    return CampaignWorkspace(services.campaigns.items.folder(identifier))
-
-
-def describe(services: Services, identifier: str, root: str) -> CampaignAnswer:
-    workspace = find_campaign(services, identifier)
-    here, made, order = f"{root}/campaigns/{identifier}", workspace.read_made(), workspace.read_order()
-    if order is None:
-        links = _links(here, root, made, has_result=False)
-        return CampaignAnswer(**describe_damaged(identifier, here), links=links)
-    fields = describe_job(workspace, here)
-    links = _links(here, root, made, has_result=fields["state"] is JobState.SUCCEEDED)
-    steps = tuple(_steps(services, order, made, root))
-    return CampaignAnswer(**fields, robot=order.robot_name, backend=order.backend, steps=steps, links=links)
-
-
 def result_of(services: Services, identifier: str, root: str) -> CampaignResult:
-    require_success(find_campaign(services, identifier))
-    answer = describe(services, identifier, root)
-    made = find_campaign(services, identifier).read_made()
+    require_success(CAMPAIGNS.find(services, identifier))
+    answer = CAMPAIGNS.describe(services, identifier, root)
+    made = CAMPAIGNS.find(services, identifier).read_made()
     identification = IDENTIFICATIONS.finished(services, made.identification or "")
     content = require_document(identification.read_result(), identification.folder.name)
     document = IdentificationDocument.model_validate_json(content)
@@ -146,8 +128,8 @@ def _steps(services: Services, order: CampaignOrder, made: CampaignLinks, root: 
     steps: list[tuple[StepName, str, Callable[[Services, str], Any], str | None, bool]] = [
         ("design", "excitations", EXCITATIONS.find, made.excitation, True),
         ("held-out design", "excitations", EXCITATIONS.find, made.held_out_excitation, order.held_out is not None),
-        ("run", "runs", find_run, made.run, True),
-        ("held-out run", "runs", find_run, made.held_out_run, order.held_out is not None),
+        ("run", "runs", RUNS.find, made.run, True),
+        ("held-out run", "runs", RUNS.find, made.held_out_run, order.held_out is not None),
         ("identify", "identifications", IDENTIFICATIONS.find, made.identification, True),
         ("diagnose", "diagnoses", DIAGNOSES.find, made.diagnosis, order.diagnosis is not None),
     ]
@@ -183,41 +165,68 @@ def _links(here: str, root: str, made: CampaignLinks, *, has_result: bool) -> Ca
     )
 
 
-async def submit_campaign(request: Request, services: Services) -> str:
-    async with stage_request(services.campaigns.items, CampaignWorkspace) as workspace:
-        received = await receive_request(request, CampaignRequest, services.settings, workspace.robot)
-        robot_file = await run_in_threadpool(keep_robot, received, workspace.robot, services.robots)
-        robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
-        backend = choose_backend(services.settings, received.document.backend, robot)
-        permit = permit_of(request, services, backend.device(robot.name))
-        order = CampaignOrder(
-            robot_file=robot_file,
-            robot_name=robot.name,
-            backend=backend,
-            **{name: getattr(received.document, name) for name in CampaignOptions.model_fields},
-        )
-        await run_in_threadpool(workspace.write_order, order)
-        return await run_in_threadpool(services.campaigns.submit, workspace.folder, permit)
+class Campaigns(MovingResource):
+    """Motions and what is identified from them."""
+
+    @override
+    def manager(self, services: Services) -> CampaignManager:
+        return services.campaigns
+
+    @override
+    def find(self, services: Services, identifier: str) -> CampaignWorkspace:
+        return CampaignWorkspace(services.campaigns.items.folder(identifier))
+
+    @override
+    def read_state(self, services: Services, identifier: str) -> JobState | None:
+        record = self.find(services, identifier).read_record()
+        return None if record is None else record.state
+
+    @override
+    def describe(self, services: Services, identifier: str, root: str) -> CampaignAnswer:
+        workspace = self.find(services, identifier)
+        here, made, order = f"{root}/campaigns/{identifier}", workspace.read_made(), workspace.read_order()
+        if order is None:
+            links = _links(here, root, made, has_result=False)
+            return CampaignAnswer(**describe_damaged(identifier, here), links=links)
+        fields = describe_job(workspace, here)
+        links = _links(here, root, made, has_result=fields["state"] is JobState.SUCCEEDED)
+        steps = tuple(_steps(services, order, made, root))
+        return CampaignAnswer(**fields, robot=order.robot_name, backend=order.backend, steps=steps, links=links)
+
+    @override
+    async def submit(self, request: Request, services: Services) -> str:
+        async with stage_request(services.campaigns.items, CampaignWorkspace) as workspace:
+            received = await receive_request(request, CampaignRequest, services.settings, workspace.robot)
+            robot_file = await run_in_threadpool(keep_robot, received, workspace.robot, services.robots)
+            robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
+            backend = choose_backend(services.settings, received.document.backend, robot)
+            permit = permit_of(request, services, backend.device(robot.name))
+            order = CampaignOrder(
+                robot_file=robot_file,
+                robot_name=robot.name,
+                backend=backend,
+                **{name: getattr(received.document, name) for name in CampaignOptions.model_fields},
+            )
+            await run_in_threadpool(workspace.write_order, order)
+            return await run_in_threadpool(services.campaigns.submit, workspace.folder, permit)
 
 
-CAMPAIGNS = Resource(
+CAMPAIGNS = Campaigns(
     noun="a campaign",
     plural="campaigns",
     models=(CampaignRequest, CampaignAnswer),
     examples=EXAMPLES,
-    items=lambda services: services.campaigns.items,
-    find=find_campaign,
-    followed=find_campaign,
-    submit=submit_campaign,
-    describe=describe,
     summary="Begin a campaign",
     words="Designs a motion, runs it, runs a second one that the model is judged by, and identifies the arm.\n\n"
     "The campaign has the arm until its motions are done. Follow `Location` until it has ended, or stop it"
     " at any time.",
-    moves_arm=True,
+    stop_model=CampaignStopAnswer,
+    stop_words="Stops the arm first, then everything else of it; legal in every state, any number of times; needs no"
+    " body.",
+    remove_words="One that has ended is removed; its excitations, runs, recordings and identification stay.",
 )
 
-router = make_router(CAMPAIGNS)
+router = CAMPAIGNS.router()
 
 
 @router.get(
@@ -240,22 +249,3 @@ router = make_router(CAMPAIGNS)
 def get_result(request: Request, identifier: Identifier, services: ServicesDep) -> CampaignResult:
     """The identified model, and everything that led to it; else the problem that the campaign ended in."""
     return result_of(services, identifier, collection(request, 3))
-
-
-def _read_state(services: Services, identifier: str) -> JobState | None:
-    record = find_campaign(services, identifier).read_record()
-    return None if record is None else record.state
-
-
-add_stopping(
-    router,
-    CAMPAIGNS,
-    CampaignStopAnswer,
-    lambda services, identifier: services.campaigns.stop(identifier),
-    _read_state,
-    lambda services, identifier: services.campaigns.remove(identifier),
-    (
-        "Stops the arm first, then everything else of it; legal in every state, any number of times; needs no body.",
-        "One that has ended is removed; its excitations, runs, recordings and identification stay.",
-    ),
-)

@@ -27,9 +27,7 @@ from tauscope.strict_model import StrictModel
 class ReasonRequest(StrictModel):
     """Why somebody decides something; kept with the decision."""
 
-    reason: Annotated[str, Field(min_length=1, max_length=1000)] = Field(
-        description="one line", examples=["gear oil changed on 3 November"]
-    )
+    reason: Annotated[str, Field(min_length=1, max_length=1000)] = Field(description="one line", examples=["new oil"])
 
 
 class GateAnswer(AnswerModel):
@@ -112,9 +110,7 @@ class EventAnswer(AnswerModel):
     robot: str = Field(description="name of the robot")
     kind: str = Field(description="drift", examples=["drift"])
     parameter: str = Field(description="that drifted")
-    text: str = Field(
-        description="one line", examples=["joint3: viscous friction +40 % in 6 weeks (0.5 → 0.7, 12 standard errors)"]
-    )
+    text: str = Field(description="one line", examples=["joint3: viscous friction +40 % in 6 weeks"])
     raised: datetime = Field(description="when it was seen first, UTC")
     last_seen: datetime = Field(description="when it was seen last, UTC")
     closed: datetime | None = Field(description="when somebody took note, UTC")

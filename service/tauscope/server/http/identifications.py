@@ -26,10 +26,7 @@ class IdentificationRequest(RecordingsRequest):
         description="names of the recordings that the model is made from: files of this form, or on the server;"
         " null: all files sent as part `recordings`",
     )
-    held_out: Names | None = Field(
-        default=None,
-        description="names of the recordings that it is judged by; null: all files sent as part `held_out`",
-    )
+    held_out: Names | None = Field(default=None, description="recordings that judge it; null: every part `held_out`")
     options: IdentificationOptions = Field(default=IdentificationOptions(), description="how it is identified")
 
 
@@ -57,9 +54,7 @@ class IdentificationAnswer(JobAnswer):
     recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what the model is made from")
     held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what it is judged by")
     options: IdentificationOptions | None = Field(default=None, description="how it is identified")
-    refused_exports: dict[str, str] = Field(
-        default={}, description="formats that cannot hold this model, each with the reason"
-    )
+    refused_exports: dict[str, str] = Field(default={}, description="reason by format that cannot hold this model")
     links: LinksAnswer = Field(description="where to go on")
 
 

@@ -65,9 +65,7 @@ class ChannelsAnswer(AnswerModel):
     position_step: float | None = Field(description="step in multiples of which the position moves [rad or m]")
     wraps: int = Field(description="jumps of the position by about 2π")
     first_wrap: Measured = Field(description="time of the first of them [s]")
-    clipped: tuple[tuple[float, int], ...] = Field(
-        description="levels at which the effort stays, and number of samples"
-    )
+    clipped: tuple[tuple[float, int], ...] = Field(description="levels at which the effort stays, and samples there")
 
 
 class RecordingReportAnswer(AnswerModel):

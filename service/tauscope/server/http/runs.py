@@ -12,6 +12,7 @@ from fastapi.responses import FileResponse
 from pydantic import Field, JsonValue, model_validator
 from pydantic_core import PydanticCustomError
 from starlette.concurrency import run_in_threadpool
+from typing_extensions import override
 
 from tauscope.errors import ExcitationError, NotFoundError
 from tauscope.robot import Robot
@@ -28,7 +29,7 @@ from tauscope.server.control.run import (
     ready_motion,
     take_trajectory,
 )
-from tauscope.server.control.run_manager import run_recording_name
+from tauscope.server.control.run_manager import RunManager, run_recording_name
 from tauscope.server.http.answers import AnswerModel, Identifier, MotionLinks, convert_problem
 from tauscope.server.http.bodies import PartRule, file_answer, to_json_text
 from tauscope.server.http.excitations import EXCITATIONS
@@ -36,7 +37,7 @@ from tauscope.server.http.leases import permit_of
 from tauscope.server.http.openapi import binary_part, file_responses
 from tauscope.server.http.robot_files import EXAMPLE_ROBOT, read_received_robot
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
+from tauscope.server.http.tasks.router import MovingResource
 from tauscope.server.http.tasks.submission import (
     BackendRequest,
     Received,
@@ -65,9 +66,7 @@ class RunRequest(RunOptions, RobotRequest, strict=True):
         description="identifier of an excitation that succeeded; its robot is taken where none is sent; null, and no"
         " trajectory: the default motion is designed first",
     )
-    trajectory: dict[str, Any] | None = Field(
-        default=None, description="a trajectory document; in a form, the part `trajectory` may hold the file instead"
-    )
+    trajectory: dict[str, Any] | None = Field(default=None, description="a trajectory document; in a form, also a part")
 
     seed: int = Field(default=0, ge=0, lt=2**63, description="of the default motion")
 
@@ -123,18 +122,12 @@ class RunAnswer(AnswerModel):
     stop_policy: str | None = Field(default=None, description="how the arm is stopped")
     ramp_s: float | None = Field(default=None, description="time from the first cycle to the motion's start")
     motion_s: float | None = Field(default=None, description="length of the motion")
-    holds: bool | None = Field(
-        default=None, description="whether the arm was under power when the run ended; null where unknown"
-    )
-    drives: tuple[str, ...] = Field(
-        default=(), description="what the drives do not have or what was changed in them; one line each"
-    )
+    holds: bool | None = Field(default=None, description="whether the arm was powered at the end; null: unknown")
+    drives: tuple[str, ...] = Field(default=(), description="what the drives lack, or what was changed in them")
     kept: float | None = Field(default=None, description="part of the motion's samples that was kept, 0 to 1")
     timing: Timing | None = Field(default=None, description="rate, jitter, missed and stale samples")
     real_time: RealTime | None = Field(default=None, description="what the control loop was given of what it asked for")
-    worst_following: tuple[float, ...] = Field(
-        default=(), description="largest distance of arm and target, one number a joint"
-    )
+    worst_following: tuple[float, ...] = Field(default=(), description="largest distance of arm and target, by joint")
     stop: str | None = Field(default=None, description="who asked for the stop; null where nobody did")
     problem: Problem | None = Field(default=None, description="why it did not finish")
     recording: RunRecordingAnswer | None = Field(default=None, description="what it left behind, once it has ended")
@@ -149,10 +142,6 @@ class StopAnswer(AnswerModel):
 FORMATS: tuple[RecordingFormat, ...] = ("mcap", "csv", "parquet")
 
 
-def find_run(services: Services, identifier: str) -> RunWorkspace:
-    return RunWorkspace(services.runs.items.folder(identifier))
-
-
 @dataclass(frozen=True)
 class FollowedRun:
     """A run as those see it who follow its events: it ends when the desk has put everything in its place."""
@@ -161,46 +150,9 @@ class FollowedRun:
     has_ended: Callable[[], bool]
 
 
-def follow_run(services: Services, identifier: str) -> FollowedRun:
-    """Raises NotFoundError if there is none."""
-    workspace = find_run(services, identifier)
-
-    def has_ended() -> bool:
-        return services.runs.live(identifier) is None and workspace.has_ended()
-
-    return FollowedRun(workspace.events, has_ended)
-
-
-def describe(services: Services, identifier: str, root: str) -> RunAnswer:
-    """The state of a run; one whose files are damaged is said to be so. Raises NotFoundError if there is none."""
-    workspace, live = find_run(services, identifier), services.runs.live(identifier)
-    here = f"{root}/runs/{identifier}"
-    record, request = workspace.read_run(), workspace.read_order()
-    if record is None or request is None:
-        detail = f"files of {identifier} are missing or damaged; remove it and hand it in again"
-        problem = make_problem("damaged", detail, here)
-        return RunAnswer(id=identifier, state="damaged", problem=problem, links=_links(here, None, None, workspace))
-    goes_on = live is not None and not record.state.is_end
-    return RunAnswer.describe(
-        record,
-        id=identifier,
-        step=workspace.read_step() if goes_on else None,
-        percent=live.percent if live is not None and goes_on else 100.0 * record.played,
-        figures=dict(live.figures) if live is not None and goes_on else {},
-        created=record.history[0].at,
-        ended=record.history[-1].at if record.state.is_end else None,
-        backend=request.backend,
-        options=request.options,
-        campaign=request.campaign,
-        problem=convert_problem(workspace.problem(), here),
-        recording=_recording(services, identifier, record),
-        links=_links(here, request.excitation and f"{root}/excitations/{request.excitation}", record, workspace),
-    )
-
-
 def require_recording(services: Services, identifier: str, format_: RecordingFormat) -> RunWorkspace:
     """A run that left a recording of a format. Raises NotFoundError, or ProblemError while it goes on."""
-    workspace = find_run(services, identifier)
+    workspace = RUNS.find(services, identifier)
     if not workspace.has_ended() or services.runs.live(identifier) is not None:
         text = f"{identifier} goes on; ask for its recording when its state is an end state"
         raise ProblemError("not-finished", text, headers={"Retry-After": "2"})
@@ -229,23 +181,6 @@ def _links(here: str, excitation: str | None, record: RunRecord | None, workspac
 
 
 LARGEST_TRAJECTORY = 64 * 2**20  # bytes of the largest trajectory file that is accepted
-
-
-async def submit_run(request: Request, services: Services) -> str:
-    """Take a request. Raises ProblemError or TauscopeError if it is not valid, or the arm may not be moved."""
-    async with stage_request(services.runs.items, RunWorkspace) as workspace:
-        most = min(LARGEST_TRAJECTORY, services.settings.max_upload_bytes)
-        parts = {"trajectory": PartRule(most, workspace.trajectories, default_name="trajectory.json")}
-        received = await receive_request(request, RunRequest, services.settings, workspace.robot, parts)
-        robot_file = await run_in_threadpool(_put_robot, received, services, workspace)
-        robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
-        wanted = await run_in_threadpool(_prepare, received, services, workspace, robot_file, robot)
-        permit = permit_of(request, services, wanted.backend.device(wanted.robot.name))
-        if wanted.uploaded:
-            await services.reading.call(
-                request, check_trajectory, workspace.trajectories, workspace.robot / wanted.robot_file
-            )
-        return await run_in_threadpool(_submit, wanted, services, workspace, permit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,52 +261,90 @@ def _motion(wanted: _Wanted, services: Services, workspace: RunWorkspace) -> tup
 
 Format = Annotated[RecordingFormat, Query(alias="format", description="mcap: the journal, ramp included; else columns")]
 
-RUNS = Resource(
+
+class Runs(MovingResource):
+    """Motions of an arm."""
+
+    @override
+    def manager(self, services: Services) -> RunManager:
+        return services.runs
+
+    @override
+    def find(self, services: Services, identifier: str) -> RunWorkspace:
+        return RunWorkspace(services.runs.items.folder(identifier))
+
+    @override
+    def follow(self, services: Services, identifier: str) -> FollowedRun:
+        workspace = self.find(services, identifier)
+        return FollowedRun(workspace.events, lambda: services.runs.live(identifier) is None and workspace.has_ended())
+
+    @override
+    def read_state(self, services: Services, identifier: str) -> RunState | None:
+        record = self.find(services, identifier).read_run()
+        return None if record is None else record.state
+
+    @override
+    def describe(self, services: Services, identifier: str, root: str) -> RunAnswer:
+        workspace, live = self.find(services, identifier), services.runs.live(identifier)
+        here = f"{root}/runs/{identifier}"
+        record, request = workspace.read_run(), workspace.read_order()
+        if record is None or request is None:
+            detail = f"files of {identifier} are missing or damaged; remove it and hand it in again"
+            problem = make_problem("damaged", detail, here)
+            return RunAnswer(id=identifier, state="damaged", problem=problem, links=_links(here, None, None, workspace))
+        goes_on = live is not None and not record.state.is_end
+        return RunAnswer.describe(
+            record,
+            id=identifier,
+            step=workspace.read_step() if goes_on else None,
+            percent=live.percent if live is not None and goes_on else 100.0 * record.played,
+            figures=dict(live.figures) if live is not None and goes_on else {},
+            created=record.history[0].at,
+            ended=record.history[-1].at if record.state.is_end else None,
+            backend=request.backend,
+            options=request.options,
+            campaign=request.campaign,
+            problem=convert_problem(workspace.problem(), here),
+            recording=_recording(services, identifier, record),
+            links=_links(here, request.excitation and f"{root}/excitations/{request.excitation}", record, workspace),
+        )
+
+    @override
+    async def submit(self, request: Request, services: Services) -> str:
+        async with stage_request(services.runs.items, RunWorkspace) as workspace:
+            most = min(LARGEST_TRAJECTORY, services.settings.max_upload_bytes)
+            parts = {"trajectory": PartRule(most, workspace.trajectories, default_name="trajectory.json")}
+            received = await receive_request(request, RunRequest, services.settings, workspace.robot, parts)
+            robot_file = await run_in_threadpool(_put_robot, received, services, workspace)
+            robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
+            wanted = await run_in_threadpool(_prepare, received, services, workspace, robot_file, robot)
+            permit = permit_of(request, services, wanted.backend.device(wanted.robot.name))
+            if wanted.uploaded:
+                await services.reading.call(
+                    request, check_trajectory, workspace.trajectories, workspace.robot / wanted.robot_file
+                )
+            return await run_in_threadpool(_submit, wanted, services, workspace, permit)
+
+
+RUNS = Runs(
     noun="a run",
     plural="runs",
     models=(RunRequest, RunAnswer),
     examples=EXAMPLES,
-    items=lambda services: services.runs.items,
-    find=find_run,
-    followed=follow_run,
-    submit=submit_run,
-    describe=describe,
     summary="Begin a run",
     words="The arm moves as soon as there is a motion: follow `Location` until it has ended, or stop it at any time."
     "\n\n"
     "One run at a time has an arm. Where somebody has the arm's lease, only they move it; it stops when the lease ends."
     "\nEvery command passes a guard that keeps the robot file's limits.",
     problems=("not-found", "not-finished", "excitation", "queue-full"),
-    moves_arm=True,
     parts={"trajectory": binary_part("the motion: a trajectory document (.json), or samples (.csv)")},
+    stop_model=StopAnswer,
+    stop_words="Stops the arm by the run's stop policy; legal in every state, any number of times; needs no body.\n\n"
+    "It waits for nothing: neither for other requests nor for jobs. The recording up to the stop is kept.",
+    remove_words="One that has ended is removed with all its files; its recording stays among the recordings.",
 )
 
-router = make_router(RUNS)
-
-
-def _stop(services: Services, identifier: str) -> RunState | None:
-    live = services.runs.stop(identifier)
-    return None if live is None else live.state
-
-
-def _read_state(services: Services, identifier: str) -> RunState | None:
-    record = find_run(services, identifier).read_run()
-    return None if record is None else record.state
-
-
-add_stopping(
-    router,
-    RUNS,
-    StopAnswer,
-    _stop,
-    _read_state,
-    lambda services, identifier: services.runs.remove(identifier),
-    (
-        "Stops the arm by the run's stop policy; legal in every state, any number of times; needs no body.\n\n"
-        "It waits for nothing: neither for other requests nor for jobs. The recording up to the stop is kept.",
-        "One that has ended is removed with all its files; its recording stays among the recordings.",
-    ),
-)
+router = RUNS.router()
 
 
 @router.get(

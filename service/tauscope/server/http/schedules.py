@@ -29,9 +29,7 @@ class ScheduleRequest(StrictModel):
         " options are repeated",
         examples=["20261103T101502Z-1f2e3d4c"],
     )
-    anywhere: bool = Field(
-        default=False, description="whether any service of the same database may do it; else only this one"
-    )
+    anywhere: bool = Field(default=False, description="whether any service of the database may do it, or this one")
     definition: ScheduleDefinition = Field(description="when it is due")
 
 
@@ -77,9 +75,7 @@ class FiringAnswer(AnswerModel):
     number: int = Field(description="of the firing")
     due: datetime = Field(description="when it was, UTC")
     is_asked: bool = Field(description="whether somebody asked for it")
-    state: str = Field(
-        description="asked, claimed, started, skipped, missed, failed, interrupted or withdrawn; nothing is repeated"
-    )
+    state: str = Field(description="asked, claimed, started, skipped, missed, failed, interrupted or withdrawn")
     reason: str | None = Field(description="why nothing was started")
     item: str | None = Field(description="path of what was started, as on the service that started it")
     item_state: str | None = Field(description="where that stands, as far as the index knows")

@@ -49,9 +49,7 @@ def run_identification(folder: Path, server_recordings: Path) -> JobProblem | No
 class DiagnosisOrder(TaskOrder):
     task = diagnose
 
-    form: Literal["tauscope.diagnosis-order/1"] = Field(
-        default="tauscope.diagnosis-order/1", description="name and version of this form"
-    )
+    form: Literal["tauscope.diagnosis-order/1"] = "tauscope.diagnosis-order/1"
     recordings: tuple[OrderedRecording, ...] = Field(description="what is to be explained")
     held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what findings are confirmed by")
     simulated: tuple[OrderedRecording, ...] = Field(default=(), description="what the user's simulator recorded")
@@ -83,9 +81,7 @@ def run_diagnosis(folder: Path, server_recordings: Path) -> JobProblem | None:
 class RolloutOrder(TaskOrder):
     task = rollout
 
-    form: Literal["tauscope.rollout-order/1"] = Field(
-        default="tauscope.rollout-order/1", description="name and version of this form"
-    )
+    form: Literal["tauscope.rollout-order/1"] = "tauscope.rollout-order/1"
     recordings: tuple[OrderedRecording, ...] = Field(description="what is rolled out")
     refine: tuple[OrderedRecording, ...] = Field(default=(), description="what the model is refined by")
     model: str | None = Field(default=None, description="name of the model, in the folder `against`")
@@ -110,12 +106,8 @@ MOST_ROWS = 2_000_000  # rows of the longest CSV that is made on request
 class ExcitationOrder(TaskOrder):
     task = design_excitation
 
-    form: Literal["tauscope.excitation-order/1"] = Field(
-        default="tauscope.excitation-order/1", description="name and version of this form"
-    )
-    options: ExcitationDesignOptions = Field(
-        default=ExcitationDesignOptions(), description="how the motion is designed"
-    )
+    form: Literal["tauscope.excitation-order/1"] = "tauscope.excitation-order/1"
+    options: ExcitationDesignOptions = Field(default=ExcitationDesignOptions(), description="how the motion is made")
 
 
 class ExcitationWorkspace(TaskWorkspace[ExcitationOrder]):

@@ -5,14 +5,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fastapi import APIRouter, Request
-from pydantic import BaseModel
 from starlette.concurrency import run_in_threadpool
+from typing_extensions import override
 
 from tauscope.errors import LimitExceededError
 from tauscope.server.auth.gate import find_caller
 from tauscope.server.http.answers import describe_damaged, describe_job, require_success
 from tauscope.server.http.bodies import PartRule
-from tauscope.server.http.openapi import Examples
 from tauscope.server.http.robot_files import read_received_robot
 from tauscope.server.http.services import Services
 from tauscope.server.http.tasks.router import (
@@ -21,13 +20,13 @@ from tauscope.server.http.tasks.router import (
     add_cancelling,
     add_document_route,
     add_export_route,
-    make_router,
 )
-from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request, stage_request
+from tauscope.server.http.tasks.submission import Received, keep_robot, receive_request, stage_request
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.job_folder import JobState
 from tauscope.server.queue.queue import JobKind
 from tauscope.server.queue.task_job import OrderedRecording, TaskWorkspace
+from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import RecordingStore
 
@@ -39,29 +38,27 @@ def no_further(_received: Received[Any], _services: Services, _workspace: Any) -
     return {}
 
 
-@dataclass(frozen=True, eq=False)
-class QueuedTask:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class QueuedTask(Resource):
     """`further`: more fields of an order; `further_parts`: folder and limit [bytes] of other files; `links`: routes."""
 
-    noun: str
-    plural: str
     kind: Callable[[Services], JobKind]
     workspace: type[TaskWorkspace[Any]]
-    models: tuple[type[RobotRequest], type[BaseModel]]
-    examples: Examples
-    summary: str
-    words: str
     documents: Sequence[JobDocument]
-    submission_problems: Sequence[str] = ("recording", "not-found", "queue-full")
+    problems: Sequence[str] = ("recording", "not-found", "queue-full")
     work_problems: Sequence[str] = ("robot-file", "recording", "recording-mismatch", "identification")
-    parts: Mapping[str, Any] = field(default_factory=dict)
     export_words: str = ""
     links: Sequence[str] = ()
     further: Callable[[Received[Any], Services, Any], dict[str, Any]] = no_further
     further_parts: Mapping[str, tuple[str, int]] = field(default_factory=dict)
 
+    @override
+    def items(self, services: Services) -> ItemStore:
+        return self.kind(services).items
+
+    @override
     def find(self, services: Services, identifier: str) -> TaskWorkspace[Any]:
-        return self.workspace(self.kind(services).items.folder(identifier))
+        return self.workspace(self.items(services).folder(identifier))
 
     def finished(self, services: Services, identifier: str) -> TaskWorkspace[Any]:
         """Raises NotFoundError if there is none, ProblemError if it has not succeeded."""
@@ -69,32 +66,18 @@ class QueuedTask:
         require_success(workspace)
         return workspace
 
+    @override
     def router(self) -> APIRouter:
-        resource = Resource(
-            noun=self.noun,
-            plural=self.plural,
-            models=self.models,
-            examples=self.examples,
-            items=lambda services: self.kind(services).items,
-            find=self.find,
-            followed=self.find,
-            submit=self.submit,
-            describe=self.describe,
-            summary=self.summary,
-            words=self.words,
-            problems=self.submission_problems,
-            parts=self.parts,
-        )
-        router = make_router(resource)
-        add_cancelling(router, resource, self.kind)
+        router = super().router()
+        add_cancelling(router, self, self.kind)
         for document in self.documents:
             add_document_route(router, self.finished, document, self.work_problems)
         if self.workspace.formats:
             add_export_route(router, self.finished, self.workspace.formats, self.export_words)
         return router
 
+    @override
     def describe(self, services: Services, identifier: str, root: str) -> Any:
-        """The state of a job; one whose files are damaged is said to be so. Raises NotFoundError if there is none."""
         answer, workspace = self.models[1], self.find(services, identifier)
         here, order = f"{root}/{self.plural}/{identifier}", workspace.read_order()
         links: dict[str, Any] = {"self": here, "events": f"{here}/events"}
@@ -112,8 +95,8 @@ class QueuedTask:
         fields |= {"refused_exports": refused} if workspace.formats else {}
         return answer(**fields, robot=order.robot_name, links=links)
 
+    @override
     async def submit(self, request: Request, services: Services) -> str:
-        """Keep what was sent in a job's folder. Raises ProblemError or TauscopeError if it is not valid."""
         settings = services.settings
         async with stage_request(self.kind(services).items, self.workspace) as workspace:
             most, largest = settings.max_recordings, settings.max_upload_bytes

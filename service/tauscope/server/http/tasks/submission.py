@@ -181,12 +181,8 @@ class BackendRequest(StrictModel):
         default=None,
         description="of the simulated arm: as fast as it computes, or by the clock; null: the service's own",
     )
-    scenario: dict[str, Any] | None = Field(
-        default=None, description="what the simulated arm conceals: content of a scenario file; null: nothing"
-    )
-    keep_settings: bool = Field(
-        default=False, description="whether servos keep in EEPROM what a run changed; false: it is put back"
-    )
+    scenario: dict[str, Any] | None = Field(default=None, description="effects that the simulated arm conceals")
+    keep_settings: bool = Field(default=False, description="whether servos keep in EEPROM what a run changed")
     start: tuple[FiniteFloat, ...] | None = Field(
         default=None,
         max_length=100,
