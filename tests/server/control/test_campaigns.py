@@ -12,9 +12,14 @@ from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.waiting import wait_until
 from tauscope.runtime.record import RunProblem
 from tauscope.runtime.states import RunState
-from tauscope.server.control import campaign_runner
-from tauscope.server.control.campaign import CampaignLinks, CampaignOrder, CampaignWorkspace
-from tauscope.server.control.campaign_runner import CampaignDependencies, CampaignManager
+from tauscope.server.control import campaign as campaign_runner
+from tauscope.server.control.campaign import (
+    CampaignDependencies,
+    CampaignLinks,
+    CampaignManager,
+    CampaignOrder,
+    CampaignWorkspace,
+)
 from tauscope.server.control.leases import BusyError, DeviceClaims
 from tauscope.server.control.run import RunWorkspace
 from tauscope.server.control.run_manager import RunManager, StartControl

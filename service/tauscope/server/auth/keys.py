@@ -5,7 +5,6 @@ import hmac
 import logging
 import re
 import secrets
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -267,20 +266,3 @@ class KeyRing:
     def _revoke_all(self) -> tuple[ApiKey, ...]:
         """All known keys as revoked: their file was taken away."""
         return tuple(key.model_copy(update={"revoked": key.revoked or self._clock()}) for key in self._keys)
-
-    @contextmanager
-    def watched(self) -> Iterator[None]:
-        """Look at the file again and again, within the context."""
-        is_over = threading.Event()
-
-        def watch() -> None:
-            while not is_over.wait(CHECK_S):
-                self.look()
-
-        thread = threading.Thread(target=watch, name="keys", daemon=True)
-        thread.start()
-        try:
-            yield
-        finally:
-            is_over.set()
-            thread.join()

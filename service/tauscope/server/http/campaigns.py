@@ -12,8 +12,7 @@ from typing_extensions import override
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
-from tauscope.server.control.campaign import CampaignLinks, CampaignOrder, CampaignWorkspace
-from tauscope.server.control.campaign_runner import CampaignManager
+from tauscope.server.control.campaign import CampaignLinks, CampaignManager, CampaignOrder, CampaignWorkspace
 from tauscope.server.control.run import RunWorkspace
 from tauscope.server.http.answers import (
     ENDINGS,

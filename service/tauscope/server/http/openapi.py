@@ -3,9 +3,10 @@
 import json
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import reduce
 from http import HTTPStatus
+from itertools import count
 from operator import getitem
 from typing import Any
 
@@ -202,62 +203,60 @@ def merge_problems(answers: dict[str, Any], status: str, answer: dict[str, Any])
         }
 
 
-def _share_parameters(document: dict[str, Any]) -> None:
-    """Put each parameter that several operations have into the document once."""
-    lists = [operation["parameters"] for operation in _operations(document) if "parameters" in operation]
-    counts = Counter(json.dumps(each, sort_keys=True) for each in (each for found in lists for each in found))
-    shared: dict[str, Any] = {}
+Slot = tuple[Any, Any]  # a list or an object, and the place in it that holds a part
+
+
+def _share(
+    slots: Sequence[Slot], section: str, shared: dict[str, Any], name: Callable[[Slot], str], least: int
+) -> None:
+    """Put each part of at least so many characters that several slots hold into a section of the document once."""
+    counts = Counter(json.dumps(holder[key], sort_keys=True) for holder, key in slots)
     names: dict[str, str] = {}
-    for parameters in lists:
-        for place, parameter in enumerate(parameters):
-            text = json.dumps(parameter, sort_keys=True)
-            if counts[text] == 1:
-                continue
-            if text not in names:
-                alike = sum(each["name"] == parameter["name"] for each in shared.values())
-                names[text] = f"{parameter['name']}-{alike + 1}" if alike else parameter["name"]
-                shared[names[text]] = parameter
-            parameters[place] = {"$ref": f"#/components/parameters/{names[text]}"}
+    for holder, key in slots:
+        text = json.dumps(holder[key], sort_keys=True)
+        if counts[text] == 1 or len(text) < least or "$ref" in holder[key]:
+            continue
+        if text not in names:
+            names[text] = name((holder, key))
+            shared[names[text]] = holder[key]
+        holder[key] = {"$ref": f"#/components/{section}/{names[text]}"}
+
+
+def _share_parameters(document: dict[str, Any]) -> None:
+    lists = [operation["parameters"] for operation in _operations(document) if "parameters" in operation]
+    shared: dict[str, Any] = {}
+
+    def name(slot: Slot) -> str:
+        own = slot[0][slot[1]]["name"]
+        alike = sum(each["name"] == own for each in shared.values())
+        return f"{own}-{alike + 1}" if alike else own
+
+    _share([(each, place) for each in lists for place in range(len(each))], "parameters", shared, name, 0)
     document["components"]["parameters"] = dict(sorted(shared.items()))
 
 
 def _share_answers(document: dict[str, Any]) -> None:
-    """Put each answer that several operations have, and that is no problem, into the document once."""
-    counts = Counter(
-        json.dumps(answer) for operation in _operations(document) for answer in operation["responses"].values()
-    )
-    names: dict[str, str] = {}
-    for operation in _operations(document):
-        for status, answer in operation["responses"].items():
-            text = json.dumps(answer)
-            if "$ref" not in answer and counts[text] > 1 and len(text) > _LEAST_SHARED:
-                found = re.search(r'schemas/(\w+)"', text)
-                name = names.setdefault(text, f"{found[1] if found else 'answer'}-{len(names) + 1}")
-                document["components"]["responses"][name] = answer
-                operation["responses"][status] = {"$ref": f"#/components/responses/{name}"}
+    answers, numbers = [operation["responses"] for operation in _operations(document)], count(1)
+
+    def name(slot: Slot) -> str:
+        found = re.search(r'schemas/(\w+)"', json.dumps(slot[0][slot[1]]))
+        return f"{found[1] if found else 'answer'}-{next(numbers)}"
+
+    slots = [(each, status) for each in answers for status in each]
+    _share(slots, "responses", document["components"]["responses"], name, _LEAST_SHARED)
 
 
 def _share_properties(document: dict[str, Any]) -> None:
-    """Put each long schema that several properties have into the document once, under the property's name."""
     schemas = document["components"]["schemas"]
-    places = [
-        (node["properties"], name)
-        for node in [*_schema_nodes(document)]
-        if isinstance(node.get("properties"), dict)
-        for name in node["properties"]
-    ]
-    counts = Counter(json.dumps(properties[name], sort_keys=True) for properties, name in places)
-    names: dict[str, str] = {}
-    for properties, property_ in places:
-        text = json.dumps(properties[property_], sort_keys=True)
-        if counts[text] == 1 or len(text) < _LEAST_SHARED or "$ref" in properties[property_]:
-            continue
-        if text not in names:
-            name = "".join(part.capitalize() for part in property_.split("_"))
-            while name in schemas:
-                name += "Field"
-            names[text], schemas[name] = name, properties[property_]
-        properties[property_] = {"$ref": SCHEMAS + names[text]}
+    nodes = [node["properties"] for node in _schema_nodes(document) if isinstance(node.get("properties"), dict)]
+
+    def name(slot: Slot) -> str:
+        name = "".join(part.capitalize() for part in slot[1].split("_"))
+        while name in schemas:
+            name += "Field"
+        return name
+
+    _share([(each, key) for each in nodes for key in each], "schemas", schemas, name, _LEAST_SHARED)
     document["components"]["schemas"] = dict(sorted(schemas.items()))
 
 

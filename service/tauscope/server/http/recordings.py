@@ -12,13 +12,12 @@ from starlette.concurrency import run_in_threadpool
 from tauscope.recording import EffortKind
 from tauscope.server.http.answers import After, AnswerModel, Measured, PageAnswer
 from tauscope.server.http.bodies import PartRule, file_answer, parse_document, receive_form
-from tauscope.server.http.evidence import require_no_evidence
 from tauscope.server.http.openapi import binary_part, file_responses, form_body, refer_to_model
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robot_files import FindingAnswer, read_received_robot, robot_part_rules
-from tauscope.server.http.services import ServicesDep
+from tauscope.server.http.services import ServicesDep, require_no_evidence
 from tauscope.server.problems import ProblemError, problem_responses
-from tauscope.server.queue.kept_recordings import check_kept_recording, read_kept_samples, understand_recording
+from tauscope.server.queue.analyses import check_kept_recording, read_kept_samples, understand_recording
 from tauscope.server.store.recordings import StoredRecording
 from tauscope.tasks.task import ReadingOptions
 

@@ -9,7 +9,6 @@ from fastapi import APIRouter, Path, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.server.http.bodies import FORM, JSON, media_type, read_document, receive_form, refuse_media_type
-from tauscope.server.http.evidence import require_no_identification
 from tauscope.server.http.openapi import binary_part, form_body, json_body
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robot_files import (
@@ -22,7 +21,7 @@ from tauscope.server.http.robot_files import (
     read_received_robot,
     robot_part_rules,
 )
-from tauscope.server.http.services import ServicesDep
+from tauscope.server.http.services import ServicesDep, require_no_identification
 from tauscope.server.http.tasks.router import JobRobotAnswer, describe_robot
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.store.robots import VERSION_PATTERN

@@ -14,9 +14,8 @@ from tauscope.server.http.openapi import json_request
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.problems import problem_responses
 from tauscope.server.schedules.definition import ScheduleDefinition
-from tauscope.server.schedules.repeater import make_schedule
 from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry
-from tauscope.server.schedules.scheduler import read_definition
+from tauscope.server.schedules.scheduler import make_schedule, read_definition
 from tauscope.server.store.data_folder import FOLDERS
 from tauscope.strict_model import StrictModel
 

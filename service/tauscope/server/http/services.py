@@ -3,9 +3,9 @@
 import logging
 import shutil
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import timedelta
 from functools import partial
@@ -14,11 +14,11 @@ from typing import Annotated, cast
 from anyio import CapacityLimiter
 from fastapi import Depends, Request
 
-from tauscope.errors import TauscopeError
+from tauscope.errors import NotFoundError, TauscopeError
 from tauscope.server.auth.audit_log import AuditLog, AuditTrail
 from tauscope.server.auth.gate import Access, RateLimit
-from tauscope.server.auth.keys import KeyFile, KeyRing
-from tauscope.server.control.campaign_runner import CampaignDependencies, CampaignManager
+from tauscope.server.auth.keys import CHECK_S, KeyFile, KeyRing
+from tauscope.server.control.campaign import CampaignDependencies, CampaignManager
 from tauscope.server.control.leases import DeviceClaims, Lease, Leases
 from tauscope.server.control.run import start_control
 from tauscope.server.control.run_manager import RunManager, StartControl
@@ -32,19 +32,25 @@ from tauscope.server.http.reading import WIDTH, ReadingQueue
 from tauscope.server.http.repeated_requests import StoredAnswers
 from tauscope.server.http.settings import Settings
 from tauscope.server.http.tasks.event_feeds import EventFeeds
-from tauscope.server.queue.analyses import run_diagnosis, run_excitation, run_identification, run_rollout
+from tauscope.server.problems import ProblemError
+from tauscope.server.queue.analyses import (
+    IdentificationWorkspace,
+    run_diagnosis,
+    run_excitation,
+    run_identification,
+    run_rollout,
+)
 from tauscope.server.queue.cluster_executor import ClusterExecutor, open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.worker_pool import WorkerPool
-from tauscope.server.schedules.repeater import Repeater
 from tauscope.server.schedules.repository import ScheduleRepository
-from tauscope.server.schedules.scheduler import Scheduler, new_boot
+from tauscope.server.schedules.scheduler import Repeater, Scheduler, new_boot
 from tauscope.server.store.data_folder import FOLDERS, FolderLock, ItemStore, item_stores, site_identifier
 from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index
 from tauscope.server.store.recordings import RecordingStore
-from tauscope.server.store.robots import RobotStore
+from tauscope.server.store.robots import RobotStore, hash_robot
 
 _log = logging.getLogger("tauscope.jobs")
 
@@ -118,6 +124,7 @@ def open_services(
     housekeeping = Housekeeping(
         [services.jobs.settle, services.runs.settle, services.index.sync, services.models.judge_new, drift.look]
     )
+    keys = Housekeeping([services.access.ring.look], CHECK_S)
     clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
     filling = threading.Thread(target=_fill_index, args=(services,), name="index", daemon=True)
     filling.start()
@@ -130,11 +137,12 @@ def open_services(
     try:
         with services.audit.writing():
             services.audit.note("service", "began")
+            keys.start()
             try:
-                with services.access.ring.watched():
-                    yield services
+                yield services
             finally:
                 services.begin_to_close()
+                keys.close()
                 clock.close()
                 pruning.close()
                 services.runs.close()
@@ -325,3 +333,40 @@ def require_data_folder(settings: Settings) -> None:
     except OSError as error:
         text = f"{folder}: cannot be used as data folder ({error.strerror}); name a folder that can be written to"
         raise TauscopeError(text) from None
+
+
+def require_no_model(services: Services, identifier: str) -> None:
+    _judge_new(services)
+    _require_free(services, identifier, {identifier})
+
+
+def require_no_evidence(services: Services, recording: str) -> None:
+    """Raises ProblemError if an active model or a reference was made from or judged by a recording."""
+    _judge_new(services)
+    _require_free(services, recording, services.index.index.list_users(recording))
+
+
+def require_no_identification(services: Services, version: str) -> None:
+    """Raises ProblemError if an active model or a reference was identified with a robot."""
+    _judge_new(services)
+    users = set()
+    for identifier in services.models.history.list_protected():
+        with suppress(NotFoundError):  # of another service
+            workspace = IdentificationWorkspace(services.identifications.items.folder(identifier))
+            order = workspace.read_order()
+            if order is not None and hash_robot(workspace.robot, order.robot_file) == version:
+                users.add(identifier)
+    _require_free(services, version, users)
+
+
+def _judge_new(services: Services) -> None:
+    """Judge every identification: one that ended a moment ago may become the active model."""
+    services.index.refresh()
+    services.models.judge_new()
+
+
+def _require_free(services: Services, name: str, users: Collection[str]) -> None:
+    models = services.models.history.list_protected().intersection(users)
+    if models:
+        hint = "make another model active, and the reference, first; identify again where there is no other"
+        raise ProblemError("in-use", f"{name}: model {min(models)} is in use and rests on it; {hint}")

@@ -1,15 +1,23 @@
-"""Jobs of the queue: what each kind of order holds, what its folder holds, and the work."""
+"""Jobs of the queue: what each kind of order and folder holds, the work, and recordings as a worker reads them."""
 
+import json
 from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
-from tauscope.errors import LimitExceededError, NotFoundError
+from tauscope.errors import LimitExceededError, NotFoundError, RecordingError
 from tauscope.export.formats import CODE_FILES, EXPORT_FILES
-from tauscope.robot import read_robot
-from tauscope.server.queue.job_folder import JobProblem, hide_folders
+from tauscope.recording import ColumnMapping, Reading, RecordingReport, check_recording, find_mapping, read_recording
+from tauscope.recording.recording import Array
+from tauscope.report.series import envelope_indices
+from tauscope.robot import Robot, read_robot
+from tauscope.server.queue.job_folder import JobProblem, hide_folders, without_folders
 from tauscope.server.queue.task_job import TRAJECTORY, OrderedRecording, TaskOrder, TaskWorkspace, perform_job
 from tauscope.tasks import design_excitation, diagnose, identify, rollout
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
@@ -142,3 +150,73 @@ def check_trajectory(folder: Path, robot_file: Path) -> None:
     (path,) = folder.iterdir()
     with hide_folders(folder, robot_file.parent):
         read_trajectory(path, read_robot(robot_file))
+
+
+def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport:
+    """Report on a recording. Raises RecordingError, whose message calls the file by its name alone."""
+    with hide_folders(path.parent):
+        return replace(check_recording(path, joint_count), name=path.name)
+
+
+@dataclass(frozen=True)
+class Understanding:
+    """`mapping`: None for a log, which names its joints; `problem`: why the file is refused, without `report`."""
+
+    mapping: ColumnMapping | None
+    report: RecordingReport | None
+    problem: str | None
+
+
+def understand_recording(path: Path, robot: Robot | None, reading: Reading) -> Understanding:
+    """Find a file's columns and units, and report what it holds when it is read so.
+
+    A mapping that its column names suggest is used like one that was stated.
+    """
+    mapping = None
+    with suppress(RecordingError):  # a log, or a file that the check refuses, too
+        mapping = find_mapping(path, robot, reading)
+    if mapping is not None and mapping.is_guessed and reading.columns is None:
+        reading = replace(reading, columns=mapping.columns, units={**mapping.units, **reading.units})
+    try:
+        report = check_recording(path, None, robot, reading)
+    except RecordingError as error:
+        return Understanding(mapping, None, without_folders(str(error), path.parent))
+    return Understanding(mapping, replace(report, name=path.name), None)
+
+
+def read_kept_samples(path: Path, most: int) -> bytes:
+    """Time, positions and effort of a recording in the store, for a plot.
+
+    A recording of more samples than asked for is thinned: of each stretch those are kept at which any joint's position
+    or effort is least or greatest. Raises RecordingError if it cannot be read; the message calls the file by its name
+    alone.
+
+    Returns bytes: length of the header (4 bytes, little-endian), the header (JSON, filled with blanks to a multiple of
+        four), then each column that the header names as 32-bit floats, little-endian; time counts from the first sample
+        [s].
+    """
+    with hide_folders(path.parent):
+        recording = read_recording(path)
+    samples = recording.samples()
+    effort = recording.effort_kind.value
+    values = np.hstack([samples.position, samples.effort])
+    kept = _choose_rows(values, most)
+    joints = range(1, recording.joint_count + 1)
+    header = {
+        "columns": ["t", *(f"q{j}" for j in joints), *(f"{effort}{j}" for j in joints)],
+        "joint_count": recording.joint_count,
+        "effort": effort,
+        "samples": len(samples.time),
+        "shown": len(kept),
+    }
+    text = json.dumps(header).encode()
+    text += b" " * (-len(text) % 4)
+    columns = np.vstack([samples.time[kept] - samples.time[0], values[kept].T]).astype("<f4")
+    return len(text).to_bytes(4, "little") + text + columns.tobytes()
+
+
+def _choose_rows(values: Array, most: int) -> NDArray[np.intp]:
+    if len(values) <= most:
+        return np.arange(len(values))
+    share = max(most // values.shape[1], 2)
+    return np.unique(np.concatenate([envelope_indices(column, share) for column in values.T]))

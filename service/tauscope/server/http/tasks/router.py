@@ -17,7 +17,7 @@ from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
-from tauscope.server.control.supervised_threads import Manager
+from tauscope.server.control.run_manager import Manager
 from tauscope.server.http.answers import (
     ENDINGS,
     MOTION,
@@ -30,12 +30,11 @@ from tauscope.server.http.answers import (
     collection,
     require_document,
 )
-from tauscope.server.http.evidence import require_no_model
 from tauscope.server.http.leases import NO_BODY, LeaseToken
 from tauscope.server.http.openapi import Examples, file_contents
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robot_files import RobotReportAnswer, check_received_robot
-from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.services import Services, ServicesDep, require_no_model
 from tauscope.server.http.tasks.event_feeds import EventSource
 from tauscope.server.http.tasks.events import add_events_route
 from tauscope.server.http.tasks.submission import RobotRequest, request_body
