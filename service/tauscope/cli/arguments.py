@@ -70,10 +70,7 @@ LayoutFields = Annotated[dict[str, Any], OptionsOf(ReadingOptions, without=("tru
 
 
 def complete_reading(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields of `ReadingOptions`; an option overrides the file of ``--columns``.
-
-    Raises typer.BadParameter for a part that is no unit, or a layout that cannot be read.
-    """
+    """Options override the file of ``--columns``. Raises typer.BadParameter for an unknown unit or layout."""
     units, columns = _parse_units(values["units"]), values["columns"]
     try:
         layout = RecordingLayout() if columns is None else read_layout(columns)
@@ -92,10 +89,7 @@ def _parse_units(text: str | None) -> Mapping[str, str] | None:
 
 
 def parse_cutoff(text: str) -> float | Literal["auto"] | None:
-    """Read the value of ``--cutoff``: ``auto``, ``none`` or a positive number [Hz].
-
-    Raises typer.BadParameter for anything else.
-    """
+    """Read ``auto``, ``none`` or a positive number [Hz]. Raises typer.BadParameter for anything else."""
     if text.lower() == "auto":
         return "auto"
     if text.lower() == "none":

@@ -101,11 +101,7 @@ def demo(
 
 
 def run_demo(folder: Path, page: PageShown) -> None:
-    """Design, run, identify, compare, and say where everything is.
-
-    Raises TauscopeError where the folder holds somebody else's files of the same names, cannot be written, or the page
-    not be served.
-    """
+    """Raises TauscopeError where the folder holds other files, cannot be written, or the page cannot be served."""
     prepare_folder(folder, (*FILES, DATA))
     arm = read_robot(example_robot("paper_arm"))
     write_file(folder / ROBOT, robot_text_without_model(example_robot("paper_arm")).encode())
@@ -143,10 +139,7 @@ def design_motion(robot: Path, out: Path, options: ExcitationOptions, told: Told
 
 
 def run_motion(folder: Path, trajectory: Path, out: Path, seed: int, told: Told) -> None:
-    """Play a motion on the simulated arm, and keep what it recorded.
-
-    Raises AcquisitionError if the run does not finish.
-    """
+    """Play a motion on the simulated arm, and keep its recording. Raises AcquisitionError if it does not finish."""
     scenario = folder.with_suffix(".yaml")
     scenario.write_text(f"{SCENARIO_TEXT}seed: {seed}\n", encoding="utf-8")
     request = run.Request(

@@ -30,10 +30,7 @@ _FIRST_LINE = "Written by `tauscope demo`, which replaces the files named here w
 
 
 def prepare_folder(folder: Path, files: Sequence[str]) -> None:
-    """Make the folder, mark it, and take away the files that an earlier demo wrote into it; folders stay.
-
-    Raises ExportError where one of these names is taken by a file that no demo wrote, or the folder cannot be written.
-    """
+    """Make and mark the folder, without an earlier demo's files. Raises ExportError where a name is taken."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         ours = _list_own(folder / MARK)
@@ -86,12 +83,7 @@ class LeftPage:
 
 
 def leave_page(folder: Path, seconds: float = LEFT_FOR_S) -> LeftPage:
-    """Serve the page from a process of its own.
-
-    Raises StoreError if that process ends instead, with what it said.
-
-    `seconds`: after which it ends [s].
-    """
+    """Serve the page from another process for so many [s]. Raises StoreError if that process ends instead."""
     process = subprocess.Popen(  # noqa: S603 - this program
         [sys.executable, "-m", __name__, str(folder.resolve()), str(seconds)],
         stdin=subprocess.DEVNULL,

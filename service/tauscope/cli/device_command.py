@@ -134,11 +134,7 @@ def require_sound(findings: Sequence[Finding]) -> None:
 
 
 def check_drives(path: Path) -> list[Finding]:
-    """Everything doubtful in a robot file's ``drive`` blocks and the files that they name, without a port.
-
-    Nothing where no bus is meant, or where the drivers are not installed. Raises AcquisitionError where a joint has no
-    ``drive`` block, and another one has.
-    """
+    """Everything doubtful in ``drive`` blocks, without a port. Raises AcquisitionError where one has no block."""
     robot = read_robot(path)
     meant = [bus for bus in bus_drivers().values() if any(bus.is_meant(joint.drive or {}) for joint in robot.joints)]
     if len(meant) != 1:
@@ -183,10 +179,7 @@ _RATE_HZ = 200.0
 
 
 def show_frames(robot_file: Path, backend: str, trajectory: Path | None, options: RunOptions) -> None:
-    """Show the frames that a run would send: connecting, enabling, its first cycles, stopping.
-
-    Raises AcquisitionError where a drive block or a limit is not possible.
-    """
+    """Show the frames of a run. Raises AcquisitionError where a drive block or a limit is not possible."""
     robot = read_robot(robot_file)
     targets = _targets(robot, trajectory, options)
     rate_hz = options.rate_hz or _RATE_HZ

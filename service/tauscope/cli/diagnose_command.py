@@ -112,10 +112,7 @@ def _trajectory_suffix(path: Path) -> str:
 
 
 def parse_against(words: list[str]) -> dict[str, Any]:
-    """Read the values of ``--against``: `against` of the options, and `simulated` or `model` of the request.
-
-    Raises typer.BadParameter for a file that does not exist.
-    """
+    """`against`, and `simulated` or `model` of the request. Raises typer.BadParameter for a missing file."""
     if words in (["identified"], ["model"]):
         return {"against": words[0]}
     for word in words:

@@ -61,11 +61,7 @@ def diagnose_fleet(manifest: Manifest, out: Out, workers: Workers = CORES) -> No
 
 
 def run_fleet(verb: Literal["identify", "diagnose"], manifest: Path, out: Path, workers: int) -> None:
-    """Analyse every robot of a manifest.
-
-    Raises RecordingError if the manifest is not valid: nothing is begun then. Raises ExportError if the results cannot
-    be written. Raises IdentificationError if any robot failed.
-    """
+    """Raises RecordingError for a bad manifest, ExportError for results, IdentificationError if any robot failed."""
     total = sum(1 for _ in read_manifest(manifest))
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -46,10 +46,7 @@ def prove(
 
 
 def become_trials(repository: Path, words: list[str]) -> NoReturn:
-    """Run the trials of a clone in the place of this program: what ends it ends them, and their exit status is its own.
-
-    Raises NotFoundError where the program was installed without its tests.
-    """
+    """Run the trials of a clone in place of this program. Raises NotFoundError where its tests are missing."""
     tests = repository / "tests"
     if not (tests / "concealed").is_dir():
         raise NotFoundError(

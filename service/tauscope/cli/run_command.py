@@ -103,11 +103,7 @@ def require_options(backend: str, options: Collection[str]) -> None:
 
 
 def _run_arm(request: task.Request, asked: Path | None) -> None:
-    """Run to the end, keep the recording, and show what came.
-
-    Raises typer.BadParameter where an option is out of place. Raises TauscopeError where the run cannot start, or ended
-    before its time.
-    """
+    """Raises typer.BadParameter, or TauscopeError where the run cannot start or ended before its time."""
     out = _output(asked)
     folder, is_settled = _folder_beside(out), False
     try:
@@ -128,12 +124,7 @@ def _run_arm(request: task.Request, asked: Path | None) -> None:
 
 
 def keep_recording(result: task.Result, out: Path) -> bool:
-    """Give the recording of a run its place; no file is ever replaced.
-
-    Raises ExportError if there is such a file by now, or it cannot be written.
-
-    Returns bool: False where nothing was recorded.
-    """
+    """Name the recording; False where nothing was recorded. Raises ExportError if it cannot be kept."""
     recording = result.recording(out.suffix.lower().removeprefix("."))
     if recording is not None:
         keep_file(recording, out)

@@ -78,11 +78,7 @@ def serve(
 
 
 def run_server(data: Path | None, **choices: Any) -> None:
-    """Serve until interrupted.
-
-    Raises typer.BadParameter if a setting is out of its range. Raises TauscopeError if the address cannot be listened
-    at, or is one that others could reach without a key.
-    """
+    """Serve until interrupted. Raises typer.BadParameter or TauscopeError if a setting is not possible."""
     try:
         settings = Settings(data_folder=data or default_data_folder(), **choices)
     except ValidationError as error:

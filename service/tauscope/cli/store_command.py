@@ -62,11 +62,7 @@ class OpenStore:
 
 @contextmanager
 def open_store(data: Path | None, database: str | None) -> Iterator[OpenStore]:
-    """Take a data folder.
-
-    Raises StoreError if there is no such folder, or its database cannot be used. Raises TauscopeError if a service
-    works with it.
-    """
+    """Take a data folder. Raises StoreError if it cannot be used, TauscopeError if a service works with it."""
     folder = data or default_data_folder()
     if not folder.is_dir():
         raise StoreError(f"{folder}: there is no such data folder; name it with --data")
@@ -86,10 +82,7 @@ def open_store(data: Path | None, database: str | None) -> Iterator[OpenStore]:
 
 @contextmanager
 def open_database(data: Path | None, database: str | None) -> Iterator[Database]:
-    """Open the database alone, beside a service that may work with it.
-
-    Raises StoreError if there is none, or it cannot be used.
-    """
+    """Open the database beside a service. Raises StoreError if there is none, or it cannot be used."""
     path = (data or default_data_folder()) / FILE_NAME
     if database is None and not path.is_file():
         raise StoreError(f"{path}: there is no such database; name the data folder with --data, or serve it once")

@@ -18,14 +18,7 @@ from tauscope.tasks.task import LocalFiles
 def run_task(
     task: ModuleType, request: Any, asked: Sequence[tuple[Path | None, str]], show: Callable[[Any], None] | None = None
 ) -> Any:
-    """Perform a task, write its outputs, and show the result.
-
-    Raises typer.BadParameter where files are given twice, or an output would destroy an input. Raises TauscopeError
-    where the data or the robot cannot answer.
-
-    `asked`: sequence of (Path, str), files to write, each with the name of its output; `show`: shows the result on the
-    terminal.
-    """
+    """Perform a task; `asked`: files to write, each with its output. Raises typer.BadParameter or TauscopeError."""
     outputs = [(path, name) for path, name in asked if path is not None]
     paths, robot_file = tuple(path for path, _ in outputs), Path(request.robot)
     inputs = list_files(request)
@@ -55,18 +48,7 @@ def name_files(paths: Iterable[Path] | None) -> tuple[str, ...]:
 def write_outputs(
     task: ModuleType, request: Any, outputs: Mapping[Path, str], progress: Told
 ) -> tuple[Any, Iterable[Path]]:
-    """Perform a task and write its outputs: all of them, or none where one cannot be made.
-
-    Raises TauscopeError where the data or the robot cannot answer, a format cannot hold the model, or a file cannot be
-    written.
-
-    Returns
-    -------
-    result
-        of the task
-    iterable of Path
-        what was written; an output that the result does not have is left out
-    """
+    """The result, and the files that were written: all, or none. Raises TauscopeError if one cannot be made."""
     result = task.perform(request, LocalFiles({name: path for path, name in outputs.items()}), progress)
     progress("make outputs")
     made = result.outputs
@@ -78,10 +60,7 @@ def write_outputs(
 
 
 def export_outputs(paths: Sequence[Path], files: Mapping[ExportFormat, ExportFile]) -> list[tuple[Path, str]]:
-    """The outputs that ``--export`` asks for, by the files' suffixes.
-
-    Raises typer.BadParameter where a suffix names no format.
-    """
+    """Outputs of ``--export`` by their suffixes. Raises typer.BadParameter where one names no format."""
     return [(path, files[parse_export_format(path, files, "'--export'")].output) for path in paths]
 
 

@@ -22,10 +22,7 @@ _UNIT = re.compile(r"_(s|ms|m|hz|c|rad_s)$")
 
 
 def spread_values(words: Sequence[str], options: Collection[str]) -> list[str]:
-    """Write an option again before each of its values: ``--held-out a b`` becomes ``--held-out a --held-out b``.
-
-    An option's values end at the next option or at ``--``; ``--held-out=a`` takes this one value.
-    """
+    """Write ``--held-out a b`` as ``--held-out a --held-out b``: values end at the next option or at ``--``."""
     spread: list[str] = []
     option: str | None = None
     for index, word in enumerate(words):
@@ -69,10 +66,7 @@ def make_group(words: str, **verbs: Callable[..., None]) -> typer.Typer:
 
 @dataclass(frozen=True)
 class OptionsOf:
-    """Marks a parameter that takes fields of a model, by name: each is an option, described and bounded as there.
-
-    `only`: the fields; all where empty. `without`: fields that the command states itself.
-    """
+    """A parameter that takes fields of a model as options: `only` these, or all `without` some."""
 
     model: type[BaseModel]
     only: tuple[str, ...] = ()

@@ -102,10 +102,7 @@ def describe_neighbours(bus: BusDriver) -> str:
 
 
 def select_bus(robot: Robot) -> BusDriver:
-    """The driver of the field bus that a robot file's ``drive`` blocks speak of.
-
-    Raises AcquisitionError: none of them, or several.
-    """
+    """The driver of the bus that ``drive`` blocks speak of. Raises AcquisitionError: none of them, or several."""
     blocks = [joint.drive or {} for joint in robot.joints]
     meant = [bus for bus in bus_drivers().values() if any(map(bus.is_meant, blocks))]
     if len(meant) == 1:
@@ -121,13 +118,7 @@ def select_bus(robot: Robot) -> BusDriver:
 
 
 def make_backend(name: str, robot: Robot, settings: Mapping[str, Any], *, folder: Path | None = None) -> Connection:
-    """The backend of a name, not connected yet; moves nothing.
-
-    Raises AcquisitionError where there is no such backend, or a setting or a ``drive`` block is not valid. Raises
-    MissingExtraError where the backend's optional dependencies are not installed.
-
-    `settings`: the driver's own; `folder`: for files of the driver's own.
-    """
+    """A backend, not connected; `folder`: for its own files. Raises AcquisitionError or MissingExtraError."""
     driver = find_driver(name)
     for key in settings:
         if key not in driver.option_names:
@@ -140,10 +131,7 @@ def make_backend(name: str, robot: Robot, settings: Mapping[str, Any], *, folder
 def to_drive_joints(
     driver: Driver, robot: Robot, settings: Mapping[str, Any] = MappingProxyType({})
 ) -> tuple[DriveJoint, ...]:
-    """The joints as a driver sees them: files beside the robot file, on the bus of the settings where they name one.
-
-    Raises AcquisitionError where the driver is of a bus, and a joint has no ``drive`` block.
-    """
+    """The joints as a driver sees them. Raises AcquisitionError where a joint on a bus has no ``drive`` block."""
     joints = [_to_drive_joint(driver, robot, joint) for joint in robot.joints]
     if isinstance(driver, BusDriver):
         bus = {key: settings[key] for key in driver.bus_options if settings.get(key) is not None}
@@ -176,10 +164,7 @@ def _to_drive_joint(driver: Driver, robot: Robot, joint: Joint) -> DriveJoint:
 
 @contextmanager
 def translate_driver_errors() -> Iterator[None]:
-    """Turn what a driver refuses into an error of Tauscope's, in the same words.
-
-    Raises AcquisitionError in place of `DriverError`.
-    """
+    """Raises AcquisitionError in place of `DriverError`, in the same words."""
     try:
         yield
     except DriverError as error:

@@ -41,11 +41,7 @@ class Rule(StrEnum):
 
 @dataclass(frozen=True)
 class Violation:
-    """One find_objection.
-
-    `joint`: name of the joint; None where it concerns the whole arm.
-    `value`: what was found, in the rule's unit; None where it is no number.
-    """
+    """`joint`: None where it concerns the whole arm; `value`: in the rule's unit, None where it is no number."""
 
     rule: Rule
     joint: str | None
@@ -152,10 +148,7 @@ _SPEED_RULES = (Rule.VELOCITY, Rule.BRAKING, Rule.BRAKING)
 
 
 class Guard:
-    """Holds every command, and the state that it answers to, against the limits; objects for good once it objects.
-
-    It keeps the command before and counts, and reads no clock and no device: the same calls give the same verdicts.
-    """
+    """Holds commands and states against the limits; reads no clock and no device: the same calls, the same verdicts."""
 
     def __init__(
         self,

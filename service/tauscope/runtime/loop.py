@@ -35,13 +35,7 @@ class GuardedArm:
         return self._guard.stale
 
     def exchange(self, setpoint: Setpoint, due_ns: int) -> ArmState:
-        """Send a command that the guard passes, and read the arm.
-
-        Raises GuardViolationError where the guard objects; nothing was sent. Raises DriverError where the backend
-        cannot.
-
-        `due_ns`: when it was to be sent [ns].
-        """
+        """Send a command due at `due_ns` [ns]. Raises GuardViolationError before it is sent, or DriverError."""
         violation = self._guard.check(self.state, setpoint, self._backend.clock.now_ns(), due_ns)
         if violation is not None:
             raise GuardViolationError(violation)
@@ -95,11 +89,7 @@ class Cycles:
         return ControlMode.POSITION if self.control is None else ControlMode.TORQUE
 
     def play(self) -> None:
-        """Play the plan from its first cycle to its last.
-
-        Raises StopAskedError where it was asked to stop. Raises GuardViolationError where the guard objected. Raises
-        DriverError where the backend gave up.
-        """
+        """Raises StopAskedError, GuardViolationError or DriverError where it ends before the last cycle."""
         plan, metronome = self.plan, self.metronome
         while metronome.wait():
             raise_if_requested(self.stops)
@@ -110,10 +100,7 @@ class Cycles:
             self.each_cycle(self)
 
     def _log(self, cycle: int, state: ArmState, torque: Array) -> None:
-        """No answer at all, or one that is no newer than the one before, is no sample: the guard counts it.
-
-        Nor is one that came so late that nobody knows of which instant it tells.
-        """
+        """An answer that is missing, not newer, or too late to tell its instant is no sample: the guard counts it."""
         plan, row = self.plan, self._fields
         if state.late_ns > self.latest_ns:
             self.late += state.fresh

@@ -78,13 +78,7 @@ def choose_rate_hz(options: RunOptions, capabilities: Capabilities) -> float:
 def choose_stop_policy(
     options: RunOptions, joints: Sequence[Joint], capabilities: Capabilities | None = None
 ) -> StopPolicy:
-    """How the arm is stopped: as the run says, else as the robot file's drives say, else under power where it is.
-
-    An arm that is released is held first. Raises AcquisitionError where the robot file states no policy, or several; or
-    the device cannot do it by itself.
-
-    `capabilities`: what the device can do by itself; None where it is not known yet.
-    """
+    """As the run says, else the drives, else hold. Raises AcquisitionError where there are several, or none can."""
     wanted = options.stop_policy or _read_policy(joints)
     policy = StopPolicy.HOLD if wanted == RELEASE else StopPolicy(wanted)
     if capabilities is not None and policy not in (able := capabilities.policies_in(options.mode)):
@@ -96,11 +90,7 @@ def choose_stop_policy(
 
 
 def is_released(options: RunOptions, joints: Sequence[Joint]) -> bool:
-    """Whether the arm is let go once it stands still at the end of its motion.
-
-    Raises AcquisitionError where it is asked for, and the robot file does not state that the arm is safe without
-    torque.
-    """
+    """Whether the arm is let go at the end. Raises AcquisitionError where it is not said to be safe without torque."""
     if options.stop_policy not in (None, RELEASE):
         return False
     is_stated = _read_policy(joints) == RELEASE

@@ -19,10 +19,7 @@ def child_environment() -> dict[str, str]:
 
 
 def read_process_start(pid: int) -> int | None:
-    """When a process was started, in the kernel's ticks; with its number it names a process for good.
-
-    Returns int or None: None where there is no such process.
-    """
+    """When a process was started, in the kernel's ticks; None where there is no such process."""
     try:
         status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -52,10 +49,7 @@ class RunLock:
 
 
 def wait_for_lock(folder: Path, patience_s: float) -> RunLock | None:
-    """Take a folder as soon as nobody holds it.
-
-    `patience_s`: how long to wait [s]. Returns RunLock or None: None where it is still held.
-    """
+    """Take a folder as soon as nobody holds it; None where it is still held after `patience_s` [s]."""
     deadline = time.monotonic() + patience_s
     while True:
         try:

@@ -41,10 +41,7 @@ class ProcessName(StrictModel):
 
 
 def write_process(folder: Path, pid: int) -> None:
-    """Keep which process was started for a run, as soon as it was: it may never come to say so itself.
-
-    Raises OSError where the disk does not take it.
-    """
+    """Keep the process of a run as soon as it is started. Raises OSError where the disk does not take it."""
     write_atomically(folder / PROCESS_FILE, ProcessName.of(pid).model_dump_json().encode())
 
 
@@ -168,10 +165,7 @@ class RecordKeeper:
             self._changed.notify_all()
 
     def close(self, patience_s: float = FLUSH_S) -> str | None:
-        """Wait for the last record to reach the disk.
-
-        `patience_s`: how long [s]. Returns str or None: why it did not, None where it did.
-        """
+        """Why the last record did not reach the disk within `patience_s` [s]; None where it did."""
         with self._changed:
             self._is_closed = True
             self._changed.notify_all()

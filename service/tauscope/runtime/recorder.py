@@ -98,10 +98,7 @@ class DirectRecorder:
 
 
 class RecorderProcess:
-    """Hands the cycles to a process of its own, by a pipe that holds some seconds of them.
-
-    It outlives this process: what is in the pipe when this process is killed is still written.
-    """
+    """Hands the cycles to a process that outlives this one: what is in the pipe is still written."""
 
     def __init__(
         self, path: Path, header: JournalHeader, *, may_wait: bool = False, command: Sequence[str] | None = None

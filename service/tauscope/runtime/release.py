@@ -18,10 +18,7 @@ _LOOK_S = 0.05
 
 
 def release_settled(backend: Backend, state: ArmState) -> ArmState:
-    """Hold an arm until it stands still, then let go of it; one that moves, or is not seen, stays held.
-
-    `state`: of an arm that was just stopped to hold.
-    """
+    """Hold an arm that was just stopped until it stands still, then let go; one that moves stays held."""
     clock = backend.clock
     begin_ns = since_ns = clock.now_ns()
     place = state.position

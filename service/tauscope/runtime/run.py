@@ -61,11 +61,7 @@ LEAST_CYCLES_A_WATCHDOG = 2  # A watchdog has to outlast this many cycles, or ev
 
 
 def prepare(task: RunTask, backend: Backend, state: ArmState) -> Plan:
-    """Plan a run for the arm as it was found, or refuse it: no torque is on yet.
-
-    Raises AcquisitionError where the backend cannot do what was asked for, a drive reports a fault, or the motion does
-    not fit.
-    """
+    """Plan a run without torque. Raises AcquisitionError where backend, drives or motion do not allow it."""
     options, capabilities = task.options, backend.capabilities
     choose_stop_policy(options, task.robot.joints, capabilities)
     if options.mode not in capabilities.modes:
@@ -329,11 +325,7 @@ def run_trajectory(
     stops: Stops | None = None,
     report: Report | None = None,
 ) -> RunRecord:
-    """Run a motion in this process and return when it is over.
-
-    A run in real time belongs into a process of its own (`tauscope.runtime.RunProcess`), which does nothing else.
-    Raises AcquisitionError where the folder holds a run, or cannot be written to.
-    """
+    """Run a motion in this process, real time in one of its own. Raises AcquisitionError where the folder is taken."""
     options = options or RunOptions()
     prepare_folder(folder)
     record = new_record(robot.name, backend_name, options.mode.value)
@@ -356,10 +348,7 @@ def prepare_folder(folder: Path) -> None:
 
 
 def open_recorder(path: Path, header: JournalHeader, stops: Stops, is_real_time: bool) -> Recorder:
-    """Open a journal in the way that suits the arm's time.
-
-    Raises AcquisitionError where the journal cannot be created.
-    """
+    """Open a journal. Raises AcquisitionError where it cannot be created."""
     if not is_real_time:
         return DirectRecorder(path, header)
     recorder = RecorderProcess(path, header)

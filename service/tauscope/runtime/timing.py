@@ -127,10 +127,7 @@ class Metronome:
         self.played = 0
 
     def wait(self) -> bool:
-        """Wait for the next deadline that is not a whole period past, and say in `index` which it is.
-
-        Returns bool: False where there is none left.
-        """
+        """Wait for the next deadline that is not a whole period past, its `index`; False where there is none left."""
         if self._next >= self._cycles:
             return False
         due = self._start + self._next * self._period

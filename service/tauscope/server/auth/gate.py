@@ -83,8 +83,6 @@ class HttpMiddleware:
 
 
 class Gate(HttpMiddleware):
-    """Lets a request pass that comes with a key of the scope that it needs."""
-
     @override
     async def answer(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
         outcome = _admit(cast(Access, scope["app"].state.services.access), scope)

@@ -97,11 +97,7 @@ _NOBODY = "0" * 64
 
 
 class ApiKey(StrictModel):
-    """One key, without its secret.
-
-    The secret is 256 random bits, so that one SHA-256 with a salt is enough: there is nothing to guess that a slow hash
-    would protect, and a slow one would let strangers keep the service busy.
-    """
+    """The secret is 256 random bits: one salted SHA-256 is enough, and a slow hash would keep the service busy."""
 
     id: str = Field(pattern="^[0-9a-f]{8}$", description="public part of the key")
     name: str = Field(min_length=1, max_length=100, description="who has it")
@@ -130,10 +126,7 @@ class KeyFile:
         self.path = folder / KEY_FILE
 
     def read(self) -> tuple[ApiKey, ...]:
-        """All keys ever made, revoked ones too; none where there is no file.
-
-        Raises TauscopeError if the file is damaged or cannot be read.
-        """
+        """All keys ever made; none without a file. Raises TauscopeError if the file is damaged or cannot be read."""
         try:
             return _KeyList.model_validate_json(self.path.read_bytes()).keys
         except FileNotFoundError:
@@ -220,11 +213,7 @@ LOCAL = Caller("local", None, Scope.ADMIN)  # anybody on this machine, as long a
 
 
 class KeyRing:
-    """Tells callers by their keys.
-
-    Once a service has had a key, it asks for one, also after the last was revoked. A file that is damaged while the
-    service runs changes nothing: whoever could stop an arm can still do so.
-    """
+    """Asks for a key once there was one, also after the last was revoked; keeps its keys while the file is damaged."""
 
     def __init__(self, file: KeyFile, *, is_required: bool, clock: Callable[[], datetime] = utc_now) -> None:
         """Read the keys. Raises TauscopeError if the file is damaged."""
@@ -254,7 +243,6 @@ class KeyRing:
         return Caller(key.name, key.id, key.scope)
 
     def look(self) -> None:
-        """Read the file again if it was changed."""
         try:
             stamp = self._file.stamp()
             if stamp != self._stamp:
@@ -264,5 +252,4 @@ class KeyRing:
             _log.exception("the API keys could not be read again; those known so far count")
 
     def _revoke_all(self) -> tuple[ApiKey, ...]:
-        """All known keys as revoked: their file was taken away."""
         return tuple(key.model_copy(update={"revoked": key.revoked or self._clock()}) for key in self._keys)

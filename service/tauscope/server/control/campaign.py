@@ -59,8 +59,6 @@ class CampaignOrder(CampaignOptions):
 
 
 class CampaignLinks(StrictModel):
-    """What a campaign has made so far; null where it has not come to it."""
-
     excitation: str | None = Field(default=None, description="identifier of the training motion")
     held_out_excitation: str | None = Field(default=None, description="identifier of the held-out motion")
     run: str | None = Field(default=None, description="identifier of the training run")
@@ -72,8 +70,6 @@ class CampaignLinks(StrictModel):
 
 
 class CampaignWorkspace(Workspace):
-    """Files of a campaign: ``order.json`` and ``robot/``; ``made.json`` names what it has made so far."""
-
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)
         self.robot = folder / "robot"
@@ -309,7 +305,6 @@ class CampaignRunner:
                     dependencies.jobs.cancel(kind, identifier)
 
     def _move(self, state: JobState, problem: JobProblem | None = None) -> bool:
-        """Write the campaign's new state, if it may follow the present one; False where the disk does not take it."""
         record = self._workspace.read_record()
         if record is None or not record.may_become(state):
             return True

@@ -60,14 +60,11 @@ class DeviceClaims:
 class Permit(Protocol):
     """Somebody's leave to move one arm. Every method takes no lock, touches no disk and returns at once."""
 
-    def require(self) -> None:
-        """Refuse a motion that may not begin. Raises LeaseError if it may not."""
+    def require(self) -> None: ...
 
-    def find_end_reason(self) -> str | None:
-        """Why the motion may not go on; None while it may."""
+    def find_end_reason(self) -> str | None: ...
 
-    def disarm(self) -> None:
-        """Somebody stopped the arm: before it moves again, it has to be armed again."""
+    def disarm(self) -> None: ...
 
 
 class FreePermit:
@@ -233,7 +230,6 @@ class Leases:
             self._finish(self.require(device, token, owner), "it was released")
 
     def disarm_all(self) -> None:
-        """Let no leased arm move before it is armed again; takes no lock."""
         for lease in self._active.values():
             lease.is_armed = False
 
@@ -268,7 +264,6 @@ class Leases:
         return lease.lost
 
     def require_unleased(self, device: str) -> None:
-        """Refuse an arm that somebody has a lease of. Raises LeasedError if somebody has."""
         present = self._present(device)
         if present is not None:
             raise self._refuse_leased(present)

@@ -51,11 +51,7 @@ class RunRequestRecord(StrictModel):
 
 
 class RunWorkspace(JobFolder):
-    """Files of a run.
-
-    ``request.json``, ``robot/`` and ``trajectory/`` are its input; ``control/`` belongs to the control process and
-    holds its record, the journal and the recording. Before there is a control process, the record stands beside it.
-    """
+    """Input, and the folder ``control/`` of the control process; before there is one the record stands beside it."""
 
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)

@@ -27,14 +27,12 @@ class Supervisor(Protocol):
     @property
     def state(self) -> Any: ...
 
-    def run(self) -> None:
-        """Supervise to the end; never raises."""
+    def run(self) -> None: ...
 
     def stop(self) -> None:
         """Stop, in any state; takes no lock, returns at once, may be called repeatedly."""
 
-    def interrupt(self) -> None:
-        """Stop because the service ends; as `stop` otherwise."""
+    def interrupt(self) -> None: ...
 
 
 S = TypeVar("S", bound=Supervisor)
@@ -55,8 +53,6 @@ class SupervisedThreads(Generic[S]):
         self._active: Mapping[str, _Supervised[S]] = {}
 
     def start(self, identifier: str, supervisor: S, then: Callable[[], None] = lambda: None) -> None:
-        """Run a supervisor in a thread of its own, and call `then` after it."""
-
         def run() -> None:
             try:
                 supervisor.run()
@@ -140,13 +136,10 @@ BEATS_A_HEARTBEAT = 5  # how often it is told so in the time after which it coun
 
 
 class ControlProcess(Protocol):
-    """The process that moves the arm, as its owner sees it."""
-
     def stop(self) -> None:
         """Ask it to stop; returns at once, may be called at any time and any number of times."""
 
-    def beat(self) -> None:
-        """Say that the owner is alive."""
+    def beat(self) -> None: ...
 
     def wait(self, timeout_s: float | None = None) -> RunRecord:
         """Wait for the end of the run [s], for good where None. Raises TimeoutError if it has not come by then."""
@@ -323,7 +316,6 @@ class RunManager(Manager[RunSupervisor]):
         return identifier
 
     def live(self, identifier: str) -> Live | None:
-        """The status of an active run; None for any other."""
         supervisor = self._threads.find(identifier)
         return None if supervisor is None else supervisor.live
 

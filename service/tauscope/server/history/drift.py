@@ -25,11 +25,7 @@ class NamedParameter:
 
 
 def extract_parameters(document: IdentificationDocument) -> tuple[NamedParameter, ...]:
-    """The parameters of an identification that its recordings tell.
-
-    The shape constants K_v and δ are left out: they describe the same curve as stiction and Stribeck friction, and
-    wander with them.
-    """
+    """All but the shape constants K_v and δ, which describe the same curve as stiction and Stribeck friction."""
     return (*_base(document), *_friction(document), *_rotors(document))
 
 

@@ -76,7 +76,6 @@ def _consistency(document: IdentificationDocument, policy: ModelPolicy) -> Gate:
 
 
 def _excitation(document: IdentificationDocument, policy: ModelPolicy) -> Gate:
-    """The motion shows every parameter."""
     if document.undetermined:
         names = ", ".join(document.undetermined[:3])
         return Gate("excitation", False, f"the recordings say nothing about {names}; record a richer motion")
@@ -87,7 +86,6 @@ def _excitation(document: IdentificationDocument, policy: ModelPolicy) -> Gate:
 
 
 def _structure(document: IdentificationDocument, active: IdentificationDocument) -> Gate:
-    """It is a model of the same arm."""
     if document.joints != active.joints:
         return Gate("structure", False, "other joints than the active model's; activate it by hand if the arm changed")
     if _names(document) != _names(active):

@@ -176,11 +176,7 @@ class ChangedItem:
 
 
 class Indexer:
-    """Compares the folders with the index. The folders are right, always; nothing here writes to them.
-
-    Jobs and runs know nothing of the index: a database that is locked or gone holds up none of them, and what was
-    missed meanwhile is made up for by the next comparison.
-    """
+    """Keeps the index like the folders, which are right; a database that is gone holds up no job."""
 
     def __init__(self, index: Index, items: Mapping[str, ItemStore], recordings: RecordingStore) -> None:
         self.index = index
@@ -204,7 +200,6 @@ class Indexer:
             self._is_whole = not self._is_closing.is_set()
 
     def close(self) -> None:
-        """Have what is being indexed end after the present item."""
         self._is_closing.set()
 
     def refresh(self) -> None:

@@ -84,7 +84,6 @@ class ModelHistory:
             return frozenset(session.scalars(select(Model.identifier).where(Model.is_active | Model.is_reference)))
 
     def find(self, identifier: str) -> ModelEntry:
-        """A model. Raises NotFoundError if no such identification was judged."""
         with self._database.reading() as session:
             return _entry(_model(session, identifier))
 

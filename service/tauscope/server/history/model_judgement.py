@@ -121,10 +121,7 @@ def _check_place(candidate: Candidate, active: Model | None) -> Sequence[Gate]:
 
 
 def _check_diagnosis(content: bytes | None, document: IdentificationDocument, policy: ModelPolicy) -> Iterator[Gate]:
-    """A model whose parameters hold without the physics that its own diagnosis names.
-
-    A parameter that the findings move by as much as counts as drift is wrong in the model.
-    """
+    """A parameter that the diagnosis' findings move by as much as counts as drift is wrong in the model."""
     diagnosis = _parse(content, OwnDiagnosis)
     if diagnosis is None:
         return

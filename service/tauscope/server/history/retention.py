@@ -30,11 +30,7 @@ class Removal:
 def plan_removal(
     indexer: Indexer, history: ModelHistory, recordings: RecordingStore, rule: RetentionRule, now: datetime
 ) -> Removal:
-    """What a rule lets go.
-
-    The identification of an active model, or of one that drift is counted from, stays; so does what goes on, and what
-    is damaged: somebody should look at it. Raises StoreError if the database does not answer.
-    """
+    """What a rule lets go: nothing active, unfinished or damaged, and no reference. Raises StoreError."""
     indexer.sync(thorough=True)
     list_protected = history.list_protected()
     going = [

@@ -149,11 +149,7 @@ def _shorten_answers(operation: dict[str, Any]) -> None:
 
 
 def _share_problems(document: dict[str, Any]) -> None:
-    """Put each problem's example, and each set of problems, into the document once.
-
-    The answer `default` of an operation with a scope holds the problems of any request; a status that has no others
-    is left out.
-    """
+    """Hold each problem's example once; `default` holds those of any request, and a status without others goes."""
     examples: dict[str, Any] = {}
     shared: dict[str, dict[str, Any]] = {}
     for operation in _operations(document):
@@ -296,10 +292,7 @@ def binary_parts(description: str) -> dict[str, Any]:
 
 
 def file_contents(*media_types: str) -> dict[str, Any]:
-    """The content of an answer that is a file of one of several types.
-
-    Generators of clients read by the first type: bytes where there is one, else text.
-    """
+    """A file of one of several types; generators of clients read by the first: bytes where there is one, else text."""
     ranks = {_BYTES: 0, "application/json": 2}
     ordered = sorted(media_types, key=lambda each: (ranks.get(each, 0 if each.startswith("text/") else 1), each))
     schemas = {_BYTES: {"type": "string", "format": "binary"}, "application/json": {}}
@@ -326,10 +319,7 @@ def resolve_reference(document: Mapping[str, Any], node: dict[str, Any]) -> dict
 
 
 def install_openapi(app: FastAPI) -> None:
-    """Have the application's OpenAPI document hold all models, and refer to formats of files by their address.
-
-    ``app.state.schemas`` then holds every model in full, as text by name: a reference is the other model's name.
-    """
+    """Fit the document to 150 kB; ``app.state.schemas`` holds every model in full, as text by name."""
 
     def document() -> dict[str, Any]:
         if app.openapi_schema is None:

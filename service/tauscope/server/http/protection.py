@@ -141,11 +141,7 @@ LONGEST_WAIT_S = 30.0  # how long a client that has its answer may go on sending
 
 
 class BodyLimit(HttpMiddleware):
-    """Ends a request whose body is larger than allowed, by its own word or by count, with problem `limit-exceeded`.
-
-    Whenever a request is answered before its body was read, the rest is read and dropped: else a client that is still
-    sending would see a broken connection in place of the answer.
-    """
+    """Ends a request whose body is too large; reads the rest, else a client that sends sees a broken connection."""
 
     def __init__(self, app: ASGIApp, limit: int) -> None:
         super().__init__(app)
@@ -221,10 +217,7 @@ _PROBES = ("/healthz", "/readyz")
 
 
 class ConcurrencyLimiter(HttpMiddleware):
-    """Admits a few reading requests at a time, first come first served; all other requests pass at once.
-
-    A slot is free again when the answer begins: a stream of events keeps no other request waiting.
-    """
+    """Admits a few readers at a time, until their answers begin: a stream keeps nobody waiting; others pass."""
 
     def __init__(
         self,

@@ -73,7 +73,6 @@ def show_example(name: str) -> Response:
 
 @cache
 def assets() -> Mapping[str, Asset]:
-    """All files of the page by name: ours, the plotting library's, and the list of drivers."""
     package = distribution("uplot-python")
     paths = {path.name: path for path in sorted(STATIC.iterdir()) if path.suffix in MEDIA_TYPES}
     paths |= {name: Path(str(package.locate_file(file))) for name, file in PLOT_LIBRARY.items()}

@@ -168,10 +168,7 @@ class Understanding:
 
 
 def understand_recording(path: Path, robot: Robot | None, reading: Reading) -> Understanding:
-    """Find a file's columns and units, and report what it holds when it is read so.
-
-    A mapping that its column names suggest is used like one that was stated.
-    """
+    """Find columns and units, guessed ones too, and report what a file holds when it is read so."""
     mapping = None
     with suppress(RecordingError):  # a log, or a file that the check refuses, too
         mapping = find_mapping(path, robot, reading)
@@ -185,16 +182,7 @@ def understand_recording(path: Path, robot: Robot | None, reading: Reading) -> U
 
 
 def read_kept_samples(path: Path, most: int) -> bytes:
-    """Time, positions and effort of a recording in the store, for a plot.
-
-    A recording of more samples than asked for is thinned: of each stretch those are kept at which any joint's position
-    or effort is least or greatest. Raises RecordingError if it cannot be read; the message calls the file by its name
-    alone.
-
-    Returns bytes: length of the header (4 bytes, little-endian), the header (JSON, filled with blanks to a multiple of
-        four), then each column that the header names as 32-bit floats, little-endian; time counts from the first sample
-        [s].
-    """
+    """Samples of a plot, thinned to extremes: header length (4 bytes), JSON header, columns of 32-bit floats."""
     with hide_folders(path.parent):
         recording = read_recording(path)
     samples = recording.samples()

@@ -64,11 +64,7 @@ class ClusterUnavailableError(BrokenExecutor):
 
 
 class ClusterExecutor(Executor):
-    """A Dask cluster; a task whose worker dies again and again ends with BrokenExecutor, as in a pool of processes.
-
-    Dask's own client gives up for good where the scheduler is away for longer than it waits. A thread reaches the
-    scheduler again then; meanwhile `is_there` is false, tasks end with `ClusterUnavailableError`.
-    """
+    """A Dask cluster that is reached again where Dask's client has given up; `is_there` is false meanwhile."""
 
     def __init__(self, address: str, wait_s: float = 0.0) -> None:
         """`wait_s`: for a scheduler that is away [s]. Raises StoreError if it does not answer, or without Dask."""
@@ -187,13 +183,6 @@ def _executor_of(client: "Client") -> Executor:
 
 
 def open_executor(workers: int, wait_s: float = 0.0, deadline_s: float | None = None) -> Executor:
-    """Where analysis is done: on the cluster that the environment names, else in processes of our own.
-
-    The workers of a cluster have to see the data folder under the same path. Raises StoreError if the cluster does not
-    answer, or Dask is not installed.
-
-    `wait_s`: how long a task waits for a cluster that is away before it ends [s]; `deadline_s`: how long a task may
-    take in a process of our own [s].
-    """
+    """The cluster that the environment names, or processes of our own; bounds in [s]. Raises StoreError."""
     address = os.environ.get(SCHEDULER, "")
     return ClusterExecutor(address, wait_s) if address else WorkerPool(workers, deadline_s=deadline_s)

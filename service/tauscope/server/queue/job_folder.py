@@ -221,11 +221,7 @@ class JobFolder:
 
 
 class Workspace(JobFolder):
-    """A job in the queue: its state beside its step and its events.
-
-    ``state.json`` is written by whoever leads the job only, ``progress`` by the work only, ``events.jsonl`` by both;
-    input is written by whoever hands the job in, and never again.
-    """
+    """``state.json`` is written by whoever leads the job, ``progress`` by the work, ``events.jsonl`` by both."""
 
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)

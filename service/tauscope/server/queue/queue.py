@@ -54,14 +54,7 @@ class QueuedJob:
         return 0 if record is None else record.attempts
 
     def move(self, state: JobState, problem: JobProblem | None = None) -> bool:
-        """Write a new state, if it may follow the present one.
-
-        An earlier attempt may have written it and failed after that, as on a disk that became full in between. Raises
-        OSError if the disk does not take it.
-
-        Returns bool: whether the job is in that state now; False where it may not be, its record is damaged, or it is
-        gone.
-        """
+        """Write a state; False where it may not follow, is damaged or gone. Raises OSError if the disk is full."""
         try:
             workspace = Workspace(self.folder)
         except NotFoundError:

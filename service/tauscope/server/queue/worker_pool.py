@@ -80,11 +80,7 @@ class _Task:
 
 
 class WorkerPool(Executor):
-    """A pool of spawned processes, one BLAS thread each; a process that dies takes its own work with it only.
-
-    A future stays pending while its work goes on: `Future.cancel` succeeds until the end, and kills the process.
-    Work ends with BrokenProcessPool where its process died, with LimitExceededError beyond a bound.
-    """
+    """Spawned processes, one BLAS thread each; `Future.cancel` kills the process, and a bound ends it."""
 
     def __init__(self, workers: int, *, deadline_s: float | None = None, memory_bytes: int | None = None) -> None:
         """`deadline_s`: of a call [s]; `memory_bytes`: data that a process may hold. Processes start when needed."""

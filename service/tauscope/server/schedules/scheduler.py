@@ -249,7 +249,6 @@ class Scheduler:
         return latest is None or latest > now
 
     def _find_obstacle(self, entry: ScheduleEntry, definition: ScheduleDefinition) -> str | None:
-        """Why nothing may be started now."""
         window = definition.window
         if window is not None and not definition.is_open(self._clock()):
             days = ", ".join(window.days)

@@ -22,11 +22,7 @@ class LoggedEvent:
 
 
 class EventLog:
-    """A file of JSON objects, one a line, that only ever grows.
-
-    Who appends holds the file's lock meanwhile: lines of several processes never mix, and a line that another has half
-    written is not taken for one that a full disk cut off. Such a line keeps its number and is passed over.
-    """
+    """Lines of JSON, appended under a lock; one that a full disk cut off keeps its number and is passed over."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -53,7 +49,6 @@ class EventLog:
         return _parse(lines[-2]) if len(lines) > 1 else None
 
     def follow(self, after: int = 0) -> "LogFollower":
-        """A reader of what comes after a line."""
         return LogFollower(self.path, after)
 
 

@@ -83,7 +83,6 @@ class IncomingFile:
         return KeptFile(self.path, self.name, self.size, self._hash.hexdigest())
 
     def discard(self) -> None:
-        """Close and remove the file; may be called twice."""
         self._file.close()
         self.path.unlink(missing_ok=True)
 

@@ -36,10 +36,7 @@ class KnownHash:
 
 
 class RecordingHashes:
-    """A small file a recording, which names the size and the time of the file that its hash belongs to.
-
-    What is missing or damaged here can be computed again; only what the recording was in the beginning is lost then.
-    """
+    """A file a recording, with the size and time that its hash belongs to; only `kept` cannot be computed again."""
 
     def __init__(self, root: Path) -> None:
         self._root = root
@@ -80,7 +77,6 @@ class RecordingHashes:
                 path.unlink(missing_ok=True)
 
     def _write(self, name: str, status: os.stat_result, known: KnownHash) -> None:
-        """Write what is known, unless that is written already."""
         content = {"size": status.st_size, "modified_ns": status.st_mtime_ns, **asdict(known)}
         content |= {"check": _check(content)}
         if content != self._read(name):
@@ -127,10 +123,7 @@ class StoredRecording:
 
 
 class RecordingStore:
-    """The folder of recordings; files that an operator puts there by hand belong to it too.
-
-    Only regular files are seen: a symbolic link could lead out of the folder.
-    """
+    """Regular files by name, an operator's too; a symbolic link could lead out of the folder."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -152,7 +145,6 @@ class RecordingStore:
         return self.find(file.name), is_new
 
     def path(self, name: str) -> Path:
-        """Where a recording lies. Raises NotFoundError if no regular file of this name is in the folder."""
         self._status(name)
         return self.root / name
 
@@ -229,10 +221,7 @@ class RecordingStore:
         return status
 
     def _give_name(self, file: KeptFile) -> bool:
-        """Link the file to its name, which fails where the name is in use; True where it is new.
-
-        What its bytes are is written down first: no recording is ever there of which that is not known.
-        """
+        """Link a file to its name, its hash written first; False where the same bytes have that name."""
         target = self.root / file.name
         with self._naming:
             if os.path.lexists(target):

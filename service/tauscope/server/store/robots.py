@@ -58,7 +58,6 @@ class RobotStore:
         return robot, True
 
     def discard(self, staged: Path) -> None:
-        """Remove a staged folder; nothing happens where it was kept."""
         shutil.rmtree(staged.parent if staged.name == _FILES else staged, ignore_errors=True)
 
     def versions(self) -> list[RobotVersion]:

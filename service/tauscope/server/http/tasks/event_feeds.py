@@ -62,7 +62,6 @@ class Feed:
         self._wake()
 
     def _wake(self) -> None:
-        """Wake everybody who waits; who waits next waits for the next news."""
         news, self._news = self._news, asyncio.Event()
         news.set()
 
@@ -92,7 +91,6 @@ class EventFeeds:
                 del self._feeds[path]
 
     async def _read_all(self) -> None:
-        """Read every feed that somebody follows, round after round, until nobody does."""
         while self._feeds:
             feeds = [feed for feed in self._feeds.values() if not feed.is_over]
             if self._closing.is_set():

@@ -101,7 +101,6 @@ def present_revision(connection: Connection) -> str | None:
 
 @cache
 def revisions() -> tuple[str, ...]:
-    """All forms that this program knows, the oldest first."""
     scripts = ScriptDirectory.from_config(_configuration(None))
     return tuple(script.revision for script in scripts.walk_revisions())[::-1]
 
@@ -159,11 +158,7 @@ class Database:
 
     @contextmanager
     def writing(self) -> Iterator[Session]:
-        """A transaction that writes: all of it is kept, or nothing. Keep it short, others wait meanwhile.
-
-        Raises StoreError if the database does not answer, or somebody else writes for longer than we wait. Raises
-        IntegrityError if a row that may be there once is there already.
-        """
+        """A short transaction that writes. Raises StoreError, or IntegrityError if a unique row is there already."""
         engine = self._engine.execution_options(**{WRITES: True})
         with self._own_words(), Session(engine, expire_on_commit=False) as session, session.begin():
             session.connection()  # takes SQLite's lock now, not with the first statement
