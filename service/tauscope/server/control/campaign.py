@@ -38,12 +38,11 @@ from tauscope.server.queue.job_folder import (
     JobState,
     StoppedError,
     Workspace,
-    read_stored,
-    write_stored,
 )
 from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, JobKind, JobQueue, QueueFullError
 from tauscope.server.queue.task_job import Order, TaskWorkspace, order_kept, stage_workspace, submit_job
 from tauscope.server.store.data_folder import ItemStore, staged_identifier
+from tauscope.server.store.files import read_stored, write_stored
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.campaign import CampaignOptions, backend_of_run

@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import count
-from typing import Protocol
 
 from typing_extensions import override
 
@@ -57,28 +56,21 @@ class DeviceClaims:
         return BusyError(one_line(f"{device}: {holder} has it; wait until that has ended, or stop it"))
 
 
-class Permit(Protocol):
-    """Somebody's leave to move one arm. Every method takes no lock, touches no disk and returns at once."""
+class Permit:
+    """Leave to move one arm, here one without lease; takes no lock, touches no disk and returns at once."""
 
-    def require(self) -> None: ...
-
-    def find_end_reason(self) -> str | None: ...
-
-    def disarm(self) -> None: ...
-
-
-class FreePermit:
-    """Leave to move an arm that nobody has a lease of, where no lease is asked for."""
-
-    def require(self) -> None: ...
+    def require(self) -> None:
+        """Raises LeaseError if a motion may not begin."""
 
     def find_end_reason(self) -> str | None:
+        """Why a motion may not go on; None while it may."""
         return None
 
-    def disarm(self) -> None: ...
+    def disarm(self) -> None:
+        """Ask for the arm to be armed again before it moves again."""
 
 
-FREE = FreePermit()  # leave that is never taken back
+FREE = Permit()  # leave that is never taken back
 
 
 class LeaseError(AcquisitionError):
@@ -124,10 +116,11 @@ class Lease:
         return f"{self.number}-{self.secret}"
 
 
-class LeasePermit:
+class LeasePermit(Permit):
     def __init__(self, lease: Lease, find_end_reason: Callable[[Lease], str | None]) -> None:
         self._lease, self._end_of = lease, find_end_reason
 
+    @override
     def require(self) -> None:
         lost = self._end_of(self._lease)
         if lost is not None:
@@ -136,17 +129,19 @@ class LeasePermit:
             hint = f"POST /api/v1/leases/{self._lease.id}/arm first"
             raise NotArmedError(one_line(f"{self._lease.device}: its lease is not armed; {hint}"))
 
+    @override
     def find_end_reason(self) -> str | None:
         lost = self._end_of(self._lease)
         if lost is not None:
             return f"lease {self._lease.number} of {self._lease.holder} ended: {lost}"
         return None if self._lease.is_armed else f"lease {self._lease.number} of {self._lease.holder} was disarmed"
 
+    @override
     def disarm(self) -> None:
         self._lease.is_armed = False
 
 
-class UnleasedPermit(FreePermit):
+class UnleasedPermit(Permit):
     """Permit for one motion, by the claim of the arm alone; the arm cannot be leased while it lasts."""
 
     def __init__(self, device: str, require_unleased: Callable[[str], None]) -> None:

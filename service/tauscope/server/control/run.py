@@ -27,12 +27,11 @@ from tauscope.server.queue.job_folder import (
     JobRecord,
     JobState,
     Workspace,
-    read_stored,
     without_folders,
-    write_stored,
 )
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.task_job import TaskWorkspace
+from tauscope.server.store.files import read_stored, write_stored
 from tauscope.strict_model import StrictModel
 from tauscope.tasks import run
 from tauscope.tasks.run import BackendChoice, recording_file

@@ -5,6 +5,7 @@ from typing import Any, Literal
 from urllib.parse import quote
 
 from fastapi import Request
+from fastapi.concurrency import contextmanager_in_threadpool
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 from typing_extensions import override
@@ -40,10 +41,10 @@ from tauscope.server.http.tasks.submission import (
     choose_backend,
     keep_robot,
     receive_request,
-    stage_request,
 )
 from tauscope.server.problems import problem_responses
 from tauscope.server.queue.job_folder import JobState
+from tauscope.server.queue.task_job import stage_workspace
 from tauscope.tasks.campaign import CampaignOptions
 from tauscope.tasks.run import BackendChoice
 
@@ -194,7 +195,9 @@ class Campaigns(MovingResource):
 
     @override
     async def submit(self, request: Request, services: Services) -> str:
-        async with stage_request(services.campaigns.items, CampaignWorkspace) as workspace:
+        async with contextmanager_in_threadpool(
+            stage_workspace(services.campaigns.items, CampaignWorkspace)
+        ) as workspace:
             received = await receive_request(request, CampaignRequest, services.settings, workspace.robot)
             robot_file = await run_in_threadpool(keep_robot, received, workspace.robot, services.robots)
             robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)

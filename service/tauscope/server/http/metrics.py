@@ -3,11 +3,11 @@
 import threading
 import time
 from collections import Counter as Tally
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor, Future
 from typing import Any
 
-from prometheus_client import CollectorRegistry, Counter, Histogram, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
@@ -52,7 +52,20 @@ class Metrics:
         self.registry.register(ModelDrift(drift))
 
     def watch(self, name: str, text: str, value: Callable[[], float]) -> None:
-        self.registry.register(_Watched(name, text, value))
+        """Have a number asked for whenever somebody looks; NaN where that fails."""
+
+        def ask() -> float:
+            try:
+                return value()
+            except OSError:
+                return float("nan")
+
+        Gauge(name, text, registry=self.registry).set_function(ask)
+
+    def watch_readiness(self, checks: Mapping[str, Callable[[], str | None]]) -> None:
+        gauge = Gauge("tauscope_ready", "Whether a part can work: 1, or 0", ["part"], registry=self.registry)
+        for part, check in checks.items():
+            gauge.labels(part).set_function(lambda check=check: float(check() is None))
 
     def text(self) -> bytes:
         return generate_latest(self.registry)
@@ -147,20 +160,6 @@ class TimedExecutor(Executor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         self._executor.shutdown(wait=wait, cancel_futures=cancel_futures)
-
-
-class _Watched(Collector):
-    """A gauge whose value is asked for."""
-
-    def __init__(self, name: str, text: str, value: Callable[[], float]) -> None:
-        self._name, self._text, self._value = name, text, value
-
-    def collect(self) -> Iterator[Metric]:
-        try:
-            value = self._value()
-        except OSError:
-            value = float("nan")
-        yield GaugeMetricFamily(self._name, self._text, value=value)
 
 
 def _cumulative(counts: Tally[float]) -> list[tuple[str, float]]:

@@ -68,7 +68,10 @@ def find_methods(methods: Methods, path: str) -> list[str]:
 
 _log = logging.getLogger("tauscope.api")
 
-_OF_LEASE: Mapping[type[Exception], str] = {
+_OF_ERROR: Mapping[type[Exception], str] = {
+    QueueFullError: "queue-full",
+    BusyError: "busy",
+    NameTakenError: "name-taken",
     LeasedError: "leased",
     LeaseNeededError: "lease-needed",
     LeaseLostError: "lease-lost",
@@ -86,14 +89,9 @@ def install_problem_handlers(app: FastAPI) -> None:
 
 
 async def _tauscope_error(request: Request, error: Exception) -> Response:
-    if isinstance(error, QueueFullError):
-        return problem_answer(make_problem("queue-full", str(error), request.url.path), {"Retry-After": "10"})
-    if isinstance(error, BusyError):
-        return problem_answer(make_problem("busy", str(error), request.url.path), {"Retry-After": "10"})
-    if isinstance(error, NameTakenError):
-        return make_code_answer(request, "name-taken", str(error))
-    code = _OF_LEASE.get(type(error)) or (error.code if isinstance(error, TauscopeError) else "internal")
-    return make_code_answer(request, code, str(error))
+    code = _OF_ERROR.get(type(error)) or getattr(error, "code", "internal")
+    headers = {"Retry-After": "10"} if code in ("queue-full", "busy") else None
+    return problem_answer(make_problem(code, str(error), request.url.path), headers)
 
 
 async def _validation_error(request: Request, error: Exception) -> Response:

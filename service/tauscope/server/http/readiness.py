@@ -6,7 +6,7 @@ import socket
 import tempfile
 import threading
 import time
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -14,8 +14,6 @@ from pathlib import Path
 
 import anyio
 from anyio import CapacityLimiter, to_thread
-from prometheus_client.core import GaugeMetricFamily, Metric
-from prometheus_client.registry import Collector
 
 from tauscope.errors import StoreError
 
@@ -119,17 +117,6 @@ class Readiness:
             for name, check in self.checks.items():
                 group.start_soon(ask, name, check)
         return [obstacle for name in self.checks if (obstacle := found[name]) is not None]
-
-
-class ReadyMetrics(Collector):
-    def __init__(self, readiness: Readiness) -> None:
-        self._readiness = readiness
-
-    def collect(self) -> Iterator[Metric]:
-        family = GaugeMetricFamily("tauscope_ready", "Whether a part can work: 1, or 0", labels=["part"])
-        for name, check in self._readiness.checks.items():
-            family.add_metric([name], float(check() is None))
-        yield family
 
 
 def check_disk(folder: Path) -> str | None:

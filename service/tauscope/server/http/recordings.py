@@ -1,23 +1,26 @@
 """Recordings over HTTP: sent, listed, checked, and how one is read before it is sent for good."""
 
 from datetime import datetime
+from pathlib import Path as FilePath
 from typing import Annotated
 from urllib.parse import quote
 
 from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi.concurrency import contextmanager_in_threadpool
 from fastapi.responses import FileResponse
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.recording import EffortKind
 from tauscope.server.http.answers import After, AnswerModel, Measured, PageAnswer
-from tauscope.server.http.bodies import PartRule, file_answer, parse_document, receive_form
+from tauscope.server.http.bodies import PartRule, ReceivedForm, file_answer, parse_document, receive_form
 from tauscope.server.http.openapi import binary_part, file_responses, form_body, refer_to_model
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robot_files import FindingAnswer, read_received_robot, robot_part_rules
 from tauscope.server.http.services import ServicesDep, require_no_evidence
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.analyses import check_kept_recording, read_kept_samples, understand_recording
+from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import StoredRecording
 from tauscope.tasks.task import ReadingOptions
 
@@ -126,15 +129,10 @@ _BODY = form_body({"file": binary_part("the recording: CSV, Parquet, MCAP or a r
 )
 async def keep_recording(request: Request, response: Response, services: ServicesDep) -> RecordingAnswer:
     """The file is kept under its own name; nothing is ever overwritten."""
-    folder = await run_in_threadpool(services.recordings.stage)
-    try:
-        rules = {"file": PartRule(services.settings.max_upload_bytes, folder)}
-        file = (await receive_form(request, rules)).file("file")
-        if file is None:
-            raise ProblemError("invalid-request", "the form has no part file; send the recording as part file")
+    async with contextmanager_in_threadpool(services.recordings.stage()) as folder:
+        rules = {"file": PartRule(services.settings.max_upload_bytes, FilePath(folder))}
+        file = _require_file(await receive_form(request, rules))
         kept, is_new = await run_in_threadpool(services.recordings.keep, file)
-    finally:
-        await run_in_threadpool(services.recordings.discard, folder)
     response.status_code = 201 if is_new else 200
     response.headers["Location"] = f"{request.url.path}/{quote(kept.name)}"
     return _answer(kept)
@@ -240,22 +238,24 @@ _MAPPING_BODY = form_body(
 )
 async def check_sent_recording(request: Request, services: ServicesDep) -> UnderstandingAnswer:
     """Its columns and units as they are understood, and what it holds when it is read so; nothing is kept."""
-    folder = await run_in_threadpool(services.recordings.stage)
-    try:
-        settings, robots = services.settings, folder / "robot"
+    async with contextmanager_in_threadpool(services.recordings.stage()) as folder:
+        settings, robots = services.settings, FilePath(folder) / "robot"
         await run_in_threadpool(robots.mkdir)
         rules = {
             "request": PartRule(settings.max_document_bytes),
-            "file": PartRule(settings.max_upload_bytes, folder),
+            "file": PartRule(settings.max_upload_bytes, FilePath(folder)),
             **robot_part_rules(robots),
         }
         form = await receive_form(request, rules)
-        file, robot_file = form.file("file"), form.file("robot")
-        if file is None:
-            raise ProblemError("invalid-request", "the form has no part file; send the recording as part file")
+        file, robot_file = _require_file(form), form.file("robot")
         options = parse_document(form.texts.get("request", b"{}"), ReadingRequest, within="part request")
         robot = robot_file and await run_in_threadpool(read_received_robot, robots, robot_file.name)
         found = await services.reading.call(request, understand_recording, file.path, robot, options.reading)
         return UnderstandingAnswer.model_validate(found)
-    finally:
-        await run_in_threadpool(services.recordings.discard, folder)
+
+
+def _require_file(form: ReceivedForm) -> KeptFile:
+    file = form.file("file")
+    if file is None:
+        raise ProblemError("invalid-request", "the form has no part file; send the recording as part file")
+    return file

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import cast
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 from python_multipart.multipart import parse_options_header
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
@@ -22,6 +22,7 @@ from typing_extensions import override
 from tauscope.files import sync_folder, write_atomically
 from tauscope.server.auth.gate import HttpMiddleware, find_caller
 from tauscope.server.problems import make_problem, problem_answer
+from tauscope.server.store.files import read_stored
 from tauscope.strict_model import StrictModel
 
 LIFE_S = 24 * 3600.0  # how long an answer is kept [s]
@@ -78,10 +79,7 @@ class StoredAnswers:
 
     def find(self, name: str) -> KeptAnswer | None:
         """The answer to a request; None where there is none (yet)."""
-        try:
-            return KeptAnswer.model_validate_json((self._folder / name).read_bytes())
-        except (OSError, ValidationError):
-            return None
+        return read_stored(self._folder / name, KeptAnswer)
 
     def _tidy(self) -> None:
         for entry in self._folder.iterdir():

@@ -1,11 +1,11 @@
 """Robots over HTTP: checked, kept, listed."""
 
-import shutil
-import tempfile
 from pathlib import Path as FilePath
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
 from fastapi import APIRouter, Path, Request, Response
+from fastapi.concurrency import contextmanager_in_threadpool
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.server.http.bodies import FORM, JSON, media_type, read_document, receive_form, refuse_media_type
@@ -49,12 +49,10 @@ _BODY = {
 )
 async def check_robot_file(request: Request, services: ServicesDep) -> RobotReportAnswer:
     """Summary and findings; nothing is kept. A model that no rigid body can have is among the findings."""
-    folder = FilePath(await run_in_threadpool(tempfile.mkdtemp, prefix="tauscope-robot-"))
-    try:
+    async with contextmanager_in_threadpool(TemporaryDirectory(prefix="tauscope-robot-")) as name:
+        folder = FilePath(name)
         file_name = await _receive_robot(request, services, folder)
         return RobotReportAnswer.of(await services.reading.call(request, check_received_robot, folder, file_name))
-    finally:
-        await run_in_threadpool(shutil.rmtree, folder, ignore_errors=True)
 
 
 Version = Annotated[str, Path(description="version of the robot", pattern=VERSION_PATTERN)]

@@ -8,6 +8,7 @@ from functools import partial
 from typing import Annotated, Any, Literal, Self
 
 from fastapi import Query, Request
+from fastapi.concurrency import contextmanager_in_threadpool
 from fastapi.responses import FileResponse
 from pydantic import Field, JsonValue, model_validator
 from pydantic_core import PydanticCustomError
@@ -45,11 +46,10 @@ from tauscope.server.http.tasks.submission import (
     choose_backend,
     keep_robot,
     receive_request,
-    stage_request,
 )
 from tauscope.server.problems import Problem, ProblemError, make_problem
 from tauscope.server.queue.analyses import ExcitationOrder, ExcitationWorkspace, check_trajectory
-from tauscope.server.queue.task_job import submit_job
+from tauscope.server.queue.task_job import stage_workspace, submit_job
 from tauscope.server.store.event_log import EventLog
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.run import BackendChoice
@@ -311,7 +311,7 @@ class Runs(MovingResource):
 
     @override
     async def submit(self, request: Request, services: Services) -> str:
-        async with stage_request(services.runs.items, RunWorkspace) as workspace:
+        async with contextmanager_in_threadpool(stage_workspace(services.runs.items, RunWorkspace)) as workspace:
             most = min(LARGEST_TRAJECTORY, services.settings.max_upload_bytes)
             parts = {"trajectory": PartRule(most, workspace.trajectories, default_name="trajectory.json")}
             received = await receive_request(request, RunRequest, services.settings, workspace.robot, parts)

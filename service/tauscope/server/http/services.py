@@ -27,7 +27,7 @@ from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.history.model_registry import DriftMonitor, ModelRegistry
 from tauscope.server.history.retention import RetentionRule, RetentionSweeper
 from tauscope.server.http.metrics import Metrics, TimedExecutor
-from tauscope.server.http.readiness import Clock, Heartbeat, Readiness, ReadyMetrics, check_database, check_disk
+from tauscope.server.http.readiness import Clock, Heartbeat, Readiness, check_database, check_disk
 from tauscope.server.http.reading import WIDTH, ReadingQueue
 from tauscope.server.http.repeated_requests import StoredAnswers
 from tauscope.server.http.settings import Settings
@@ -300,7 +300,7 @@ def _watch(services: Services, drift: DriftMonitor) -> None:
     metrics, folder = services.metrics, services.settings.data_folder
     metrics.loops.live = services.runs.list_live
     metrics.watch_drift(drift)
-    metrics.registry.register(ReadyMetrics(services.readiness))
+    metrics.watch_readiness(services.readiness.checks)
     metrics.watch("tauscope_jobs_waiting", "Jobs that wait", services.jobs.waiting)
     metrics.watch("tauscope_leases", "Leases that hold", lambda: len(services.leases.active()))
     metrics.watch("tauscope_audit_lost", "Entries that the audit log did not take", lambda: services.audit.lost)

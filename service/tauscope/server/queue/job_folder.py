@@ -7,13 +7,14 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal
 
-from pydantic import AwareDatetime, Field, JsonValue, ValidationError
+from pydantic import AwareDatetime, Field, JsonValue
 
 from tauscope.errors import TauscopeError
-from tauscope.files import is_disk_full, write_atomically
+from tauscope.files import is_disk_full
 from tauscope.server.store.event_log import EventLog
+from tauscope.server.store.files import read_stored, write_stored
 from tauscope.strict_model import StrictModel
 
 
@@ -137,21 +138,6 @@ class EndedEvent(StrictModel):
 
 JobEvent = Annotated[StateEvent | StepEvent | ProgressEvent | EndedEvent, Field(discriminator="kind")]
 """Any of the four."""
-
-
-Stored = TypeVar("Stored", bound=StrictModel)
-
-
-def read_stored(path: Path, kind: type[Stored]) -> Stored | None:
-    """A stored model, or None where the file is missing or damaged."""
-    try:
-        return kind.model_validate_json(path.read_bytes())
-    except (OSError, ValidationError):
-        return None
-
-
-def write_stored(path: Path, model: StrictModel) -> None:
-    write_atomically(path, model.model_dump_json(indent=1).encode())
 
 
 def read_document(path: Path, schema: str) -> bytes | None:

@@ -19,14 +19,12 @@ from tauscope.server.queue.job_folder import (
     do_work,
     read_bytes,
     read_document,
-    read_stored,
     require_wanted,
     without_folders,
-    write_stored,
 )
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.store.data_folder import ItemStore
-from tauscope.server.store.files import hash_file
+from tauscope.server.store.files import hash_file, read_stored, write_stored
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.task import ROLES

@@ -11,8 +11,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TypeVar
+
+from pydantic import ValidationError
 
 from tauscope.errors import LimitExceededError
+from tauscope.files import write_atomically
+from tauscope.strict_model import StrictModel
 
 FILE_NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.+=@ -]{0,127}$"
 """What a file name looks like, for JSON schemas; `is_file_name` is the rule itself."""
@@ -105,3 +110,18 @@ def hash_file(path: Path) -> str:
         while piece := file.read(_PIECE):
             digest.update(piece)
     return digest.hexdigest()
+
+
+Stored = TypeVar("Stored", bound=StrictModel)
+
+
+def read_stored(path: Path, kind: type[Stored]) -> Stored | None:
+    """A stored model, or None where the file is missing or damaged."""
+    try:
+        return kind.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError):
+        return None
+
+
+def write_stored(path: Path, model: StrictModel) -> None:
+    write_atomically(path, model.model_dump_json(indent=1).encode())

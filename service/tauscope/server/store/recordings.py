@@ -10,29 +10,41 @@ import threading
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Self
 
 from tauscope.errors import NotFoundError, RecordingError
 from tauscope.files import sync_folder, write_atomically
 from tauscope.robot.messages import one_line, shown
-from tauscope.server.store.files import FILE_NAME_RULE, KeptFile, hash_file, is_file_name
+from tauscope.server.store.files import FILE_NAME_RULE, KeptFile, hash_file, is_file_name, read_stored
+from tauscope.strict_model import StrictModel
 
 _log = logging.getLogger("tauscope.store")
 
 
-@dataclass(frozen=True)
-class KnownHash:
+class KnownHash(StrictModel):
     """`sha256`: of the present bytes; `kept`: of those that were sent or recorded, None for an operator's own file."""
 
+    size: int
+    modified_ns: int
     sha256: str
-    kept: str | None
+    kept: str | None = None
+    check: int | None = None
+
+    @classmethod
+    def of(cls, status: os.stat_result, sha256: str, kept: str | None) -> Self:
+        known = cls(size=status.st_size, modified_ns=status.st_mtime_ns, sha256=sha256, kept=kept)
+        return known.model_copy(update={"check": known.compute_check()})
 
     @property
     def is_damaged(self) -> bool:
         return self.kept not in (None, self.sha256)
+
+    def compute_check(self) -> int:
+        """A flipped bit here must not be taken for a damaged recording."""
+        return zlib.crc32(json.dumps([self.size, self.modified_ns, self.sha256, self.kept]).encode())
 
 
 class RecordingHashes:
@@ -44,25 +56,24 @@ class RecordingHashes:
 
     def of(self, name: str, status: os.stat_result) -> KnownHash | None:
         """What is known of a recording, unless its file was written since."""
-        content = self._read(name)
-        if content is None or (content["size"], content["modified_ns"]) != (status.st_size, status.st_mtime_ns):
-            return None
-        return KnownHash(content["sha256"], content.get("kept"))
+        known = self._read(name)
+        is_same = known is not None and (known.size, known.modified_ns) == (status.st_size, status.st_mtime_ns)
+        return known if is_same else None
 
     def is_kept(self, name: str) -> bool:
-        content = self._read(name)
-        return content is not None and content.get("kept") is not None
+        known = self._read(name)
+        return known is not None and known.kept is not None
 
     def keep(self, name: str, status: os.stat_result, sha256: str) -> None:
         """Write down what is about to be kept. Raises OSError if the disk does not take it."""
-        self._write(name, status, KnownHash(sha256, kept=sha256))
+        self._write(name, KnownHash.of(status, sha256, kept=sha256))
 
     def remember(self, name: str, status: os.stat_result, sha256: str) -> KnownHash:
         """Remember the present hash of a recording; a disk that takes nothing costs the memory alone."""
         before = self._read(name)
-        known = KnownHash(sha256, None if before is None else before.get("kept"))
+        known = KnownHash.of(status, sha256, before and before.kept)
         try:
-            self._write(name, status, known)
+            self._write(name, known)
         except OSError:
             _log.warning("the hash of recording %s could not be remembered", name, exc_info=True)
         return known
@@ -76,31 +87,17 @@ class RecordingHashes:
             if not is_there(path.name.removesuffix(".json")):
                 path.unlink(missing_ok=True)
 
-    def _write(self, name: str, status: os.stat_result, known: KnownHash) -> None:
-        content = {"size": status.st_size, "modified_ns": status.st_mtime_ns, **asdict(known)}
-        content |= {"check": _check(content)}
-        if content != self._read(name):
-            write_atomically(self._path(name), json.dumps(content).encode())
+    def _write(self, name: str, known: KnownHash) -> None:
+        if known != self._read(name):
+            write_atomically(self._path(name), known.model_dump_json().encode())
 
     def _path(self, name: str) -> Path:
         return self._root / f"{name}.json"
 
-    def _read(self, name: str) -> dict[str, Any] | None:
-        try:
-            content = json.loads(self._path(name).read_bytes())
-        except (OSError, ValueError, RecursionError):
-            return None
-        if not isinstance(content, dict) or not isinstance(content.get("sha256"), str):
-            return None
-        # Earlier versions remembered neither a check nor what was kept.
-        is_whole = "check" not in content or content["check"] == _check(content)
-        return content if is_whole and {"size", "modified_ns"} <= content.keys() else None
-
-
-def _check(content: dict[str, Any]) -> int:
-    """A number that other content does not have: a flipped bit here must not be taken for a damaged recording."""
-    values = [content.get(key) for key in ("size", "modified_ns", "sha256", "kept")]
-    return zlib.crc32(json.dumps(values).encode())
+    def _read(self, name: str) -> KnownHash | None:
+        known = read_stored(self._path(name), KnownHash)
+        # Earlier versions remembered no check.
+        return known if known is not None and known.check in (None, known.compute_check()) else None
 
 
 _HASHES = ".sha256"
@@ -130,12 +127,9 @@ class RecordingStore:
         self._hashes = RecordingHashes(root / _HASHES)
         self._naming = threading.Lock()
 
-    def stage(self) -> Path:
-        """A new hidden folder on the same disk, for a file that is still arriving; `discard` it in the end."""
-        return Path(tempfile.mkdtemp(prefix=_INCOMING, dir=self.root))
-
-    def discard(self, staged: Path) -> None:
-        shutil.rmtree(staged, ignore_errors=True)
+    def stage(self) -> tempfile.TemporaryDirectory[str]:
+        """A new hidden folder on the same disk, for a file that is still arriving."""
+        return tempfile.TemporaryDirectory(prefix=_INCOMING, dir=self.root, ignore_cleanup_errors=True)
 
     def keep(self, file: KeptFile) -> tuple[StoredRecording, bool]:
         """Name a staged file; False where the same bytes were kept. Raises RecordingError or NameTakenError."""
@@ -204,7 +198,7 @@ class RecordingStore:
     def tidy(self) -> None:
         """Remove what a crash left of uploads; to be called before anything arrives."""
         for entry in self.root.glob(f"{_INCOMING}*"):
-            self.discard(entry)
+            shutil.rmtree(entry, ignore_errors=True)
         self._hashes.tidy(self.holds)
 
     def _status(self, name: str) -> os.stat_result:

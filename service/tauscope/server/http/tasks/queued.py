@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fastapi import APIRouter, Request
+from fastapi.concurrency import contextmanager_in_threadpool
 from starlette.concurrency import run_in_threadpool
 from typing_extensions import override
 
@@ -21,11 +22,11 @@ from tauscope.server.http.tasks.router import (
     add_document_route,
     add_export_route,
 )
-from tauscope.server.http.tasks.submission import Received, keep_robot, receive_request, stage_request
+from tauscope.server.http.tasks.submission import Received, keep_robot, receive_request
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.job_folder import JobState
 from tauscope.server.queue.queue import JobKind
-from tauscope.server.queue.task_job import OrderedRecording, TaskWorkspace
+from tauscope.server.queue.task_job import OrderedRecording, TaskWorkspace, stage_workspace
 from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import RecordingStore
@@ -98,7 +99,9 @@ class QueuedTask(Resource):
     @override
     async def submit(self, request: Request, services: Services) -> str:
         settings = services.settings
-        async with stage_request(self.kind(services).items, self.workspace) as workspace:
+        async with contextmanager_in_threadpool(
+            stage_workspace(self.kind(services).items, self.workspace)
+        ) as workspace:
             most, largest = settings.max_recordings, settings.max_upload_bytes
             rules = {role: PartRule(largest, workspace.uploads(role), most) for role in workspace.roles}
             for part, (folder, limit) in self.further_parts.items():

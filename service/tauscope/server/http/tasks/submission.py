@@ -1,8 +1,7 @@
 """A request that hands a job in: JSON, or a form with the JSON as part `request` and files beside it."""
 
 import shutil
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from contextlib import asynccontextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, Self, TypeVar
@@ -10,7 +9,6 @@ from typing import Annotated, Any, Generic, Literal, Self, TypeVar
 from fastapi import Request
 from pydantic import AfterValidator, Field, FiniteFloat, model_validator
 from pydantic_core import PydanticCustomError
-from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import IdentificationError, RobotFileError, ScenarioError
 from tauscope.robot import Robot
@@ -32,8 +30,7 @@ from tauscope.server.http.openapi import Examples, binary_part, form_body, json_
 from tauscope.server.http.robot_files import EXAMPLE_ROBOT, keep_inline_robot, robot_part_rules
 from tauscope.server.http.settings import Settings
 from tauscope.server.problems import ProblemError
-from tauscope.server.queue.task_job import SAVED_MODEL, Staged, TaskWorkspace
-from tauscope.server.store.data_folder import ItemStore
+from tauscope.server.queue.task_job import SAVED_MODEL, TaskWorkspace
 from tauscope.server.store.files import FILE_NAME_PATTERN, FILE_NAME_RULE, KeptFile, is_file_name
 from tauscope.server.store.robots import RobotStore
 from tauscope.strict_model import StrictModel
@@ -109,18 +106,6 @@ Document = TypeVar("Document", bound=RobotRequest)
 class Received(Generic[Document]):
     document: Document
     form: ReceivedForm
-
-
-@asynccontextmanager
-async def stage_request(items: ItemStore, kind: Callable[[Path], Staged]) -> AsyncIterator[Staged]:
-    """A new folder that is removed in the end, unless it was handed in meanwhile."""
-    staged = await run_in_threadpool(items.stage)
-    try:
-        workspace = kind(staged)
-        await run_in_threadpool(workspace.prepare)
-        yield workspace
-    finally:
-        await run_in_threadpool(items.discard, staged)
 
 
 async def receive_request(

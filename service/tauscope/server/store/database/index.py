@@ -8,7 +8,7 @@ from sqlalchemy import ColumnElement, delete, insert, select, update
 from sqlalchemy.orm import Session
 
 from tauscope.server.store.database.database import Database, read_row
-from tauscope.server.store.database.tables import ITEM_CLASSES, Artefact, Item, Recording, RecordingUse, Robot, Site
+from tauscope.server.store.database.tables import Artefact, Item, Recording, RecordingUse, Robot, Site
 from tauscope.server.store.recordings import StoredRecording
 
 
@@ -123,7 +123,7 @@ class Index:
             for each in facts:
                 row = rows.get(each.identifier)
                 if row is None:
-                    row = ITEM_CLASSES[kind](site=site, kind=kind, identifier=each.identifier)
+                    row = Item.__mapper__.polymorphic_map[kind].class_(site=site, kind=kind, identifier=each.identifier)
                     rows[each.identifier] = row
                     session.add(row)
                 _fill(row, each)

@@ -127,17 +127,6 @@ class Campaign(Item):
     __mapper_args__ = {"polymorphic_identity": "campaign"}  # noqa: RUF012
 
 
-ITEM_CLASSES: dict[str, type[Item]] = {
-    "excitation": Excitation,
-    "run": Run,
-    "identification": Identification,
-    "diagnosis": Diagnosis,
-    "rollout": Rollout,
-    "campaign": Campaign,
-}
-"""The table class of each kind of item."""
-
-
 class Artefact(Base):
     __tablename__ = "artefacts"
 
