@@ -39,11 +39,9 @@ from tauscope.trajectory import write_trajectory
 from tauscope_sim.examples import example_robot
 
 NOISE_STD_NM = (0.5, 0.3, 0.7)  # σ_τ of the seed paper's section 5
-
 RATE_HZ = 200.0
 TRAIN_MOTION = ExcitationOptions(periods=5, slow_postures=1, seed=0)
 HELD_OUT_MOTION = ExcitationOptions(periods=2, slow_postures=0, closing_period=False, seed=1)
-
 ROBOT, TRAIN, HELD_OUT = "robot.yaml", "train.csv", "held-out.csv"
 SCENARIO, TRAIN_TRAJECTORY, HELD_OUT_TRAJECTORY = "scenario.yaml", "train.json", "held-out.json"
 RESULT, REPORT = "identification.json", "report.html"
@@ -55,7 +53,6 @@ CONCEALED = {"torque_noise_std": list(NOISE_STD_NM), "seed": 1} | {
     "effects": [{"effect": "joint_spring", "joint": 1, "stiffness": 0.6}]
 }
 """What the arm of that campaign conceals: a scenario, by which the diagnosis is put to the test."""
-
 SCENARIO_TEXT = f"torque_noise_std: {list(NOISE_STD_NM)}\n"
 """What the simulated arm conceals, but for the seed of its noise."""
 

@@ -58,17 +58,13 @@ def _list_own(mark: Path) -> set[str]:
 DATA = "service"  # data folder of a service within the demo's, which holds a campaign on an arm that conceals an effect
 PORT = 8000  # where the page is, unless something else is there already
 LEFT_FOR_S = 900.0  # how long a page that nobody waits for stays [s]
-
 _LOOK_S = 0.5
 
 
 class PageShown(Enum):
-    HERE = auto()
-    """The demo itself, until interrupted."""
-    LEFT = auto()
-    """A process that the demo leaves behind, for a while."""
-    NOT = auto()
-    """Nobody."""
+    HERE = auto()  # The demo itself, until interrupted.
+    LEFT = auto()  # A process that the demo leaves behind, for a while.
+    NOT = auto()  # Nobody.
 
 
 def show_page(folder: Path) -> None:

@@ -174,7 +174,6 @@ def _ask(name: str) -> bool:
 
 
 SHOWN_CYCLES = 3  # cycles of a run whose frames are shown
-
 _RATE_HZ = 200.0
 
 

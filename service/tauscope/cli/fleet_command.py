@@ -25,7 +25,6 @@ from tauscope.server.queue.fleet import (
 )
 
 TABLE = "table.csv"
-
 CLUSTER_PATIENCE_S = 60.0
 """How long a robot waits for a cluster that is away, as when its scheduler is started anew [s]."""
 CORES = os.cpu_count() or 1

@@ -22,7 +22,6 @@ from tauscope.server.store.data_folder import FolderLock, site_identifier, utc_n
 
 POLL_S = 0.5  # how often the end is looked for [s]
 PATIENCE_S = 30.0  # how long a service may take to take it on [s]
-
 GOOD_ENDS = ("succeeded", "finished")
 
 

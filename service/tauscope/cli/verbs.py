@@ -15,9 +15,7 @@ from pydantic.fields import FieldInfo
 from typer.core import TyperCommand, TyperOption
 
 SEVERAL = "..."  # A metavar that ends so marks an option that takes several values: what --help shows is what is parsed
-
 Model = TypeVar("Model", bound=BaseModel)
-
 _UNIT = re.compile(r"_(s|ms|m|hz|c|rad_s)$")
 
 

@@ -41,7 +41,6 @@ __all__ = [
 ]
 
 ENTRY_POINT_GROUP = "tauscope.drivers"
-
 DEFAULT_BACKEND = "sim"  # what moves the arm where nothing is said: it does no harm
 _UNSTATED_CONSTANT = 1.0  # A robot file that states no torque constant reads so
 

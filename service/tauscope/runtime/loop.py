@@ -122,7 +122,6 @@ class Cycles:
 
 Report = Callable[[Mapping[str, Any]], None]
 """Takes an event: plain data with the key ``event``, one of ``state``, ``progress``, ``end``. Must be quick."""
-
 INTERVAL_S = 0.2  # time between two words about progress
 
 

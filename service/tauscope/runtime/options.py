@@ -16,7 +16,6 @@ from tauscope_drivers import Capabilities, ControlMode, StopPolicy
 
 DEFAULT_RATE_HZ = 500.0  # cycles a second where nothing is stated and the bus allows as many
 RELEASE = "release"  # stop policy: hold, and let go once the arm stands still
-
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 
 

@@ -17,7 +17,6 @@ from tauscope.trajectory.trajectory import Trajectory, ramp
 from tauscope_drivers import Capabilities, ControlMode
 
 Array = NDArray[np.float64]
-
 _MOST_POSTURES = 100_000
 
 
@@ -61,7 +60,6 @@ def _parameters(robot: Robot) -> Array | None:
 
 
 MOST_CYCLES = 4_000_000  # A longer run must be a mistake: it is more than two hours at 500 cycles a second
-
 _ROUNDING = 1e-9
 
 

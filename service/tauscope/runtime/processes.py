@@ -30,7 +30,6 @@ def read_process_start(pid: int) -> int | None:
 
 
 LOCK_FILE = ".lock"
-
 _POLL_S = 0.02
 
 

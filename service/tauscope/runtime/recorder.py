@@ -30,7 +30,6 @@ from tauscope.runtime.states import Stops, raise_if_requested
 PIPE_BYTES = 2**20  # room between loop and writer: some seconds of cycles
 OPENING_S = 20.0  # time that the writer may take to start
 CLOSING_S = 5.0  # time that the writer may take to write what is left
-
 _LARGEST_FRAME = select.PIPE_BUF
 _ROWS_AT_ONCE = 32
 

@@ -13,7 +13,6 @@ from tauscope_drivers import ArmState, Backend, StopPolicy
 SETTLED_S = 0.5  # time for which every joint has to stand still [s]
 STILL = 1e-3  # most that a joint may move in that time: some counts of an encoder [rad or m]
 LONGEST_S = 5.0  # time after which an arm that does not come to rest stays held [s]
-
 _LOOK_S = 0.05
 
 

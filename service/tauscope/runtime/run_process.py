@@ -40,7 +40,6 @@ from tauscope.runtime.stop_listener import BEAT, STOP
 
 INTERRUPTED = "interrupted"  # code of the problem of a run whose process is gone
 PATIENCE_S = 5.0  # time that a control process without an owner may take to stop its arm before it is ended
-
 _WRITER_S = 10.0
 _POLL_S = 0.02
 _GONE = (
@@ -119,7 +118,6 @@ def _write(folder: Path, record: RunRecord) -> RunRecord:
 
 
 BEATS_A_HEARTBEAT = 5  # how often an owner says that it is alive in the time after which it counts as gone
-
 _READ_BYTES = 2**16
 
 

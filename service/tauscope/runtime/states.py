@@ -57,10 +57,8 @@ def after_stop(state: RunState) -> RunState:
 
 
 class StopSource(StrEnum):
-    OPERATOR = "operator"
-    """a byte on the pipe, the stop file, or a signal"""
-    OWNER_GONE = "owner-gone"
-    """the process that started the run has died, or is silent while the arm runs in real time"""
+    OPERATOR = "operator"  # a byte on the pipe, the stop file, or a signal
+    OWNER_GONE = "owner-gone"  # the process that started the run has died, or is silent while the arm runs in real time
 
 
 @dataclass(frozen=True)

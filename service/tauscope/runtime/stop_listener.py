@@ -19,10 +19,8 @@ from types import FrameType
 from tauscope.runtime.states import StopAskedError, StopRequest, StopSource
 
 BEAT, STOP = b".", b"s"  # what an owner writes to its run's pipe: it is alive; the run has to stop
-
 NOTICE_S = 0.25  # time for a run to notice a request before a signal breaks it out of its call
 STOPPING_S = 2.0  # time for the drives to confirm the stop, in real time
-
 _POLL_S = 0.02
 _SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 _BREAK = signal.SIGUSR1

@@ -17,7 +17,6 @@ from tauscope_drivers import Clock
 
 PRIORITY = 80  # real-time priority of the loop: above the drivers of most devices, below the kernel's own threads
 BESIDE = 20  # by how much the other threads of the process are below the loop
-
 _TASKS = Path("/proc/self/task")
 _LOCK_CURRENT_AND_FUTURE = 3
 

@@ -105,7 +105,6 @@ def _canonical(entry: Mapping[str, Any]) -> bytes:
 
 
 _log = logging.getLogger("tauscope.audit")
-
 AUDIT_FILE = "audit.jsonl"  # name of the file, in the data folder
 _TAIL = 2**20  # where the last entry is looked for; entries are far shorter [bytes]
 MOST_WAITING = 10_000  # entries that wait for a disk that does not take them

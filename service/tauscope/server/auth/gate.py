@@ -48,7 +48,6 @@ class RateLimit:
 
 
 CALLER = "tauscope.caller"  # where the request's ASGI scope holds its `Caller`
-
 FAILURES_PER_S, FAILURE_BURST = 0.5, 20.0
 """How often an address may come with a wrong key before it is told to wait; right keys always pass."""
 

@@ -26,14 +26,10 @@ from tauscope.strict_model import StrictModel
 class Scope(StrEnum):
     """What a key may do; each scope includes those before it."""
 
-    READ = "read"
-    """look at everything, and stop every arm"""
-    ANALYSE = "analyse"
-    """send recordings and robots, hand in and cancel analyses"""
-    MOVE = "move"
-    """take, arm and move arms"""
-    ADMIN = "admin"
-    """remove what was measured, take an arm from somebody else"""
+    READ = "read"  # look at everything, and stop every arm
+    ANALYSE = "analyse"  # send recordings and robots, hand in and cancel analyses
+    MOVE = "move"  # take, arm and move arms
+    ADMIN = "admin"  # remove what was measured, take an arm from somebody else
 
     def includes(self, other: "Scope") -> bool:
         order = list(Scope)
@@ -91,7 +87,6 @@ def is_stop(method: str, path: str) -> bool:
 
 
 KEY_FILE = "keys.json"  # name of the file, in the data folder
-
 _PREFIX = "tsk"
 _NOBODY = "0" * 64
 
@@ -197,7 +192,6 @@ def _hash(salt: str, secret: str) -> str:
 
 
 _log = logging.getLogger("tauscope.api")
-
 CHECK_S = 1.0
 """How often the file is looked at: a key that was revoked or added counts after this time at the latest [s]."""
 

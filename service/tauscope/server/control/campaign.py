@@ -92,7 +92,6 @@ class CampaignWorkspace(Workspace):
 
 
 _log = logging.getLogger("tauscope.jobs")
-
 POLL_S = 0.2  # how often the progress of a run is told [s]
 RETRY_S = 0.5  # how often a queue, or a disk, that is full is asked again [s]
 

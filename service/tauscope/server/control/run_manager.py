@@ -130,7 +130,6 @@ class Manager(Generic[S]):
 
 
 _log = logging.getLogger("tauscope.jobs")
-
 BEAT_S = 0.1  # how often the control process is told that its owner is alive, at least [s]
 BEATS_A_HEARTBEAT = 5  # how often it is told so in the time after which it counts its owner as gone
 

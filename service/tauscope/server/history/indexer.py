@@ -33,7 +33,6 @@ WORKSPACES: Mapping[str, type[Any]] = {
     "campaign": CampaignWorkspace,
 }
 """The folder of each kind of item that has a job's record; a run has a record of its own."""
-
 _ANALYSES = (IdentificationWorkspace, DiagnosisWorkspace, RolloutWorkspace)
 DAMAGED = "damaged"
 _ROLES = ("recordings", "held_out", "simulated", "refine")
@@ -161,9 +160,7 @@ def _read_run(folder: Path) -> ItemMetadata:
 
 
 _log = logging.getLogger("tauscope.jobs")
-
 BATCH = 200  # items that are indexed at once
-
 LONGEST_WAIT_S = 1.0
 """How long a search waits for what is new; while an old folder is indexed it finds what is indexed until then [s]."""
 

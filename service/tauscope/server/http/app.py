@@ -35,7 +35,6 @@ from tauscope.server.page.router import router as page
 
 API_VERSION = "1.22.0"
 """Of the interface, not of the package; a change of tests/server/http/openapi.json goes with a change here."""
-
 PREFIX = "/api/v1"
 
 VERBS = (
@@ -55,7 +54,6 @@ VERBS = (
     leases.stop_router,
 )
 """Routers of everything that a client may ask for, below `PREFIX`."""
-
 PAGES = (health.router, pages.router, page)
 
 

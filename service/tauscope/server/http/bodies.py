@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 
 JSON = "application/json"
-
 Model = TypeVar("Model", bound=BaseModel)
 
 

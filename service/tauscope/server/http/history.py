@@ -149,13 +149,11 @@ def trend_answer(robot: str, models: Sequence[tuple[ModelEntry, IdentificationDo
 
 
 router = APIRouter(tags=["models"], responses=problem_responses("store"))
-
 RobotName = Annotated[str, Query(alias="robot", min_length=1, max_length=1000, description="name of the robot")]
 AnyRobot = Annotated[
     str | None, Query(alias="robot", max_length=1000, description="name of the robot; any where absent")
 ]
 Number = Annotated[int, Path(ge=1, le=2**31 - 1, description="number of the event")]
-
 _REASON = {"why": ("Why", {"reason": "gear oil changed on 3 November"})}
 _BODY_PROBLEMS = ("bad-request", "limit-exceeded", "media-type", "not-found")
 

@@ -48,7 +48,6 @@ class RobotListAnswer(AnswerModel):
 
 
 router = APIRouter(tags=["items"], responses=problem_responses("store"))
-
 Kind = Annotated[ItemKind | None, Query(description="kind of item")]
 State = Annotated[str | None, Query(max_length=40, description="where it stands", examples=["succeeded", "damaged"])]
 RobotName = Annotated[str | None, Query(max_length=1000, description="name of the robot")]

@@ -90,9 +90,7 @@ def permit_of(request: Request, services: Services, device: str) -> Permit:
 
 router = APIRouter(prefix="/leases", tags=["leases"])
 stop_router = APIRouter(tags=["runs"])
-
 Identifier = Annotated[str, Path(description="identifier of the lease", examples=["lease-7"])]
-
 _HELD = problem_responses("lease-lost", "unauthorized")
 NO_BODY = {"requestBody": {"required": False, "content": {}}}
 

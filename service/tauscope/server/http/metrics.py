@@ -16,7 +16,6 @@ from tauscope.server.control.run_manager import Live
 from tauscope.server.history.model_registry import DriftMonitor
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
-
 _JOB_BUCKETS_S = (0.1, 0.5, 1, 5, 10, 30, 60, 120, 300, 600, 1800, 3600)
 
 

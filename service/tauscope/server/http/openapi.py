@@ -38,10 +38,8 @@ _COMMON = (
     "storage-full",
 )
 """Problems that any request to the interface may meet, before its route or in it."""
-
 _VALUES = ("examples", "default", "enum", "const")  # keywords of a schema that hold plain data
 _LEAST_SHARED = 150  # A shorter schema is not worth a name and two references [characters]
-
 SCHEMAS = "#/components/schemas/"
 
 
@@ -257,7 +255,6 @@ def _share_properties(document: dict[str, Any]) -> None:
 
 
 _REFERENCE = SCHEMAS + "{model}"
-
 Examples = Mapping[str, tuple[str, Any]]  # for each example its summary and its value
 
 

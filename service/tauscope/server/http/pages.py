@@ -22,10 +22,8 @@ from tauscope.server.http.openapi import resolve_reference
 from tauscope.server.problems import KINDS
 
 SECTIONS = ("errors", "how-to")
-
 _ROOTS = (Path(__file__).parent / "handbook_pages", Path(__file__).parents[4] / "docs")
 """Where the pages lie: beside this file where the package was installed, in docs/ of a source tree."""
-
 _markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
 
 
@@ -80,7 +78,6 @@ def _target(link: str, path: str, known: Mapping[str, object]) -> str | None:
 
 
 router = APIRouter(prefix="/docs", include_in_schema=False)
-
 _METHODS = ("get", "post", "put", "delete")
 _FOLDER = FilePath(__file__).parent / "templates"
 _templates = Environment(

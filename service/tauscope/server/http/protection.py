@@ -19,7 +19,6 @@ from tauscope.server.http.metrics import Metrics
 from tauscope.server.problems import make_problem, problem_answer
 
 _request_log = logging.getLogger("tauscope.requests")
-
 REQUEST_ID = "X-Request-Id"
 
 
@@ -210,7 +209,6 @@ class _CountedBody:
 
 READERS = 2  # reading requests at a time: more threads of one interpreter read no faster
 SLOT_TIMEOUT_S = 0.5  # a reader that a disk or a lock holds up loses its slot after this time [s]
-
 _READING = ("GET", "HEAD")
 _PROBES = ("/healthz", "/readyz")
 """Probes have a slot of their own: a supervisor that gets no answer restarts the service, which stops its arms."""

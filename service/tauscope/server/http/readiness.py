@@ -90,10 +90,8 @@ async def notify_systemd() -> AsyncIterator[None]:
 
 LEAST_FREE_BYTES = 64 * 2**20  # room on the disk below which no run should begin [bytes]
 TIMEOUT_S = 2.0  # how long each part may take to answer [s]
-
 EARLIEST = datetime(2026, 1, 1, tzinfo=UTC)
 """A clock before this moment was never set: identifiers, leases and schedules would be wrong."""
-
 MOST_SETBACK_S = 60.0  # how far the clock may be set back while the service runs: items are sorted by it [s]
 
 

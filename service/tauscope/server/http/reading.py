@@ -14,7 +14,6 @@ from tauscope.server.problems import ProblemError
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
-
 WIDTH = 2  # files that are read at a time; a caller has one of them, so that another caller finds a process free
 MOST_WAITING = 32  # requests that wait for a process
 MOST_WAITING_EACH = 8  # requests of one caller that wait, a page's worth of plots

@@ -106,13 +106,10 @@ class UnderstandingAnswer(AnswerModel):
 
 
 router = APIRouter(prefix="/recordings", tags=["recordings"])
-
 Name = Annotated[str, Path(description="name of the recording", examples=["log-2026-11-03.csv"])]
 JointCount = Annotated[int | None, Query(gt=0, le=1000, description="joints that the recording must have")]
 MostSamples = Annotated[int, Query(ge=2, le=1_000_000, description="samples to return, about")]
-
 RecordingLimit = Annotated[int, Query(ge=1, le=10_000, description="most entries of the list")]
-
 _BODY = form_body({"file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database")}, required=["file"])
 
 

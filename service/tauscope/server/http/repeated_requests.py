@@ -116,7 +116,6 @@ class Fingerprint:
 
 
 HEADER = "Idempotency-Key"
-
 LONGEST_KEY = 200  # most characters of the header's value
 
 _REPEATABLE = re.compile(

@@ -104,7 +104,6 @@ class RobotReportAnswer(AnswerModel):
 
 
 FOLDERS = frozenset({"assetdir", "meshdir", "texturedir"})  # attributes of an MJCF that name a folder
-
 _MOST_BODIES = 1000
 _MOST_CELLS = 2**24  # a texture of 4096 by 4096
 INLINE_NAME = "robot.json"  # file name of a robot that came as JSON; YAML readers read JSON

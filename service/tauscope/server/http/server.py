@@ -61,8 +61,6 @@ def hide_secrets(_logger: Any, _method: str, event: MutableMapping[str, Any]) ->
 
 
 GRACE_S = 5  # how long open requests may take when the service is asked to stop
-
-
 SWITCH_S = 0.0005
 """How long a thread computes while the event loop waits for the interpreter [s]; Python's own 5 ms add up in a stop."""
 

@@ -95,12 +95,8 @@ async def _services_of(request: Request) -> Services:
 
 
 ServicesDep = Annotated[Services, Depends(_services_of)]  # the services, as an argument of a route
-
-
 PRUNING_S = 3600.0  # how often what is old is removed, where the operator asked for it [s]
-
 DAY_S = 86400.0
-
 REQUESTS_PER_S = 200.0  # how often a key may call in the long run, where the operator says nothing [1/s]
 
 

@@ -16,7 +16,6 @@ from tauscope.runtime.drivers import driver_names, find_driver
 from tauscope.server.page.example import example_files
 
 router = APIRouter(include_in_schema=False)
-
 STATIC = Path(__file__).parent / "static"
 
 MEDIA_TYPES: Mapping[str, str] = {

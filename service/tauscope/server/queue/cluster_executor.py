@@ -49,12 +49,9 @@ class LoopThread:
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
-
 _log = logging.getLogger("tauscope.jobs")
-
 SCHEDULER = "DASK_SCHEDULER_ADDRESS"
 """Environment variable that names the scheduler of a Dask cluster, as in ``tcp://scheduler:8786``."""
-
 TIMEOUT_S = 10  # how long a scheduler may take to answer [s]
 CHECK_S = 1.0  # how often the scheduler is looked at: whether it is there, and how many workers it has [s]
 

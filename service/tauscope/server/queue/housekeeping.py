@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from tauscope.errors import TauscopeError
 
 _log = logging.getLogger("tauscope.jobs")
-
 PERIOD_S = 1.0  # how often the tasks are done [s]
 
 

@@ -15,9 +15,7 @@ from tauscope.server.store.data_folder import ItemStore
 
 Work = Callable[[Path], JobProblem | None]
 """Does the job of a folder; returns why it failed. It may run in another process."""
-
 _log = logging.getLogger("tauscope.jobs")
-
 MOST_ATTEMPTS = 3
 """How often the work of a job is begun whose service was killed meanwhile: it may be what brought the service down."""
 

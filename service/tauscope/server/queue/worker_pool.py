@@ -66,9 +66,7 @@ def _end_with_service() -> None:
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
-
 START_S = 120.0  # how long a process may take to start on a busy machine [s]
-
 _THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _environment = threading.Lock()
 

@@ -167,7 +167,6 @@ def _fault(path: Path) -> str | None:
 
 
 _log = logging.getLogger("tauscope.jobs")
-
 _Outcome = tuple[str, str | None, tuple[str, str] | None]  # state of a firing, its reason, and what was started
 
 

@@ -96,7 +96,6 @@ FOLDERS = {
     "campaign": "campaigns",
 }
 """The folder of each kind of item, below the data folder; its collection has the same name at the API."""
-
 RECORDINGS = "recordings"
 
 

@@ -21,9 +21,7 @@ from tauscope.strict_model import StrictModel
 
 FILE_NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.+=@ -]{0,127}$"
 """What a file name looks like, for JSON schemas; `is_file_name` is the rule itself."""
-
 FILE_NAME_RULE = "use at most 128 letters a-z, digits and _ . + = @ - or blanks, beginning with a letter, digit or _"
-
 _FILE_NAME = re.compile(FILE_NAME_PATTERN.removeprefix("^").removesuffix("$"))
 _IDENTIFIER = re.compile(r"[0-9]{8}T[0-9]{6}Z-[0-9a-f]{8}")
 

@@ -43,7 +43,6 @@ from tauscope.server.queue.queue import JobKind
 from tauscope.server.store.data_folder import ItemStore
 
 HTML = "text/html"
-
 PAGE_HEADERS = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; sandbox"}
 """A report brings its style with it, runs no script, and may do nothing in the name of whoever reads it."""
 

@@ -22,7 +22,6 @@ from tauscope.errors import StoreError
 from tauscope.robot.messages import one_line
 
 TIMEOUT_S = 5  # how long a write waits for another one, and a connection for its server [s]
-
 WRITES = "tauscope_writes"
 """Execution option of a connection that will write: SQLite then takes its lock at the beginning.
 
@@ -114,10 +113,7 @@ def _configuration(connection: Connection | None) -> Config:
 
 
 FILE_NAME = "tauscope.db"  # of the SQLite database in a data folder
-
-
 Entry = TypeVar("Entry")
-
 _SQLITE_MAGIC = b"SQLite format 3\0"
 _DAMAGE_HINT = "restore a backup, or move it away: the index is made anew, schedules and the choice of models are not"
 
