@@ -37,7 +37,7 @@ def show_trend(robot: RobotName, data: DataFolder = None, database: DatabaseUrl 
         trends = parameter_trends(ModelHistory(opened).documents(robot))
     rows = []
     for trend in trends:
-        first, last, line = trend.points[0][1], trend.points[-1][1], trend.line
+        first, last, line = trend.points[0], trend.points[-1], trend.line
         slope = ABSENT if line is None else f"{significant(line.slope, 3)} ± {significant(line.slope_std, 2)}"
         rows.append(
             (trend.name, str(len(trend.points)), significant(first.value, 4), significant(last.value, 4), slope)

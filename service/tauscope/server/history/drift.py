@@ -6,8 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 
+from pydantic import Field
+
 from tauscope.identification.result import FrictionEntry, IdentificationDocument
 from tauscope.server.history.gates import ModelPolicy
+from tauscope.strict_model import entry
 
 FRICTION_TERMS = ("stiction", "stribeck", "viscous", "offset")
 _LINK = re.compile(r"\d+$")
@@ -31,51 +34,49 @@ def extract_parameters(document: IdentificationDocument) -> tuple[NamedParameter
 
 def _base(document: IdentificationDocument) -> Iterator[NamedParameter]:
     """Base parameters; a value within three standard errors of zero counts as three standard errors."""
-    for entry in document.base_parameters:
-        if entry.std is None or entry.std <= 0.0:
+    for each in document.base_parameters:
+        if each.std is None or each.std <= 0.0:
             continue
-        match = _LINK.search(next(iter(entry.terms), ""))
+        match = _LINK.search(next(iter(each.terms), ""))
         link = int(match.group()) if match else 1
         joint = document.joints[min(max(link, 1), len(document.joints)) - 1]
-        scale = max(abs(entry.value), 3.0 * entry.std)
-        yield NamedParameter(entry.name, joint, entry.value, entry.std, scale)
+        scale = max(abs(each.value), 3.0 * each.std)
+        yield NamedParameter(each.name, joint, each.value, each.std, scale)
 
 
 def _friction(document: IdentificationDocument) -> Iterator[NamedParameter]:
     """Friction terms; those that add to the same torque are measured by the joint's whole dry friction."""
-    for entry in document.friction:
-        level = abs(entry.stiction) + abs(entry.stribeck)
+    for each in document.friction:
+        level = abs(each.stiction) + abs(each.stribeck)
         for term in FRICTION_TERMS:
-            std = entry.std.get(term)
-            if std is None or std <= 0.0 or not entry.identifiable.get(term, True):
+            std = each.std.get(term)
+            if std is None or std <= 0.0 or not each.identifiable.get(term, True):
                 continue
-            value = _value(entry, term)
+            value = _value(each, term)
             scale = max(abs(value), 3.0 * std, 0.0 if term == "viscous" else level)
-            yield NamedParameter(f"{term} {entry.joint}", entry.joint, value, std, scale)
+            yield NamedParameter(f"{term} {each.joint}", each.joint, value, std, scale)
 
 
 def _rotors(document: IdentificationDocument) -> Iterator[NamedParameter]:
-    for entry in document.rotor_inertia:
-        if entry.std is not None and entry.std > 0.0:
-            scale = max(abs(entry.value), 3.0 * entry.std)
-            yield NamedParameter(f"rotor_inertia {entry.joint}", entry.joint, entry.value, entry.std, scale)
+    for each in document.rotor_inertia:
+        if each.std is not None and each.std > 0.0:
+            scale = max(abs(each.value), 3.0 * each.std)
+            yield NamedParameter(f"rotor_inertia {each.joint}", each.joint, each.value, each.std, scale)
 
 
 def _value(entry: FrictionEntry, term: str) -> float:
     return float(getattr(entry, term))
 
 
-@dataclass(frozen=True)
+@entry
 class Drift:
-    """Values `before` and `after`, and the standard error `std` of their difference [SI]."""
-
-    name: str
-    joint: str
-    before: float
-    after: float
-    std: float
-    in_std: float
-    share: float
+    name: str = Field(description="of the parameter", examples=["viscous joint3"])
+    joint: str = Field(description="that it belongs to")
+    before: float = Field(description="in the model that it is compared with [SI]")
+    after: float = Field(description="in this model [SI]")
+    std: float = Field(description="standard error of the difference [SI]")
+    in_std: float = Field(description="difference in standard errors")
+    share: float = Field(description="difference in parts of the earlier value")
 
 
 def compute_drift(before: Sequence[NamedParameter], after: Sequence[NamedParameter]) -> tuple[Drift, ...]:

@@ -1,14 +1,13 @@
 """Acceptance gates: the bounds by which a new model is judged, and each gate's finding."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field, FiniteFloat
 
 from tauscope.identification.result import IdentificationDocument, LinkEntry
-from tauscope.strict_model import ResultModel
+from tauscope.strict_model import ResultModel, entry
 
 Ratio = Annotated[FiniteFloat, Field(ge=1.0)]
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
@@ -25,11 +24,11 @@ class ModelPolicy(ResultModel):
     drift_share: Positive = Field(default=0.25, description="and in parts of the earlier value: both have to be passed")
 
 
-@dataclass(frozen=True)
+@entry
 class Gate:
-    name: str
-    passed: bool
-    reason: str
+    name: str = Field(description="held_out, consistency, excitation, structure, newer, source or diagnosis")
+    passed: bool = Field(description="whether it is met")
+    reason: str = Field(description="what was found, what is allowed, and what to do where it is not met")
 
 
 def check_gates(
@@ -114,4 +113,4 @@ def _ratios(rms: Sequence[float], floor: Sequence[float], joints: Sequence[str])
 
 
 def _names(document: IdentificationDocument) -> list[str]:
-    return [entry.name for entry in document.base_parameters]
+    return [each.name for each in document.base_parameters]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
+from pydantic import Field
 from sqlalchemy import select
 from sqlalchemy.orm import Session, aliased, undefer
 
@@ -15,6 +16,7 @@ from tauscope.server.history.gates import Gate, ModelPolicy
 from tauscope.server.history.model_judgement import Candidate, choose, judge
 from tauscope.server.store.database.database import Database, read_row
 from tauscope.server.store.database.tables import Item, Model, ModelEvent, Robot, RobotPolicy
+from tauscope.strict_model import entry
 
 
 @dataclass(frozen=True)
@@ -30,18 +32,18 @@ class ModelEntry:
     is_reference: bool
 
 
-@dataclass(frozen=True)
+@entry
 class ModelEventEntry:
-    number: int
-    robot: str
-    kind: str
-    parameter: str
-    text: str
-    details: Mapping[str, Any]
-    raised: datetime
-    last_seen: datetime
-    closed: datetime | None
-    note: str | None
+    number: int = Field(description="of the event")
+    robot: str = Field(description="name of the robot")
+    kind: str = Field(description="drift", examples=["drift"])
+    parameter: str = Field(description="that drifted")
+    text: str = Field(description="one line", examples=["joint3: viscous friction +40 % in 6 weeks"])
+    details: Mapping[str, Any] = Field(exclude=True)
+    raised: datetime = Field(description="when it was seen first, UTC")
+    last_seen: datetime = Field(description="when it was seen last, UTC")
+    closed: datetime | None = Field(description="when somebody took note, UTC")
+    note: str | None = Field(description="what they wrote")
 
 
 class ModelHistory:

@@ -33,7 +33,7 @@ from tauscope.server.http.services import open_services
 from tauscope.server.http.settings import Settings
 from tauscope.server.page.router import router as page
 
-API_VERSION = "1.22.0"
+API_VERSION = "1.23.0"
 """Of the interface, not of the package; a change of tests/server/http/openapi.json goes with a change here."""
 PREFIX = "/api/v1"
 

@@ -1,7 +1,6 @@
 """Models over HTTP: their history, gates, trends, policies and events."""
 
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Annotated, Literal
 
@@ -11,11 +10,11 @@ from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
-from tauscope.server.history.drift import find_largest_by_joint
-from tauscope.server.history.gates import ModelPolicy
-from tauscope.server.history.model_history import ModelEntry
+from tauscope.server.history.drift import Drift, find_largest_by_joint
+from tauscope.server.history.gates import Gate, ModelPolicy
+from tauscope.server.history.model_history import ModelEntry, ModelEventEntry
 from tauscope.server.history.model_judgement import compare_models
-from tauscope.server.history.trend import parameter_trends
+from tauscope.server.history.trend import ParameterTrend, parameter_trends
 from tauscope.server.http.answers import AnswerModel, Identifier, Limit, collection
 from tauscope.server.http.bodies import read_document
 from tauscope.server.http.openapi import json_request
@@ -28,12 +27,6 @@ class ReasonRequest(StrictModel):
     """Why somebody decides something; kept with the decision."""
 
     reason: Annotated[str, Field(min_length=1, max_length=1000)] = Field(description="one line", examples=["new oil"])
-
-
-class GateAnswer(AnswerModel):
-    name: str = Field(description="held_out, consistency, excitation, structure, newer or source")
-    passed: bool = Field(description="whether it is met")
-    reason: str = Field(description="what was found, what is allowed, and what to do where it is not met")
 
 
 class ModelLinksAnswer(AnswerModel):
@@ -52,7 +45,7 @@ class ModelAnswer(AnswerModel):
         description="active: in use; kept: was in use; refused: did not pass a gate; unreadable: its result is damaged"
     )
     is_reference: bool = Field(description="whether drift is counted from this model")
-    gates: tuple[GateAnswer, ...] = Field(description="what it had to show")
+    gates: tuple[Gate, ...] = Field(description="what it had to show")
     links: ModelLinksAnswer = Field(description="where to go on")
 
 
@@ -60,92 +53,26 @@ class ModelListAnswer(AnswerModel):
     models: list[ModelAnswer] = Field(description="the newest first")
 
 
-class DriftAnswer(AnswerModel):
-    name: str = Field(description="of the parameter", examples=["viscous joint3"])
-    joint: str = Field(description="that it belongs to")
-    before: float = Field(description="in the model that it is compared with [SI]")
-    after: float = Field(description="in this model [SI]")
-    std: float = Field(description="standard error of the difference [SI]")
-    in_std: float = Field(description="difference in standard errors")
-    share: float = Field(description="difference in parts of the earlier value")
-
-
 class ComparisonAnswer(AnswerModel):
     before: str = Field(description="identifier of the model that it is compared with")
     after: str = Field(description="identifier of this model")
-    parameters: list[DriftAnswer] = Field(description="every parameter that both tell")
-    joints: dict[str, DriftAnswer] = Field(description="for each joint its most significant change")
-
-
-class TrendPointAnswer(AnswerModel):
-    time: datetime = Field(description="when its identification was handed in, UTC")
-    value: float = Field(description="estimate [SI]")
-    std: float = Field(description="its standard error [SI]")
-    model: str = Field(description="identifier of the model")
-
-
-class LineAnswer(AnswerModel):
-    count: int = Field(description="number of points")
-    slope: float = Field(description="change a week [SI]")
-    slope_std: float = Field(description="its standard error, scatter of the points included [SI]")
-    scatter: float = Field(description="1 where the points scatter as their standard errors say")
-    change: float = Field(description="of the line from the first point to the last [SI]")
-    in_std: float = Field(description="slope in its standard errors")
-
-
-class ParameterTrendAnswer(AnswerModel):
-    name: str = Field(description="of the parameter")
-    joint: str = Field(description="that it belongs to")
-    points: list[TrendPointAnswer] = Field(description="in every model that was ever active, the oldest first")
-    line: LineAnswer | None = Field(description="null before there are three points")
+    parameters: tuple[Drift, ...] = Field(description="every parameter that both tell")
+    joints: Mapping[str, Drift] = Field(description="for each joint its most significant change")
 
 
 class TrendAnswer(AnswerModel):
     robot: str = Field(description="name of the robot")
-    parameters: list[ParameterTrendAnswer] = Field(description="in the order of the newest model")
-
-
-class EventAnswer(AnswerModel):
-    number: int = Field(description="of the event")
-    robot: str = Field(description="name of the robot")
-    kind: str = Field(description="drift", examples=["drift"])
-    parameter: str = Field(description="that drifted")
-    text: str = Field(description="one line", examples=["joint3: viscous friction +40 % in 6 weeks"])
-    raised: datetime = Field(description="when it was seen first, UTC")
-    last_seen: datetime = Field(description="when it was seen last, UTC")
-    closed: datetime | None = Field(description="when somebody took note, UTC")
-    note: str | None = Field(description="what they wrote")
+    parameters: list[ParameterTrend] = Field(description="in the order of the newest model")
 
 
 class EventListAnswer(AnswerModel):
-    events: list[EventAnswer] = Field(description="the newest first")
+    events: list[ModelEventEntry] = Field(description="the newest first")
 
 
 def make_model_answer(entry: ModelEntry, collection: str) -> ModelAnswer:
     here = f"{collection}/{entry.identifier}"
     links = ModelLinksAnswer(self=here, document=f"{here}/document")
     return ModelAnswer.describe(entry, id=entry.identifier, links=links)
-
-
-def comparison_answer(
-    before: str, earlier: IdentificationDocument, after: str, later: IdentificationDocument
-) -> ComparisonAnswer:
-    drifts = compare_models(earlier, later)
-    return ComparisonAnswer(
-        before=before,
-        after=after,
-        parameters=[DriftAnswer.model_validate(drift) for drift in drifts],
-        joints={joint: DriftAnswer.model_validate(drift) for joint, drift in find_largest_by_joint(drifts).items()},
-    )
-
-
-def trend_answer(robot: str, models: Sequence[tuple[ModelEntry, IdentificationDocument]]) -> TrendAnswer:
-    parameters = []
-    for trend in parameter_trends(models):
-        points = [TrendPointAnswer(**asdict(point), model=model) for model, point in trend.points]
-        line = None if trend.line is None else LineAnswer.model_validate(trend.line)
-        parameters.append(ParameterTrendAnswer(name=trend.name, joint=trend.joint, points=points, line=line))
-    return TrendAnswer(robot=robot, parameters=parameters)
 
 
 router = APIRouter(tags=["models"], responses=problem_responses("store"))
@@ -200,7 +127,8 @@ def get_model_drift(
     before = since or next((each.identifier for each in history.models(robot, 10_000) if each.is_reference), None)
     if before is None:
         raise NotFoundError("no model of this robot has passed yet, so there is no reference; name one with since")
-    return comparison_answer(before, history.document(before), identifier, after)
+    drifts = compare_models(history.document(before), after)
+    return ComparisonAnswer(before=before, after=identifier, parameters=drifts, joints=find_largest_by_joint(drifts))
 
 
 @router.post(
@@ -229,7 +157,7 @@ async def make_reference(request: Request, identifier: Identifier, services: Ser
 def get_trend(services: ServicesDep, robot: RobotName) -> TrendAnswer:
     """Every parameter in every model that was ever active, and the straight line through it."""
     _bring_up_to_date(services)
-    return trend_answer(robot, services.models.history.documents(robot))
+    return TrendAnswer(robot=robot, parameters=parameter_trends(services.models.history.documents(robot)))
 
 
 @router.get("/model-policy", summary="Look up the bounds of a robot", responses=problem_responses("not-found"))
@@ -262,8 +190,7 @@ def list_events(
 ) -> EventListAnswer:
     """Parameters that have drifted beyond the bounds; one event for each, brought up to date while it is open."""
     _bring_up_to_date(services)
-    events = services.models.history.events(robot, only_open=only_open, limit=limit)
-    return EventListAnswer(events=[EventAnswer.model_validate(event) for event in events])
+    return EventListAnswer(events=services.models.history.events(robot, only_open=only_open, limit=limit))
 
 
 @router.post(
@@ -272,11 +199,11 @@ def list_events(
     responses=problem_responses(*_BODY_PROBLEMS),
     openapi_extra=json_request(ReasonRequest, _REASON),
 )
-async def acknowledge_event(request: Request, number: Number, services: ServicesDep) -> EventAnswer:
+async def acknowledge_event(request: Request, number: Number, services: ServicesDep) -> ModelEventEntry:
     """It is closed; another one is raised when the parameter is found beyond its bounds again."""
     body = await read_document(request, ReasonRequest, services.settings.max_document_bytes)
     history, now = services.models.history, datetime.now(UTC)
-    return EventAnswer.model_validate(await run_in_threadpool(history.acknowledge, number, body.reason, now))
+    return await run_in_threadpool(history.acknowledge, number, body.reason, now)
 
 
 async def _choose(request: Request, identifier: str, services: Services, role: str) -> ModelAnswer:

@@ -11,7 +11,7 @@ from tauscope.server.http.robot_files import RobotVersionAnswer
 from tauscope.server.http.services import ServicesDep
 from tauscope.server.problems import problem_responses
 from tauscope.server.store.data_folder import FOLDERS, ItemKind
-from tauscope.server.store.database.index import ItemEntry, ItemQuery
+from tauscope.server.store.database.index import ItemEntry, ItemQuery, RobotEntry
 
 
 class ItemAnswer(AnswerModel):
@@ -36,14 +36,8 @@ class ItemListAnswer(AnswerModel):
     before: datetime | None = Field(description="to be given as `before` for the next ones; null where there are none")
 
 
-class KnownRobotAnswer(AnswerModel):
-    name: str = Field(description="as in its file")
-    first_seen: datetime = Field(description="when the first item about it was handed in, UTC")
-    last_seen: datetime = Field(description="when the last one was, UTC")
-
-
 class RobotListAnswer(AnswerModel):
-    robots: list[KnownRobotAnswer] = Field(description="by name")
+    robots: list[RobotEntry] = Field(description="by name")
     versions: list[RobotVersionAnswer] = Field(description="robots that were sent to be kept, the newest first")
 
 
@@ -83,7 +77,7 @@ def search_items(
 def list_robots(services: ServicesDep) -> RobotListAnswer:
     """Every robot that something is or was kept about; its name is the one in its file."""
     services.index.refresh()
-    known = [KnownRobotAnswer.model_validate(each) for each in services.index.index.robots()]
+    known = services.index.index.robots()
     return RobotListAnswer(robots=known, versions=[RobotVersionAnswer.of(each) for each in services.robots.versions()])
 
 

@@ -4,12 +4,14 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 
+from pydantic import Field
 from sqlalchemy import ColumnElement, delete, insert, select, update
 from sqlalchemy.orm import Session
 
 from tauscope.server.store.database.database import Database, read_row
 from tauscope.server.store.database.tables import Artefact, Item, Recording, RecordingUse, Robot, Site
 from tauscope.server.store.recordings import StoredRecording
+from tauscope.strict_model import entry
 
 
 @dataclass(frozen=True)
@@ -74,11 +76,11 @@ class ItemQuery:
     limit: int = 100
 
 
-@dataclass(frozen=True)
+@entry
 class RobotEntry:
-    name: str
-    first_seen: datetime
-    last_seen: datetime
+    name: str = Field(description="as in its file")
+    first_seen: datetime = Field(description="when the first item about it was handed in, UTC")
+    last_seen: datetime = Field(description="when the last one was, UTC")
 
 
 FIGURES: Mapping[str, tuple[str, ...]] = {
@@ -162,17 +164,17 @@ class Index:
 
     def put_recordings(self, entries: Iterable[StoredRecording]) -> None:
         """Index the recordings of this site; those that are not among them any more are forgotten."""
-        present = {entry.name: entry for entry in entries}
+        present = {each.name: each for each in entries}
         with self._database.writing() as session:
             known = {row.name: row for row in session.scalars(select(Recording).where(Recording.site == self.site))}
             for name in known.keys() - present.keys():
                 session.delete(known[name])
-            for name, entry in present.items():
+            for name, found in present.items():
                 row = known.get(name)
                 if row is None:
                     row = Recording(site=self.site, name=name)
                     session.add(row)
-                row.size, row.modified, row.sha256 = entry.size, entry.modified, entry.sha256
+                row.size, row.modified, row.sha256 = found.size, found.modified, found.sha256
 
     def list_used_recordings(self, except_by: Collection[tuple[str, str]] = ()) -> frozenset[str]:
         """Recordings on the server that items of this site use, `except_by` those of some kinds and identifiers."""
