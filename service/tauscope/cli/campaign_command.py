@@ -12,7 +12,7 @@ from tauscope.cli.arguments import RobotFile
 from tauscope.cli.diagnose_command import show_diagnosis
 from tauscope.cli.identify_command import show_identification
 from tauscope.cli.output_files import write_file
-from tauscope.cli.terminal import output, plain, show_progress
+from tauscope.cli.terminal import output, say, show_progress
 from tauscope.errors import ExportError
 from tauscope.runtime.drivers import DEFAULT_BACKEND, driver_names
 from tauscope.tasks import campaign as task
@@ -71,7 +71,7 @@ def campaign(
     show_identification(output(), result.identification.document, result.identification.robot)
     if result.diagnosis is not None:
         show_diagnosis(output(), result.diagnosis.document)
-    output().print(plain(f"wrote {out}"), soft_wrap=True)
+    say(f"wrote {out}")
 
 
 def _request(robot: Path, steps: Mapping[str, str]) -> task.Request:
@@ -91,4 +91,4 @@ def _write(path: Path, outputs: Mapping[str, bytes], name: str) -> None:
     try:
         write_file(path, outputs[name])
     except ExportError as error:
-        output().print(plain(f"! {error}"), soft_wrap=True)
+        say(f"! {error}")

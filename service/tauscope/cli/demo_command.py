@@ -22,7 +22,7 @@ from tauscope.cli.identify_command import show_identification
 from tauscope.cli.output_files import write_file
 from tauscope.cli.run_command import explain_unfinished, keep_recording
 from tauscope.cli.task_run import write_outputs
-from tauscope.cli.terminal import Told, output, plain, show_progress, table
+from tauscope.cli.terminal import Told, output, say, show_progress, table
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.errors import AcquisitionError
 from tauscope.excitation import ExcitationOptions, OptimiserProgress, design_excitation
@@ -125,7 +125,7 @@ def run_demo(folder: Path, page: PageShown) -> None:
     said = f"Look at it: {hint}, then open http://127.0.0.1:{PORT}"
     if page is PageShown.LEFT:
         said = f"Look at it: {leave_page(folder).address}, for {LEFT_FOR_S / 60.0:.0f} minutes; after that: {hint}"
-    output().print(plain(said), soft_wrap=True)
+    say(said)
 
 
 def design_motion(robot: Path, out: Path, options: ExcitationOptions, told: Told) -> None:
@@ -185,17 +185,17 @@ def _show(console: Console, folder: Path, outcome: identify.Result, comparisons:
     console.print()
     console.print(table("Truth and estimate", Table(("parameter", "truth", "estimate", "± std", "z"), rows)))
     rms = float(np.sqrt(np.mean([row.z**2 for row in comparisons])))
-    console.print(
-        plain(f"z is the error in standard errors; its rms over all {len(rows)} parameters is {rms:.2f} (1 expected)")
+    say(
+        f"z is the error in standard errors; its rms over all {len(rows)} parameters is {rms:.2f} (1 expected)", console
     )
     for name in FILES:
-        console.print(plain(f"wrote {folder / name}"), soft_wrap=True)
+        say(f"wrote {folder / name}", console)
 
 
 def _show_findings(console: Console, found: DiagnosisDocument) -> None:
     console.print()
-    console.print(plain("The same arm once more, a spring concealed at its first joint; what the diagnosis found:"))
+    say("The same arm once more, a spring concealed at its first joint; what the diagnosis found:", console)
     for finding in found.findings:
-        console.print(plain(finding.statement), soft_wrap=True)
-    console.print(plain(f"verdict: {found.verdict}"))
+        say(finding.statement, console)
+    say(f"verdict: {found.verdict}", console)
     console.print()

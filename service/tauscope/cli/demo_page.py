@@ -68,7 +68,6 @@ class PageShown(Enum):
 
 
 def show_page(folder: Path) -> None:
-    """Serve the page until interrupted."""
     run_server(folder / DATA, port=_free_port())
 
 

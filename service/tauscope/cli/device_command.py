@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from tauscope.cli.arguments import RobotFile, name_input
-from tauscope.cli.terminal import output, plain, show_progress, table
+from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import make_group
 from tauscope.errors import AcquisitionError, MissingExtraError
 from tauscope.extras import require_extra
@@ -87,7 +87,7 @@ def release(
     if not supported and not _ask(arm.name):
         raise AcquisitionError(f"{arm.name} holds on; support it, then state --supported")
     release_drives(bus.name, arm, {})
-    output().print(plain(f"{arm.name}: no drive is under power"), soft_wrap=True)
+    say(f"{arm.name}: no drive is under power")
 
 
 def scan(
@@ -166,7 +166,7 @@ def _drives(path: Path, backend: str | None) -> Sequence[Finding]:
 def show_finding(console: Console, finding: Finding) -> None:
     remedy = f"; {finding.remedy}" if finding.remedy else ""
     line = f"{_MARKS[finding.severity]}: {finding.subject}: {finding.detail}{remedy}"
-    console.print(plain(line), soft_wrap=True)
+    say(line, console)
 
 
 def _ask(name: str) -> bool:
@@ -189,7 +189,7 @@ def show_frames(robot_file: Path, backend: str, trajectory: Path | None, options
     bus = select_bus(robot) if find_driver(backend).is_simulated else find_bus(backend)
     with translate_driver_errors():
         for frame in bus.plan_frames(to_drive_joints(bus, robot), request):
-            console.print(plain(f"{frame.phase} | {frame.wire} | {frame.meaning}"), soft_wrap=True)
+            say(f"{frame.phase} | {frame.wire} | {frame.meaning}", console)
 
 
 def _targets(robot: Robot, trajectory: Path | None, options: RunOptions) -> NDArray[np.float64]:

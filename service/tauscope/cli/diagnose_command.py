@@ -19,7 +19,7 @@ from tauscope.cli.arguments import (
     parse_cutoff,
 )
 from tauscope.cli.task_run import export_outputs, name_files, run_task
-from tauscope.cli.terminal import output, plain, table
+from tauscope.cli.terminal import output, say, table
 from tauscope.cli.verbs import OptionsOf, make_request
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.result import FindingEntry
@@ -125,18 +125,18 @@ def parse_against(words: list[str]) -> dict[str, Any]:
 
 
 def show_diagnosis(console: Console, document: DiagnosisDocument) -> None:
-    console.print(plain(f"Robot {document.robot}: {document.headline}"), soft_wrap=True)
-    console.print(plain(f"Verdict {document.verdict}: {VERDICTS[document.verdict]}"), soft_wrap=True)
-    console.print(plain(f"Noise: {noise_words(document.noise_method)}"), soft_wrap=True)
+    say(f"Robot {document.robot}: {document.headline}", console)
+    say(f"Verdict {document.verdict}: {VERDICTS[document.verdict]}", console)
+    say(f"Noise: {noise_words(document.noise_method)}", console)
     for warning in document.warnings:
-        console.print(plain(f"! {warning.sentence}."), soft_wrap=True)
+        say(f"! {warning.sentence}.", console)
     console.print()
     _show_findings(console, document.findings)
     if document.tentative:
-        console.print(plain("Tentative: held-out motion does not confirm these"), soft_wrap=True)
+        say("Tentative: held-out motion does not confirm these", console)
         _show_findings(console, document.tentative)
     for sentence in document.wrong_values:
-        console.print(plain(f"* {sentence}"), soft_wrap=True)
+        say(f"* {sentence}", console)
     if document.wrong_values:
         console.print()
     console.print(table("Mismatch with the nominal model", _mismatch(document)))
@@ -145,23 +145,23 @@ def show_diagnosis(console: Console, document: DiagnosisDocument) -> None:
         title = f"Headroom: held-out residual below {significant(document.cutoff_hz, 3)} Hz [Nm or N]"
         console.print(table(title, headroom_table(document)))
         for sentence in refutations(document):
-            console.print(plain(f"* {sentence}"), soft_wrap=True)
+            say(f"* {sentence}", console)
     if document.parameter_differences:
         console.print(table("What the simulation has wrong", difference_table(document)))
     if document.parameter_shifts:
         console.print(table("What the left-out effects had done to the parameters", shift_table(document)))
     invisible = sorted({e.effect + (f"@{e.joint}" if e.joint else "") for e in document.detectable if not e.visible})
     if invisible:
-        console.print(plain(f"No such data can show: {', '.join(invisible)}"), soft_wrap=True)
+        say(f"No such data can show: {', '.join(invisible)}", console)
     if document.next_experiment is not None:
-        console.print(plain(f"Next: {document.next_experiment.why}"), soft_wrap=True)
+        say(f"Next: {document.next_experiment.why}", console)
 
 
 def _show_findings(console: Console, findings: Sequence[FindingEntry]) -> None:
     for finding in findings[:MOST_FINDINGS]:
-        console.print(plain(f"* {finding.statement}"), soft_wrap=True)
+        say(f"* {finding.statement}", console)
     if len(findings) > MOST_FINDINGS:
-        console.print(plain(f"  and {len(findings) - MOST_FINDINGS} more, see --json"), soft_wrap=True)
+        say(f"  and {len(findings) - MOST_FINDINGS} more, see --json", console)
     if findings:
         console.print()
 

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from tauscope.cli.arguments import RobotFile, name_output
 from tauscope.cli.task_run import run_task
-from tauscope.cli.terminal import output, plain, table
+from tauscope.cli.terminal import output, say, table
 from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
 from tauscope.excitation import ExcitationDesign
 from tauscope.number_text import ABSENT, counted, percent, significant
@@ -68,11 +68,10 @@ CRITERIA = {"cond-f": "Cond_F(LᵀL)", "log-det": "-ln det(LᵀL)/p", "cond-2": 
 
 def show_design(console: Console, design: ExcitationDesign, robot: Robot) -> None:
     trajectory = design.trajectory
-    console.print(
-        plain(
-            f"Excitation of {robot.name}: {counted(robot.joint_count, 'joint')}, {counted(design.periods, 'period')} "
-            f"of {design.series.period_s:.4g} s, {trajectory.duration_s:.4g} s in all"
-        )
+    say(
+        f"Excitation of {robot.name}: {counted(robot.joint_count, 'joint')}, {counted(design.periods, 'period')} "
+        f"of {design.series.period_s:.4g} s, {trajectory.duration_s:.4g} s in all",
+        console,
     )
     rows = [
         ("condition number", significant(design.condition_number, 4)),
@@ -91,6 +90,6 @@ def show_design(console: Console, design: ExcitationDesign, robot: Robot) -> Non
     ]
     console.print(table("Margins: part of each limit that is left", Table(("joint", *margins), cells)))
     if design.active:
-        console.print(plain(f"Limited by {', '.join(design.active)}"), soft_wrap=True)
+        say(f"Limited by {', '.join(design.active)}", console)
     for note in design.notes:
-        console.print(plain(f"! {note}"), soft_wrap=True)
+        say(f"! {note}", console)

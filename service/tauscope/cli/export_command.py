@@ -8,7 +8,7 @@ import typer
 from tauscope.cli.arguments import name_input
 from tauscope.cli.output_files import require_free, write_file
 from tauscope.cli.task_run import parse_export_format
-from tauscope.cli.terminal import output, plain
+from tauscope.cli.terminal import say
 from tauscope.export.actuators import ActuatorChoice, ActuatorKind, to_isaac_lab
 from tauscope.export.formats import EXPORT_FILES, ExportFormat, make_export
 from tauscope.export.mjcf_patch import patch_mjcf
@@ -71,7 +71,7 @@ def export(
     else:
         write_file(out, to_isaac_lab(read, choice).encode() if isaac_lab else make_export(kind, read, choice))
     if str(out) != "-":
-        output().print(plain(f"wrote {out}"), soft_wrap=True)
+        say(f"wrote {out}")
 
 
 def _numbers(text: str | None, option: str) -> tuple[float, ...]:

@@ -9,7 +9,7 @@ import typer
 
 from tauscope.cli.arguments import name_input
 from tauscope.cli.output_files import require_new
-from tauscope.cli.terminal import output, plain, show_progress
+from tauscope.cli.terminal import say, show_progress
 from tauscope.cli.verbs import make_group
 from tauscope.errors import ExportError, IdentificationError
 from tauscope.number_text import counted
@@ -68,7 +68,7 @@ def run_fleet(verb: Literal["identify", "diagnose"], manifest: Path, out: Path, 
         raise ExportError(f"{out}: cannot be made ({error.strerror}); choose another --out") from error
     require_new(out / TABLE)
     failed = _run(verb, manifest, out.resolve(), workers, total)
-    output().print(plain(f"wrote {out / TABLE}: {counted(total, 'robot')}, {failed} failed"), soft_wrap=True)
+    say(f"wrote {out / TABLE}: {counted(total, 'robot')}, {failed} failed")
     if failed:
         text = f"{manifest}: {failed} of {counted(total, 'robot')} failed; see the column error of {out / TABLE}"
         raise IdentificationError(text)

@@ -18,7 +18,7 @@ from tauscope.cli.arguments import (
     parse_cutoff,
 )
 from tauscope.cli.task_run import export_outputs, name_files, run_task
-from tauscope.cli.terminal import output, plain, table
+from tauscope.cli.terminal import output, say, table
 from tauscope.cli.verbs import OptionsOf, make_request
 from tauscope.export.formats import EXPORT_FILES
 from tauscope.identification import IdentificationDocument
@@ -70,15 +70,13 @@ def identify(
 
 
 def show_identification(console: Console, document: IdentificationDocument, robot: Robot) -> None:
-    console.print(
-        plain(f"Robot {document.robot}: {counted(len(document.joints), 'joint')}, {document.estimator.upper()}")
-    )
+    say(f"Robot {document.robot}: {counted(len(document.joints), 'joint')}, {document.estimator.upper()}", console)
     for sentence in cautions(document):
-        console.print(plain(f"! {sentence}"), soft_wrap=True)
+        say(f"! {sentence}", console)
     console.print(table("Base parameters", base_parameter_table(document)))
     if document.unidentifiable:
         names = ", ".join(document.unidentifiable)
-        console.print(plain(f"No motion of this arm shows {names}"), soft_wrap=True)
+        say(f"No motion of this arm shows {names}", console)
         console.print()
     console.print(table("Friction [SI units]; in brackets: these data cannot tell", friction_table(document)))
     if document.rotor_inertia:
@@ -86,7 +84,7 @@ def show_identification(console: Console, document: IdentificationDocument, robo
     console.print(table("Noise and residual", fit_table(document, robot)))
     console.print(table("Whole arm", _whole_arm(document)))
     for sentence in fit_sentences(document):
-        console.print(plain(sentence), soft_wrap=True)
+        say(sentence, console)
 
 
 def _whole_arm(document: IdentificationDocument) -> Table:

@@ -12,7 +12,7 @@ from tauscope import robot as robots
 from tauscope.cli.arguments import LayoutFields, ReadingFields, RecordingFile, RobotFile, complete_reading, name_input
 from tauscope.cli.device_command import check_drives, require_sound, show_finding
 from tauscope.cli.output_files import write_file
-from tauscope.cli.terminal import output, plain, show_progress, table
+from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import make_group, make_request
 from tauscope.number_text import ABSENT, counted, given, significant
 from tauscope.recording import EffortKind, Reading, RecordingReport, check_recording, convert_recording
@@ -61,16 +61,13 @@ def check_recording_file(
         arm = None if robot is None else read_robot(robot)
         report = check_recording(file, joints, arm, options)
     console = output()
-    console.print(
-        plain(f"{report.name}: {counted(len(report.joints), 'joint')}, {counted(report.samples, 'sample')}"),
-        soft_wrap=True,
-    )
+    say(f"{report.name}: {counted(len(report.joints), 'joint')}, {counted(report.samples, 'sample')}", console)
     console.print(table("Recording", _clock(report)))
     console.print(table("Joints", _joints(report)))
     for finding in report.findings:
-        console.print(plain(f"{finding.severity}: {finding.where}: {finding.text}"), soft_wrap=True)
+        say(f"{finding.severity}: {finding.where}: {finding.text}", console)
     report.require_usable()
-    console.print(plain(f"{file}: valid"), soft_wrap=True)
+    say(f"{file}: valid", console)
 
 
 def convert_file(
@@ -95,11 +92,11 @@ def convert_file(
         arm = None if robot is None else read_robot(robot)
         done = convert_recording(source, target, recover=recover, overwrite=overwrite, robot=arm, reading=options)
     console = output()
-    console.print(plain(f"wrote {done.target}: {counted(done.samples, 'sample')}"), soft_wrap=True)
+    say(f"wrote {done.target}: {counted(done.samples, 'sample')}", console)
     if done.dropped_columns:
-        console.print(plain(f"left out: {', '.join(done.dropped_columns)}"), soft_wrap=True)
+        say(f"left out: {', '.join(done.dropped_columns)}", console)
     if done.damage is not None:
-        console.print(plain(f"damage passed over: {done.damage}"), soft_wrap=True)
+        say(f"damage passed over: {done.damage}", console)
 
 
 def map_file(
@@ -124,7 +121,7 @@ def map_file(
     text = layout_text(layout) + "\n"
     if out is not None:
         write_file(out, text.encode())
-        output().print(plain(f"wrote {out}: {found.joint_count} joints"), soft_wrap=True)
+        say(f"wrote {out}: {found.joint_count} joints")
     else:
         typer.echo(text, nl=False)
 
@@ -179,8 +176,8 @@ def check_robot_file(file: RobotFile) -> None:
     report = robots.check_robot(file)
     console = output()
     gravity = ", ".join(given(value) for value in report.gravity)
-    console.print(
-        plain(f"Robot {report.name}: {counted(len(report.joints), 'joint')}, gravity [{gravity}] m/s²{_mass(report)}")
+    say(
+        f"Robot {report.name}: {counted(len(report.joints), 'joint')}, gravity [{gravity}] m/s²{_mass(report)}", console
     )
     columns = (
         "joint",
@@ -196,12 +193,12 @@ def check_robot_file(file: RobotFile) -> None:
     )
     console.print(table("Joints", Table(columns, [_row(joint) for joint in report.joints], words=3)))
     for finding in report.findings:
-        console.print(plain(f"{finding.severity}: {finding.where}: {finding.text}"), soft_wrap=True)
+        say(f"{finding.severity}: {finding.where}: {finding.text}", console)
     findings = check_drives(file)
     for finding in findings:
         show_finding(console, finding)
     require_sound(findings)
-    console.print(plain(f"{file}: valid"), soft_wrap=True)
+    say(f"{file}: valid", console)
 
 
 def _mass(report: RobotReport) -> str:

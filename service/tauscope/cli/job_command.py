@@ -9,7 +9,7 @@ import typer
 from pydantic import SecretStr
 
 from tauscope.cli.store_command import DatabaseUrl, DataFolder, open_database
-from tauscope.cli.terminal import output, plain, table
+from tauscope.cli.terminal import output, say, table
 from tauscope.cli.verbs import make_group
 from tauscope.errors import StoreError, TauscopeError
 from tauscope.number_text import ABSENT
@@ -112,7 +112,7 @@ def _tell(name: str, firing: FiringEntry) -> None:
     what = f"{firing.item[0]} {firing.item[1]}"
     if firing.item_state not in GOOD_ENDS:
         raise StoreError(f"schedule {name}: {what} ended {firing.item_state}; look it up, and do what its problem says")
-    output().print(plain(f"schedule {name}: {what} {firing.item_state}"), soft_wrap=True)
+    say(f"schedule {name}: {what} {firing.item_state}")
 
 
 def _outcome(firing: FiringEntry | None) -> str:

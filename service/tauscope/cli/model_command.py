@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from tauscope.cli.store_command import DatabaseUrl, DataFolder, open_database
-from tauscope.cli.terminal import output, plain, table
+from tauscope.cli.terminal import output, say, table
 from tauscope.cli.verbs import make_group
 from tauscope.errors import StoreError
 from tauscope.number_text import ABSENT, counted, significant
@@ -53,10 +53,10 @@ def show_events(robot: RobotName, data: DataFolder = None, database: DatabaseUrl
         history.policy(robot)
         events = history.events(robot, only_open=True, limit=limit)
     if not events:
-        output().print(plain(f"{robot}: nothing has drifted beyond its bounds"), soft_wrap=True)
+        say(f"{robot}: nothing has drifted beyond its bounds")
         return
     for event in events:
-        output().print(plain(event.text), soft_wrap=True)
+        say(event.text)
     hint = "look at the arm; `tauscope model reference` counts from a new model on"
     raise StoreError(f"{robot}: {counted(len(events), 'parameter')} drifted beyond the bounds; {hint}")
 
@@ -79,7 +79,7 @@ def _choose(identifier: str, role: str, reason: str, data: Path | None, database
     with open_database(data, database) as opened:
         entry = ModelHistory(opened).activate(identifier, role, reason, datetime.now(UTC))
     noun = "active model" if role == "active" else "reference"
-    output().print(plain(f"{entry.identifier} is the {noun} of {entry.robot}"), soft_wrap=True)
+    say(f"{entry.identifier} is the {noun} of {entry.robot}")
 
 
 def _state(entry: ModelEntry) -> str:

@@ -14,7 +14,7 @@ from rich.console import Console
 from tauscope.cli.arguments import RobotFile, name_input
 from tauscope.cli.device_command import show_frames
 from tauscope.cli.output_files import keep_file, require_new
-from tauscope.cli.terminal import output, plain, show_progress, table
+from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
 from tauscope.errors import AcquisitionError
 from tauscope.number_text import ABSENT, counted, significant
@@ -118,7 +118,7 @@ def _run_arm(request: task.Request, asked: Path | None) -> None:
             shutil.rmtree(folder, ignore_errors=True)
     show_run(output(), result.record, result.robot)
     if made:
-        output().print(plain(f"wrote {out}"), soft_wrap=True)
+        say(f"wrote {out}")
     if result.record.state is not RunState.FINISHED:
         raise AcquisitionError(explain_unfinished(result.record, out if made else None, journal))
 
@@ -139,7 +139,6 @@ def _unsaved_journal(result: task.Result) -> Path | None:
 
 
 def explain_unfinished(record: RunRecord, recording: Path | None, journal: Path | None = None) -> str:
-    """One line on a run that did not finish."""
     reason = record.stop if record.problem is None else record.problem.detail
     until = "" if record.state is RunState.DEGRADED else " until then"
     kept = "nothing was recorded" if recording is None else f"what was recorded{until} is in {recording}"
@@ -181,18 +180,18 @@ def _folder_beside(out: Path) -> Path:
 
 def show_run(console: Console, record: RunRecord, robot: Robot) -> None:
     reason = f": {record.problem.detail}" if record.problem is not None else ""
-    console.print(plain(f"Robot {record.robot} on {record.backend}: {record.state}{reason}"), soft_wrap=True)
+    say(f"Robot {record.robot} on {record.backend}: {record.state}{reason}", console)
     for line in record.drives:
-        console.print(plain(f"! {line}."), soft_wrap=True)
+        say(f"! {line}.", console)
     for warning in robot.warnings:
-        console.print(plain(f"! {warning.sentence}."), soft_wrap=True)
+        say(f"! {warning.sentence}.", console)
     if record.holds and not find_driver(record.backend).is_simulated:
-        console.print(plain(HELD), soft_wrap=True)
+        say(HELD, console)
     console.print(table("Run", _whole(record)))
     if record.worst_following:
         console.print(table("Joints", _joints(record, robot)))
     for remark in record.recording.remarks if record.recording is not None else ():
-        console.print(plain(f"! {remark}"), soft_wrap=True)
+        say(f"! {remark}", console)
 
 
 def _whole(record: RunRecord) -> Table:

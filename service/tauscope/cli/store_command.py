@@ -12,7 +12,7 @@ import typer
 
 from tauscope.cli.arguments import name_input
 from tauscope.cli.output_files import require_new
-from tauscope.cli.terminal import output, plain, show_progress, table
+from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import make_group
 from tauscope.errors import StoreError
 from tauscope.number_text import ABSENT, counted
@@ -109,7 +109,7 @@ def check_store(
         recordings = len(RecordingStore(store.folder / RECORDINGS).entries())
     kept = f"{counted(count, 'item')} and {counted(recordings, 'recording')}"
     if not changed:
-        output().print(plain(f"{store.folder}: {kept}, all as they were"), soft_wrap=True)
+        say(f"{store.folder}: {kept}, all as they were")
         return
     own = {"recording": "its bytes"}
     rows = [(item.kind, item.identifier, item.path or own.get(item.kind, _OWN_FILES)) for item in changed]
@@ -151,7 +151,7 @@ def prune_store(
     done = "would go" if dry_run else "removed"
     if rows:
         output().print(table(done.capitalize(), Table(("kind", "item", "robot"), rows, words=3)))
-    output().print(plain(f"{store.folder}: {counted(len(rows), 'item')} {done}"), soft_wrap=True)
+    say(f"{store.folder}: {counted(len(rows), 'item')} {done}")
 
 
 def backup(
@@ -168,7 +168,7 @@ def backup(
             count = write_backup(folder, opened, file, tauscope_version())
         except OSError as error:
             raise StoreError(f"{file}: cannot be written ({error.strerror or error}); choose another place") from error
-    output().print(plain(f"wrote {file}: {counted(count, 'file')} and the database"), soft_wrap=True)
+    say(f"wrote {file}: {counted(count, 'file')} and the database")
 
 
 def restore(
@@ -183,7 +183,7 @@ def restore(
             count = restore_backup(file, data, database)
         except OSError as error:
             raise StoreError(f"{data}: cannot be written ({error.strerror or error}); choose another place") from error
-    output().print(plain(f"restored {data}: {counted(count, 'file')} and the database"), soft_wrap=True)
+    say(f"restored {data}: {counted(count, 'file')} and the database")
 
 
 store = make_group("Look after what is kept.", check=check_store, prune=prune_store)

@@ -8,7 +8,7 @@ from typing import Any
 import typer
 
 from tauscope.cli.output_files import STANDARD_OUTPUT, require_distinct, require_free, write_file
-from tauscope.cli.terminal import Told, output, plain, show_progress
+from tauscope.cli.terminal import Told, say, show_progress
 from tauscope.export.formats import SUFFIXES, ExportFile, ExportFormat
 from tauscope.robot import Robot, Severity, read_robot
 from tauscope.robot.messages import one_line
@@ -32,7 +32,7 @@ def run_task(
         show(result)
     if STANDARD_OUTPUT not in paths:
         for path in written:
-            output().print(plain(f"wrote {path}"), soft_wrap=True)
+            say(f"wrote {path}")
     _show_warnings(robot, result, summarised=show is not None)
     return result
 

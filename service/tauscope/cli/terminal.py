@@ -27,6 +27,11 @@ def plain(text: str) -> Text:
     return Text(one_line(text))
 
 
+def say(text: str, console: Console | None = None) -> None:
+    """Print text of a user's file in one line, however long."""
+    (console or output()).print(plain(text), soft_wrap=True)
+
+
 def table(title: str, view: Table) -> RichTable:
     """A table of plain text, numbers to the right."""
     made = RichTable(title=plain(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)

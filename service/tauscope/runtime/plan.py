@@ -53,7 +53,6 @@ def compute_inertia(robot: Robot, position: Array) -> tuple[Array, int] | None:
 
 
 def _parameters(robot: Robot) -> Array | None:
-    """Θ of the model's links."""
     if robot.model.links is None:
         return None
     return np.concatenate([link.to_vector() for link in robot.model.links])

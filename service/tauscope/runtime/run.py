@@ -83,7 +83,6 @@ def prepare(task: RunTask, backend: Backend, state: ArmState) -> Plan:
 
 
 def journal_header(robot: Robot, plan: Plan, backend: Backend, state: ArmState, mode: str) -> JournalHeader:
-    """What all rows of a run's journal have in common."""
     unit = backend.capabilities.effort_unit
     return JournalHeader(
         robot=robot.name,

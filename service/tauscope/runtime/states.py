@@ -80,8 +80,6 @@ class StopAskedError(Exception):
 
 
 class Stops(Protocol):
-    """Where a run looks for requests to stop."""
-
     @property
     def requested(self) -> StopRequest | None:
         """The first request, None where there is none."""

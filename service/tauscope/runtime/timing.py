@@ -22,8 +22,6 @@ _LOCK_CURRENT_AND_FUTURE = 3
 
 
 class RealTime(StrictModel):
-    """What the loop was given of what it asked for."""
-
     scheduler: str = Field(description="fifo with its priority, or why the ordinary scheduler was used")
     memory_locked: bool = Field(description="whether no page of the process could be swapped out")
     collector_frozen: bool = Field(description="whether Python's garbage collector stood still")
@@ -98,8 +96,6 @@ _PERCENTILES = {"p50": 50.0, "p99": 99.0, "p99.9": 99.9, "max": 100.0}
 
 
 class Timing(StrictModel):
-    """How well a run kept its time."""
-
     rate_hz: float = Field(description="cycles a second that were asked for")
     achieved_rate_hz: float | None = Field(description="cycles by the time they took; null for less than two")
     cycles: int = Field(description="cycles that took place")

@@ -61,13 +61,6 @@ class Access:
     failures: RateLimit = field(default_factory=lambda: RateLimit(FAILURES_PER_S, FAILURE_BURST))
 
 
-@dataclass(frozen=True)
-class _Refusal:
-    code: str
-    detail: str
-    headers: dict[str, str] = field(default_factory=dict)
-
-
 class HttpMiddleware:
     """Answers requests over HTTP; whatever else comes to the application passes."""
 
@@ -85,7 +78,7 @@ class Gate(HttpMiddleware):
     @override
     async def answer(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
         outcome = _admit(cast(Access, scope["app"].state.services.access), scope)
-        if isinstance(outcome, _Refusal):
+        if isinstance(outcome, ProblemError):
             _note_refusal(scope, outcome)
             problem = make_problem(outcome.code, outcome.detail, scope["path"])
             return await problem_answer(problem, outcome.headers)(scope, receive, send)
@@ -97,7 +90,7 @@ def find_caller(scope: AsgiScope) -> Caller:
     return cast(Caller, scope.get(CALLER, LOCAL))
 
 
-def _admit(access: Access, scope: AsgiScope) -> Caller | _Refusal:
+def _admit(access: Access, scope: AsgiScope) -> Caller | ProblemError:
     method, path = scope["method"], scope["path"]
     needed = find_needed_scope(method, path)
     if needed is None:
@@ -106,10 +99,12 @@ def _admit(access: Access, scope: AsgiScope) -> Caller | _Refusal:
     caller = access.ring.caller(_key(Headers(scope=scope)), may_be_expired=stops)
     if isinstance(caller, str):
         wait = access.failures.take((scope.get("client") or ("",))[0])
-        return _too_often(wait) if wait else _Refusal("unauthorized", caller, {"WWW-Authenticate": "Bearer"})
+        return (
+            _too_often(wait) if wait else ProblemError("unauthorized", caller, headers={"WWW-Authenticate": "Bearer"})
+        )
     if not caller.scope.includes(needed):
         text = f"{method} {path} needs a key of scope {needed}; the one of {caller.name} has {caller.scope}"
-        return _Refusal("forbidden", text)
+        return ProblemError("forbidden", text)
     # Whoever wants to stop an arm is never told to wait.
     if stops or (caller.key is None and not access.limits_local):
         return caller
@@ -117,7 +112,7 @@ def _admit(access: Access, scope: AsgiScope) -> Caller | _Refusal:
     return _too_often(wait) if wait else caller
 
 
-def _note_refusal(scope: AsgiScope, refusal: _Refusal) -> None:
+def _note_refusal(scope: AsgiScope, refusal: ProblemError) -> None:
     """Have it known who tried what; whoever only has to wait is not worth an entry."""
     if refusal.code != "rate-limited":
         audit, address = cast(AuditTrail, scope["app"].state.services.audit), (scope.get("client") or (None,))[0]
@@ -145,9 +140,10 @@ def require_upload_quota(scope: AsgiScope) -> Callable[[int], None]:
     return partial(quota.charge, key)
 
 
-def _too_often(wait_s: float) -> _Refusal:
+def _too_often(wait_s: float) -> ProblemError:
     seconds = max(1, math.ceil(wait_s))
-    return _Refusal("rate-limited", f"too many requests; go on after {seconds} s", {"Retry-After": str(seconds)})
+    headers = {"Retry-After": str(seconds)}
+    return ProblemError("rate-limited", f"too many requests; go on after {seconds} s", headers=headers)
 
 
 _log = logging.getLogger("tauscope.audit")

@@ -5,7 +5,6 @@ import shutil
 import threading
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import UTC
 from pathlib import Path
 from typing import Any, Literal
@@ -161,23 +160,21 @@ def ready_motion(run: RunWorkspace, stop: threading.Event) -> bool:
     return run.trajectory is not None and not stop.is_set()
 
 
-@dataclass(frozen=True, eq=False)
-class DesignedMotion:
-    jobs: JobQueue
-    excitations: JobKind
-    excitation: str
+def await_design(jobs: JobQueue, excitations: JobKind, excitation: str) -> Motion:
+    """The motion that a job designs meanwhile. Raises TauscopeError, when it is needed, if the job has no result."""
 
-    def __call__(self, run: RunWorkspace, stop: threading.Event) -> bool:
-        """Wait for the job and fetch its trajectory. Raises TauscopeError if the job has no result."""
-        design = ExcitationWorkspace(self.excitations.items.folder(self.excitation))
+    def fetch(run: RunWorkspace, stop: threading.Event) -> bool:
+        design = ExcitationWorkspace(excitations.items.folder(excitation))
         run.write_step("design the motion")
         record = wait_for_end(design, stop)
         if record is None:
-            self.jobs.cancel(self.excitations, self.excitation)
+            jobs.cancel(excitations, excitation)
             return False
-        require_succeeded(record, f"excitation {self.excitation}")
+        require_succeeded(record, f"excitation {excitation}")
         take_trajectory(design, run)
         return True
+
+    return fetch
 
 
 def wait_for_end(workspace: Workspace, stop: threading.Event) -> JobRecord | None:

@@ -109,7 +109,6 @@ def _read_job(kind: str, folder: Path) -> ItemMetadata:
 
 
 def _roles(order: Any) -> Iterator[RecordingRole]:
-    """The recordings of an order; motions have none."""
     for role in _ROLES:
         listed = getattr(order, role, None)
         for entry in listed if isinstance(listed, tuple) else ():
@@ -133,7 +132,6 @@ def _figures(kind: str, document: Mapping[str, Any]) -> dict[str, str | float | 
 
 
 def _describe_damage(kind: str, folder: Path, mark: str, file: str) -> ItemMetadata:
-    """An item that has lost a file without which nothing can be said of it."""
     detail = f"{folder.name}: {file} is missing or damaged; restore it from a backup, or remove it"
     created = identifier_time(folder.name)
     return ItemMetadata(kind, folder.name, DAMAGED, True, mark, created, problem=(DAMAGED, detail))

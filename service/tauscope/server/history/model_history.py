@@ -98,7 +98,6 @@ class ModelHistory:
         return IdentificationDocument.model_validate(content)
 
     def active(self, robot: str) -> ModelEntry | None:
-        """The active model of a robot; None where none has passed yet."""
         query = select(Model).join(Robot).where(Robot.name == robot, Model.is_active)
         with self._database.reading() as session:
             model = session.scalar(query)

@@ -34,8 +34,6 @@ class ParameterShift(BaseModel):
 
 
 class OwnDiagnosis(BaseModel):
-    """As much of a diagnosis as a model is judged by."""
-
     verdict: str
     findings: list[NamedFinding]
     parameter_shifts: list[ParameterShift]

@@ -68,26 +68,19 @@ def _is_gone(remove_one: Callable[[str], object], name: str) -> bool:
     return True
 
 
-class RetentionSweeper:
-    """A rule that is kept to while the service works, by the same ways by which its routes remove something."""
-
-    def __init__(
-        self,
-        rule: RetentionRule,
-        indexer: Indexer,
-        history: ModelHistory,
-        recordings: RecordingStore,
-        removers: Mapping[str, Callable[[str], object]],
-        on_removed: Callable[[str, str], None],
-    ) -> None:
-        self._rule, self._indexer, self._history = rule, indexer, history
-        self._recordings, self._removers, self._on_removed = recordings, removers, on_removed
-
-    def tidy(self) -> None:
-        """Remove what the rule lets go. Raises StoreError, before anything goes, or OSError."""
-        plan = plan_removal(self._indexer, self._history, self._recordings, self._rule, utc_now())
-        gone = remove(plan, self._removers, self._recordings, self._indexer)
-        for entry in gone.items:
-            self._on_removed(entry.kind, entry.identifier)
-        for name in gone.recordings:
-            self._on_removed("recording", name)
+def sweep(
+    rule: RetentionRule,
+    indexer: Indexer,
+    history: ModelHistory,
+    recordings: RecordingStore,
+    removers: Mapping[str, Callable[[str], object]],
+    on_removed: Callable[[str, str], None],
+) -> None:
+    """Remove what a rule lets go, as the routes do. Raises StoreError, before anything goes, or OSError."""
+    plan = plan_removal(indexer, history, recordings, rule, utc_now())
+    gone = remove(plan, removers, recordings, indexer)
+    for kind, name in [
+        *((each.kind, each.identifier) for each in gone.items),
+        *(("recording", e) for e in gone.recordings),
+    ]:
+        on_removed(kind, name)

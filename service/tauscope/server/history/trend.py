@@ -25,8 +25,6 @@ class TrendPoint:
 
 @entry
 class Trend:
-    """The straight line through the points."""
-
     count: int = Field(description="number of points")
     slope: float = Field(description="change a week [SI]")
     slope_std: float = Field(description="its standard error, scatter of the points included [SI]")

@@ -14,7 +14,7 @@ from python_multipart.exceptions import FormParserError
 from python_multipart.multipart import MultipartParser, parse_options_header
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.errors import LimitExceededError
+from tauscope.errors import LimitExceededError, TauscopeError
 from tauscope.robot.messages import one_line, shown
 from tauscope.server.auth.gate import require_upload_quota
 from tauscope.server.problems import ProblemError, invalid_request
@@ -58,13 +58,13 @@ def parse_document(content: bytes, kind: type[Model], *, within: str) -> Model:
         raise invalid_request(error, within=within) from None
 
 
-def to_json_text(value: Any) -> str | None:
-    """Plain data as JSON; None where it holds NaN or infinity, or text that is not Unicode."""
+def to_json_text(value: Any, place: str, kind: type[TauscopeError]) -> str:
+    """Plain data as JSON. Raises an error of a kind where it holds NaN or infinity, or text that is not Unicode."""
     try:
         text = json.dumps(value, ensure_ascii=False, allow_nan=False)
         text.encode()
     except (ValueError, RecursionError):
-        return None
+        raise kind(f"{place}: holds NaN, infinity or text that is not Unicode; write plain numbers and text") from None
     return text
 
 

@@ -166,8 +166,6 @@ def _links(here: str, root: str, made: CampaignLinks, *, has_result: bool) -> Ca
 
 
 class Campaigns(MovingResource):
-    """Motions and what is identified from them."""
-
     @override
     def manager(self, services: Services) -> CampaignManager:
         return services.campaigns

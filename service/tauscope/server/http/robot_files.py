@@ -118,9 +118,7 @@ def robot_part_rules(folder: Path) -> dict[str, PartRule]:
 
 def keep_inline_robot(folder: Path, robot: Mapping[str, Any]) -> str:
     """Write a robot that came as JSON. Raises RobotFileError if it is not plain data, or too large."""
-    text = to_json_text(robot)
-    if text is None:
-        raise RobotFileError("robot: holds NaN, infinity or text that is not Unicode; write plain numbers and text")
+    text = to_json_text(robot, "robot", RobotFileError)
     (folder / INLINE_NAME).write_text(text, encoding="utf-8")
     return INLINE_NAME
 

@@ -23,10 +23,10 @@ from tauscope.runtime.states import RunState
 from tauscope.runtime.timing import RealTime, Timing
 from tauscope.server.control.leases import Permit
 from tauscope.server.control.run import (
-    DesignedMotion,
     Motion,
     RunRequestRecord,
     RunWorkspace,
+    await_design,
     ready_motion,
     take_trajectory,
 )
@@ -183,15 +183,6 @@ def _links(here: str, excitation: str | None, record: RunRecord | None, workspac
 LARGEST_TRAJECTORY = 64 * 2**20  # bytes of the largest trajectory file that is accepted
 
 
-@dataclass(frozen=True, eq=False)
-class _Wanted:
-    document: RunRequest
-    robot_file: str
-    robot: Robot
-    backend: BackendChoice
-    uploaded: bool
-
-
 def _put_robot(received: Received[RunRequest], services: Services, workspace: RunWorkspace) -> str:
     document, has_robot = received.document, received.form.file("robot") or received.document.robot
     if document.excitation is None or has_robot:
@@ -204,67 +195,57 @@ def _put_robot(received: Received[RunRequest], services: Services, workspace: Ru
 
 def _prepare(
     received: Received[RunRequest], services: Services, workspace: RunWorkspace, robot_file: str, robot: Robot
-) -> _Wanted:
-    document = received.document
-    uploaded = received.form.file("trajectory") is not None
+) -> tuple[RunRequestRecord, bool]:
+    """What is asked for, and whether its trajectory was sent."""
+    document, is_sent = received.document, received.form.file("trajectory") is not None
     if document.trajectory is not None:
-        if uploaded:
+        if is_sent:
             raise ProblemError("invalid-request", "the trajectory came twice, as a part and in part request; send one")
-        text = to_json_text(document.trajectory)
-        if text is None:
-            raise ExcitationError("trajectory: holds NaN, infinity or text that is not Unicode; write plain numbers")
+        text = to_json_text(document.trajectory, "trajectory", ExcitationError)
         (workspace.trajectories / "trajectory.json").write_text(text, encoding="utf-8")
-        uploaded = True
-    if uploaded and document.excitation is not None:
+        is_sent = True
+    if is_sent and document.excitation is not None:
         raise ProblemError("invalid-request", "excitation and trajectory were both given; give one motion")
     backend = choose_backend(services.settings, document.backend, robot)
-    return _Wanted(document, robot_file, robot, backend, uploaded)
-
-
-def _submit(wanted: _Wanted, services: Services, workspace: RunWorkspace, permit: Permit) -> str:
-    document, backend = wanted.document, wanted.backend
-    device = backend.device(wanted.robot.name)
-    services.runs.claims.require_free(device)
-    excitation, motion = _motion(wanted, services, workspace)
-    workspace.write_request(
-        RunRequestRecord(
-            robot_file=wanted.robot_file,
-            robot_name=wanted.robot.name,
-            backend=backend,
-            device=device,
-            excitation=excitation,
-            options=RunOptions.model_validate(document.model_dump(include=set(RunOptions.model_fields))),
-        )
+    order = RunRequestRecord(
+        robot_file=robot_file,
+        robot_name=robot.name,
+        backend=backend,
+        device=backend.device(robot.name),
+        excitation=document.excitation,
+        options=RunOptions.model_validate(document.model_dump(include=set(RunOptions.model_fields))),
     )
+    return order, is_sent
+
+
+def _submit(
+    order: RunRequestRecord, seed: int | None, services: Services, workspace: RunWorkspace, permit: Permit
+) -> str:
+    """Start a run; `seed`: of the motion that is designed first, None where there is one."""
+    services.runs.claims.require_free(order.device)
+    motion: Motion = ready_motion
+    if order.excitation is not None:
+        take_trajectory(EXCITATIONS.finished(services, order.excitation), workspace)
+    elif seed is not None:
+        options = ExcitationDesignOptions(seed=seed)
+        design = ExcitationOrder(robot_file=order.robot_file, robot_name=order.robot_name, options=options)
+        put_robot = partial(shutil.copytree, workspace.robot, dirs_exist_ok=True)
+        identifier = submit_job(services.jobs, services.excitations, ExcitationWorkspace, design, put_robot)
+        order = order.model_copy(update={"excitation": identifier})
+        motion = await_design(services.jobs, services.excitations, identifier)
+    workspace.write_request(order)
     try:
         return services.runs.submit(workspace.folder, motion, permit=permit)
     except BaseException:
-        if excitation is not None and document.excitation is None:
-            services.jobs.cancel(services.excitations, excitation)
+        if motion is not ready_motion:
+            services.jobs.cancel(services.excitations, order.excitation or "")
         raise
-
-
-def _motion(wanted: _Wanted, services: Services, workspace: RunWorkspace) -> tuple[str | None, Motion]:
-    """The excitation that is played, if it is one, and how the run gets its trajectory."""
-    identifier = wanted.document.excitation
-    if wanted.uploaded:
-        return None, ready_motion
-    if identifier is not None:
-        take_trajectory(EXCITATIONS.finished(services, identifier), workspace)
-        return identifier, ready_motion
-    options = ExcitationDesignOptions(seed=wanted.document.seed)
-    order = ExcitationOrder(robot_file=wanted.robot_file, robot_name=wanted.robot.name, options=options)
-    put_robot = partial(shutil.copytree, workspace.robot, dirs_exist_ok=True)
-    identifier = submit_job(services.jobs, services.excitations, ExcitationWorkspace, order, put_robot)
-    return identifier, DesignedMotion(services.jobs, services.excitations, identifier)
 
 
 Format = Annotated[RecordingFormat, Query(alias="format", description="mcap: the journal, ramp included; else columns")]
 
 
 class Runs(MovingResource):
-    """Motions of an arm."""
-
     @override
     def manager(self, services: Services) -> RunManager:
         return services.runs
@@ -317,13 +298,14 @@ class Runs(MovingResource):
             received = await receive_request(request, RunRequest, services.settings, workspace.robot, parts)
             robot_file = await run_in_threadpool(_put_robot, received, services, workspace)
             robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
-            wanted = await run_in_threadpool(_prepare, received, services, workspace, robot_file, robot)
-            permit = permit_of(request, services, wanted.backend.device(wanted.robot.name))
-            if wanted.uploaded:
+            order, is_sent = await run_in_threadpool(_prepare, received, services, workspace, robot_file, robot)
+            permit = permit_of(request, services, order.device)
+            if is_sent:
                 await services.reading.call(
-                    request, check_trajectory, workspace.trajectories, workspace.robot / wanted.robot_file
+                    request, check_trajectory, workspace.trajectories, workspace.robot / robot_file
                 )
-            return await run_in_threadpool(_submit, wanted, services, workspace, permit)
+            seed = None if is_sent else received.document.seed
+            return await run_in_threadpool(_submit, order, seed, services, workspace, permit)
 
 
 RUNS = Runs(

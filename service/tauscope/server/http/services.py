@@ -25,7 +25,7 @@ from tauscope.server.control.run_manager import RunManager, StartControl
 from tauscope.server.history.indexer import Indexer, open_index
 from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.history.model_registry import DriftMonitor, ModelRegistry
-from tauscope.server.history.retention import RetentionRule, RetentionSweeper
+from tauscope.server.history.retention import RetentionRule, sweep
 from tauscope.server.http.metrics import Metrics, TimedExecutor
 from tauscope.server.http.readiness import Clock, Heartbeat, Readiness, check_database, check_disk
 from tauscope.server.http.reading import WIDTH, ReadingQueue
@@ -114,7 +114,7 @@ def open_services(
         lock.release()
         raise
     readers = open_readers(settings)
-    services = _assemble(_Ground(settings, access, database, site), executor, readers, start)
+    services = _assemble(settings, access, database, site, executor, readers, start)
     drift = DriftMonitor(services.models.history, site)
     _watch(services, drift)
     housekeeping = Housekeeping(
@@ -167,17 +167,16 @@ def _fill_index(services: Services) -> None:
         _log.warning("the index is not filled: %s; it is tried again", error)
 
 
-@dataclass(frozen=True, eq=False)
-class _Ground:
-    settings: Settings
-    access: Access
-    database: Database
-    site: str
-
-
-def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, start: StartControl | None) -> Services:
+def _assemble(
+    settings: Settings,
+    access: Access,
+    database: Database,
+    site: str,
+    executor: Executor | None,
+    readers: Executor,
+    start: StartControl | None,
+) -> Services:
     """Everything that the routes work with; nothing of it moves yet, and unfinished analysis goes on."""
-    settings, database, site = ground.settings, ground.database, ground.site
     items, metrics, heartbeat = item_stores(settings.data_folder), Metrics(), Heartbeat()
     recordings = RecordingStore(settings.recordings_folder)
     recordings.tidy()
@@ -214,12 +213,12 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
         runs=runs,
         campaigns=campaigns,
         reading=ReadingQueue(readers),
-        access=ground.access,
+        access=access,
         leases=leases,
         audit=audit,
         answers=StoredAnswers(settings.data_folder / "idempotency"),
         metrics=metrics,
-        readiness=Readiness(_collect_checks(ground, jobs, readers, audit, closing)),
+        readiness=Readiness(_collect_checks(settings, database, jobs, readers, audit, closing)),
         closing=closing,
         feeds=EventFeeds(closing),
         heartbeat=heartbeat,
@@ -230,7 +229,12 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
 
 
 def _collect_checks(
-    ground: _Ground, jobs: JobQueue, readers: Executor, audit: AuditTrail, closing: threading.Event
+    settings: Settings,
+    database: Database,
+    jobs: JobQueue,
+    readers: Executor,
+    audit: AuditTrail,
+    closing: threading.Event,
 ) -> dict[str, Callable[[], str | None]]:
     def check_workers() -> str | None:
         if not jobs.can_work():
@@ -239,8 +243,8 @@ def _collect_checks(
 
     return {
         "service": lambda: "the service is ending" if closing.is_set() else None,
-        "database": partial(check_database, ground.database.check),
-        "disk": partial(check_disk, ground.settings.data_folder),
+        "database": partial(check_database, database.check),
+        "disk": partial(check_disk, settings.data_folder),
         "workers": check_workers,
         "clock": Clock().check,
         "audit log": lambda: f"{audit.lost} entries of the audit log were lost" if audit.lost else None,
@@ -280,14 +284,11 @@ def _retention(services: Services) -> list[Callable[[], object]]:
     def note(kind: str, name: str) -> None:
         services.audit.note("service", "pruned", subject=name, kind=kind)
 
-    history = services.models.history
-    sweeper = RetentionSweeper(rule, services.index, history, services.recordings, removers, note)
-
     def prune() -> None:
         # What was not judged yet may become the active model, which stays.
         services.index.sync()
         services.models.judge_new()
-        sweeper.tidy()
+        sweep(rule, services.index, services.models.history, services.recordings, removers, note)
 
     return [prune]
 

@@ -68,8 +68,6 @@ def may_follow(before: JobState, after: JobState) -> bool:
 
 
 class JobProblem(StrictModel):
-    """Why a job did not succeed."""
-
     code: str = Field(description="code of the error, as in tauscope.errors, or of the way the job ended")
     detail: str = Field(description="one line: what is wrong, where, and what to do")
 

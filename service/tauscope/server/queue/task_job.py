@@ -183,8 +183,6 @@ def perform_job(workspace: TaskWorkspace[Any], server_recordings: Path) -> JobPr
 
 
 class Preparable(Protocol):
-    """A folder whose input has places of its own."""
-
     def prepare(self) -> None: ...
 
 

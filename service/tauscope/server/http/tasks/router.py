@@ -97,8 +97,6 @@ def plots_document(noun: str, model: type[BaseModel], words: str) -> JobDocument
 
 
 class Folder(Protocol):
-    """What every resource keeps in a folder."""
-
     robot: FilePath
 
     def read_order(self) -> Any:
@@ -145,7 +143,6 @@ class Resource(ABC):
         """The answer; one whose files are damaged says so. Raises NotFoundError. `root`: path of the interface."""
 
     def router(self) -> APIRouter:
-        """The routes that every resource has."""
         router = APIRouter(prefix=f"/{self.plural}", tags=[self.plural])
         _add_submission(router, self)
         _add_list(router, self)

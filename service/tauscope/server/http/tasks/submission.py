@@ -55,10 +55,7 @@ def keep_model(
     if isinstance(model, str):
         path.write_bytes(read(model))
         return MODEL_FILE
-    text = to_json_text(model)
-    if text is None:
-        raise IdentificationError("model: holds NaN, infinity or text that is not Unicode; write plain numbers")
-    path.write_text(text, encoding="utf-8")
+    path.write_text(to_json_text(model, "model", IdentificationError), encoding="utf-8")
     return MODEL_FILE
 
 
@@ -177,8 +174,8 @@ class BackendRequest(StrictModel):
 
 def choose_backend(settings: Settings, request: BackendRequest, robot: Robot) -> BackendChoice:
     """Raises ScenarioError, or RobotFileError if a drive names a file or a simulated arm has no model."""
-    if request.scenario is not None and to_json_text(request.scenario) is None:
-        raise ScenarioError("scenario: holds NaN, infinity or text that is not Unicode; write plain numbers and text")
+    if request.scenario is not None:
+        to_json_text(request.scenario, "scenario", ScenarioError)
     name = request.name or settings.backend
     driver = find_driver(name)
     _refuse_files(robot, driver.file_keys)

@@ -11,7 +11,6 @@ const GAP = 14;
 const WIDTH = 960;
 const TOP = 24;
 
-/** Level of a residual, given as a multiple of the noise. */
 export const level = (ratio) => LEVELS.filter((edge) => ratio > edge).length;
 
 /** The map; `choose(joint, variable, bin, words)` is told which cell was clicked, or reached with the arrow keys. */

@@ -185,14 +185,12 @@ class Index:
             return frozenset(name for kind, identifier, name in uses if (kind, identifier) not in except_by)
 
     def list_users(self, recording: str) -> frozenset[str]:
-        """Identifiers of the items of this site that were made from or judged by a recording on the server."""
         query = select(Item.identifier).join(RecordingUse).where(Item.site == self.site)
         query = query.where(RecordingUse.origin == "server", RecordingUse.name == recording)
         with self._database.reading() as session:
             return frozenset(session.scalars(query))
 
     def search(self, query: ItemQuery) -> list[ItemEntry]:
-        """Items of all sites, the newest first."""
         statement = select(Item).outerjoin(Robot)
         for column, value in (
             (Item.kind, query.kind),
@@ -211,7 +209,6 @@ class Index:
             return [_entry(row) for row in session.scalars(statement)]
 
     def robots(self) -> list[RobotEntry]:
-        """Every robot that an item is or was about, by name."""
         with self._database.reading() as session:
             rows = session.scalars(select(Robot).order_by(Robot.name))
             return [read_row(RobotEntry, row) for row in rows]
