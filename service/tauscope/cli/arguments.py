@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
+from typer import Argument, Option
 
 from tauscope.cli.verbs import OptionsOf
 from tauscope.errors import RobotFileError
@@ -16,25 +17,25 @@ from tauscope.tasks.task import ReadingOptions
 
 
 def name_output(words: str, metavar: str = "OUT", *names: str) -> Any:
-    return typer.Option(*names, metavar=metavar, dir_okay=False, help=words)
+    return Option(*names, metavar=metavar, dir_okay=False, help=words)
 
 
-def name_input(words: str, metavar: str | None = None, kind: Any = typer.Option, *names: str, **more: Any) -> Any:
+def name_input(words: str, metavar: str | None = None, kind: Any = Option, *names: str, **more: Any) -> Any:
     stated: dict[str, Any] = {"exists": True, "dir_okay": False, "show_default": False, **more}
     return kind(*names, metavar=metavar, help=words, **stated)
 
 
 def name_recordings(words: str) -> Any:
-    return name_input(words, "RECORDING", typer.Argument, dir_okay=True)
+    return name_input(words, "RECORDING", Argument, dir_okay=True)
 
 
-RobotFile = Annotated[Path, name_input("Robot file (YAML), or a URDF or MJCF by itself.", "ROBOT", typer.Argument)]
+RobotFile = Annotated[Path, name_input("Robot file (YAML), or a URDF or MJCF by itself.", "ROBOT", Argument)]
 RecordingFile = Annotated[
     Path,
     name_input(
         "Recording: CSV, Parquet, NumPy archive, MCAP, rosbag2 folder, or ROS 1 bag.",
         "FILE",
-        typer.Argument,
+        Argument,
         dir_okay=True,
     ),
 ]
@@ -44,14 +45,14 @@ HeldOut = Annotated[
         "Recordings that the model is judged by, never made from. All files up to the next option, or up to --,"
         " belong to it.",
         "RECORDING...",
-        typer.Option,
+        Option,
         "--held-out",
         dir_okay=True,
     ),
 ]
 Cutoff = Annotated[
     str,
-    typer.Option(
+    Option(
         "--cutoff",
         "--cutoff-hz",
         metavar="auto|none|HZ",
@@ -95,7 +96,5 @@ def parse_cutoff(text: str) -> float | Literal["auto"] | None:
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0.0):
-        raise typer.BadParameter(
-            f"{text!r} is neither auto, none nor a positive frequency in Hz", param_hint="'--cutoff'"
-        )
+        raise typer.BadParameter(f"{text!r} is neither auto, none nor a positive number of Hz", param_hint="'--cutoff'")
     return value

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 from pydantic import ValidationError
+from typer import Option
 
 from tauscope.cli.arguments import RobotFile
 from tauscope.cli.diagnose_command import show_diagnosis
@@ -20,20 +21,16 @@ from tauscope.tasks.task import LocalFiles
 
 
 def _step(words: str) -> Any:
-    return typer.Option(metavar="JSON", help=f"{words}: an object as in the REST API, or none.")
+    return Option(metavar="JSON", help=f"{words}: an object as in the REST API, or none.")
 
 
 def campaign(
     robot: RobotFile,
     *,
-    out: Annotated[
-        Path, typer.Option(metavar="DIR", file_okay=False, help="New folder for motions, recordings and results.")
-    ],
+    out: Annotated[Path, Option(metavar="DIR", file_okay=False, help="New folder of all results.")],
     backend: Annotated[
         str,
-        typer.Option(
-            metavar=f"[{'|'.join(driver_names())}|JSON]", help="What moves the arm, by name or as in the REST API."
-        ),
+        Option(metavar=f"[{'|'.join(driver_names())}|JSON]", help="What moves the arm: a name, or as in the REST API."),
     ] = DEFAULT_BACKEND,
     excitation: Annotated[str, _step("How the training motion is designed")] = "{}",
     held_out: Annotated[str, _step("The motion that the model is judged by")] = "{}",

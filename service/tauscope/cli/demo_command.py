@@ -12,9 +12,9 @@ from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import numpy as np
-import typer
 from rich.console import Console
 from ruamel.yaml import YAML
+from typer import Option
 
 from tauscope.cli.demo_campaign import run_campaign
 from tauscope.cli.demo_page import DATA, LEFT_FOR_S, PORT, PageShown, leave_page, prepare_folder, show_page
@@ -48,14 +48,12 @@ RESULT, REPORT = "identification.json", "report.html"
 EXPORTS = ("friction.json", "friction.yaml", "friction.h", "friction.py", "model.xml")
 FILES = (ROBOT, SCENARIO, TRAIN_TRAJECTORY, HELD_OUT_TRAJECTORY, TRAIN, HELD_OUT, RESULT, REPORT, *EXPORTS)
 """What the demo writes, and may therefore write again."""
-
 CONCEALED = {"torque_noise_std": list(NOISE_STD_NM), "seed": 1} | {
     "effects": [{"effect": "joint_spring", "joint": 1, "stiffness": 0.6}]
 }
 """What the arm of that campaign conceals: a scenario, by which the diagnosis is put to the test."""
 SCENARIO_TEXT = f"torque_noise_std: {list(NOISE_STD_NM)}\n"
 """What the simulated arm conceals, but for the seed of its noise."""
-
 _HEADING = """\
 The seed paper's arm, Table 1, as `tauscope demo` hands it to the design and to the identification: what its links weigh
 and how its joints rub is left out. Of the friction curve only the shape constants are given."""
@@ -74,12 +72,10 @@ class Comparison:
 
 
 def demo(
-    out: Annotated[Path, typer.Option(metavar="DIR", file_okay=False, help="Folder for the results.")] = Path(
-        "demo-output"
-    ),
+    out: Annotated[Path, Option(metavar="DIR", file_okay=False, help="Folder of results.")] = Path("demo-output"),
     page: Annotated[
         bool | None,
-        typer.Option(
+        Option(
             "--page/--no-page",
             show_default=False,
             help="Show the page with what was found, until Ctrl-C. By default so in a terminal; elsewhere a process of"
@@ -185,9 +181,7 @@ def _show(console: Console, folder: Path, outcome: identify.Result, comparisons:
     console.print()
     console.print(table("Truth and estimate", Table(("parameter", "truth", "estimate", "± std", "z"), rows)))
     rms = float(np.sqrt(np.mean([row.z**2 for row in comparisons])))
-    say(
-        f"z is the error in standard errors; its rms over all {len(rows)} parameters is {rms:.2f} (1 expected)", console
-    )
+    say(f"z is the error in standard errors; its rms over {len(rows)} parameters is {rms:.2f} (1 expected)", console)
     for name in FILES:
         say(f"wrote {folder / name}", console)
 

@@ -9,6 +9,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 from rich.console import Console
+from typer import Argument, Option
 
 from tauscope.cli.arguments import RobotFile, name_input
 from tauscope.cli.terminal import output, say, show_progress, table
@@ -42,15 +43,13 @@ else:
     BusName = Literal[tuple(bus_drivers())]
     """A name of a registered driver of a field bus: help lists the choices."""
 
-BusOption = Annotated[
-    BusName | None, typer.Option(help="Field bus; the one that the robot file's drives speak of by default.")
-]
+BusOption = Annotated[BusName | None, Option(help="Field bus; by default the one of the robot file's drives.")]
 DoctorRobotFile = Annotated[
     Path | None,
     name_input(
         "Robot file (YAML) whose drives are looked at; without one, the adapters of this machine.",
         "ROBOT",
-        typer.Argument,
+        Argument,
     ),
 ]
 _MARKS = {Severity.GOOD: "ok", Severity.WARNING: "warning", Severity.FAILURE: "failure"}
@@ -74,9 +73,7 @@ def release(
     robot: RobotFile,
     *,
     backend: BusOption = None,
-    supported: Annotated[
-        bool, typer.Option("--supported", help="State that the arm is supported; else you are asked.")
-    ] = False,
+    supported: Annotated[bool, Option("--supported", help="State that the arm is supported.")] = False,
 ) -> None:
     """Let go of an arm that holds: its drives give no torque any more.
 
@@ -91,17 +88,17 @@ def release(
 
 
 def scan(
-    backend: Annotated[BusName, typer.Argument(metavar="BUS", help="Field bus.")],
+    backend: Annotated[BusName, Argument(metavar="BUS", help="Field bus.")],
     port: Annotated[
         str,
-        typer.Argument(
+        Argument(
             metavar="PORT", help=", ".join(f"{bus.port_help} ({name})" for name, bus in bus_drivers().items()) + "."
         ),
     ],
     *,
     bit_rate: Annotated[
         list[int] | None,
-        typer.Option(metavar="RATE", min=1, help="Bit rate to try; may be repeated. The usual ones by default."),
+        Option(metavar="RATE", min=1, help="Bit rate to try; may be repeated. The usual ones by default."),
     ] = None,
 ) -> None:
     """Show every device that answers on a bus.

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from typer import Option
 
 from tauscope.cli.arguments import (
     Cutoff,
@@ -31,7 +32,7 @@ from tauscope.tasks import diagnose as task
 
 Against = Annotated[
     list[str],
-    typer.Option(
+    Option(
         default_factory=lambda: ["identified"],
         show_default=False,
         metavar="identified|model|MODEL.json|SIM...",
@@ -56,21 +57,17 @@ def diagnose(
     reading: ReadingFields,
     options: Annotated[dict[str, Any], OptionsOf(task.DiagnosisOptions, ("headroom",))],
     json: Json = None,
-    report: Annotated[
-        Path | None, name_output("Write a page with verdict, findings and residuals.", "OUT.html")
-    ] = None,
+    report: Annotated[Path | None, name_output("Write a page with verdict, findings, residuals.", "OUT.html")] = None,
     next_trajectory: Annotated[
         Path | None, name_output("Write the motion to record next: what best separates, or shows, what is open.")
     ] = None,
-    model: Annotated[
-        Path | None, name_output("Write the model with all findings, for export and --against.", "OUT.json")
-    ] = None,
+    model: Annotated[Path | None, name_output("Write the model with all findings, for --against.", "OUT.json")] = None,
     export: Annotated[
         list[Path] | None, name_output("Write the model with all findings, by suffix as in tauscope export.", "FILE")
     ] = None,
     scenario: Annotated[Path | None, name_output("Write the findings for the simulated arm.", "OUT.yaml")] = None,
     improved_robot: Annotated[
-        Path | None, name_output("Write the robot file with identified links and friction.", "OUT.yaml")
+        Path | None, name_output("Write the robot file with what was identified.", "OUT.yaml")
     ] = None,
 ) -> None:
     """Say what an arm's model leaves out.

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
 from rich.console import Console
+from typer import Option
 
 from tauscope.cli.arguments import RobotFile, name_output
 from tauscope.cli.task_run import run_task
@@ -18,7 +18,7 @@ from tauscope.tasks import design_excitation as task
 
 Boxes = Annotated[
     list[str] | None,
-    typer.Option(
+    Option(
         "--box",
         "--boxes",
         metavar="X0,Y0,Z0,X1,Y1,Z1",
@@ -33,16 +33,12 @@ def excite(
     *,
     options: Annotated[dict[str, Any], OptionsOf(task.ExcitationDesignOptions, without=("boxes",))],
     box: Boxes = None,
-    slow_reversals: Annotated[
-        bool, typer.Option("--slow-reversals/--no-slow-reversals", help="None with --no-slow-reversals.")
-    ] = True,
-    json: Annotated[
-        Path | None, name_output("Write the design, trajectory included, as JSON; - is standard output.")
-    ] = None,
+    slow_reversals: Annotated[bool, Option("--slow-reversals/--no-slow-reversals", help="Add slow reversals.")] = True,
+    json: Annotated[Path | None, name_output("Write the design as JSON, with its trajectory; - is stdout.")] = None,
     csv: Annotated[Path | None, name_output("Write the trajectory's samples as CSV for other controllers.")] = None,
     rate: Annotated[
         float,
-        typer.Option("--rate", "--rate-hz", metavar="HZ", min=1.0, max=10_000.0, help="Samples a second of the CSV."),
+        Option("--rate", "--rate-hz", metavar="HZ", min=1.0, max=10_000.0, help="Samples a second of the CSV."),
     ] = 500.0,
 ) -> None:
     """Design the motion that tells most about an arm.

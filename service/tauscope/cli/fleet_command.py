@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 from typing import Annotated, Literal
 
-import typer
+from typer import Argument, Option
 
 from tauscope.cli.arguments import name_input
 from tauscope.cli.output_files import require_new
@@ -34,15 +34,13 @@ Manifest = Annotated[
     name_input(
         "CSV with the columns name,robot,recordings,held_out; recordings separated by ';', paths relative to it.",
         "MANIFEST",
-        typer.Argument,
+        Argument,
     ),
 ]
-Out = Annotated[
-    Path, typer.Option(metavar="DIR", file_okay=False, help="Folder of the results: table.csv, and NAME.json for each.")
-]
+Out = Annotated[Path, Option(metavar="DIR", file_okay=False, help="Folder of table.csv, and NAME.json for each.")]
 Workers = Annotated[
     int,
-    typer.Option(
+    Option(
         min=1, max=1024, metavar="N", help="Processes; a Dask cluster has its own (DASK_SCHEDULER_ADDRESS).",
         show_default="one a core",
     ),

@@ -32,7 +32,7 @@ from tauscope.tasks import identify as task
 def identify(
     robot: RobotFile,
     recordings: Annotated[
-        list[Path], name_recordings("Recordings that the model is made from: CSV, Parquet, NumPy, MCAP or a bag.")
+        list[Path], name_recordings("Recordings that train the model: CSV, Parquet, NumPy, MCAP, bag.")
     ],
     *,
     held_out: HeldOut = None,

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
 from tauscope import robot as robots
 from tauscope.cli.arguments import LayoutFields, ReadingFields, RecordingFile, RobotFile, complete_reading, name_input
@@ -28,7 +29,6 @@ from tauscope.robot.yaml_text import read_yaml
 from tauscope.tasks.task import ReadingOptions
 
 RobotOption = Annotated[Path | None, name_input("Robot file: its names, limits, masses and layout.", "ROBOT")]
-
 EFFORT_WORDS = {
     EffortKind.TORQUE: "torque",
     EffortKind.CURRENT: "drive units",
@@ -48,9 +48,7 @@ NONE = "-"
 def check_recording_file(
     file: RecordingFile,
     *,
-    joints: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Number of joints that it has to have.")
-    ] = None,
+    joints: Annotated[int | None, Option(min=1, metavar="N", help="Number of joints that it must have.")] = None,
     robot: RobotOption = None,
     reading: ReadingFields,
 ) -> None:
@@ -72,12 +70,10 @@ def check_recording_file(
 
 def convert_file(
     source: RecordingFile,
-    target: Annotated[
-        Path, typer.Argument(metavar="TARGET", dir_okay=False, help="File to make: .csv, .parquet or .mcap.")
-    ],
+    target: Annotated[Path, Argument(metavar="TARGET", dir_okay=False, help="File: .csv, .parquet or .mcap.")],
     *,
-    recover: Annotated[bool, typer.Option(help="Keep what comes before the damage of a truncated MCAP file.")] = False,
-    overwrite: Annotated[bool, typer.Option(help="Replace TARGET where it exists.")] = False,
+    recover: Annotated[bool, Option(help="Keep what comes before the damage of a truncated MCAP file.")] = False,
+    overwrite: Annotated[bool, Option(help="Replace TARGET where it exists.")] = False,
     robot: RobotOption = None,
     reading: LayoutFields,
 ) -> None:
@@ -102,12 +98,8 @@ def convert_file(
 def map_file(
     file: RecordingFile,
     robot: RobotOption = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="OUT.yaml", dir_okay=False, help="File to write, for --columns.")
-    ] = None,
-    ask: Annotated[
-        bool | None, typer.Option("--ask/--no-ask", help="Ask for each column; by default on a terminal.")
-    ] = None,
+    out: Annotated[Path | None, Option(metavar="OUT.yaml", dir_okay=False, help="File for --columns.")] = None,
+    ask: Annotated[bool | None, Option("--ask/--no-ask", help="Ask for each column; default: on a terminal.")] = None,
 ) -> None:
     """Write the mapping of another tool's columns: a guess, which questions correct."""
     arm = None if robot is None else read_robot(robot)
@@ -127,9 +119,7 @@ def map_file(
 
 
 def _ask(layout: RecordingLayout) -> RecordingLayout:
-    typer.echo(
-        f"{{0}} or {{1}} stands for the joint's number from 0 or 1, {{name}} for its name; {NONE}: none", err=True
-    )
+    typer.echo(f"{{0}} or {{1}} stands for a joint's number from 0 or 1, {{name}} its name; {NONE}: none", err=True)
     guessed: Mapping[str, Source] = layout.columns if isinstance(layout.columns, Mapping) else {}
     columns = dict(guessed)
     for group, words in QUESTIONS.items():
@@ -174,23 +164,12 @@ def _joints(report: RecordingReport) -> Table:
 def check_robot_file(file: RobotFile) -> None:
     """Show what a robot file says, and everything doubtful in it."""
     report = robots.check_robot(file)
-    console = output()
-    gravity = ", ".join(given(value) for value in report.gravity)
+    console, gravity = output(), ", ".join(given(value) for value in report.gravity)
     say(
         f"Robot {report.name}: {counted(len(report.joints), 'joint')}, gravity [{gravity}] m/s²{_mass(report)}", console
     )
-    columns = (
-        "joint",
-        "name",
-        "type",
-        "position",
-        "velocity",
-        "acceleration",
-        "torque",
-        "gear",
-        "per unit",
-        "mass [kg]",
-    )
+    columns = ("joint", "name", "type", "position", "velocity", "acceleration", "torque")
+    columns += ("gear", "per unit", "mass [kg]")
     console.print(table("Joints", Table(columns, [_row(joint) for joint in report.joints], words=3)))
     for finding in report.findings:
         say(f"{finding.severity}: {finding.where}: {finding.text}", console)

@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from tauscope.cli.store_command import DatabaseUrl, DataFolder, open_database
 from tauscope.cli.terminal import output, say, table
@@ -15,10 +15,10 @@ from tauscope.report.tables import Table
 from tauscope.server.history.model_history import ModelEntry, ModelHistory
 from tauscope.server.history.trend import parameter_trends
 
-RobotName = Annotated[str, typer.Argument(metavar="ROBOT", help="Name of the robot, as in its file.")]
-Identifier = Annotated[str, typer.Argument(metavar="MODEL", help="Identifier of the identification.")]
-Reason = Annotated[str, typer.Option(metavar="TEXT", help="Why; kept with the choice.")]
-Count = Annotated[int, typer.Option("--limit", min=1, max=1000, metavar="N", help="Most rows.")]
+RobotName = Annotated[str, Argument(metavar="ROBOT", help="Name of the robot, as in its file.")]
+Identifier = Annotated[str, Argument(metavar="MODEL", help="Identifier of the identification.")]
+Reason = Annotated[str, Option(metavar="TEXT", help="Why; kept with the choice.")]
+Count = Annotated[int, Option("--limit", min=1, max=1000, metavar="N", help="Most rows.")]
 
 
 def list_models(robot: RobotName, data: DataFolder = None, database: DatabaseUrl = None, limit: Count = 20) -> None:
@@ -39,9 +39,7 @@ def show_trend(robot: RobotName, data: DataFolder = None, database: DatabaseUrl 
     for trend in trends:
         first, last, line = trend.points[0], trend.points[-1], trend.line
         slope = ABSENT if line is None else f"{significant(line.slope, 3)} ± {significant(line.slope_std, 2)}"
-        rows.append(
-            (trend.name, str(len(trend.points)), significant(first.value, 4), significant(last.value, 4), slope)
-        )
+        rows.append((trend.name, str(len(trend.points)), *(significant(end.value, 4) for end in (first, last)), slope))
     columns = ("parameter", "models", "first [SI]", "last [SI]", "change a week")
     output().print(table(f"Parameters of {robot}", Table(columns, rows)))
 

@@ -30,7 +30,9 @@ def require_free(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
         if path == STANDARD_OUTPUT:
             continue
         real = path.resolve()
-        if not read.isdisjoint((real, *real.parents)) or any(_is_same_file(real, other) for other in read):
+        if not read.isdisjoint((real, *real.parents)) or any(
+            real.exists() and each.exists() and real.samefile(each) for each in read
+        ):
             raise typer.BadParameter(f"output {str(path)!r} is an input of this command; inputs are never written to")
         if real in written:
             raise typer.BadParameter(f"output {str(path)!r} is asked for twice; name each output once")
@@ -86,7 +88,3 @@ def _replace(path: Path, content: bytes) -> None:
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
-
-
-def _is_same_file(path: Path, other: Path) -> bool:
-    return path.exists() and other.exists() and path.samefile(other)

@@ -19,7 +19,7 @@ from tauscope.tasks.task import ReadingOptions
 def rollout(
     robot: RobotFile,
     recordings: Annotated[
-        list[Path], name_recordings("Recordings with commands (qref), or with torque: CSV, Parquet, MCAP or rosbag2.")
+        list[Path], name_recordings("Recordings with commands (qref) or torque: CSV, Parquet, MCAP.")
     ],
     *,
     model: Annotated[

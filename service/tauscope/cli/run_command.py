@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 from rich.console import Console
+from typer import Option
 
 from tauscope.cli.arguments import RobotFile, name_input
 from tauscope.cli.device_command import show_frames
@@ -30,13 +31,11 @@ from tauscope.tasks.task import LocalFiles
 
 Trajectory = Annotated[
     Path | None,
-    name_input(
-        "Motion to play: a trajectory (JSON, CSV). The default excitation is designed where none is given.", "FILE"
-    ),
+    name_input("Motion to play: a trajectory (JSON, CSV). A default one is designed where none is given.", "FILE"),
 ]
 Out = Annotated[
     Path | None,
-    typer.Option(
+    Option(
         metavar="RECORDING",
         dir_okay=False,
         help="File to make: .csv, .parquet, or .mcap (with the ramp). Never replaces a file; run-TIME.csv by default.",
@@ -53,24 +52,22 @@ SUFFIXES = (".csv", ".parquet", ".mcap")  # formats of a recording, by suffix
 def run(
     robot: RobotFile,
     *,
-    backend: Annotated[BackendName, typer.Option(help="What moves the arm.")] = DEFAULT_BACKEND,
+    backend: Annotated[BackendName, Option(help="What moves the arm.")] = DEFAULT_BACKEND,
     trajectory: Trajectory = None,
     out: Out = None,
     scenario: Scenario = None,
     time: Annotated[
-        Literal["virtual", "real"], typer.Option(help="Of the simulated arm: as fast as it computes, or by the clock.")
+        Literal["virtual", "real"], Option(help="Of the simulated arm: as fast as it computes, or by the clock.")
     ] = "virtual",
     start: Annotated[
-        str | None, typer.Option(metavar="Q1,Q2,...", help="Where the simulated arm stands at first [rad or m].")
+        str | None, Option(metavar="Q1,Q2,...", help="First posture of the simulated arm [rad or m].")
     ] = None,
     options: Annotated[dict[str, Any], OptionsOf(RunOptions)],
-    seed: Annotated[int, typer.Option(min=0, help="Of the default excitation.")] = 0,
+    seed: Annotated[int, Option(min=0, help="Of the default excitation.")] = 0,
     keep_settings: Annotated[
-        bool, typer.Option("--keep-settings", help="Leave in servos' EEPROM what the run changed; else it is put back.")
+        bool, Option("--keep-settings", help="Leave in servos' EEPROM what the run changed; else it is put back.")
     ] = False,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Show the frames that would be sent to the bus, and send none.")
-    ] = False,
+    dry_run: Annotated[bool, Option("--dry-run", help="Show the bus frames of the run, and send none.")] = False,
 ) -> None:
     """Move an arm and record it.
 

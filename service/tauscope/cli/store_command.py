@@ -8,7 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from tauscope.cli.arguments import name_input
 from tauscope.cli.output_files import require_new
@@ -33,7 +33,7 @@ DataFolder = Annotated[
 ]
 DatabaseUrl = Annotated[
     str | None,
-    typer.Option(
+    Option(
         metavar="URL",
         envvar="TAUSCOPE_DATABASE",
         show_envvar=True,
@@ -96,7 +96,7 @@ def open_database(data: Path | None, database: str | None) -> Iterator[Database]
 def check_store(
     data: DataFolder = None,
     database: DatabaseUrl = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Compare sizes only, not every byte.")] = False,
+    quick: Annotated[bool, Option("--quick", help="Compare sizes only, not every byte.")] = False,
 ) -> None:
     """Compare every file of every finished item with what it was when the item ended.
 
@@ -119,18 +119,12 @@ def check_store(
 
 
 def prune_store(
-    older_than: Annotated[
-        float, typer.Option("--older-than", min=0.0, metavar="DAYS", help="What ended longer ago may go.")
-    ],
+    older_than: Annotated[float, Option("--older-than", min=0.0, metavar="DAYS", help="What is older may go.")],
     data: DataFolder = None,
     database: DatabaseUrl = None,
-    kind: Annotated[
-        list[Kind] | None, typer.Option(help="Kind of item that may go, once for each; every kind by default.")
-    ] = None,
-    recordings: Annotated[
-        bool, typer.Option("--recordings", help="Recordings too that nothing which stays was made from.")
-    ] = False,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would go, and remove nothing.")] = False,
+    kind: Annotated[list[Kind] | None, Option(help="Kind that may go; repeatable; default: every kind.")] = None,
+    recordings: Annotated[bool, Option("--recordings", help="Recordings too that nothing else uses.")] = False,
+    dry_run: Annotated[bool, Option("--dry-run", help="Say what would go, and remove nothing.")] = False,
 ) -> None:
     """Remove what is old. Identifications of active models, and whatever is damaged, stay.
 
@@ -155,7 +149,7 @@ def prune_store(
 
 
 def backup(
-    file: Annotated[Path, typer.Argument(metavar="FILE", dir_okay=False, help="File to make, as in monday.tar.gz.")],
+    file: Annotated[Path, Argument(metavar="FILE", dir_okay=False, help="File to make, as in monday.tar.gz.")],
     data: DataFolder = None,
     database: DatabaseUrl = None,
 ) -> None:
@@ -172,8 +166,8 @@ def backup(
 
 
 def restore(
-    file: Annotated[Path, name_input("Of `tauscope backup`.", "FILE", typer.Argument)],
-    data: Annotated[Path, typer.Option(metavar="DIR", file_okay=False, help="Data folder to make.")],
+    file: Annotated[Path, name_input("Of `tauscope backup`.", "FILE", Argument)],
+    data: Annotated[Path, Option(metavar="DIR", file_okay=False, help="Data folder to make.")],
     database: DatabaseUrl = None,
 ) -> None:
     """Make a data folder from a backup; also where the database was one of the other kind."""

@@ -21,7 +21,7 @@ def run_task(
     """Perform a task; `asked`: files to write, each with its output. Raises typer.BadParameter or TauscopeError."""
     outputs = [(path, name) for path, name in asked if path is not None]
     paths, robot_file = tuple(path for path, _ in outputs), Path(request.robot)
-    inputs = list_files(request)
+    inputs = [Path(name) for names in getattr(request, "inputs", {}).values() for name in names]
     require_distinct(inputs)
     require_free(paths, (robot_file, *inputs))
     robot = read_robot(robot_file)
@@ -35,10 +35,6 @@ def run_task(
             say(f"wrote {path}")
     _show_warnings(robot, result, summarised=show is not None)
     return result
-
-
-def list_files(request: Any) -> list[Path]:
-    return [Path(name) for names in getattr(request, "inputs", {}).values() for name in names]
 
 
 def name_files(paths: Iterable[Path] | None) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 import typer
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
+from typer import Option
 from typer.core import TyperCommand, TyperOption
 
 SEVERAL = "..."  # A metavar that ends so marks an option that takes several values: what --help shows is what is parsed
@@ -128,10 +129,8 @@ def _list_options(group: OptionsOf) -> Iterator[inspect.Parameter]:
             flags = [f"{flag}/--no-{flag[2:]}" for flag in flags] if default else flags
         elif isinstance(default, tuple):
             default = ",".join(f"{value:g}" for value in default)
-        bounds = {
-            edge: getattr(mark, limit) for mark in field.metadata for edge, limit in _EDGES if hasattr(mark, limit)
-        }
-        option = typer.Option(
+        bounds = {edge: getattr(mark, name) for mark in field.metadata for edge, name in _EDGES if hasattr(mark, name)}
+        option = Option(
             *flags,
             help=describe_field(field),
             metavar="|".join(choices) or None,
@@ -166,9 +165,7 @@ def _option_type(field: FieldInfo) -> tuple[Any, list[str]]:
         return kinds[0], []
     if len(kinds) == 1 and not issubclass(kinds[0], tuple | Mapping):
         return kinds[0], []
-    choices = [
-        str(choice) for kind in kinds for choice in (get_args(kind) or getattr(kind, "__members__", {}).values())
-    ]
+    choices = [str(choice) for kind in kinds for choice in get_args(kind) or getattr(kind, "__members__", {}).values()]
     return str, choices or (["N,..."] if tuple in kinds else [])
 
 

@@ -141,9 +141,7 @@ def to_drive_joints(
 def _to_drive_joint(driver: Driver, robot: Robot, joint: Joint) -> DriveJoint:
     if joint.drive is None and isinstance(driver, BusDriver):
         example = driver.block_example
-        raise AcquisitionError(
-            f"{robot.name}: {joint.name} has no drive block; state its drive, as in drive: {example}"
-        )
+        raise AcquisitionError(f"{robot.name}: {joint.name} has no drive block; state one, as in drive: {example}")
     drive = dict(joint.drive or {})
     for key in driver.file_keys:
         file = drive.get(key)

@@ -33,9 +33,7 @@ class RunOptions(StrictModel, strict=False):
     )
     watchdog_s: Positive = Field(default=0.1, le=10, description="time without a cycle until the device stops itself")
     heartbeat_s: Positive = Field(default=1.0, le=60, description="silence of the owner until a real-time run ends")
-    following_error: Positive | None = Field(
-        default=None, description="allowed distance of arm and target, rad or m; null for 0.2 rad or 0.05 m"
-    )
+    following_error: Positive | None = Field(default=None, description="of arm and target; null: 0.2 rad or 0.05 m")
     # The second names are those of earlier versions, which stored runs have.
     missed: int = Field(
         default=3,

@@ -91,9 +91,7 @@ class DirectRecorder:
             self._writer.write_rows(rows)
         except OSError as error:
             reason = error.strerror or error
-            raise AcquisitionError(
-                f"{self._path}: the journal cannot be written ({reason}); make room there"
-            ) from error
+            raise AcquisitionError(f"{self._path}: the journal cannot be written ({reason}); make room") from error
 
 
 class RecorderProcess:

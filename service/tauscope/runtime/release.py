@@ -44,9 +44,7 @@ def release(backend_name: str, robot: Robot, settings: Mapping[str, Any]) -> Non
             backend.disconnect()
     held = [joint.name for joint, is_held in zip(robot.joints, state.enabled, strict=True) if is_held]
     if held:
-        raise AcquisitionError(
-            f"{', '.join(held)}: still under power; switch the arm's power off, and look at its drives"
-        )
+        raise AcquisitionError(f"{', '.join(held)}: still under power; switch the arm's power off, look at its drives")
     silent = [fault for fault in state.faults if fault.code == "silent"]
     if silent:
         raise AcquisitionError(f"{silent[0]}")

@@ -46,8 +46,6 @@ _GONE = (
     "the process that moved the arm is gone: the device's watchdog has stopped the arm; look at it, then acknowledge "
     "the watchdog's fault and start again"
 )
-
-
 _NEVER_MOVED = (
     "the process that was to move the arm ended before the arm was under power: nothing has moved; "
     f"{LOG_FILE} in the run's folder may say why"

@@ -26,6 +26,7 @@ class RunState(StrEnum):
         return not TRANSITIONS[self]
 
 
+_ENDS = frozenset([*RunState][-5:])
 _LEFT_BEHIND = frozenset({RunState.STOPPING, RunState.INTERRUPTED})
 
 TRANSITIONS: Mapping[RunState, frozenset[RunState]] = {
@@ -34,14 +35,8 @@ TRANSITIONS: Mapping[RunState, frozenset[RunState]] = {
     RunState.ENABLING: frozenset({RunState.RAMPING}) | _LEFT_BEHIND,
     RunState.RAMPING: frozenset({RunState.RUNNING}) | _LEFT_BEHIND,
     RunState.RUNNING: _LEFT_BEHIND,
-    RunState.STOPPING: frozenset(
-        {RunState.FINISHED, RunState.DEGRADED, RunState.STOPPED, RunState.FAILED, RunState.INTERRUPTED}
-    ),
-    RunState.FINISHED: frozenset(),
-    RunState.DEGRADED: frozenset(),
-    RunState.STOPPED: frozenset(),
-    RunState.FAILED: frozenset(),
-    RunState.INTERRUPTED: frozenset(),
+    RunState.STOPPING: _ENDS,
+    **dict.fromkeys(_ENDS, frozenset()),
 }
 """For each state, the states that may follow. No run ends without having been stopped, but for one whose process is
 gone: that is `interrupted`, and the device's watchdog has stopped the arm."""

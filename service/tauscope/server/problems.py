@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any
 
-from fastapi import Request, Response
+from fastapi import Response
 from pydantic import Field, ValidationError
 from starlette.exceptions import HTTPException
 
@@ -123,10 +123,6 @@ def make_problem(code: str, detail: str, instance: str, errors: Sequence[FieldEr
 def problem_answer(problem: Problem, headers: Mapping[str, str] | None = None) -> Response:
     content = problem.model_dump_json(exclude_none=True)
     return Response(content, problem.status, dict(headers or {}), media_type=MEDIA_TYPE)
-
-
-def make_code_answer(request: Request, code: str, detail: str) -> Response:
-    return problem_answer(make_problem(code, detail, request.url.path))
 
 
 def field_errors(details: Sequence[Any], *, within: str = "") -> list[FieldError]:

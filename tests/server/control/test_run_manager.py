@@ -40,9 +40,7 @@ class Bench:
         workspace.prepare()
         (workspace.trajectories / "trajectory.json").touch()
         backend = BackendChoice(name="sim")
-        workspace.write_request(
-            RunRequestRecord(robot_file="arm.yaml", robot_name="arm", backend=backend, device=device)
-        )
+        workspace.write_order(RunRequestRecord(robot_file="arm.yaml", robot_name="arm", backend=backend, device=device))
         try:
             return self.manager.submit(staged, motion, holder)
         finally:

@@ -119,7 +119,8 @@ class AuditLog:
 
     def append(self, actor: str, action: str, **details: Any) -> None:
         """Add an entry; it is on the disk when this returns. Raises OSError if it cannot be written."""
-        self._append(self._content(actor, action, details))
+        known = {name: value for name, value in details.items() if value is not None}
+        self._append({"time": self._clock().isoformat(), "actor": actor, "action": action, **known})
 
     def verify(self, noted: str | None = None) -> Verification:
         """Check the whole log. Raises NotFoundError if there is no log."""
@@ -128,10 +129,6 @@ class AuditLog:
                 return verify_lines(file, noted)
         except FileNotFoundError:
             raise NotFoundError(f"{self.path}: there is no audit log; name the service's data folder") from None
-
-    def _content(self, actor: str, action: str, details: Mapping[str, Any]) -> dict[str, Any]:
-        known = {name: value for name, value in details.items() if value is not None}
-        return {"time": self._clock().isoformat(), "actor": actor, "action": action, **known}
 
     def _append(self, content: dict[str, Any]) -> None:
         """Chain an entry to the last one; a line that a crash cut off stays, and the next entry says so."""

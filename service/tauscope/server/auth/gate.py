@@ -73,6 +73,10 @@ class HttpMiddleware:
     async def answer(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
         raise NotImplementedError
 
+    async def refuse(self, problem: ProblemError, scope: AsgiScope, receive: Receive, send: Send) -> None:
+        answer = problem_answer(make_problem(problem.code, problem.detail, scope["path"]), problem.headers)
+        await answer(scope, receive, send)
+
 
 class Gate(HttpMiddleware):
     @override
@@ -80,8 +84,7 @@ class Gate(HttpMiddleware):
         outcome = _admit(cast(Access, scope["app"].state.services.access), scope)
         if isinstance(outcome, ProblemError):
             _note_refusal(scope, outcome)
-            problem = make_problem(outcome.code, outcome.detail, scope["path"])
-            return await problem_answer(problem, outcome.headers)(scope, receive, send)
+            return await self.refuse(outcome, scope, receive, send)
         scope[CALLER] = outcome
         return await self.app(scope, receive, send)
 
@@ -165,7 +168,7 @@ class AuditedRequests(HttpMiddleware):
             except OSError as error:
                 _log.error("the audit log takes no entry: %s", error.strerror)
                 text = "the audit log takes no entry, and nothing moves or goes without one; make room on the disk"
-                return await problem_answer(make_problem("storage-full", text, path))(scope, receive, send)
+                return await self.refuse(ProblemError("storage-full", text), scope, receive, send)
         status, subject = 500, None
 
         async def send_noting(message: Message) -> None:

@@ -36,14 +36,6 @@ class Scope(StrEnum):
         return order.index(self) >= order.index(other)
 
 
-def parse_scope(text: str) -> Scope:
-    """The scope of a name. Raises TauscopeError if there is none of that name."""
-    try:
-        return Scope(text)
-    except ValueError:
-        raise TauscopeError(f"scope {text[:40]!r}: not known; give one of {', '.join(Scope)}") from None
-
-
 _ITEM = r"[^/]+"
 _ANALYSES = "(identifications|diagnoses|excitations|rollouts)"
 
@@ -240,10 +232,9 @@ class KeyRing:
         try:
             stamp = self._file.stamp()
             if stamp != self._stamp:
-                keys = self._file.read()
-                self._keys, self._stamp = keys or self._revoke_all(), stamp
+                # Where the file was taken away, all known keys count as revoked.
+                now = self._clock()
+                gone = tuple(key.model_copy(update={"revoked": key.revoked or now}) for key in self._keys)
+                self._keys, self._stamp = self._file.read() or gone, stamp
         except (TauscopeError, OSError):
             _log.exception("the API keys could not be read again; those known so far count")
-
-    def _revoke_all(self) -> tuple[ApiKey, ...]:
-        return tuple(key.model_copy(update={"revoked": key.revoked or self._clock()}) for key in self._keys)

@@ -68,21 +68,12 @@ class CampaignLinks(StrictModel):
     held_out: tuple[str, ...] = Field(default=(), description="recordings that it is judged by")
 
 
-class CampaignWorkspace(Workspace):
+class CampaignWorkspace(Workspace[CampaignOrder]):
+    order_type = CampaignOrder
+
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)
-        self.robot = folder / "robot"
-        self._order = folder / "order.json"
         self._made = folder / "made.json"
-
-    def prepare(self) -> None:
-        self.robot.mkdir()
-
-    def read_order(self) -> CampaignOrder | None:
-        return read_stored(self._order, CampaignOrder)
-
-    def write_order(self, order: CampaignOrder) -> None:
-        write_stored(self._order, order)
 
     def read_made(self) -> CampaignLinks:
         return read_stored(self._made, CampaignLinks) or CampaignLinks()
@@ -118,11 +109,8 @@ class CampaignRunner:
         permit: Permit = FREE,
     ) -> None:
         self.state = JobState.QUEUED
-        self._workspace = workspace
-        self._order = order
-        self._dependencies = dependencies
-        self._release_arm = release_arm
-        self._permit = permit
+        self._workspace, self._order, self._dependencies = workspace, order, dependencies
+        self._release_arm, self._permit = release_arm, permit
         self._robot: dict[str, Any] = {"robot_file": order.robot_file, "robot_name": order.robot_name}
         self._run_identifier: str | None = None
         self._stop_requested = threading.Event()
@@ -238,7 +226,7 @@ class CampaignRunner:
         with stage_workspace(dependencies.runs.items, RunWorkspace) as staged:
             self._put_robot(staged.robot)
             take_trajectory(ExcitationWorkspace(dependencies.excitations.items.folder(excitation)), staged)
-            staged.write_request(request)
+            staged.write_order(request)
             self._run_identifier = dependencies.runs.submit(staged.folder, ready_motion, self.holder, self._permit)
         self._record(**{link: self._run_identifier})
         if self._stop_requested.is_set():
@@ -353,7 +341,7 @@ class CampaignManager(Manager[CampaignRunner]):
             workspace = CampaignWorkspace(self.items.folder(identifier))
             claims = self._dependencies.runs.claims
             runner = CampaignRunner(workspace, order, self._dependencies, lambda: claims.release(*claim), permit)
-            self._threads.start(identifier, runner)
+            self._supervise(identifier, runner)
         return identifier
 
     def _resume(self, workspace: CampaignWorkspace) -> None:
@@ -362,6 +350,6 @@ class CampaignManager(Manager[CampaignRunner]):
             workspace.tell_lost_end()
         elif order is not None and workspace.read_made().recordings:
             runner = CampaignRunner(workspace, order, self._dependencies, lambda: None)
-            self._threads.start(workspace.folder.name, runner)
+            self._supervise(workspace.folder.name, runner)
         else:
             workspace.write_record(record.moved(JobState.INTERRUPTED, self.items.clock(), INTERRUPTED))

@@ -152,6 +152,7 @@ class UnleasedPermit(Permit):
         self._require_unleased(self._device)
 
 
+Clock = Callable[[], float]  # [s]
 LeaseEnd = Callable[[Lease, str], None]
 """Told that a lease has ended, and why; called by whoever notices, so that it must return at once."""
 
@@ -159,9 +160,7 @@ LeaseEnd = Callable[[Lease, str], None]
 class Leases:
     """The leases of all arms. Reading takes no lock; every change does, and none of them waits but for `acquire`."""
 
-    def __init__(
-        self, claims: DeviceClaims, *, clock: Callable[[], float] = time.monotonic, on_end: LeaseEnd | None = None
-    ) -> None:
+    def __init__(self, claims: DeviceClaims, *, clock: Clock = time.monotonic, on_end: LeaseEnd | None = None) -> None:
         self._claims, self._numbers, self._clock = claims, count(1), clock
         self._on_end = on_end or (lambda _lease, _why: None)
         self._lock = threading.Lock()

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field
+from typing_extensions import override
 
 from tauscope.errors import AcquisitionError
 from tauscope.runtime.drivers import find_driver
@@ -30,7 +31,6 @@ from tauscope.server.queue.job_folder import (
 )
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.task_job import TaskWorkspace
-from tauscope.server.store.files import read_stored, write_stored
 from tauscope.strict_model import StrictModel
 from tauscope.tasks import run
 from tauscope.tasks.run import BackendChoice, recording_file
@@ -48,19 +48,21 @@ class RunRequestRecord(StrictModel):
     options: RunOptions = Field(default=RunOptions(), description="how it is run")
 
 
-class RunWorkspace(JobFolder):
+class RunWorkspace(JobFolder[RunRequestRecord]):
     """Input, and the folder ``control/`` of the control process; before there is one the record stands beside it."""
+
+    order_type = RunRequestRecord
+    order_name = "request.json"
 
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)
-        self.robot = folder / "robot"
         self.trajectories = folder / "trajectory"
         self.control = folder / "control"
         self.scenario = folder / "scenario.json"
-        self._request = folder / "request.json"
 
+    @override
     def prepare(self) -> None:
-        self.robot.mkdir()
+        super().prepare()
         self.trajectories.mkdir()
 
     @property
@@ -70,12 +72,6 @@ class RunWorkspace(JobFolder):
     def recording(self, format_: str) -> Path:
         """Where the recording of a format lies; the journal is the MCAP, ramp included."""
         return recording_file(self.control, format_)
-
-    def read_order(self) -> RunRequestRecord | None:
-        return read_stored(self._request, RunRequestRecord)
-
-    def write_request(self, request: RunRequestRecord) -> None:
-        write_stored(self._request, request)
 
     def create(self, request: RunRequestRecord) -> None:
         backend, mode = request.backend.name, request.options.mode.value
@@ -87,8 +83,8 @@ class RunWorkspace(JobFolder):
         except AcquisitionError:
             return None
 
+    @override
     def has_ended(self) -> bool:
-        """Whether nothing will happen to the run any more: it has ended, its record is damaged, or it is gone."""
         record = self.read_run()
         return record is None or record.state.is_end
 
@@ -152,7 +148,6 @@ Motion = Callable[[RunWorkspace, threading.Event], bool]
 
 Raises TauscopeError where there is none.
 """
-
 POLL_S = 0.05  # how often the state of a job is looked at by whoever waits for it [s]
 
 

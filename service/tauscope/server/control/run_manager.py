@@ -38,70 +38,32 @@ class Supervisor(Protocol):
 S = TypeVar("S", bound=Supervisor)
 
 
-@dataclass(frozen=True, eq=False)
-class _Supervised(Generic[S]):
-    supervisor: S
-    thread: threading.Thread
-
-
-class SupervisedThreads(Generic[S]):
-    """The active supervisors by identifier. Reading takes no lock, so that a stuck thread cannot delay a stop."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        # Replaced as a whole, never changed: each reader sees one consistent state.
-        self._active: Mapping[str, _Supervised[S]] = {}
-
-    def start(self, identifier: str, supervisor: S, then: Callable[[], None] = lambda: None) -> None:
-        def run() -> None:
-            try:
-                supervisor.run()
-                then()
-            finally:
-                with self._lock:
-                    self._active = {name: entry for name, entry in self._active.items() if name != identifier}
-
-        thread = threading.Thread(target=run, name=f"supervise-{identifier}", daemon=True)
-        with self._lock:
-            self._active = {**self._active, identifier: _Supervised(supervisor, thread)}
-        thread.start()
-
-    def find(self, identifier: str) -> S | None:
-        entry = self._active.get(identifier)
-        return None if entry is None else entry.supervisor
-
-    def identifiers(self) -> tuple[str, ...]:
-        return tuple(self._active)
-
-    def supervisors(self) -> tuple[S, ...]:
-        return tuple(entry.supervisor for entry in self._active.values())
-
-    def join(self, timeout_s: float) -> None:
-        """Wait until all threads have ended, for at most `timeout_s` each [s]."""
-        for entry in self._active.values():
-            entry.thread.join(timeout_s)
-
-
 class Manager(Generic[S]):
-    """Active items and the folders of all items of a kind. Every method may be called from any thread."""
+    """Active items, each with a thread, and the folders of all items. Every method may be called from any thread."""
 
     def __init__(self, items: ItemStore) -> None:
         self.items = items
-        self._lock = threading.Lock()
-        self._threads: SupervisedThreads[S] = SupervisedThreads()
+        self._lock, self._registering = threading.Lock(), threading.Lock()
+        # Replaced as a whole, never changed: reading takes no lock, so that a stuck thread cannot delay a stop.
+        self._active: Mapping[str, tuple[S, threading.Thread]] = {}
         self._is_closed = False
         items.tidy()
 
+    def find(self, identifier: str) -> S | None:
+        """The supervisor of an active item."""
+        supervisor, _ = self._active.get(identifier, (None, None))
+        return supervisor
+
     def remove(self, identifier: str) -> bool:
         """Remove an item that has ended, False where it is active. Raises NotFoundError if there is none."""
-        if self._threads.find(identifier) is not None:
+        if self.find(identifier) is not None:
             return False
         self.items.remove(identifier)
         return True
 
     def stop(self, identifier: str) -> Any:
         """Stop an item without any lock; returns the state in which it stood, None where it is not active."""
-        supervisor = self._threads.find(identifier)
+        supervisor = self.find(identifier)
         if supervisor is None:
             return None
         state = supervisor.state
@@ -110,23 +72,37 @@ class Manager(Generic[S]):
 
     def stop_all(self) -> list[str]:
         """Stop all that is active, and accept further items; takes no lock. Returns the identifiers."""
-        active = [(identifier, self._threads.find(identifier)) for identifier in self._threads.identifiers()]
-        for _, supervisor in active:
-            if supervisor is not None:
-                supervisor.stop()
-        return [identifier for identifier, supervisor in active if supervisor is not None]
+        active = self._active
+        for supervisor, _ in active.values():
+            supervisor.stop()
+        return [*active]
 
     def begin_close(self) -> None:
         """Stop all that is active and accept no further items; returns at once."""
         self._is_closed = True
-        for supervisor in self._threads.supervisors():
+        for supervisor, _ in self._active.values():
             supervisor.interrupt()
 
     def close(self) -> None:
-        """Stop all that is active, and wait for its end for at most `CLOSE_TIMEOUT_S`."""
+        """Stop all that is active, and wait for its end for at most `CLOSE_TIMEOUT_S` each."""
         with self._lock:
             self.begin_close()
-        self._threads.join(CLOSE_TIMEOUT_S)
+        for _, thread in self._active.values():
+            thread.join(CLOSE_TIMEOUT_S)
+
+    def _supervise(self, identifier: str, supervisor: S, then: Callable[[], None] = lambda: None) -> None:
+        def run() -> None:
+            try:
+                supervisor.run()
+                then()
+            finally:
+                with self._registering:
+                    self._active = {name: entry for name, entry in self._active.items() if name != identifier}
+
+        thread = threading.Thread(target=run, name=f"supervise-{identifier}", daemon=True)
+        with self._registering:
+            self._active = {**self._active, identifier: (supervisor, thread)}
+        thread.start()
 
 
 _log = logging.getLogger("tauscope.jobs")
@@ -168,11 +144,8 @@ class RunSupervisor:
         permit: Permit = FREE,
     ) -> None:
         self.live = Live(RunState.CREATED, None, {})
-        self._workspace = workspace
-        self._start = start
-        self._motion = motion
-        self._is_alive = is_alive
-        self._permit = permit
+        self._workspace, self._start, self._motion = workspace, start, motion
+        self._is_alive, self._permit = is_alive, permit
         self._control: ControlProcess | None = None
         self._stop_requested = threading.Event()
 
@@ -280,11 +253,8 @@ class RunManager(Manager[RunSupervisor]):
         on_end: Callable[[RunRecord], None] = lambda _record: None,
     ) -> None:
         super().__init__(items)
-        self.claims = claims
-        self._recordings = recordings
-        self._start = start
-        self._is_alive = is_alive
-        self._on_end = on_end
+        self.claims, self._recordings, self._start = claims, recordings, start
+        self._is_alive, self._on_end = is_alive, on_end
         self._pending: dict[str, RunWorkspace] = {}
         for identifier in items.identifiers():
             self._end(RunWorkspace(items.folder(identifier)), None)
@@ -311,15 +281,15 @@ class RunManager(Manager[RunSupervisor]):
                 raise
             workspace = RunWorkspace(self.items.folder(identifier))
             supervisor = RunSupervisor(workspace, self._start, motion, self._is_alive, permit)
-            self._threads.start(identifier, supervisor, lambda: self._end_supervised(workspace, claim))
+            self._supervise(identifier, supervisor, lambda: self._end_supervised(workspace, claim))
         return identifier
 
     def live(self, identifier: str) -> Live | None:
-        supervisor = self._threads.find(identifier)
+        supervisor = self.find(identifier)
         return None if supervisor is None else supervisor.live
 
     def list_live(self) -> list[Live]:
-        return [supervisor.live for supervisor in self._threads.supervisors()]
+        return [supervisor.live for supervisor, _ in self._active.values()]
 
     def settle(self) -> None:
         """Keep recordings that a full disk did not take. Raises OSError if it still does not."""

@@ -8,7 +8,7 @@ from datetime import timedelta
 
 from pydantic import Field
 
-from tauscope.identification.result import FrictionEntry, IdentificationDocument
+from tauscope.identification.result import IdentificationDocument
 from tauscope.server.history.gates import ModelPolicy
 from tauscope.strict_model import entry
 
@@ -52,7 +52,7 @@ def _friction(document: IdentificationDocument) -> Iterator[NamedParameter]:
             std = each.std.get(term)
             if std is None or std <= 0.0 or not each.identifiable.get(term, True):
                 continue
-            value = _value(each, term)
+            value = float(getattr(each, term))
             scale = max(abs(value), 3.0 * std, 0.0 if term == "viscous" else level)
             yield NamedParameter(f"{term} {each.joint}", each.joint, value, std, scale)
 
@@ -62,10 +62,6 @@ def _rotors(document: IdentificationDocument) -> Iterator[NamedParameter]:
         if each.std is not None and each.std > 0.0:
             scale = max(abs(each.value), 3.0 * each.std)
             yield NamedParameter(f"rotor_inertia {each.joint}", each.joint, each.value, each.std, scale)
-
-
-def _value(entry: FrictionEntry, term: str) -> float:
-    return float(getattr(entry, term))
 
 
 @entry
@@ -115,7 +111,8 @@ def describe_drift(drift: Drift, elapsed: timedelta) -> str:
     noun = _NOUNS.get(term, drift.name) if drift.name == f"{term} {drift.joint}" else drift.name
     difference = drift.after - drift.before
     # A percentage means something only where the earlier value is what the change was measured by, or near it.
-    amount = f" {100 * difference / abs(drift.before):+.0f} %" if abs(drift.before) > 0.5 * _measure(drift) else ""
+    measure = abs(difference / drift.share) if drift.share else 0.0
+    amount = f" {100 * difference / abs(drift.before):+.0f} %" if abs(drift.before) > 0.5 * measure else ""
     figures = f"{drift.before:.3g} → {drift.after:.3g}, {abs(drift.in_std):.0f} standard errors"
     return f"{drift.joint}: {noun}{amount} in {duration_words(elapsed)} ({figures})"
 
@@ -127,8 +124,3 @@ def duration_words(elapsed: timedelta) -> str:
             return f"{count} {unit}{'' if count == 1 else 's'}"
     count = round(elapsed.total_seconds() / (30.44 * 86400))
     return f"{count} months"
-
-
-def _measure(drift: Drift) -> float:
-    """What the change was measured by [SI]."""
-    return abs((drift.after - drift.before) / drift.share) if drift.share else 0.0

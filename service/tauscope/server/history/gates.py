@@ -88,9 +88,7 @@ def _structure(document: IdentificationDocument, active: IdentificationDocument)
     if document.joints != active.joints:
         return Gate("structure", False, "other joints than the active model's; activate it by hand if the arm changed")
     if _names(document) != _names(active):
-        reason = (
-            "other base parameters than the active model's: the kinematics differ; activate it by hand if that is so"
-        )
+        reason = "other base parameters than the active model's: the kinematics differ; if so, activate it by hand"
         return Gate("structure", False, reason)
     return Gate("structure", True, "the same joints and base parameters as the active model")
 

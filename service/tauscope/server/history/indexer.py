@@ -174,9 +174,7 @@ class Indexer:
     """Keeps the index like the folders, which are right; a database that is gone holds up no job."""
 
     def __init__(self, index: Index, items: Mapping[str, ItemStore], recordings: RecordingStore) -> None:
-        self.index = index
-        self._items = items
-        self._recordings = recordings
+        self.index, self._items, self._recordings = index, items, recordings
         self._lock = threading.Lock()
         self._known: dict[str, dict[str, tuple[str, bool]]] = {}
         self._seen_recordings: object = None

@@ -26,8 +26,7 @@ class ModelRegistry:
     """Brings identifications before the history of models, in the order in which they were handed in."""
 
     def __init__(self, history: ModelHistory, site: str, items: Mapping[str, ItemStore]) -> None:
-        self.history = history
-        self._site = site
+        self.history, self._site = history, site
         self._identifications = items["identification"]
         self._diagnoses, self._campaigns, self._runs = items["diagnosis"], items["campaign"], items["run"]
         self._failed: set[str] = set()

@@ -21,6 +21,9 @@ class RetentionRule:
     recordings: bool = False
 
 
+Removers = Mapping[str, Callable[[str], object]]  # what removes an item, by its kind
+
+
 @dataclass(frozen=True)
 class Removal:
     items: tuple[ItemEntry, ...]
@@ -50,9 +53,7 @@ def plan_removal(
     return Removal(tuple(going), names)
 
 
-def remove(
-    removal: Removal, removers: Mapping[str, Callable[[str], object]], recordings: RecordingStore, indexer: Indexer
-) -> Removal:
+def remove(removal: Removal, removers: Removers, recordings: RecordingStore, indexer: Indexer) -> Removal:
     """Remove what was planned and is still there. Raises OSError if something cannot be removed."""
     items = tuple(entry for entry in removal.items if _is_gone(removers[entry.kind], entry.identifier))
     names = tuple(name for name in removal.recordings if _is_gone(recordings.remove, name))
@@ -73,7 +74,7 @@ def sweep(
     indexer: Indexer,
     history: ModelHistory,
     recordings: RecordingStore,
-    removers: Mapping[str, Callable[[str], object]],
+    removers: Removers,
     on_removed: Callable[[str, str], None],
 ) -> None:
     """Remove what a rule lets go, as the routes do. Raises StoreError, before anything goes, or OSError."""

@@ -70,10 +70,11 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 }
 
 
+StepName = Literal["design", "run", "held-out design", "held-out run", "identify", "diagnose"]
+
+
 class CampaignStepAnswer(AnswerModel):
-    name: Literal["design", "run", "held-out design", "held-out run", "identify", "diagnose"] = Field(
-        description="of the step"
-    )
+    name: StepName = Field(description="of the step")
     state: str = Field(description="waiting, or the state of its excitation, run, identification or diagnosis")
     link: str | None = Field(default=None, description="its excitation, run, identification or diagnosis")
 
@@ -105,10 +106,6 @@ class CampaignStopAnswer(AnswerModel):
     state: JobState = Field(description="where it stood; it stops unless that is an end state")
 
 
-StepName = Literal["design", "run", "held-out design", "held-out run", "identify", "diagnose"]
-WAITING, GONE = "waiting", "gone"
-
-
 def result_of(services: Services, identifier: str, root: str) -> CampaignResult:
     require_success(CAMPAIGNS.find(services, identifier))
     answer = CAMPAIGNS.describe(services, identifier, root)
@@ -135,7 +132,7 @@ def _steps(services: Services, order: CampaignOrder, made: CampaignLinks, root: 
     ]
     for name, plural, find, identifier, is_wanted in steps:
         if is_wanted and identifier is None:
-            yield CampaignStepAnswer(name=name, state=WAITING)
+            yield CampaignStepAnswer(name=name, state="waiting")
         elif is_wanted and identifier is not None:
             yield CampaignStepAnswer(
                 name=name, state=_state(services, find, identifier), link=f"{root}/{plural}/{identifier}"
@@ -146,7 +143,7 @@ def _state(services: Services, find: Callable[[Services, str], Any], identifier:
     try:
         folder = find(services, identifier)
     except NotFoundError:
-        return GONE
+        return "gone"
     record = folder.read_run() if isinstance(folder, RunWorkspace) else folder.read_record()
     return "damaged" if record is None else record.state.value
 
@@ -227,24 +224,14 @@ CAMPAIGNS = Campaigns(
 )
 
 router = CAMPAIGNS.router()
+_MOTION_PROBLEMS = ("robot-file", "excitation", "scenario", "acquisition", "recording", "identification")
 
 
 @router.get(
     "/{identifier}/result",
     name="get_result_of_campaigns",
     summary="Fetch the result",
-    responses=problem_responses(
-        "not-found",
-        *ENDINGS,
-        "robot-file",
-        "excitation",
-        "scenario",
-        "acquisition",
-        "recording",
-        "identification",
-        "worker-lost",
-        "internal",
-    ),
+    responses=problem_responses("not-found", *ENDINGS, *_MOTION_PROBLEMS, "worker-lost", "internal"),
 )
 def get_result(request: Request, identifier: Identifier, services: ServicesDep) -> CampaignResult:
     """The identified model, and everything that led to it; else the problem that the campaign ended in."""

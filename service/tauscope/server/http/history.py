@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import Field
@@ -77,12 +77,11 @@ def make_model_answer(entry: ModelEntry, collection: str) -> ModelAnswer:
 
 router = APIRouter(tags=["models"], responses=problem_responses("store"))
 RobotName = Annotated[str, Query(alias="robot", min_length=1, max_length=1000, description="name of the robot")]
-AnyRobot = Annotated[
-    str | None, Query(alias="robot", max_length=1000, description="name of the robot; any where absent")
-]
+AnyRobot = Annotated[str | None, Query(alias="robot", max_length=1000, description="name of the robot; default: any")]
 Number = Annotated[int, Path(ge=1, le=2**31 - 1, description="number of the event")]
 _REASON = {"why": ("Why", {"reason": "gear oil changed on 3 November"})}
-_BODY_PROBLEMS = ("bad-request", "limit-exceeded", "media-type", "not-found")
+_BODY_PROBLEMS = problem_responses("bad-request", "limit-exceeded", "media-type", "not-found")
+_WITH_REASON: Any = {"responses": _BODY_PROBLEMS, "openapi_extra": json_request(ReasonRequest, _REASON)}
 
 
 @router.get("/models", summary="List models")
@@ -131,23 +130,13 @@ def get_model_drift(
     return ComparisonAnswer(before=before, after=identifier, parameters=drifts, joints=find_largest_by_joint(drifts))
 
 
-@router.post(
-    "/models/{identifier}/activate",
-    summary="Make a model the active one",
-    responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra=json_request(ReasonRequest, _REASON),
-)
+@router.post("/models/{identifier}/activate", summary="Make a model the active one", **_WITH_REASON)
 async def activate_model(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
     """Also one that was refused; the one before is kept. The reason is kept with the choice."""
     return await _choose(request, identifier, services, "active")
 
 
-@router.post(
-    "/models/{identifier}/make-reference",
-    summary="Count drift from a model",
-    responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra=json_request(ReasonRequest, _REASON),
-)
+@router.post("/models/{identifier}/make-reference", summary="Count drift from a model", **_WITH_REASON)
 async def make_reference(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
     """After maintenance, say; drifts that are open are closed."""
     return await _choose(request, identifier, services, "reference")
@@ -169,10 +158,8 @@ def get_policy(services: ServicesDep, robot: RobotName) -> ModelPolicy:
 @router.put(
     "/model-policy",
     summary="Set the bounds of a robot",
-    responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra=json_request(
-        ModelPolicy, {"drift": ("Tell smaller changes", {"drift_share": 0.1, "drift_std": 5.0})}
-    ),
+    responses=_BODY_PROBLEMS,
+    openapi_extra=json_request(ModelPolicy, {"drift": ("Tell smaller changes", {"drift_share": 0.1, "drift_std": 5})}),
 )
 async def set_policy(request: Request, services: ServicesDep, robot: RobotName) -> ModelPolicy:
     """They hold for models that are judged from now on; what is left out takes its default."""
@@ -193,12 +180,7 @@ def list_events(
     return EventListAnswer(events=services.models.history.events(robot, only_open=only_open, limit=limit))
 
 
-@router.post(
-    "/events/{number}/acknowledge",
-    summary="Take note of an event",
-    responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra=json_request(ReasonRequest, _REASON),
-)
+@router.post("/events/{number}/acknowledge", summary="Take note of an event", **_WITH_REASON)
 async def acknowledge_event(request: Request, number: Number, services: ServicesDep) -> ModelEventEntry:
     """It is closed; another one is raised when the parameter is found beyond its bounds again."""
     body = await read_document(request, ReasonRequest, services.settings.max_document_bytes)

@@ -74,9 +74,7 @@ IDENTIFICATIONS = QueuedTask(
     work_problems=("robot-file", "recording", "recording-mismatch", "identification", "invalid-request"),
     documents=(
         result_document("an identification", "identify", IdentificationDocument),
-        plots_document(
-            "the identification", IdentificationPlots, "torque over time and friction over velocity, joint by joint"
-        ),
+        plots_document("the identification", IdentificationPlots, "torque over time, friction over velocity"),
         JobDocument(
             "model",
             MODEL_FILE,

@@ -70,7 +70,7 @@ def search_items(
     services.index.refresh()
     query = ItemQuery(kind, state, robot, None, recording_sha256, before, limit)
     found = [_answer(entry, services.index.index.site) for entry in services.index.index.search(query)]
-    return ItemListAnswer(items=found, before=_next(found, limit))
+    return ItemListAnswer(items=found, before=found[-1].created if len(found) == limit else None)
 
 
 @router.get("/robots", tags=["robots"], summary="List the robots")
@@ -79,10 +79,6 @@ def list_robots(services: ServicesDep) -> RobotListAnswer:
     services.index.refresh()
     known = services.index.index.robots()
     return RobotListAnswer(robots=known, versions=[RobotVersionAnswer.of(each) for each in services.robots.versions()])
-
-
-def _next(found: list[ItemAnswer], limit: int) -> datetime | None:
-    return found[-1].created if len(found) == limit else None
 
 
 def _answer(entry: ItemEntry, site: str) -> ItemAnswer:

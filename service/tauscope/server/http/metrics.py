@@ -26,11 +26,9 @@ class Metrics:
         self.registry = CollectorRegistry()
         self.loops = LoopTimes()
         self.registry.register(self.loops)
-        self.requests = Counter(
-            "tauscope_requests", "Requests answered", ["method", "route", "status"], registry=self.registry
-        )
+        self.requests = Counter("tauscope_requests", "Requests", ["method", "route", "status"], registry=self.registry)
         self.request_seconds = Histogram(
-            "tauscope_request_seconds", "Time until the answer began", ["method", "route"], registry=self.registry
+            "tauscope_request_seconds", "Time to the answer", ["method", "route"], registry=self.registry
         )
         self.job_seconds = Histogram(
             "tauscope_job_seconds",
@@ -39,16 +37,11 @@ class Metrics:
             buckets=_JOB_BUCKETS_S,
             registry=self.registry,
         )
-        self.runs = Counter(
-            "tauscope_runs_ended", "Runs by backend and end", ["backend", "end"], registry=self.registry
-        )
+        self.runs = Counter("tauscope_runs_ended", "Runs by backend, end", ["backend", "end"], registry=self.registry)
 
     def run_ended(self, record: RunRecord) -> None:
         self.runs.labels(record.backend, record.state.value).inc()
         self.loops.add(record)
-
-    def watch_drift(self, drift: DriftMonitor) -> None:
-        self.registry.register(ModelDrift(drift))
 
     def watch(self, name: str, text: str, value: Callable[[], float]) -> None:
         """Have a number asked for whenever somebody looks; NaN where that fails."""
@@ -102,7 +95,7 @@ class LoopTimes(Collector):
                 missed.add_metric([backend], self._missed[backend])
                 stale.add_metric([backend], self._stale[backend])
         recent = GaugeMetricFamily(
-            "tauscope_loop_lateness_recent_seconds", "The same of the last second, the worst run's", labels=["quantile"]
+            "tauscope_loop_lateness_recent_seconds", "The same of the last second", labels=["quantile"]
         )
         lives = list(self.live())
         figures = [live.figures.get("lateness_us") for live in lives]
@@ -125,14 +118,10 @@ class ModelDrift(Collector):
     def collect(self) -> Iterator[Metric]:
         labels = ["robot", "parameter"]
         share = GaugeMetricFamily(
-            "tauscope_model_drift_ratio", "Change of a parameter since the reference, in parts of it", labels=labels
+            "tauscope_model_drift_ratio", "Change of a parameter, in parts of its reference", labels=labels
         )
-        errors = GaugeMetricFamily(
-            "tauscope_model_drift_standard_errors", "The same change in its standard errors", labels=labels
-        )
-        events = GaugeMetricFamily(
-            "tauscope_model_drift_events", "Drifts beyond their bounds that nobody took note of", labels=["robot"]
-        )
+        errors = GaugeMetricFamily("tauscope_model_drift_standard_errors", "The same in standard errors", labels=labels)
+        events = GaugeMetricFamily("tauscope_model_drift_events", "Open drifts beyond their bounds", labels=["robot"])
         for robot, found in self._watch.robots.items():
             events.add_metric([robot], found.open_events)
             for drift in found.drifts:

@@ -22,20 +22,8 @@ from tauscope.server.http.repeated_requests import LONGEST_KEY, is_repeatable
 from tauscope.server.problems import MEDIA_TYPE, Problem, problem_responses
 
 _COMMON = (
-    "bad-request",
-    "host",
-    "origin",
-    "unauthorized",
-    "forbidden",
-    "invalid-request",
-    "limit-exceeded",
-    "media-type",
-    "rate-limited",
-    "queue-full",
-    "internal",
-    "worker-lost",
-    "store",
-    "storage-full",
+    *("bad-request", "host", "origin", "unauthorized", "forbidden", "invalid-request", "limit-exceeded", "media-type"),
+    *("rate-limited", "queue-full", "internal", "worker-lost", "store", "storage-full"),
 )
 """Problems that any request to the interface may meet, before its route or in it."""
 _VALUES = ("examples", "default", "enum", "const")  # keywords of a schema that hold plain data
@@ -200,9 +188,7 @@ def merge_problems(answers: dict[str, Any], status: str, answer: dict[str, Any])
 Slot = tuple[Any, Any]  # a list or an object, and the place in it that holds a part
 
 
-def _share(
-    slots: Sequence[Slot], section: str, shared: dict[str, Any], name: Callable[[Slot], str], least: int
-) -> None:
+def _share(slots: Sequence[Slot], section: str, shared: Any, name: Callable[[Slot], str], least: int) -> None:
     """Put each part of at least so many characters that several slots hold into a section of the document once."""
     counts = Counter(json.dumps(holder[key], sort_keys=True) for holder, key in slots)
     names: dict[str, str] = {}
@@ -286,6 +272,12 @@ def binary_part(description: str) -> dict[str, Any]:
 
 def binary_parts(description: str) -> dict[str, Any]:
     return {"type": "array", "items": _FILE, "description": description}
+
+
+ROBOT_PARTS = {
+    "robot": binary_part("the robot file (YAML)"),
+    "urdf": binary_part("the URDF that the robot file names, by its bare name"),
+}
 
 
 def file_contents(*media_types: str) -> dict[str, Any]:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cache
 from http import HTTPStatus
 from pathlib import Path
-from pathlib import Path as FilePath
 from types import MappingProxyType
 from typing import Any
 
@@ -79,7 +78,7 @@ def _target(link: str, path: str, known: Mapping[str, object]) -> str | None:
 
 router = APIRouter(prefix="/docs", include_in_schema=False)
 _METHODS = ("get", "post", "put", "delete")
-_FOLDER = FilePath(__file__).parent / "templates"
+_FOLDER = Path(__file__).parent / "templates"
 _templates = Environment(
     loader=FileSystemLoader(_FOLDER), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
 )
@@ -138,7 +137,11 @@ def _operations(document: dict[str, Any]) -> list[dict[str, Any]]:
             "parameters": [resolve_reference(document, each) for each in operation.get("parameters", [])],
             "bodies": _bodies(document, operation.get("requestBody", {}).get("content", {})),
             "statuses": [
-                (status, _name_status(status), resolve_reference(document, answer)["description"])
+                (
+                    status,
+                    HTTPStatus(int(status)).phrase if status.isdecimal() else "of any request",
+                    resolve_reference(document, answer)["description"],
+                )
                 for status, answer in sorted(operation["responses"].items())
             ],
         }
@@ -146,10 +149,6 @@ def _operations(document: dict[str, Any]) -> list[dict[str, Any]]:
         for method, operation in operations.items()
         if method in _METHODS
     ]
-
-
-def _name_status(status: str) -> str:
-    return HTTPStatus(int(status)).phrase if status.isdecimal() else "of any request"
 
 
 def _bodies(document: dict[str, Any], content: dict[str, Any]) -> list[dict[str, Any]]:

@@ -21,7 +21,6 @@ from tauscope.server.problems import (
     FieldError,
     ProblemError,
     field_errors,
-    make_code_answer,
     make_problem,
     problem_answer,
     summarise,
@@ -60,10 +59,6 @@ def collect_methods(routers: Iterable[tuple[str, APIRouter]]) -> Methods:
         for route in router.routes
         if isinstance(route, Route)
     )
-
-
-def find_methods(methods: Methods, path: str) -> list[str]:
-    return sorted({method for pattern, known in methods if pattern.match(path) for method in known})
 
 
 _log = logging.getLogger("tauscope.api")
@@ -112,7 +107,9 @@ async def _http_exception(request: Request, error: Exception) -> Response:
     }.get(error.status_code, error.detail)
     headers = dict(error.headers or {})
     if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
-        headers["Allow"] = ", ".join(find_methods(request.app.state.methods, path))
+        headers["Allow"] = ", ".join(
+            sorted({each for rule, known in request.app.state.methods if rule.match(path) for each in known})
+        )
     return problem_answer(make_problem(_OF_STATUS.get(error.status_code, "bad-request"), detail, path), headers)
 
 
@@ -120,9 +117,8 @@ async def _system_error(request: Request, error: Exception) -> Response:
     """A full disk is said; any other failure of the system is a fault to look into."""
     if isinstance(error, OSError) and is_disk_full(error):
         _log.error("the disk is full")
-        return make_code_answer(
-            request, "storage-full", "the service's disk is full; remove recordings or identifications"
-        )
+        text = "the service's disk is full; remove recordings or identifications"
+        return problem_answer(make_problem("storage-full", text, request.url.path))
     raise error
 
 

@@ -16,7 +16,7 @@ from typing_extensions import override
 from tauscope.errors import LimitExceededError
 from tauscope.server.auth.gate import HttpMiddleware, find_caller
 from tauscope.server.http.metrics import Metrics
-from tauscope.server.problems import make_problem, problem_answer
+from tauscope.server.problems import ProblemError, make_problem, problem_answer
 
 _request_log = logging.getLogger("tauscope.requests")
 REQUEST_ID = "X-Request-Id"
@@ -98,8 +98,7 @@ class ResponseProtection(HttpMiddleware):
             if has_begun:
                 raise
             detail = "the request met a fault of Tauscope's own; the service's log has the details"
-            answer = problem_answer(make_problem("internal", detail, scope["path"]))
-            await answer(scope, receive, send_safely)
+            await self.refuse(ProblemError("internal", detail), scope, receive, send_safely)
 
 
 class OriginCheck(HttpMiddleware):
@@ -112,8 +111,7 @@ class OriginCheck(HttpMiddleware):
     @override
     async def answer(self, scope: Scope, receive: Receive, send: Send) -> None:
         if reason := self._reason(Headers(scope=scope)):
-            answer = problem_answer(make_problem(*reason, scope["path"]))
-            return await answer(scope, receive, send)
+            return await self.refuse(ProblemError(*reason), scope, receive, send)
         return await self.app(scope, receive, send)
 
     def _reason(self, headers: Headers) -> tuple[str, str] | None:
@@ -179,8 +177,7 @@ class BodyLimit(HttpMiddleware):
 
 class _CountedBody:
     def __init__(self, headers: Headers, receive: Receive, limit: int) -> None:
-        self._receive = receive
-        self._limit = limit
+        self._receive, self._limit = receive, limit
         self._count = 0
         announced = headers.get("content-length", "")
         length = int(announced) if announced.isdecimal() else 0
@@ -239,8 +236,8 @@ class ConcurrencyLimiter(HttpMiddleware):
         if slots is self._slots and self._is_closing():  # hundreds that wait would hold up the end
             slots.release()
             text = "the service is ending; ask again when it has started"
-            problem = make_problem("not-ready", text, scope["path"])
-            return await problem_answer(problem, {"Retry-After": "5"})(scope, receive, send)
+            problem = ProblemError("not-ready", text, headers={"Retry-After": "5"})
+            return await self.refuse(problem, scope, receive, send)
         slot = _Slot(slots, self._slot_timeout_s)
 
         async def send_and_free_slot(message: Message) -> None:

@@ -41,9 +41,7 @@ class ReadingQueue:
         who = find_caller(request.scope)
         caller = who.key or who.name
         if len(self) >= MOST_WAITING + WIDTH or self._waiting[caller] > MOST_WAITING_EACH:
-            text = (
-                f"{self._waiting[caller]} of your requests wait for a file to be read; repeat this one in {RETRY_S} s"
-            )
+            text = f"{self._waiting[caller]} of your requests wait for a file; repeat this one in {RETRY_S} s"
             raise ProblemError("queue-full", text, headers={"Retry-After": str(RETRY_S)})
         self._waiting[caller] += 1
         try:

@@ -14,7 +14,7 @@ from starlette.concurrency import run_in_threadpool
 from tauscope.recording import EffortKind
 from tauscope.server.http.answers import After, AnswerModel, Measured, PageAnswer
 from tauscope.server.http.bodies import PartRule, ReceivedForm, file_answer, parse_document, receive_form
-from tauscope.server.http.openapi import binary_part, file_responses, form_body, refer_to_model
+from tauscope.server.http.openapi import ROBOT_PARTS, binary_part, file_responses, form_body, refer_to_model
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robot_files import FindingAnswer, read_received_robot, robot_part_rules
 from tauscope.server.http.services import ServicesDep, require_no_evidence
@@ -219,8 +219,7 @@ mapping_router = APIRouter(prefix="/mappings", tags=["recordings"], responses=pr
 _MAPPING_BODY = form_body(
     {
         "file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database"),
-        "robot": binary_part("the robot file, whose joints, limits and layout it is read by"),
-        "urdf": binary_part("the URDF that the robot file names, by its bare name"),
+        **ROBOT_PARTS,
         "request": refer_to_model(ReadingRequest),
     },
     required=["file"],

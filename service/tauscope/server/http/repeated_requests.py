@@ -21,7 +21,7 @@ from typing_extensions import override
 
 from tauscope.files import sync_folder, write_atomically
 from tauscope.server.auth.gate import HttpMiddleware, find_caller
-from tauscope.server.problems import make_problem, problem_answer
+from tauscope.server.problems import ProblemError, make_problem, problem_answer
 from tauscope.server.store.files import read_stored
 from tauscope.strict_model import StrictModel
 
@@ -36,11 +36,6 @@ class KeptAnswer(StrictModel):
 
     def content(self) -> bytes:
         return base64.b64decode(self.body)
-
-
-def request_name(caller: str, path: str, key: str) -> str:
-    """What a request is called: nobody meets another caller's answers."""
-    return hashlib.sha256("\n".join((caller, path, key)).encode()).hexdigest()
 
 
 _TIDY_EVERY = 500
@@ -117,7 +112,6 @@ class Fingerprint:
 
 HEADER = "Idempotency-Key"
 LONGEST_KEY = 200  # most characters of the header's value
-
 _REPEATABLE = re.compile(
     r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|rollouts|recordings|robots(?:/check)?|schedules/[^/]+/run)"
 )
@@ -136,15 +130,17 @@ class IdempotentRequests(HttpMiddleware):
             return await self.app(scope, receive, send)
         if not _KEY.fullmatch(key):
             text = f"header {HEADER}: give 1 to {LONGEST_KEY} characters without blanks, for example a UUID"
-            return await problem_answer(make_problem("invalid-request", text, scope["path"]))(scope, receive, send)
+            return await self.refuse(ProblemError("invalid-request", text), scope, receive, send)
         store = _answers_of(scope)
-        name = request_name(find_caller(scope).key or "local", scope["path"], key)
+        # Nobody meets another caller's answers.
+        words = (find_caller(scope).key or "local", scope["path"], key)
+        name = hashlib.sha256("\n".join(words).encode()).hexdigest()
         is_underway = name in self._underway
         try:
             is_new = not is_underway and await run_in_threadpool(store.begin, name)
         except OSError:
             text = "the request could not be written down, so that it was not begun; make room on the disk"
-            return await problem_answer(make_problem("storage-full", text, scope["path"]))(scope, receive, send)
+            return await self.refuse(ProblemError("storage-full", text), scope, receive, send)
         if not is_new:
             return await (await _repeat(scope, receive, store, name, is_underway))(scope, receive, send)
         self._underway.add(name)

@@ -79,9 +79,7 @@ class JointAnswer(AnswerModel):
     origin: tuple[float, float, float] = Field(description="of the link frame at q = 0, in the frame before [m]")
     axis: tuple[float, float, float] = Field(description="unit vector of the joint axis, in the frame before")
     mass: float | None = Field(description="of the link that it carries, as the model believes [kg]")
-    before: tuple[float, ...] = Field(
-        description="4 × 4 transform, row by row: link frame = frame before · before · motion about (along) z · after"
-    )
+    before: tuple[float, ...] = Field(description="4 × 4, by rows: link = before's · before · motion about z · after")
     after: tuple[float, ...] = Field(description="4 × 4 transform, row by row, from the joint to the link frame [m]")
 
 

@@ -9,7 +9,7 @@ from fastapi.concurrency import contextmanager_in_threadpool
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.server.http.bodies import FORM, JSON, media_type, read_document, receive_form, refuse_media_type
-from tauscope.server.http.openapi import binary_part, form_body, json_body
+from tauscope.server.http.openapi import ROBOT_PARTS, form_body, json_body
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robot_files import (
     EXAMPLE_ROBOT,
@@ -27,16 +27,9 @@ from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.store.robots import VERSION_PATTERN
 
 router = APIRouter(prefix="/robots", tags=["robots"])
-
 _BODY = {
     **json_body(RobotCheckRequest, {"inline": ("A robot as JSON", {"robot": EXAMPLE_ROBOT})}),
-    **form_body(
-        {
-            "robot": binary_part("the robot file (YAML)"),
-            "urdf": binary_part("the URDF that the robot file names, by its bare name"),
-        },
-        required=["robot"],
-    ),
+    **form_body(ROBOT_PARTS, required=["robot"]),
 }
 
 

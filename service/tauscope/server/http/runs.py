@@ -172,12 +172,10 @@ def _recording(services: Services, identifier: str, record: RunRecord) -> RunRec
 
 def _links(here: str, excitation: str | None, record: RunRecord | None, workspace: RunWorkspace) -> RunLinks:
     has_ended = record is not None and record.state.is_end
-    recordings: dict[RecordingFormat, str] = {
+    made: dict[RecordingFormat, str] = {
         name: f"{here}/recording?format={name}" for name in FORMATS if has_ended and workspace.recording(name).is_file()
     }
-    return RunLinks(
-        self=here, events=f"{here}/events", stop=f"{here}/stop", excitation=excitation, recordings=recordings
-    )
+    return RunLinks(self=here, events=f"{here}/events", stop=f"{here}/stop", excitation=excitation, recordings=made)
 
 
 LARGEST_TRAJECTORY = 64 * 2**20  # bytes of the largest trajectory file that is accepted
@@ -233,7 +231,7 @@ def _submit(
         identifier = submit_job(services.jobs, services.excitations, ExcitationWorkspace, design, put_robot)
         order = order.model_copy(update={"excitation": identifier})
         motion = await_design(services.jobs, services.excitations, identifier)
-    workspace.write_request(order)
+    workspace.write_order(order)
     try:
         return services.runs.submit(workspace.folder, motion, permit=permit)
     except BaseException:

@@ -1,6 +1,6 @@
 """Schedules over HTTP: set up, changed, run now, and their firings."""
 
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Request
@@ -16,7 +16,7 @@ from tauscope.server.problems import problem_responses
 from tauscope.server.schedules.definition import ScheduleDefinition
 from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry
 from tauscope.server.schedules.scheduler import make_schedule, read_definition
-from tauscope.server.store.data_folder import FOLDERS
+from tauscope.server.store.data_folder import FOLDERS, utc_now
 from tauscope.strict_model import StrictModel
 
 
@@ -85,10 +85,7 @@ class FiringListAnswer(AnswerModel):
 
 
 router = APIRouter(prefix="/schedules", tags=["schedules"], responses=problem_responses("store"))
-
-Name = Annotated[
-    str, Path(pattern="^[a-z0-9][a-z0-9-]{0,62}$", description="of the schedule", examples=["cell3-nightly"])
-]
+Name = Annotated[str, Path(pattern="^[a-z0-9][a-z0-9-]{0,62}$", description="its name", examples=["cell3-nightly"])]
 _BODY_PROBLEMS = ("bad-request", "limit-exceeded", "media-type", "not-found")
 
 
@@ -150,9 +147,7 @@ async def run_schedule(request: Request, name: Name, services: ServicesDep) -> F
 def _put(name: str, body: ScheduleRequest, services: Services) -> ScheduleEntry:
     scheduler = services.schedules
     site = None if body.anywhere else scheduler.repository.site
-    scheduler.repository.put(
-        make_schedule(name, body.like, body.definition, scheduler.repeater, site, datetime.now(UTC))
-    )
+    scheduler.repository.put(make_schedule(name, body.like, body.definition, scheduler.repeater, site, utc_now()))
     return scheduler.repository.find(name)
 
 

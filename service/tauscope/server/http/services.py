@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import timedelta
 from functools import partial
-from typing import Annotated, cast
+from typing import Annotated, Any, cast
 
 from anyio import CapacityLimiter
 from fastapi import Depends, Request
@@ -26,7 +26,7 @@ from tauscope.server.history.indexer import Indexer, open_index
 from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.history.model_registry import DriftMonitor, ModelRegistry
 from tauscope.server.history.retention import RetentionRule, sweep
-from tauscope.server.http.metrics import Metrics, TimedExecutor
+from tauscope.server.http.metrics import Metrics, ModelDrift, TimedExecutor
 from tauscope.server.http.readiness import Clock, Heartbeat, Readiness, check_database, check_disk
 from tauscope.server.http.reading import WIDTH, ReadingQueue
 from tauscope.server.http.repeated_requests import StoredAnswers
@@ -183,13 +183,10 @@ def _assemble(
     identifications, diagnoses, excitations, rollouts = kinds = _kinds(settings, items)
     pool = executor or open_executor(settings.workers, deadline_s=settings.job_timeout_s)
     timed = TimedExecutor(pool, metrics.job_seconds)
-    new_queue = partial(
-        JobQueue, kinds, timed, most_waiting=settings.max_waiting, most_each=settings.max_jobs_per_caller
-    )
+    bounds: dict[str, Any] = {"slots": settings.workers, "most_waiting": settings.max_waiting}
     if isinstance(pool, ClusterExecutor):  # it comes and goes, and so do its workers
-        jobs = new_queue(slots=lambda: pool.width, is_there=pool.is_there)
-    else:
-        jobs = new_queue(slots=settings.workers)
+        bounds |= {"slots": lambda: pool.width, "is_there": pool.is_there}
+    jobs = JobQueue(kinds, timed, most_each=settings.max_jobs_per_caller, **bounds)
     audit = AuditTrail(AuditLog(settings.data_folder))
     claims, closing = DeviceClaims(settings.max_arms), threading.Event()
     leases = Leases(claims, on_end=partial(_note_end, audit))
@@ -296,7 +293,7 @@ def _retention(services: Services) -> list[Callable[[], object]]:
 def _watch(services: Services, drift: DriftMonitor) -> None:
     metrics, folder = services.metrics, services.settings.data_folder
     metrics.loops.live = services.runs.list_live
-    metrics.watch_drift(drift)
+    metrics.registry.register(ModelDrift(drift))
     metrics.watch_readiness(services.readiness.checks)
     metrics.watch("tauscope_jobs_waiting", "Jobs that wait", services.jobs.waiting)
     metrics.watch("tauscope_leases", "Leases that hold", lambda: len(services.leases.active()))

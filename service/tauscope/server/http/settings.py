@@ -67,24 +67,19 @@ class Settings(BaseModel):
         """Whether a host names this service; a name that only resolves here (DNS rebinding) does not."""
         own = {"localhost", "127.0.0.1", "::1", self.host.lower(), *(other.lower() for other in self.names)}
         # No page of somebody else's can have an address of ours for its name: addresses are not rebound.
-        return name in own or (not self.is_local and name is not None and _is_address(name))
+        return name in own or (not self.is_local and name is not None and _parse_address(name) is not None)
 
 
 def is_loopback(host: str) -> bool:
-    if host.lower() == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host.strip("[]")).is_loopback
-    except ValueError:
-        return False
+    address = _parse_address(host)
+    return host.lower() == "localhost" or (address is not None and address.is_loopback)
 
 
-def _is_address(name: str) -> bool:
+def _parse_address(name: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
     try:
-        ipaddress.ip_address(name.strip("[]"))
+        return ipaddress.ip_address(name.strip("[]"))
     except ValueError:
-        return False
-    return True
+        return None
 
 
 def default_data_folder() -> Path:

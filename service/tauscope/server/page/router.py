@@ -17,17 +17,14 @@ from tauscope.server.page.example import example_files
 
 router = APIRouter(include_in_schema=False)
 STATIC = Path(__file__).parent / "static"
-
 MEDIA_TYPES: Mapping[str, str] = {
     ".html": "text/html; charset=utf-8",
     ".css": "text/css; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
     ".svg": "image/svg+xml",
 }
-
 PLOT_LIBRARY: Mapping[str, str] = {"uplot.js": "uplot/static/uPlot.iife.js", "uplot.css": "uplot/static/uPlot.min.css"}
 """Files of the installed package uplot-python, by the names that the page knows them by."""
-
 HEADERS: Mapping[str, str] = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:;"
     " connect-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'none'",

@@ -71,8 +71,7 @@ class ClusterExecutor(Executor):
         self._there = threading.Event()
         self._loop = LoopThread("cluster loop")
         try:
-            self._client = self._open_client()
-            self._executor = _executor_of(self._client)
+            self._client, self._executor = self._open_client()
             self._look()
         except (ImportError, OSError, ValueError) as error:
             self._loop.stop(TIMEOUT_S)
@@ -120,10 +119,12 @@ class ClusterExecutor(Executor):
         finally:
             self._loop.stop(TIMEOUT_S)
 
-    def _open_client(self) -> "Client":
+    def _open_client(self) -> "tuple[Client, Executor]":
         from distributed import Client
 
-        return Client(self._address, self._loop.open(), timeout=TIMEOUT_S, set_as_default=False)
+        client = Client(self._address, self._loop.open(), timeout=TIMEOUT_S, set_as_default=False)
+        # The same function of the same folder is no known result: its files may be others by now.
+        return client, client.get_executor(pure=False)
 
     def _watch(self) -> None:
         while not self._closing.wait(CHECK_S):
@@ -135,8 +136,7 @@ class ClusterExecutor(Executor):
     def _look(self) -> None:
         if self._client.status == "closed":
             self._there.clear()
-            self._client = self._open_client()
-            self._executor = _executor_of(self._client)
+            self._client, self._executor = self._open_client()
             _log.warning("the Dask scheduler at %s is back", self._address)
         if self.is_there():
             # `Client.nthreads` asks the same, and waits for ever where the scheduler is lost meanwhile.
@@ -172,11 +172,6 @@ def _not_reached(address: str, error: Exception) -> StoreError:
         return StoreError(f"{SCHEDULER}: Dask is not installed; install tauscope[fleet], or leave the variable out")
     hint = "start the scheduler, or leave the variable out"
     return StoreError(f"{SCHEDULER}={address}: does not answer ({type(error).__name__}); {hint}")
-
-
-def _executor_of(client: "Client") -> Executor:
-    """Dask's own executor. The same function of the same folder is no known result: its files may be others by now."""
-    return client.get_executor(pure=False)
 
 
 def open_executor(workers: int, wait_s: float = 0.0, deadline_s: float | None = None) -> Executor:

@@ -15,8 +15,7 @@ class Housekeeping:
 
     def __init__(self, tasks: Sequence[Callable[[], object]], period_s: float = PERIOD_S) -> None:
         """Prepare; nothing is done before `start`. `period_s`: pause between two rounds [s]."""
-        self._tasks = tasks
-        self._period_s = period_s
+        self._tasks, self._period_s = tasks, period_s
         self._closing = threading.Event()
         self._failing: set[Callable[[], object]] = set()
         self._thread = threading.Thread(target=self._run, name="housekeeping", daemon=True)

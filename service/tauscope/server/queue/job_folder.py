@@ -7,9 +7,10 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
 
 from pydantic import AwareDatetime, Field, JsonValue
+from typing_extensions import override
 
 from tauscope.errors import TauscopeError
 from tauscope.files import is_disk_full
@@ -49,15 +50,11 @@ class JobState(StrEnum):
         return not TRANSITIONS[self]
 
 
+_ENDS = frozenset([*JobState][-4:])
 TRANSITIONS: Mapping[JobState, frozenset[JobState]] = {
     JobState.QUEUED: frozenset({JobState.RUNNING, JobState.CANCELLED, JobState.INTERRUPTED}),
-    JobState.RUNNING: frozenset(
-        {JobState.QUEUED, JobState.SUCCEEDED, JobState.FAILED, JobState.CANCELLED, JobState.INTERRUPTED}
-    ),
-    JobState.SUCCEEDED: frozenset(),
-    JobState.FAILED: frozenset(),
-    JobState.CANCELLED: frozenset(),
-    JobState.INTERRUPTED: frozenset(),
+    JobState.RUNNING: _ENDS | {JobState.QUEUED},
+    **dict.fromkeys(_ENDS, frozenset()),
 }
 """For each state, the states that may follow. A job goes back to `queued` where the service ended before it did, and is
 `interrupted` where that happens again and again, or where it moves an arm."""
@@ -157,14 +154,33 @@ def read_bytes(path: Path) -> bytes | None:
 
 
 _log = logging.getLogger("tauscope.jobs")
+Order = TypeVar("Order", bound=StrictModel)
 
 
-class JobFolder:
+class JobFolder(Generic[Order]):
+    """What every item keeps in its folder: what was asked for, its robot, steps and events."""
+
+    order_type: ClassVar[type[Any]]
+    order_name: ClassVar[str] = "order.json"
+
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
+        self.folder, self.robot = folder, folder / "robot"
         self.events = EventLog(folder / "events.jsonl")
         self._progress = folder / "progress"
         self._cancel = folder / "cancel"
+
+    def prepare(self) -> None:
+        self.robot.mkdir()
+
+    def read_order(self) -> Order | None:
+        return read_stored(self.folder / self.order_name, self.order_type)
+
+    def write_order(self, order: Order) -> None:
+        write_stored(self.folder / self.order_name, order)
+
+    def has_ended(self) -> bool:
+        """Whether nothing will happen to it any more: it has ended, its record is damaged, or it is gone."""
+        raise NotImplementedError
 
     def read_step(self) -> str | None:
         try:
@@ -204,7 +220,7 @@ class JobFolder:
         return self._cancel.exists() or not self.folder.exists()
 
 
-class Workspace(JobFolder):
+class Workspace(JobFolder[Order]):
     """``state.json`` is written by whoever leads the job, ``progress`` by the work, ``events.jsonl`` by both."""
 
     def __init__(self, folder: Path) -> None:
@@ -214,8 +230,8 @@ class Workspace(JobFolder):
     def read_record(self) -> JobRecord | None:
         return read_stored(self._record, JobRecord)
 
+    @override
     def has_ended(self) -> bool:
-        """Whether nothing will happen to the job any more: it has ended, its state is damaged, or it is gone."""
         record = self.read_record()
         return record is None or record.state.is_end
 

@@ -18,7 +18,6 @@ Work = Callable[[Path], JobProblem | None]
 _log = logging.getLogger("tauscope.jobs")
 MOST_ATTEMPTS = 3
 """How often the work of a job is begun whose service was killed meanwhile: it may be what brought the service down."""
-
 TOO_OFTEN = JobProblem(
     code="interrupted",
     detail=f"the service ended {MOST_ATTEMPTS} times in the middle of this job; look into its log, and hand less in",
@@ -104,10 +103,7 @@ class QueueFullError(LimitExceededError):
     """So many jobs are waiting that no further one is accepted."""
 
 
-@dataclass(frozen=True)
-class _End:
-    state: JobState
-    problem: JobProblem | None
+_End = tuple[JobState, JobProblem | None]  # how a job ended
 
 
 class JobQueue:
@@ -126,9 +122,7 @@ class JobQueue:
         """Make the queue; jobs that an earlier service left unfinished are done again, in their order."""
         self._executor = executor
         self._slots = slots if callable(slots) else lambda: slots
-        self._is_there = is_there
-        self._most_waiting = most_waiting
-        self._most_each = most_each
+        self._is_there, self._most_waiting, self._most_each = is_there, most_waiting, most_each
         self._callers: dict[QueuedJob, str] = {}
         self._lock = threading.RLock()
         self._waiting: deque[QueuedJob] = deque()
@@ -248,7 +242,7 @@ class JobQueue:
             return
         except (BrokenExecutor, RuntimeError, OSError):
             _log.exception("job %s could not be handed to a worker", job.identifier)
-            self._unwritten[job] = _End(JobState.FAILED, WORKER_LOST)
+            self._unwritten[job] = (JobState.FAILED, WORKER_LOST)
             self._write_ends()
             return
         self._running[job] = future
@@ -264,9 +258,9 @@ class JobQueue:
     def _write_ends(self) -> None:
         """Write how jobs ended; what fails is left for the next time, or done again after the next start."""
         for job, end in list(self._unwritten.items()):
-            has_moved = job.move(end.state, end.problem)
+            has_moved = job.move(*end)
             del self._unwritten[job]
-            if has_moved and end.state is JobState.QUEUED and not self._is_closed:
+            if has_moved and end[0] is JobState.QUEUED and not self._is_closed:
                 self._waiting.appendleft(job)
 
     def _end_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> _End:
@@ -274,15 +268,15 @@ class JobQueue:
             problem = self._problem_of(job, future)
         except (ClusterUnavailableError, BrokenExecutor) as error:
             return self._end_lost(job, error)
-        return _End(JobState.SUCCEEDED if problem is None else JobState.FAILED, problem)
+        return (JobState.SUCCEEDED if problem is None else JobState.FAILED), problem
 
     def _end_lost(self, job: QueuedJob, error: Exception) -> _End:
         """A job that was lost with its worker waits again, unless that happened too often: it may be the cause."""
         if job.attempts() >= MOST_ATTEMPTS:
             _log.error("job %s: lost with its worker %d times", job.identifier, MOST_ATTEMPTS)
-            return _End(JobState.FAILED, WORKER_LOST)
+            return JobState.FAILED, WORKER_LOST
         _log.warning("job %s waits again: %s", job.identifier, error)
-        return _End(JobState.QUEUED, None)
+        return JobState.QUEUED, None
 
     def _problem_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> JobProblem | None:
         """Why the work of a job has no result; None where it has one. Raises an error where its worker was lost."""

@@ -5,14 +5,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
-from typing import Any, ClassVar, Generic, Literal, Protocol, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar
 
 from pydantic import Field
+from typing_extensions import override
 
 from tauscope.errors import ExportError, NotFoundError, RecordingError, TauscopeError
 from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.files import write_atomically
 from tauscope.server.queue.job_folder import (
+    JobFolder,
     JobProblem,
     Workspace,
     begin_step,
@@ -24,7 +26,7 @@ from tauscope.server.queue.job_folder import (
 )
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.store.data_folder import ItemStore
-from tauscope.server.store.files import hash_file, read_stored, write_stored
+from tauscope.server.store.files import hash_file
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.task import ROLES
@@ -56,10 +58,9 @@ class TaskOrder(StrictModel):
 Order = TypeVar("Order", bound=TaskOrder)
 
 
-class TaskWorkspace(Workspace, Generic[Order]):
+class TaskWorkspace(Workspace[Order]):
     """`outputs`: the files that a job leaves, each JSON document with its schema; `formats`: its exports."""
 
-    order_type: ClassVar[type[TaskOrder]]
     noun: ClassVar[str]
     roles: ClassVar[tuple[str, ...]] = ()
     takes_model: ClassVar[bool] = False
@@ -68,27 +69,19 @@ class TaskWorkspace(Workspace, Generic[Order]):
 
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)
-        self.robot = folder / "robot"
         self.exports = folder / "exports"
-        self.result = folder / "result.json"
-        self._order = folder / "order.json"
 
     @property
     def trajectory(self) -> Path:
         return self.folder / TRAJECTORY
 
+    @override
     def prepare(self) -> None:
         for folder in (self.robot, *map(self.uploads, (*self.roles, *([SAVED_MODEL] if self.takes_model else [])))):
             folder.mkdir()
 
     def uploads(self, role: str) -> Path:
         return self.folder / role
-
-    def read_order(self) -> Order | None:
-        return read_stored(self._order, self.order_type)  # type: ignore[return-value]
-
-    def write_order(self, order: Order) -> None:
-        write_stored(self._order, order)
 
     def read_output(self, name: str) -> bytes | None:
         """An output, or None where the file is missing, damaged or of another schema."""
@@ -132,9 +125,7 @@ class JobFiles:
     """Files of a request in a job's folder, or among the recordings of the server with the bytes that were ordered."""
 
     def __init__(self, workspace: TaskWorkspace[Any], order: TaskOrder, server_recordings: Path) -> None:
-        self._workspace = workspace
-        self._order = order
-        self._server_recordings = server_recordings
+        self._workspace, self._order, self._server_recordings = workspace, order, server_recordings
         self._checked: set[Path] = set()
 
     def find(self, role: str, name: str) -> Path:
@@ -182,11 +173,7 @@ def perform_job(workspace: TaskWorkspace[Any], server_recordings: Path) -> JobPr
     return do_work(workspace, work, *folders)
 
 
-class Preparable(Protocol):
-    def prepare(self) -> None: ...
-
-
-Staged = TypeVar("Staged", bound=Preparable)
+Staged = TypeVar("Staged", bound=JobFolder[Any])
 
 
 @contextmanager

@@ -45,10 +45,6 @@ class FiringEntry:
     is_final: bool
 
 
-def schedule_entry(row: Schedule) -> ScheduleEntry:
-    return read_row(ScheduleEntry, row)
-
-
 def firing_entry(session: Session, row: Firing) -> FiringEntry:
     """What is given out of a firing, and where that stands which it started."""
     item = None
@@ -70,9 +66,7 @@ class ScheduleRepository:
     """Schedules and their firings, as one site sees them. Every method is one short transaction."""
 
     def __init__(self, database: Database, site: str, boot: str) -> None:
-        self._database = database
-        self.site = site
-        self._boot = boot
+        self._database, self.site, self._boot = database, site, boot
 
     def put(self, entry: ScheduleEntry) -> None:
         """Set a schedule up, or replace one of the same name; its firings stay."""
@@ -92,17 +86,17 @@ class ScheduleRepository:
     def find(self, name: str) -> ScheduleEntry:
         """A schedule. Raises NotFoundError if there is none."""
         with self._database.reading() as session:
-            return schedule_entry(_schedule(session, name))
+            return read_row(ScheduleEntry, _schedule(session, name))
 
     def schedules(self) -> list[ScheduleEntry]:
         with self._database.reading() as session:
-            return [schedule_entry(row) for row in session.scalars(select(Schedule).order_by(Schedule.name))]
+            return [read_row(ScheduleEntry, row) for row in session.scalars(select(Schedule).order_by(Schedule.name))]
 
     def due(self, now: datetime) -> list[ScheduleEntry]:
         """Schedules that this site may do and that are due, the longest first."""
         query = select(Schedule).where(Schedule.next_due <= now, self._is_mine()).order_by(Schedule.next_due)
         with self._database.reading() as session:
-            return [schedule_entry(row) for row in session.scalars(query)]
+            return [read_row(ScheduleEntry, row) for row in session.scalars(query)]
 
     def claim(self, entry: ScheduleEntry, next_due: datetime | None, now: datetime) -> int | None:
         """Number of the firing of a due schedule; None where another service has it, or it was changed."""
@@ -139,7 +133,7 @@ class ScheduleRepository:
             if firing is None:
                 return None
             firing.state, firing.claimed, firing.site, firing.boot = "claimed", now, self.site, self._boot
-            return firing.id, schedule_entry(firing.schedule)
+            return firing.id, read_row(ScheduleEntry, firing.schedule)
 
     def withdraw(self, number: int) -> bool:
         """Take back what was asked for; False where somebody has taken it on."""

@@ -108,9 +108,10 @@ def make_schedule(
     order = workspace.read_order()
     if order is None:
         raise NotFoundError(f"{definition.kind} {like}: its order is missing or damaged; name another one")
-    plain = json.loads(order.model_dump_json(exclude=_lists(definition)))
-    if definition.kind != "campaign":
-        plain["recordings"] = []
+    # A campaign's `held_out` is a motion, all others' names recordings.
+    is_campaign = definition.kind == "campaign"
+    lists = set[str]() if is_campaign else {"recordings", "held_out", "simulated", "model"}
+    plain = json.loads(order.model_dump_json(exclude=lists)) | ({} if is_campaign else {"recordings": []})
     try:
         files = {path.name: path.read_text(encoding="utf-8") for path in sorted(workspace.robot.iterdir())}
     except (OSError, UnicodeDecodeError):
@@ -118,11 +119,6 @@ def make_schedule(
         raise NotFoundError(text) from None
     due = definition.next_after(now, now)
     return ScheduleEntry(name, site, definition.model_dump(mode="json"), plain, files, now, due)
-
-
-def _lists(definition: ScheduleDefinition) -> set[str]:
-    """Fields of an order that name recordings: a campaign's `held_out` is a motion."""
-    return set() if definition.kind == "campaign" else {"recordings", "held_out", "simulated", "model"}
 
 
 FOLDER = "interlocks"
@@ -181,9 +177,7 @@ class Scheduler:
         clock: Callable[[], datetime] = utc_now,
     ) -> None:
         """Prepare. Firings that an earlier start left undecided become `interrupted`: nothing is repeated."""
-        self.repository = repository
-        self.repeater = repeater
-        self._data_folder = data_folder
+        self.repository, self.repeater, self._data_folder = repository, repeater, data_folder
         self._clock = clock
         self._unwritten: dict[int, _Outcome] = {}
         repository.interrupt_claims()
@@ -233,7 +227,9 @@ class Scheduler:
         if reason is not None:
             return "skipped", reason, None
         try:
-            return "started", None, self.repeater.start(entry, self._last_start(entry))
+            firings = self.repository.firings(entry.name, 100)
+            last = next((each.due for each in firings if each.state == "started"), None)
+            return "started", None, self.repeater.start(entry, last)
         except (BusyError, LeasedError, QueueFullError, NothingToDoError) as error:
             return "skipped", str(error), None
         except TauscopeError as error:
@@ -265,9 +261,6 @@ class Scheduler:
         if firing.site == self.repository.site:
             return self.repeater.goes_on(kind, identifier)
         return firing.item_state is not None and not firing.is_final
-
-    def _last_start(self, entry: ScheduleEntry) -> datetime | None:
-        return next((each.due for each in self.repository.firings(entry.name, 100) if each.state == "started"), None)
 
 
 def read_definition(entry: ScheduleEntry) -> ScheduleDefinition:

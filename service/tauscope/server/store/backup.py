@@ -266,9 +266,7 @@ def _fill_database(lines: Path, address: Path | str) -> None:
         with lines.open("rb") as file:
             load_lines(engine, file)
     except SQLAlchemyError as error:
-        raise StoreError(
-            f"the database cannot be filled ({str(error).splitlines()[0]}); give it an empty one"
-        ) from None
+        raise StoreError(f"the database cannot be filled ({str(error).splitlines()[0]}); give an empty one") from None
     finally:
         engine.dispose()
 

@@ -25,9 +25,7 @@ def utc_now() -> datetime:
 
 class ItemStore:
     def __init__(self, root: Path, noun: str, clock: Callable[[], datetime] = utc_now) -> None:
-        self.root = root
-        self.noun = noun
-        self.clock = clock
+        self.root, self.noun, self.clock = root, noun, clock
         root.mkdir(parents=True, exist_ok=True)
 
     def stage(self) -> Path:

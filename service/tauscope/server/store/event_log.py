@@ -56,8 +56,7 @@ class LogFollower:
     """Reads a log from where it last ended; holds no file open between two readings."""
 
     def __init__(self, path: Path, after: int) -> None:
-        self._path = path
-        self._after = after
+        self._path, self._after = path, after
         self._number = 0
         self._offset = 0
 

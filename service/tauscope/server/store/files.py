@@ -66,8 +66,7 @@ class IncomingFile:
         self._file = os.fdopen(descriptor, "wb")
         self._hash = hashlib.sha256()
         self.path = Path(path)
-        self.name = name
-        self.limit = limit
+        self.name, self.limit = name, limit
         self.size = 0
 
     def write(self, piece: bytes) -> None:

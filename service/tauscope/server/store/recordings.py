@@ -60,9 +60,8 @@ class RecordingHashes:
         is_same = known is not None and (known.size, known.modified_ns) == (status.st_size, status.st_mtime_ns)
         return known if is_same else None
 
-    def is_kept(self, name: str) -> bool:
-        known = self._read(name)
-        return known is not None and known.kept is not None
+    def was_kept(self, name: str) -> bool:
+        return (known := self._read(name)) is not None and known.kept is not None
 
     def keep(self, name: str, status: os.stat_result, sha256: str) -> None:
         """Write down what is about to be kept. Raises OSError if the disk does not take it."""
@@ -172,7 +171,7 @@ class RecordingStore:
             try:
                 status = self._status(entry.name)
                 known = self._hashes.of(entry.name, status)
-                if known is None and self._hashes.is_kept(entry.name):
+                if known is None and self._hashes.was_kept(entry.name):
                     found.append(self.find(entry.name))
                     continue
             except (NotFoundError, FileNotFoundError):

@@ -35,10 +35,6 @@ _SHOWN = ("recordings", "held_out", "simulated", "refine", "options")
 """Fields of an order that its answer shows, where it has them."""
 
 
-def no_further(_received: Received[Any], _services: Services, _workspace: Any) -> dict[str, Any]:
-    return {}
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class QueuedTask(Resource):
     """`further`: more fields of an order; `further_parts`: folder and limit [bytes] of other files; `links`: routes."""
@@ -50,7 +46,7 @@ class QueuedTask(Resource):
     work_problems: Sequence[str] = ("robot-file", "recording", "recording-mismatch", "identification")
     export_words: str = ""
     links: Sequence[str] = ()
-    further: Callable[[Received[Any], Services, Any], dict[str, Any]] = no_further
+    further: Callable[[Received[Any], Services, Any], dict[str, Any]] = lambda *_: {}
     further_parts: Mapping[str, tuple[str, int]] = field(default_factory=dict)
 
     @override
@@ -99,9 +95,7 @@ class QueuedTask(Resource):
     @override
     async def submit(self, request: Request, services: Services) -> str:
         settings = services.settings
-        async with contextmanager_in_threadpool(
-            stage_workspace(self.kind(services).items, self.workspace)
-        ) as workspace:
+        async with contextmanager_in_threadpool(stage_workspace(self.items(services), self.workspace)) as workspace:
             most, largest = settings.max_recordings, settings.max_upload_bytes
             rules = {role: PartRule(largest, workspace.uploads(role), most) for role in workspace.roles}
             for part, (folder, limit) in self.further_parts.items():

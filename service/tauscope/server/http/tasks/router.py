@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
-from typing import Annotated, Any, ClassVar, Protocol
+from typing import Annotated, Any, ClassVar
 
 from fastapi import APIRouter, Depends, Path, Request, Response
 from pydantic import BaseModel, Field, create_model
@@ -39,6 +39,7 @@ from tauscope.server.http.tasks.event_feeds import EventSource
 from tauscope.server.http.tasks.events import add_events_route
 from tauscope.server.http.tasks.submission import RobotRequest, request_body
 from tauscope.server.problems import ProblemError, problem_responses
+from tauscope.server.queue.job_folder import JobFolder
 from tauscope.server.queue.queue import JobKind
 from tauscope.server.store.data_folder import ItemStore
 
@@ -85,24 +86,13 @@ def result_document(noun: str, verb: str, model: type[BaseModel]) -> JobDocument
 
 
 def report_document(verb: str) -> JobDocument:
-    words = "The report as one page: no script, no request to anywhere, ready to print."
-    return text_document(
-        "report", "report.html", HTML, "Fetch the report", words, f"page as `tauscope {verb} --report`"
-    )
+    text = "The report as one page: no script, no request to anywhere, ready to print."
+    return text_document("report", "report.html", HTML, "Fetch the report", text, f"page as `tauscope {verb} --report`")
 
 
 def plots_document(noun: str, model: type[BaseModel], words: str) -> JobDocument:
     answer, summary = {"model": model, "description": words}, "Fetch the data of its figures"
     return JobDocument("plots", "plots.json", summary, f"What figures of {noun} are drawn from.", answer)
-
-
-class Folder(Protocol):
-    robot: FilePath
-
-    def read_order(self) -> Any:
-        """What was asked for; None where that is damaged."""
-
-    def has_ended(self) -> bool: ...
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -214,7 +204,7 @@ def _add_item(router: APIRouter, resource: Resource) -> None:
     )
     async def get_robot(request: Request, identifier: Identifier, services: ServicesDep) -> JobRobotAnswer:
         """Its joints, limits and frames, and the files that were sent."""
-        workspace: Folder = await run_in_threadpool(resource.find, services, identifier)
+        workspace: JobFolder[Any] = await run_in_threadpool(resource.find, services, identifier)
         order = await run_in_threadpool(workspace.read_order)
         if order is None:
             raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it has no robot any more")
@@ -297,9 +287,10 @@ class MovingResource(Resource):
                 raise ProblemError("not-finished", f"{identifier} goes on; stop it, and remove it when it has ended")
 
 
-def add_document_route(
-    router: APIRouter, finished: Callable[[Services, str], Any], document: JobDocument, problems: Sequence[str]
-) -> None:
+Finished = Callable[[Services, str], Any]  # the folder of a job that succeeded
+
+
+def add_document_route(router: APIRouter, finished: Finished, document: JobDocument, problems: Sequence[str]) -> None:
     @router.get(
         f"/{{identifier}}/{document.name}",
         name=f"get_{document.name.replace('-', '_')}_of_{router.prefix.strip('/')}",
@@ -320,7 +311,7 @@ def add_document_route(
 
 
 def add_export_route(
-    router: APIRouter, finished: Callable[[Services, str], Any], formats: Mapping[ExportFormat, ExportFile], words: str
+    router: APIRouter, finished: Finished, formats: Mapping[ExportFormat, ExportFile], words: str
 ) -> None:
     """Give a resource the route ``/{identifier}/exports/{format}``."""
     content = file_contents(*{file.media_type for file in formats.values()})

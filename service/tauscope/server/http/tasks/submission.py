@@ -26,7 +26,7 @@ from tauscope.server.http.bodies import (
     refuse_media_type,
     to_json_text,
 )
-from tauscope.server.http.openapi import Examples, binary_part, form_body, json_body, refer_to_model
+from tauscope.server.http.openapi import ROBOT_PARTS, Examples, form_body, json_body, refer_to_model
 from tauscope.server.http.robot_files import EXAMPLE_ROBOT, keep_inline_robot, robot_part_rules
 from tauscope.server.http.settings import Settings
 from tauscope.server.problems import ProblemError
@@ -95,7 +95,6 @@ RECORDINGS_EXAMPLE: tuple[str, Any] = (
     "Recordings that lie on the server",
     {"robot": EXAMPLE_ROBOT, "recordings": ["monday.csv", "tuesday.csv"], "held_out": ["wednesday.mcap"]},
 )
-
 Document = TypeVar("Document", bound=RobotRequest)
 
 
@@ -147,8 +146,7 @@ def request_body(
 ) -> dict[str, Any]:
     parts = {
         "request": refer_to_model(kind),
-        "robot": binary_part("the robot file (YAML)"),
-        "urdf": binary_part("the URDF that the robot file names, by its bare name"),
+        **ROBOT_PARTS,
         **(further_parts or {}),
     }
     form = form_body(parts, required=[])

@@ -130,32 +130,28 @@ class Database:
 
     def __init__(self, address: Path | str) -> None:
         """Open and upgrade. Raises StoreError if it cannot be reached, is damaged, or of a newer program."""
-        self._engine = open_engine(address)
+        self.engine = open_engine(address)
         try:
             if isinstance(address, Path) and address.parent.is_dir():
                 address.touch(0o600)  # SQLite gives its further files the same rights
             with self._own_words():
-                upgrade(self._engine)
-                if self._engine.url.get_backend_name() == "sqlite":
-                    _check_file(self._engine.url)
+                upgrade(self.engine)
+                if self.engine.url.get_backend_name() == "sqlite":
+                    _check_file(self.engine.url)
         except BaseException:
-            self._engine.dispose()
+            self.engine.dispose()
             raise
-
-    @property
-    def engine(self) -> Engine:
-        return self._engine
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
         """A transaction that reads. Raises StoreError if the database does not answer."""
-        with self._own_words(), Session(self._engine) as session, session.begin():
+        with self._own_words(), Session(self.engine) as session, session.begin():
             yield session
 
     @contextmanager
     def writing(self) -> Iterator[Session]:
         """A short transaction that writes. Raises StoreError, or IntegrityError if a unique row is there already."""
-        engine = self._engine.execution_options(**{WRITES: True})
+        engine = self.engine.execution_options(**{WRITES: True})
         with self._own_words(), Session(engine, expire_on_commit=False) as session, session.begin():
             session.connection()  # takes SQLite's lock now, not with the first statement
             yield session
@@ -163,16 +159,16 @@ class Database:
     def check(self) -> None:
         """Raises StoreError if it does not answer, is damaged, or is another one than was opened."""
         with self._own_words():
-            if self._engine.url.get_backend_name() == "sqlite":
-                _check_file(self._engine.url)
-            with self._engine.connect() as connection:
+            if self.engine.url.get_backend_name() == "sqlite":
+                _check_file(self.engine.url)
+            with self.engine.connect() as connection:
                 present = present_revision(connection)
         if present != revisions()[-1]:
             hint = "restore it from a backup, and start the service again"
-            raise StoreError(f"{show_address(self._engine)}: its tables are gone or were changed; {hint}")
+            raise StoreError(f"{show_address(self.engine)}: its tables are gone or were changed; {hint}")
 
     def close(self) -> None:
-        self._engine.dispose()
+        self.engine.dispose()
 
     @contextmanager
     def _own_words(self) -> Iterator[None]:
@@ -182,7 +178,7 @@ class Database:
         except IntegrityError:
             raise
         except (DBAPIError, PoolTimeoutError) as error:
-            raise StoreError(_describe_fault(show_address(self._engine), error)) from error
+            raise StoreError(_describe_fault(show_address(self.engine), error)) from error
 
 
 def _check_file(url: URL) -> None:

@@ -95,8 +95,7 @@ class Index:
     """The part of the index that one data folder fills, and the search over all of it."""
 
     def __init__(self, database: Database, site: str) -> None:
-        self._database = database
-        self.site = site
+        self._database, self.site = database, site
 
     def register(self, label: str, now: datetime) -> None:
         """Make the site known, before anything of it is put into the index."""
@@ -191,15 +190,10 @@ class Index:
             return frozenset(session.scalars(query))
 
     def search(self, query: ItemQuery) -> list[ItemEntry]:
-        statement = select(Item).outerjoin(Robot)
-        for column, value in (
-            (Item.kind, query.kind),
-            (Item.state, query.state),
-            (Item.site, query.site),
-            (Robot.name, query.robot),
-        ):
-            if value is not None:
-                statement = statement.where(column == value)
+        columns = (Item.kind, Item.state, Item.site, Robot.name)
+        values = (query.kind, query.state, query.site, query.robot)
+        wanted = (column == value for column, value in zip(columns, values, strict=True) if value is not None)
+        statement = select(Item).outerjoin(Robot).where(*wanted)
         if query.before is not None:
             statement = statement.where(Item.created < query.before)
         if query.recording_sha256 is not None:
