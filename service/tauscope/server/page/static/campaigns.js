@@ -82,7 +82,6 @@ function outcomeOf(campaign, { diagnosis }) {
   ];
 }
 
-/** What the simulated arm may conceal, for a first try: a scenario, its joint the last but one. */
 const CONCEALED = {
   nothing: () => null,
   spring: (joint) => ({ effect: "joint_spring", joint, stiffness: 2.0 }),

@@ -151,7 +151,6 @@ export async function diagnoseAgain(id, recording) {
   return post("diagnoses", form);
 }
 
-/** What held-out motion confirms, and apart from it what is tentative. */
 function findingsSection(result) {
   const cards = (findings, kind) => findings.map((each, place) => findingCard(each, place, result.joints, kind));
   const confirmed = cards(result.findings, "");
@@ -181,7 +180,6 @@ function findingCard(each, place, joints, kind) {
     h("div", { class: "chance" }, h("strong", { text: chance(each.probability) }), "probable", h("div", { class: "meter", "aria-hidden": "true" }, h("span", { "width%": 100 * each.probability }))));
 }
 
-/** Whether held-out motion confirms a finding, and the change at its joint, or where it is largest. */
 function heldOut(each, joints) {
   const change = each.held_out_change;
   if (!change) return CONFIRMED.get(each.confirmed);

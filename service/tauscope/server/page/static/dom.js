@@ -40,7 +40,6 @@ export function number(value, digits = 4) {
   return value.toFixed(Math.min(decimals, 9)).replace("-", "−");
 }
 
-/** A unit behind its number; that of a ratio is not said. */
 export const unit = (name) => (name === "1" ? "" : ` ${name}`);
 
 const OF_ANY = { time: "s", temperature: "°C", motor_position: "rad" };

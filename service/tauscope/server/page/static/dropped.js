@@ -23,7 +23,6 @@ async function filesOf(entry) {
   return (await Promise.all(inside.map(filesOf))).flat();
 }
 
-/** The robot file, then the description that it names; the recordings; and the rest. */
 export async function sortFiles(files) {
   const shown = files.filter((file) => !file.name.startsWith("."));
   const recordings = shown.filter((file) => RECORDING.test(file.name)).sort((a, b) => a.name.localeCompare(b.name, "en", { numeric: true }));

@@ -64,7 +64,6 @@ export function heatMap(plots, joints, key, choose) {
     s("svg", { class: "heat", viewBox: `0 0 ${WIDTH} ${height}`, role: "img", "aria-label": label }, parts));
 }
 
-/** The cell that an arrow key leads to; nothing for other keys, and beyond the edge. */
 function neighbour(rows, from, key) {
   const [down, right] = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] }[key] ?? [0, 0];
   if (!down && !right) return null;

@@ -92,7 +92,6 @@ function duration(seconds) {
   return seconds < 86_400 ? `${number(seconds / 3600, 3)} h` : `${number(seconds / 86_400, 3)} days`;
 }
 
-/** What became of a firing: the item that it started, or why it started none. */
 function outcome(firing) {
   if (!firing) return "not due yet";
   const when = moment(firing.due);

@@ -126,7 +126,6 @@ function interpolated(x, y, at) {
   return y[right - 1] + share * (y[right] - y[right - 1]);
 }
 
-/** A value with its 95 % interval on an axis that all rows share. */
 function interval(value, std, low, high) {
   const at = (each) => 4 + (192 * (each - low)) / (high - low || 1);
   const reach = 1.96 * (std ?? 0);

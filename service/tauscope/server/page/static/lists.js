@@ -87,7 +87,6 @@ export async function figuresOf(kind, signal) {
   return new Map(found.filter((each) => each.is_here).map((each) => [each.id, each.figures]));
 }
 
-/** A view that is one list of jobs; `kind` is their kind in the index. */
 export function jobList(plural, kind, heading, lead, detail) {
   return async (root, { signal }) => {
     const [answer, figures] = await Promise.all([getJson(`${plural}?limit=1000`, signal), figuresOf(kind, signal)]);

@@ -87,7 +87,6 @@ async function show() {
   }
 }
 
-/** Ask for a key; what could not be shown without it is shown then. */
 const needKey = (problem) => askForKey(problem, show);
 
 async function pulse() {
@@ -134,7 +133,6 @@ async function stopAll() {
   if (!refused) setTimeout(() => { if (reached) notice(""); }, 6000);
 }
 
-/** Which arms this tab has, and that they stop with it. */
 function tellLeases(arms, lost) {
   const shown = document.getElementById("lease");
   shown.textContent = arms.length ? `This tab has the lease of ${arms.join(" and ")}: where it is closed, or its connection is gone for ten seconds, the arm stops.` : "";

@@ -85,7 +85,6 @@ export function plot(spec) {
   const readings = spec.series.map(() => h("output", { class: "reading" }));
   const instant = h("span", { class: "key instant" });
 
-  /** Values at the cursor, of the samples themselves; nothing where it is away. */
   function read(u) {
     const isThere = u.cursor.left >= 0 && u.cursor.idx !== null;
     const row = isThere ? nearest(time, u.posToVal(u.cursor.left, "x")) : -1;

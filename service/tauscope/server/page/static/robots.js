@@ -24,7 +24,6 @@ export async function showRobots(root, { signal }) {
 
 const pageOf = (robot) => `#/robots/${encodeURIComponent(robot)}`;
 
-/** Who has the lease of an arm, in words; nothing where nobody has. */
 function holderOf(leases, robot) {
   const held = leases.filter(({ arm }) => arm.slice(0, arm.lastIndexOf(" on ")) === robot);
   return held.map(({ holder, armed }) => (armed ? `${holder} has its lease, and it may move` : `${holder} has its lease`)).join("; ");

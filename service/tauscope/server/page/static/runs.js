@@ -113,7 +113,6 @@ export function liveMonitor(id) {
   return { element, take };
 }
 
-/** The joints of the arm that a run moves; none where its robot file cannot be read. */
 const jointsOf = (id) => getJson(`runs/${id}/robot`).then(({ report }) => report.joints, () => []);
 
 const nameOf = (arm, joint) => arm[joint]?.name ?? `joint ${joint + 1}`;
