@@ -96,7 +96,7 @@ class Bench:
         return record
 
     def ended(self, campaign: str) -> JobRecord:
-        wait_until(lambda: self.manager._threads.find(campaign) is None)
+        wait_until(lambda: self.manager.find(campaign) is None)
         return self.record(campaign)
 
     def steps(self, campaign: str) -> list[str]:
@@ -278,7 +278,7 @@ def test_stop_while_the_arm_moves_stops_the_arm_at_once(tmp_path: Path) -> None:
         bench.manager.stop(campaign)
         done.set()
 
-    with bench.jobs._lock, bench.manager._lock, bench.manager._threads._lock, bench.runs._lock, bench.claims._lock:
+    with bench.jobs._lock, bench.manager._lock, bench.manager._registering, bench.runs._lock, bench.claims._lock:
         threading.Thread(target=stop).start()
         assert done.wait(20.0)
         assert control.stops == 1

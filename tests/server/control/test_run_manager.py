@@ -175,7 +175,7 @@ def test_stop_needs_no_lock_of_the_desk_nor_of_the_claims(bench: Bench) -> None:
         bench.manager.stop(run)
         done.set()
 
-    with bench.manager._lock, bench.manager._threads._lock, bench.claims._lock:
+    with bench.manager._lock, bench.manager._registering, bench.claims._lock:
         threading.Thread(target=stop).start()
         assert done.wait(20.0)
         assert control.stops == 1
