@@ -6,34 +6,35 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
+from typer import Argument, Option
 
 from tauscope.cli.verbs import make_group
 from tauscope.errors import TauscopeError
 from tauscope.server.auth.audit_log import AuditLog
-from tauscope.server.auth.keys import ApiKey, KeyFile, parse_scope
+from tauscope.server.auth.keys import ApiKey, KeyFile, Scope
 from tauscope.server.http.settings import default_data_folder
 from tauscope.server.store.data_folder import utc_now
 
 DataFolder = Annotated[
     Path | None,
-    typer.Option(metavar="DIR", file_okay=False, help="Data folder of the service; the user's own by default."),
+    Option(metavar="DIR", file_okay=False, help="Data folder of the service; the user's own by default."),
 ]
 
 
 def add_key(
-    name: Annotated[str, typer.Argument(help="Who gets the key.")],
+    name: Annotated[str, Argument(help="Who gets the key.")],
     scope: Annotated[
         Literal["read", "analyse", "move", "admin"],
-        typer.Option(help="What it may do; each scope includes those before it."),
+        Option(help="What it may do; each scope includes those before it."),
     ] = "read",
-    days: Annotated[int, typer.Option(min=0, max=36500, help="How long it holds; 0: for good.")] = 365,
+    days: Annotated[int, Option(min=0, max=36500, help="How long it holds; 0: for good.")] = 365,
     data: DataFolder = None,
 ) -> None:
     """Make a key and print it: it is kept nowhere else. From then on the service asks for keys."""
     folder = data or default_data_folder()
     folder.mkdir(parents=True, exist_ok=True)
     life = timedelta(days=days) if days else None
-    key, text = KeyFile(folder).add(name, parse_scope(scope), utc_now(), life)
+    key, text = KeyFile(folder).add(name, Scope(scope), utc_now(), life)
     until = "for good" if key.expires is None else f"until {key.expires:%Y-%m-%d}"
     _note(folder, "key add", key)
     typer.echo(f"key {key.id} of {name}: scope {key.scope}, {until}; this is the only time that it is shown", err=True)
@@ -48,9 +49,7 @@ def list_keys(data: DataFolder = None) -> None:
         typer.echo(f"{key.id}  {key.scope:<8} {key.state(now):<8} expires {expires:<11} {key.name}")
 
 
-def revoke_key(
-    name: Annotated[str, typer.Argument(help="Name or identifier of the key.")], data: DataFolder = None
-) -> None:
+def revoke_key(name: Annotated[str, Argument(help="Name or id of the key.")], data: DataFolder = None) -> None:
     """Take a key back; a service that runs refuses it within seconds."""
     folder = data or default_data_folder()
     key = KeyFile(folder).revoke(name, utc_now())
@@ -66,10 +65,10 @@ def _note(folder: Path, action: str, key: ApiKey) -> None:
 def verify_audit(
     data: DataFolder = None,
     head: Annotated[
-        str | None, typer.Option(metavar="HASH", help="Hash of an entry, noted earlier, that has to be in the log.")
+        str | None, Option(metavar="HASH", help="Noted hash of an entry that has to be in the log.")
     ] = None,
     file: Annotated[
-        Path | None, typer.Option(metavar="FILE", dir_okay=False, help="A copy of the log, in place of a data folder.")
+        Path | None, Option(metavar="FILE", dir_okay=False, help="A copy of the log, to check instead.")
     ] = None,
 ) -> None:
     """Check that no entry of the audit log was changed, moved or removed, and print the hash of the last one.

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
+from typer import Argument, Option
 
 from tauscope.cli.verbs import OptionsOf
 from tauscope.errors import RobotFileError
@@ -17,12 +18,10 @@ from tauscope.tasks.task import ReadingOptions
 
 
 def name_output(words: str, metavar: str = "OUT", *names: str) -> Any:
-    """An option that names a file to write."""
-    return typer.Option(*names, metavar=metavar, dir_okay=False, help=words)
+    return Option(*names, metavar=metavar, dir_okay=False, help=words)
 
 
-def name_input(words: str, metavar: str | None = None, kind: Any = typer.Option, *names: str, **more: Any) -> Any:
-    """An option or an argument that names a file to read."""
+def name_input(words: str, metavar: str | None = None, kind: Any = Option, *names: str, **more: Any) -> Any:
     stated: dict[str, Any] = {"exists": True, "dir_okay": False, "show_default": False, **more}
     return kind(*names, metavar=metavar, help=words, **stated)
 
@@ -43,18 +42,18 @@ def _find_file(name: str) -> Path:
 
 def name_recordings(words: str) -> Any:
     """An argument that names recordings, or their URLs."""
-    return name_input(words, "RECORDING", typer.Argument, parser=_find_input)
+    return name_input(words, "RECORDING", Argument, parser=_find_input)
 
 
 RobotFile = Annotated[
-    Path, name_input("Robot file (YAML), or a URDF or MJCF by itself.", "ROBOT", typer.Argument, parser=_find_file)
+    Path, name_input("Robot file (YAML), or a URDF or MJCF by itself.", "ROBOT", Argument, parser=_find_file)
 ]
 RecordingFile = Annotated[
     Path,
     name_input(
         "Recording: CSV, Parquet, NumPy archive, MCAP, rosbag2 folder, or ROS 1 bag.",
         "FILE",
-        typer.Argument,
+        Argument,
         parser=_find_input,
     ),
 ]
@@ -64,14 +63,14 @@ HeldOut = Annotated[
         "Recordings that the model is judged by, never made from. All files up to the next option, or up to --,"
         " belong to it.",
         "RECORDING...",
-        typer.Option,
+        Option,
         "--held-out",
         parser=_find_input,
     ),
 ]
 Cutoff = Annotated[
     str,
-    typer.Option(
+    Option(
         "--cutoff",
         "--cutoff-hz",
         metavar="auto|none|HZ",
@@ -80,20 +79,13 @@ Cutoff = Annotated[
 ]
 Json = Annotated[Path | None, name_output("Write the result as JSON; - is standard output.")]
 Report = Annotated[Path | None, name_output("Write a page to read, figures included.", "OUT.html")]
-
-
 ReadingFields = Annotated[dict[str, Any], OptionsOf(ReadingOptions)]
 """How recordings are read: fields of `ReadingOptions`, before `complete_reading`."""
-
-
 LayoutFields = Annotated[dict[str, Any], OptionsOf(ReadingOptions, without=("trust_units",))]
 
 
 def complete_reading(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields of `ReadingOptions`; an option overrides the file of ``--columns``.
-
-    Raises typer.BadParameter for a part that is no unit, or a layout that cannot be read.
-    """
+    """Options override the file of ``--columns``. Raises typer.BadParameter for an unknown unit or layout."""
     units, columns = _parse_units(values["units"]), values["columns"]
     try:
         layout = RecordingLayout() if columns is None else read_layout(columns)
@@ -112,10 +104,7 @@ def _parse_units(text: str | None) -> Mapping[str, str] | None:
 
 
 def parse_cutoff(text: str) -> float | Literal["auto"] | None:
-    """Read the value of ``--cutoff``: ``auto``, ``none`` or a positive number [Hz].
-
-    Raises typer.BadParameter for anything else.
-    """
+    """Read ``auto``, ``none`` or a positive number [Hz]. Raises typer.BadParameter for anything else."""
     if text.lower() == "auto":
         return "auto"
     if text.lower() == "none":
@@ -125,7 +114,5 @@ def parse_cutoff(text: str) -> float | Literal["auto"] | None:
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0.0):
-        raise typer.BadParameter(
-            f"{text!r} is neither auto, none nor a positive frequency in Hz", param_hint="'--cutoff'"
-        )
+        raise typer.BadParameter(f"{text!r} is neither auto, none nor a positive number of Hz", param_hint="'--cutoff'")
     return value

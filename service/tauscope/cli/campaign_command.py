@@ -7,12 +7,13 @@ from typing import Annotated, Any
 
 import typer
 from pydantic import ValidationError
+from typer import Option
 
 from tauscope.cli.arguments import RobotFile
 from tauscope.cli.diagnose_command import show_diagnosis
 from tauscope.cli.identify_command import show_identification
 from tauscope.cli.output_files import write_file
-from tauscope.cli.terminal import output, plain, show_progress
+from tauscope.cli.terminal import output, say, show_progress
 from tauscope.errors import ExportError
 from tauscope.runtime.drivers import DEFAULT_BACKEND, driver_names
 from tauscope.tasks import campaign as task
@@ -20,20 +21,16 @@ from tauscope.tasks.task import LocalFiles
 
 
 def _step(words: str) -> Any:
-    return typer.Option(metavar="JSON", help=f"{words}: an object as in the REST API, or none.")
+    return Option(metavar="JSON", help=f"{words}: an object as in the REST API, or none.")
 
 
 def campaign(
     robot: RobotFile,
     *,
-    out: Annotated[
-        Path, typer.Option(metavar="DIR", file_okay=False, help="New folder for motions, recordings and results.")
-    ],
+    out: Annotated[Path, Option(metavar="DIR", file_okay=False, help="New folder of all results.")],
     backend: Annotated[
         str,
-        typer.Option(
-            metavar=f"[{'|'.join(driver_names())}|JSON]", help="What moves the arm, by name or as in the REST API."
-        ),
+        Option(metavar=f"[{'|'.join(driver_names())}|JSON]", help="What moves the arm: a name, or as in the REST API."),
     ] = DEFAULT_BACKEND,
     excitation: Annotated[str, _step("How the training motion is designed")] = "{}",
     held_out: Annotated[str, _step("The motion that the model is judged by")] = "{}",
@@ -71,7 +68,7 @@ def campaign(
     show_identification(output(), result.identification.document, result.identification.robot)
     if result.diagnosis is not None:
         show_diagnosis(output(), result.diagnosis.document)
-    output().print(plain(f"wrote {out}"), soft_wrap=True)
+    say(f"wrote {out}")
 
 
 def _request(robot: Path, steps: Mapping[str, str]) -> task.Request:
@@ -91,4 +88,4 @@ def _write(path: Path, outputs: Mapping[str, bytes], name: str) -> None:
     try:
         write_file(path, outputs[name])
     except ExportError as error:
-        output().print(plain(f"! {error}"), soft_wrap=True)
+        say(f"! {error}")

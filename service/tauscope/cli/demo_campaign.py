@@ -12,7 +12,7 @@ from tauscope.errors import TauscopeError
 from tauscope.robot import read_robot
 from tauscope.runtime.options import RunOptions
 from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
-from tauscope.server.http.campaigns import describe, result_of
+from tauscope.server.http.campaigns import CAMPAIGNS, result_of
 from tauscope.server.http.services import Services, open_services
 from tauscope.server.http.settings import Settings
 from tauscope.server.queue.job_folder import JobState
@@ -59,7 +59,7 @@ def _begin(services: Services, robot_file: Path, scenario: Mapping[str, Any]) ->
 def _wait_for_end(services: Services, identifier: str, told: Told) -> None:
     """Wait as long as it takes: the arm's time is virtual."""
     while True:
-        answer = describe(services, identifier, ROOT)
+        answer = CAMPAIGNS.describe(services, identifier, ROOT)
         if answer.state == "damaged" or JobState(answer.state).is_end:
             break
         going = [step.name for step in answer.steps if step.state not in ("waiting", "succeeded", "finished")]

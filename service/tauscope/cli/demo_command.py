@@ -12,9 +12,9 @@ from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import numpy as np
-import typer
 from rich.console import Console
 from ruamel.yaml import YAML
+from typer import Option
 
 from tauscope.cli.demo_campaign import run_campaign
 from tauscope.cli.demo_page import DATA, LEFT_FOR_S, PORT, PageShown, leave_page, prepare_folder, show_page
@@ -22,7 +22,7 @@ from tauscope.cli.identify_command import show_identification
 from tauscope.cli.output_files import write_file
 from tauscope.cli.run_command import explain_unfinished, keep_recording
 from tauscope.cli.task_run import write_outputs
-from tauscope.cli.terminal import Told, output, plain, show_progress, table
+from tauscope.cli.terminal import Told, output, say, show_progress, table
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.errors import AcquisitionError
 from tauscope.excitation import ExcitationOptions, OptimiserProgress, design_excitation
@@ -39,26 +39,21 @@ from tauscope.trajectory import write_trajectory
 from tauscope_sim.examples import example_robot
 
 NOISE_STD_NM = (0.5, 0.3, 0.7)  # σ_τ of the seed paper's section 5
-
 RATE_HZ = 200.0
 TRAIN_MOTION = ExcitationOptions(periods=5, slow_postures=1, seed=0)
 HELD_OUT_MOTION = ExcitationOptions(periods=2, slow_postures=0, closing_period=False, seed=1)
-
 ROBOT, TRAIN, HELD_OUT = "robot.yaml", "train.csv", "held-out.csv"
 SCENARIO, TRAIN_TRAJECTORY, HELD_OUT_TRAJECTORY = "scenario.yaml", "train.json", "held-out.json"
 RESULT, REPORT = "identification.json", "report.html"
 EXPORTS = ("friction.json", "friction.yaml", "friction.h", "friction.py", "model.xml")
 FILES = (ROBOT, SCENARIO, TRAIN_TRAJECTORY, HELD_OUT_TRAJECTORY, TRAIN, HELD_OUT, RESULT, REPORT, *EXPORTS)
 """What the demo writes, and may therefore write again."""
-
 CONCEALED = {"torque_noise_std": list(NOISE_STD_NM), "seed": 1} | {
     "effects": [{"effect": "joint_spring", "joint": 1, "stiffness": 0.6}]
 }
 """What the arm of that campaign conceals: a scenario, by which the diagnosis is put to the test."""
-
 SCENARIO_TEXT = f"torque_noise_std: {list(NOISE_STD_NM)}\n"
 """What the simulated arm conceals, but for the seed of its noise."""
-
 _HEADING = """\
 The seed paper's arm, Table 1, as `tauscope demo` hands it to the design and to the identification: what its links weigh
 and how its joints rub is left out. Of the friction curve only the shape constants are given."""
@@ -66,8 +61,6 @@ and how its joints rub is left out. Of the friction curve only the shape constan
 
 @dataclass(frozen=True)
 class Comparison:
-    """A parameter's truth beside its estimate."""
-
     name: str
     truth: float
     value: float
@@ -75,17 +68,14 @@ class Comparison:
 
     @property
     def z(self) -> float:
-        """The error in standard errors."""
         return (self.value - self.truth) / self.std
 
 
 def demo(
-    out: Annotated[Path, typer.Option(metavar="DIR", file_okay=False, help="Folder for the results.")] = Path(
-        "demo-output"
-    ),
+    out: Annotated[Path, Option(metavar="DIR", file_okay=False, help="Folder of results.")] = Path("demo-output"),
     page: Annotated[
         bool | None,
-        typer.Option(
+        Option(
             "--page/--no-page",
             show_default=False,
             help="Show the page with what was found, until Ctrl-C. By default so in a terminal; elsewhere a process of"
@@ -104,11 +94,7 @@ def demo(
 
 
 def run_demo(folder: Path, page: PageShown) -> None:
-    """Design, run, identify, compare, and say where everything is.
-
-    Raises TauscopeError where the folder holds somebody else's files of the same names, cannot be written, or the page
-    not be served.
-    """
+    """Raises TauscopeError where the folder holds other files, cannot be written, or the page cannot be served."""
     prepare_folder(folder, (*FILES, DATA))
     arm = read_robot(example_robot("paper_arm"))
     write_file(folder / ROBOT, robot_text_without_model(example_robot("paper_arm")).encode())
@@ -135,12 +121,10 @@ def run_demo(folder: Path, page: PageShown) -> None:
     said = f"Look at it: {hint}, then open http://127.0.0.1:{PORT}"
     if page is PageShown.LEFT:
         said = f"Look at it: {leave_page(folder).address}, for {LEFT_FOR_S / 60.0:.0f} minutes; after that: {hint}"
-    output().print(plain(said), soft_wrap=True)
+    say(said)
 
 
 def design_motion(robot: Path, out: Path, options: ExcitationOptions, told: Told) -> None:
-    """Design a motion and write it as a trajectory file."""
-
     def tell(progress: OptimiserProgress) -> None:
         told(f"design {out.stem} motion", 100.0 * progress.fraction)
 
@@ -148,10 +132,7 @@ def design_motion(robot: Path, out: Path, options: ExcitationOptions, told: Told
 
 
 def run_motion(folder: Path, trajectory: Path, out: Path, seed: int, told: Told) -> None:
-    """Play a motion on the simulated arm, and keep what it recorded.
-
-    Raises AcquisitionError if the run does not finish.
-    """
+    """Play a motion on the simulated arm, and keep its recording. Raises AcquisitionError if it does not finish."""
     scenario = folder.with_suffix(".yaml")
     scenario.write_text(f"{SCENARIO_TEXT}seed: {seed}\n", encoding="utf-8")
     request = run.Request(
@@ -200,17 +181,15 @@ def _show(console: Console, folder: Path, outcome: identify.Result, comparisons:
     console.print()
     console.print(table("Truth and estimate", Table(("parameter", "truth", "estimate", "± std", "z"), rows)))
     rms = float(np.sqrt(np.mean([row.z**2 for row in comparisons])))
-    console.print(
-        plain(f"z is the error in standard errors; its rms over all {len(rows)} parameters is {rms:.2f} (1 expected)")
-    )
+    say(f"z is the error in standard errors; its rms over {len(rows)} parameters is {rms:.2f} (1 expected)", console)
     for name in FILES:
-        console.print(plain(f"wrote {folder / name}"), soft_wrap=True)
+        say(f"wrote {folder / name}", console)
 
 
 def _show_findings(console: Console, found: DiagnosisDocument) -> None:
     console.print()
-    console.print(plain("The same arm once more, a spring concealed at its first joint; what the diagnosis found:"))
+    say("The same arm once more, a spring concealed at its first joint; what the diagnosis found:", console)
     for finding in found.findings:
-        console.print(plain(finding.statement), soft_wrap=True)
-    console.print(plain(f"verdict: {found.verdict}"))
+        say(finding.statement, console)
+    say(f"verdict: {found.verdict}", console)
     console.print()

@@ -30,10 +30,7 @@ _FIRST_LINE = "Written by `tauscope demo`, which replaces the files named here w
 
 
 def prepare_folder(folder: Path, files: Sequence[str]) -> None:
-    """Make the folder, mark it, and take away the files that an earlier demo wrote into it; folders stay.
-
-    Raises ExportError where one of these names is taken by a file that no demo wrote, or the folder cannot be written.
-    """
+    """Make and mark the folder, without an earlier demo's files. Raises ExportError where a name is taken."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         ours = _list_own(folder / MARK)
@@ -61,41 +58,27 @@ def _list_own(mark: Path) -> set[str]:
 DATA = "service"  # data folder of a service within the demo's, which holds a campaign on an arm that conceals an effect
 PORT = 8000  # where the page is, unless something else is there already
 LEFT_FOR_S = 900.0  # how long a page that nobody waits for stays [s]
-
 _LOOK_S = 0.5
 
 
 class PageShown(Enum):
-    """Who shows the page after the demo."""
-
-    HERE = auto()
-    """The demo itself, until interrupted."""
-    LEFT = auto()
-    """A process that the demo leaves behind, for a while."""
-    NOT = auto()
-    """Nobody."""
+    HERE = auto()  # The demo itself, until interrupted.
+    LEFT = auto()  # A process that the demo leaves behind, for a while.
+    NOT = auto()  # Nobody.
 
 
 def show_page(folder: Path) -> None:
-    """Serve the page until interrupted."""
     run_server(folder / DATA, port=_free_port())
 
 
 @dataclass(frozen=True)
 class LeftPage:
-    """A page that another process serves."""
-
     address: str
     process: subprocess.Popen[str]
 
 
 def leave_page(folder: Path, seconds: float = LEFT_FOR_S) -> LeftPage:
-    """Serve the page from a process of its own.
-
-    Raises StoreError if that process ends instead, with what it said.
-
-    `seconds`: after which it ends [s].
-    """
+    """Serve the page from another process for so many [s]. Raises StoreError if that process ends instead."""
     process = subprocess.Popen(  # noqa: S603 - this program
         [sys.executable, "-m", __name__, str(folder.resolve()), str(seconds)],
         stdin=subprocess.DEVNULL,

@@ -9,9 +9,10 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 from rich.console import Console
+from typer import Argument, Option
 
 from tauscope.cli.arguments import RobotFile, name_input
-from tauscope.cli.terminal import output, plain, show_progress, table
+from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import make_group
 from tauscope.errors import AcquisitionError, MissingExtraError
 from tauscope.extras import require_extra
@@ -42,15 +43,13 @@ else:
     BusName = Literal[tuple(bus_drivers())]
     """A name of a registered driver of a field bus: help lists the choices."""
 
-BusOption = Annotated[
-    BusName | None, typer.Option(help="Field bus; the one that the robot file's drives speak of by default.")
-]
+BusOption = Annotated[BusName | None, Option(help="Field bus; by default the one of the robot file's drives.")]
 DoctorRobotFile = Annotated[
     Path | None,
     name_input(
         "Robot file (YAML) whose drives are looked at; without one, the adapters of this machine.",
         "ROBOT",
-        typer.Argument,
+        Argument,
     ),
 ]
 _MARKS = {Severity.GOOD: "ok", Severity.WARNING: "warning", Severity.FAILURE: "failure"}
@@ -74,9 +73,7 @@ def release(
     robot: RobotFile,
     *,
     backend: BusOption = None,
-    supported: Annotated[
-        bool, typer.Option("--supported", help="State that the arm is supported; else you are asked.")
-    ] = False,
+    supported: Annotated[bool, Option("--supported", help="State that the arm is supported.")] = False,
 ) -> None:
     """Let go of an arm that holds: its drives give no torque any more.
 
@@ -87,21 +84,21 @@ def release(
     if not supported and not _ask(arm.name):
         raise AcquisitionError(f"{arm.name} holds on; support it, then state --supported")
     release_drives(bus.name, arm, {})
-    output().print(plain(f"{arm.name}: no drive is under power"), soft_wrap=True)
+    say(f"{arm.name}: no drive is under power")
 
 
 def scan(
-    backend: Annotated[BusName, typer.Argument(metavar="BUS", help="Field bus.")],
+    backend: Annotated[BusName, Argument(metavar="BUS", help="Field bus.")],
     port: Annotated[
         str,
-        typer.Argument(
+        Argument(
             metavar="PORT", help=", ".join(f"{bus.port_help} ({name})" for name, bus in bus_drivers().items()) + "."
         ),
     ],
     *,
     bit_rate: Annotated[
         list[int] | None,
-        typer.Option(metavar="RATE", min=1, help="Bit rate to try; may be repeated. The usual ones by default."),
+        Option(metavar="RATE", min=1, help="Bit rate to try; may be repeated. The usual ones by default."),
     ] = None,
 ) -> None:
     """Show every device that answers on a bus.
@@ -134,11 +131,7 @@ def require_sound(findings: Sequence[Finding]) -> None:
 
 
 def check_drives(path: Path) -> list[Finding]:
-    """Everything doubtful in a robot file's ``drive`` blocks and the files that they name, without a port.
-
-    Nothing where no bus is meant, or where the drivers are not installed. Raises AcquisitionError where a joint has no
-    ``drive`` block, and another one has.
-    """
+    """Everything doubtful in ``drive`` blocks, without a port. Raises AcquisitionError where one has no block."""
     robot = read_robot(path)
     meant = [bus for bus in bus_drivers().values() if any(bus.is_meant(joint.drive or {}) for joint in robot.joints)]
     if len(meant) != 1:
@@ -168,10 +161,9 @@ def _drives(path: Path, backend: str | None) -> Sequence[Finding]:
 
 
 def show_finding(console: Console, finding: Finding) -> None:
-    """Show one finding on a line."""
     remedy = f"; {finding.remedy}" if finding.remedy else ""
     line = f"{_MARKS[finding.severity]}: {finding.subject}: {finding.detail}{remedy}"
-    console.print(plain(line), soft_wrap=True)
+    say(line, console)
 
 
 def _ask(name: str) -> bool:
@@ -179,15 +171,11 @@ def _ask(name: str) -> bool:
 
 
 SHOWN_CYCLES = 3  # cycles of a run whose frames are shown
-
 _RATE_HZ = 200.0
 
 
 def show_frames(robot_file: Path, backend: str, trajectory: Path | None, options: RunOptions) -> None:
-    """Show the frames that a run would send: connecting, enabling, its first cycles, stopping.
-
-    Raises AcquisitionError where a drive block or a limit is not possible.
-    """
+    """Show the frames of a run. Raises AcquisitionError where a drive block or a limit is not possible."""
     robot = read_robot(robot_file)
     targets = _targets(robot, trajectory, options)
     rate_hz = options.rate_hz or _RATE_HZ
@@ -198,7 +186,7 @@ def show_frames(robot_file: Path, backend: str, trajectory: Path | None, options
     bus = select_bus(robot) if find_driver(backend).is_simulated else find_bus(backend)
     with translate_driver_errors():
         for frame in bus.plan_frames(to_drive_joints(bus, robot), request):
-            console.print(plain(f"{frame.phase} | {frame.wire} | {frame.meaning}"), soft_wrap=True)
+            say(f"{frame.phase} | {frame.wire} | {frame.meaning}", console)
 
 
 def _targets(robot: Robot, trajectory: Path | None, options: RunOptions) -> NDArray[np.float64]:

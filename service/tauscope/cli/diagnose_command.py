@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from typer import Option
 
 from tauscope.cli.arguments import (
     Cutoff,
@@ -19,7 +20,7 @@ from tauscope.cli.arguments import (
     parse_cutoff,
 )
 from tauscope.cli.task_run import export_outputs, name_files, run_task
-from tauscope.cli.terminal import output, plain, table
+from tauscope.cli.terminal import output, say, table
 from tauscope.cli.verbs import OptionsOf, make_request
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.result import FindingEntry
@@ -31,7 +32,7 @@ from tauscope.tasks import diagnose as task
 
 Against = Annotated[
     list[str],
-    typer.Option(
+    Option(
         default_factory=lambda: ["identified"],
         show_default=False,
         metavar="identified|model|MODEL.json|SIM...",
@@ -56,21 +57,17 @@ def diagnose(
     reading: ReadingFields,
     options: Annotated[dict[str, Any], OptionsOf(task.DiagnosisOptions, ("headroom",))],
     json: Json = None,
-    report: Annotated[
-        Path | None, name_output("Write a page with verdict, findings and residuals.", "OUT.html")
-    ] = None,
+    report: Annotated[Path | None, name_output("Write a page with verdict, findings, residuals.", "OUT.html")] = None,
     next_trajectory: Annotated[
         Path | None, name_output("Write the motion to record next: what best separates, or shows, what is open.")
     ] = None,
-    model: Annotated[
-        Path | None, name_output("Write the model with all findings, for export and --against.", "OUT.json")
-    ] = None,
+    model: Annotated[Path | None, name_output("Write the model with all findings, for --against.", "OUT.json")] = None,
     export: Annotated[
         list[Path] | None, name_output("Write the model with all findings, by suffix as in tauscope export.", "FILE")
     ] = None,
     scenario: Annotated[Path | None, name_output("Write the findings for the simulated arm.", "OUT.yaml")] = None,
     improved_robot: Annotated[
-        Path | None, name_output("Write the robot file with identified links and friction.", "OUT.yaml")
+        Path | None, name_output("Write the robot file with what was identified.", "OUT.yaml")
     ] = None,
 ) -> None:
     """Say what an arm's model leaves out.
@@ -112,10 +109,7 @@ def _trajectory_suffix(path: Path) -> str:
 
 
 def parse_against(words: list[str]) -> dict[str, Any]:
-    """Read the values of ``--against``: `against` of the options, and `simulated` or `model` of the request.
-
-    Raises typer.BadParameter for a file that does not exist.
-    """
+    """`against`, and `simulated` or `model` of the request. Raises typer.BadParameter for a missing file."""
     if words in (["identified"], ["model"]):
         return {"against": words[0]}
     for word in words:
@@ -128,19 +122,18 @@ def parse_against(words: list[str]) -> dict[str, Any]:
 
 
 def show_diagnosis(console: Console, document: DiagnosisDocument) -> None:
-    """Show the verdict, the findings, and what they change."""
-    console.print(plain(f"Robot {document.robot}: {document.headline}"), soft_wrap=True)
-    console.print(plain(f"Verdict {document.verdict}: {VERDICTS[document.verdict]}"), soft_wrap=True)
-    console.print(plain(f"Noise: {noise_words(document.noise_method)}"), soft_wrap=True)
+    say(f"Robot {document.robot}: {document.headline}", console)
+    say(f"Verdict {document.verdict}: {VERDICTS[document.verdict]}", console)
+    say(f"Noise: {noise_words(document.noise_method)}", console)
     for warning in document.warnings:
-        console.print(plain(f"! {warning.sentence}."), soft_wrap=True)
+        say(f"! {warning.sentence}.", console)
     console.print()
     _show_findings(console, document.findings)
     if document.tentative:
-        console.print(plain("Tentative: held-out motion does not confirm these"), soft_wrap=True)
+        say("Tentative: held-out motion does not confirm these", console)
         _show_findings(console, document.tentative)
     for sentence in document.wrong_values:
-        console.print(plain(f"* {sentence}"), soft_wrap=True)
+        say(f"* {sentence}", console)
     if document.wrong_values:
         console.print()
     console.print(table("Mismatch with the nominal model", _mismatch(document)))
@@ -149,23 +142,23 @@ def show_diagnosis(console: Console, document: DiagnosisDocument) -> None:
         title = f"Headroom: held-out residual below {significant(document.cutoff_hz, 3)} Hz [Nm or N]"
         console.print(table(title, headroom_table(document)))
         for sentence in refutations(document):
-            console.print(plain(f"* {sentence}"), soft_wrap=True)
+            say(f"* {sentence}", console)
     if document.parameter_differences:
         console.print(table("What the simulation has wrong", difference_table(document)))
     if document.parameter_shifts:
         console.print(table("What the left-out effects had done to the parameters", shift_table(document)))
     invisible = sorted({e.effect + (f"@{e.joint}" if e.joint else "") for e in document.detectable if not e.visible})
     if invisible:
-        console.print(plain(f"No such data can show: {', '.join(invisible)}"), soft_wrap=True)
+        say(f"No such data can show: {', '.join(invisible)}", console)
     if document.next_experiment is not None:
-        console.print(plain(f"Next: {document.next_experiment.why}"), soft_wrap=True)
+        say(f"Next: {document.next_experiment.why}", console)
 
 
 def _show_findings(console: Console, findings: Sequence[FindingEntry]) -> None:
     for finding in findings[:MOST_FINDINGS]:
-        console.print(plain(f"* {finding.statement}"), soft_wrap=True)
+        say(f"* {finding.statement}", console)
     if len(findings) > MOST_FINDINGS:
-        console.print(plain(f"  and {len(findings) - MOST_FINDINGS} more, see --json"), soft_wrap=True)
+        say(f"  and {len(findings) - MOST_FINDINGS} more, see --json", console)
     if findings:
         console.print()
 

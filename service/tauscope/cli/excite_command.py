@@ -3,12 +3,12 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
 from rich.console import Console
+from typer import Option
 
 from tauscope.cli.arguments import RobotFile, name_output
 from tauscope.cli.task_run import run_task
-from tauscope.cli.terminal import output, plain, table
+from tauscope.cli.terminal import output, say, table
 from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
 from tauscope.excitation import ExcitationDesign
 from tauscope.number_text import ABSENT, counted, percent, significant
@@ -18,7 +18,7 @@ from tauscope.tasks import design_excitation as task
 
 Boxes = Annotated[
     list[str] | None,
-    typer.Option(
+    Option(
         "--box",
         "--boxes",
         metavar="X0,Y0,Z0,X1,Y1,Z1",
@@ -33,16 +33,12 @@ def excite(
     *,
     options: Annotated[dict[str, Any], OptionsOf(task.ExcitationDesignOptions, without=("boxes",))],
     box: Boxes = None,
-    slow_reversals: Annotated[
-        bool, typer.Option("--slow-reversals/--no-slow-reversals", help="None with --no-slow-reversals.")
-    ] = True,
-    json: Annotated[
-        Path | None, name_output("Write the design, trajectory included, as JSON; - is standard output.")
-    ] = None,
+    slow_reversals: Annotated[bool, Option("--slow-reversals/--no-slow-reversals", help="Add slow reversals.")] = True,
+    json: Annotated[Path | None, name_output("Write the design as JSON, with its trajectory; - is stdout.")] = None,
     csv: Annotated[Path | None, name_output("Write the trajectory's samples as CSV for other controllers.")] = None,
     rate: Annotated[
         float,
-        typer.Option("--rate", "--rate-hz", metavar="HZ", min=1.0, max=10_000.0, help="Samples a second of the CSV."),
+        Option("--rate", "--rate-hz", metavar="HZ", min=1.0, max=10_000.0, help="Samples a second of the CSV."),
     ] = 500.0,
 ) -> None:
     """Design the motion that tells most about an arm.
@@ -67,13 +63,11 @@ CRITERIA = {"cond-f": "Cond_F(LᵀL)", "log-det": "-ln det(LᵀL)/p", "cond-2": 
 
 
 def show_design(console: Console, design: ExcitationDesign, robot: Robot) -> None:
-    """Show what a design is good for, what it leaves of the limits, and what limits it."""
     trajectory = design.trajectory
-    console.print(
-        plain(
-            f"Excitation of {robot.name}: {counted(robot.joint_count, 'joint')}, {counted(design.periods, 'period')} "
-            f"of {design.series.period_s:.4g} s, {trajectory.duration_s:.4g} s in all"
-        )
+    say(
+        f"Excitation of {robot.name}: {counted(robot.joint_count, 'joint')}, {counted(design.periods, 'period')} "
+        f"of {design.series.period_s:.4g} s, {trajectory.duration_s:.4g} s in all",
+        console,
     )
     rows = [
         ("condition number", significant(design.condition_number, 4)),
@@ -92,6 +86,6 @@ def show_design(console: Console, design: ExcitationDesign, robot: Robot) -> Non
     ]
     console.print(table("Margins: part of each limit that is left", Table(("joint", *margins), cells)))
     if design.active:
-        console.print(plain(f"Limited by {', '.join(design.active)}"), soft_wrap=True)
+        say(f"Limited by {', '.join(design.active)}", console)
     for note in design.notes:
-        console.print(plain(f"! {note}"), soft_wrap=True)
+        say(f"! {note}", console)

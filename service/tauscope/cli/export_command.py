@@ -4,22 +4,21 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
+from typer import Argument, Option
 
 from tauscope.cli.arguments import name_input
 from tauscope.cli.output_files import require_free, write_file
 from tauscope.cli.task_run import parse_export_format
-from tauscope.cli.terminal import output, plain
+from tauscope.cli.terminal import say
 from tauscope.export.actuators import ActuatorChoice, ActuatorKind, to_isaac_lab
 from tauscope.export.formats import EXPORT_FILES, ExportFormat, make_export
 from tauscope.export.mjcf_patch import patch_mjcf
 from tauscope.export.model_file import read_export_model
 
-ModelFile = Annotated[
-    Path, name_input("Model that identify or diagnose wrote with --model.", "MODEL.json", typer.Argument)
-]
+ModelFile = Annotated[Path, name_input("Model that identify or diagnose wrote.", "MODEL.json", Argument)]
 Output = Annotated[
     Path,
-    typer.Argument(
+    Argument(
         metavar="OUT",
         dir_okay=False,
         help="File to write, by suffix: .urdf, .xml (MJCF), .yaml .json .h .py (compensation for controllers).",
@@ -28,7 +27,7 @@ Output = Annotated[
 ]
 Gains = Annotated[
     str | None,
-    typer.Option(metavar="N,...", help="Of position and dcmotor actuators: one for all joints, or one each."),
+    Option(metavar="N,...", help="Of position and dcmotor actuators: one for all joints, or one each."),
 ]
 
 
@@ -36,20 +35,14 @@ def export(
     model: ModelFile,
     out: Output,
     *,
-    actuator: Annotated[
-        Literal["motor", "position", "dcmotor"], typer.Option(help="Actuator of each joint in an MJCF.")
-    ] = "motor",
+    actuator: Annotated[Literal["motor", "position", "dcmotor"], Option(help="Actuators of an MJCF.")] = "motor",
     kp: Gains = None,
     kv: Gains = None,
     onto: Annotated[
         Path | None,
-        name_input(
-            "Your own MJCF: its inertials and joints take the model's values, all else stays (.xml).", "ARM.xml"
-        ),
+        name_input("Your own MJCF: its inertials and joints take the model's values, the rest stays.", "ARM.xml"),
     ] = None,
-    isaac_lab: Annotated[
-        bool, typer.Option("--isaac-lab", help="Write an actuator configuration of Isaac Lab (.py).")
-    ] = False,
+    isaac_lab: Annotated[bool, Option("--isaac-lab", help="Write actuators for Isaac Lab (.py).")] = False,
 ) -> None:
     """Write a model for a controller or a simulator.
 
@@ -71,7 +64,7 @@ def export(
     else:
         write_file(out, to_isaac_lab(read, choice).encode() if isaac_lab else make_export(kind, read, choice))
     if str(out) != "-":
-        output().print(plain(f"wrote {out}"), soft_wrap=True)
+        say(f"wrote {out}")
 
 
 def _numbers(text: str | None, option: str) -> tuple[float, ...]:

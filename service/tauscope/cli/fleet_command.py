@@ -5,11 +5,11 @@ import os
 from pathlib import Path
 from typing import Annotated, Literal
 
-import typer
+from typer import Argument, Option
 
 from tauscope.cli.arguments import name_input
 from tauscope.cli.output_files import require_new
-from tauscope.cli.terminal import output, plain, show_progress
+from tauscope.cli.terminal import say, show_progress
 from tauscope.cli.verbs import make_group
 from tauscope.errors import ExportError, IdentificationError
 from tauscope.number_text import counted
@@ -25,7 +25,6 @@ from tauscope.server.queue.fleet import (
 )
 
 TABLE = "table.csv"
-
 CLUSTER_PATIENCE_S = 60.0
 """How long a robot waits for a cluster that is away, as when its scheduler is started anew [s]."""
 CORES = os.cpu_count() or 1
@@ -35,15 +34,13 @@ Manifest = Annotated[
     name_input(
         "CSV with the columns name,robot,recordings,held_out; recordings separated by ';', paths relative to it.",
         "MANIFEST",
-        typer.Argument,
+        Argument,
     ),
 ]
-Out = Annotated[
-    Path, typer.Option(metavar="DIR", file_okay=False, help="Folder of the results: table.csv, and NAME.json for each.")
-]
+Out = Annotated[Path, Option(metavar="DIR", file_okay=False, help="Folder of table.csv, and NAME.json for each.")]
 Workers = Annotated[
     int,
-    typer.Option(
+    Option(
         min=1, max=1024, metavar="N", help="Processes; a Dask cluster has its own (DASK_SCHEDULER_ADDRESS).",
         show_default="one a core",
     ),
@@ -61,11 +58,7 @@ def diagnose_fleet(manifest: Manifest, out: Out, workers: Workers = CORES) -> No
 
 
 def run_fleet(verb: Literal["identify", "diagnose"], manifest: Path, out: Path, workers: int) -> None:
-    """Analyse every robot of a manifest.
-
-    Raises RecordingError if the manifest is not valid: nothing is begun then. Raises ExportError if the results cannot
-    be written. Raises IdentificationError if any robot failed.
-    """
+    """Raises RecordingError for a bad manifest, ExportError for results, IdentificationError if any robot failed."""
     total = sum(1 for _ in read_manifest(manifest))
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -73,14 +66,13 @@ def run_fleet(verb: Literal["identify", "diagnose"], manifest: Path, out: Path, 
         raise ExportError(f"{out}: cannot be made ({error.strerror}); choose another --out") from error
     require_new(out / TABLE)
     failed = _run(verb, manifest, out.resolve(), workers, total)
-    output().print(plain(f"wrote {out / TABLE}: {counted(total, 'robot')}, {failed} failed"), soft_wrap=True)
+    say(f"wrote {out / TABLE}: {counted(total, 'robot')}, {failed} failed")
     if failed:
         text = f"{manifest}: {failed} of {counted(total, 'robot')} failed; see the column error of {out / TABLE}"
         raise IdentificationError(text)
 
 
 def _run(verb: str, manifest: Path, out: Path, workers: int, total: int) -> int:
-    """Do the work, and write each row as it comes; how many failed."""
     columns, work = (
         (IDENTIFICATION_COLUMNS, identify_robot) if verb == "identify" else (DIAGNOSIS_COLUMNS, diagnose_robot)
     )

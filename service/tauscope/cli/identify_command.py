@@ -18,7 +18,7 @@ from tauscope.cli.arguments import (
     parse_cutoff,
 )
 from tauscope.cli.task_run import export_outputs, name_files, run_task
-from tauscope.cli.terminal import output, plain, table
+from tauscope.cli.terminal import output, say, table
 from tauscope.cli.verbs import OptionsOf, make_request
 from tauscope.export.formats import EXPORT_FILES
 from tauscope.identification import IdentificationDocument
@@ -32,7 +32,7 @@ from tauscope.tasks import identify as task
 def identify(
     robot: RobotFile,
     recordings: Annotated[
-        list[Path], name_recordings("Recordings that the model is made from: CSV, Parquet, NumPy, MCAP or a bag.")
+        list[Path], name_recordings("Recordings that train the model: CSV, Parquet, NumPy, MCAP, bag.")
     ],
     *,
     held_out: HeldOut = None,
@@ -70,16 +70,13 @@ def identify(
 
 
 def show_identification(console: Console, document: IdentificationDocument, robot: Robot) -> None:
-    """Show parameters, friction, noise and fit."""
-    console.print(
-        plain(f"Robot {document.robot}: {counted(len(document.joints), 'joint')}, {document.estimator.upper()}")
-    )
+    say(f"Robot {document.robot}: {counted(len(document.joints), 'joint')}, {document.estimator.upper()}", console)
     for sentence in cautions(document):
-        console.print(plain(f"! {sentence}"), soft_wrap=True)
+        say(f"! {sentence}", console)
     console.print(table("Base parameters", base_parameter_table(document)))
     if document.unidentifiable:
         names = ", ".join(document.unidentifiable)
-        console.print(plain(f"No motion of this arm shows {names}"), soft_wrap=True)
+        say(f"No motion of this arm shows {names}", console)
         console.print()
     console.print(table("Friction [SI units]; in brackets: these data cannot tell", friction_table(document)))
     if document.rotor_inertia:
@@ -87,7 +84,7 @@ def show_identification(console: Console, document: IdentificationDocument, robo
     console.print(table("Noise and residual", fit_table(document, robot)))
     console.print(table("Whole arm", _whole_arm(document)))
     for sentence in fit_sentences(document):
-        console.print(plain(sentence), soft_wrap=True)
+        say(sentence, console)
 
 
 def _whole_arm(document: IdentificationDocument) -> Table:

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
 from tauscope import robot as robots
 from tauscope.cli.arguments import LayoutFields, ReadingFields, RecordingFile, RobotFile, complete_reading, name_input
 from tauscope.cli.device_command import check_drives, require_sound, show_finding
 from tauscope.cli.output_files import write_file
-from tauscope.cli.terminal import output, plain, show_progress, table
+from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import make_group, make_request
 from tauscope.number_text import ABSENT, counted, given, significant
 from tauscope.recording import EffortKind, Reading, RecordingReport, check_recording, convert_recording
@@ -28,7 +29,6 @@ from tauscope.robot.yaml_text import read_yaml
 from tauscope.tasks.task import ReadingOptions
 
 RobotOption = Annotated[Path | None, name_input("Robot file: its names, limits, masses and layout.", "ROBOT")]
-
 EFFORT_WORDS = {
     EffortKind.TORQUE: "torque",
     EffortKind.CURRENT: "drive units",
@@ -48,9 +48,7 @@ NONE = "-"
 def check_recording_file(
     file: RecordingFile,
     *,
-    joints: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Number of joints that it has to have.")
-    ] = None,
+    joints: Annotated[int | None, Option(min=1, metavar="N", help="Number of joints that it must have.")] = None,
     robot: RobotOption = None,
     reading: ReadingFields,
 ) -> None:
@@ -61,26 +59,21 @@ def check_recording_file(
         arm = None if robot is None else read_robot(robot)
         report = check_recording(file, joints, arm, options)
     console = output()
-    console.print(
-        plain(f"{report.name}: {counted(len(report.joints), 'joint')}, {counted(report.samples, 'sample')}"),
-        soft_wrap=True,
-    )
+    say(f"{report.name}: {counted(len(report.joints), 'joint')}, {counted(report.samples, 'sample')}", console)
     console.print(table("Recording", _clock(report)))
     console.print(table("Joints", _joints(report)))
     for finding in report.findings:
-        console.print(plain(f"{finding.severity}: {finding.where}: {finding.text}"), soft_wrap=True)
+        say(f"{finding.severity}: {finding.where}: {finding.text}", console)
     report.require_usable()
-    console.print(plain(f"{file}: valid"), soft_wrap=True)
+    say(f"{file}: valid", console)
 
 
 def convert_file(
     source: RecordingFile,
-    target: Annotated[
-        Path, typer.Argument(metavar="TARGET", dir_okay=False, help="File to make: .csv, .parquet or .mcap.")
-    ],
+    target: Annotated[Path, Argument(metavar="TARGET", dir_okay=False, help="File: .csv, .parquet or .mcap.")],
     *,
-    recover: Annotated[bool, typer.Option(help="Keep what comes before the damage of a truncated MCAP file.")] = False,
-    overwrite: Annotated[bool, typer.Option(help="Replace TARGET where it exists.")] = False,
+    recover: Annotated[bool, Option(help="Keep what comes before the damage of a truncated MCAP file.")] = False,
+    overwrite: Annotated[bool, Option(help="Replace TARGET where it exists.")] = False,
     robot: RobotOption = None,
     reading: LayoutFields,
 ) -> None:
@@ -95,22 +88,18 @@ def convert_file(
         arm = None if robot is None else read_robot(robot)
         done = convert_recording(source, target, recover=recover, overwrite=overwrite, robot=arm, reading=options)
     console = output()
-    console.print(plain(f"wrote {done.target}: {counted(done.samples, 'sample')}"), soft_wrap=True)
+    say(f"wrote {done.target}: {counted(done.samples, 'sample')}", console)
     if done.dropped_columns:
-        console.print(plain(f"left out: {', '.join(done.dropped_columns)}"), soft_wrap=True)
+        say(f"left out: {', '.join(done.dropped_columns)}", console)
     if done.damage is not None:
-        console.print(plain(f"damage passed over: {done.damage}"), soft_wrap=True)
+        say(f"damage passed over: {done.damage}", console)
 
 
 def map_file(
     file: RecordingFile,
     robot: RobotOption = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="OUT.yaml", dir_okay=False, help="File to write, for --columns.")
-    ] = None,
-    ask: Annotated[
-        bool | None, typer.Option("--ask/--no-ask", help="Ask for each column; by default on a terminal.")
-    ] = None,
+    out: Annotated[Path | None, Option(metavar="OUT.yaml", dir_okay=False, help="File for --columns.")] = None,
+    ask: Annotated[bool | None, Option("--ask/--no-ask", help="Ask for each column; default: on a terminal.")] = None,
 ) -> None:
     """Write the mapping of another tool's columns: a guess, which questions correct."""
     arm = None if robot is None else read_robot(robot)
@@ -124,15 +113,13 @@ def map_file(
     text = layout_text(layout) + "\n"
     if out is not None:
         write_file(out, text.encode())
-        output().print(plain(f"wrote {out}: {found.joint_count} joints"), soft_wrap=True)
+        say(f"wrote {out}: {found.joint_count} joints")
     else:
         typer.echo(text, nl=False)
 
 
 def _ask(layout: RecordingLayout) -> RecordingLayout:
-    typer.echo(
-        f"{{0}} or {{1}} stands for the joint's number from 0 or 1, {{name}} for its name; {NONE}: none", err=True
-    )
+    typer.echo(f"{{0}} or {{1}} stands for a joint's number from 0 or 1, {{name}} its name; {NONE}: none", err=True)
     guessed: Mapping[str, Source] = layout.columns if isinstance(layout.columns, Mapping) else {}
     columns = dict(guessed)
     for group, words in QUESTIONS.items():
@@ -177,31 +164,20 @@ def _joints(report: RecordingReport) -> Table:
 def check_robot_file(file: RobotFile) -> None:
     """Show what a robot file says, and everything doubtful in it."""
     report = robots.check_robot(file)
-    console = output()
-    gravity = ", ".join(given(value) for value in report.gravity)
-    console.print(
-        plain(f"Robot {report.name}: {counted(len(report.joints), 'joint')}, gravity [{gravity}] m/s²{_mass(report)}")
+    console, gravity = output(), ", ".join(given(value) for value in report.gravity)
+    say(
+        f"Robot {report.name}: {counted(len(report.joints), 'joint')}, gravity [{gravity}] m/s²{_mass(report)}", console
     )
-    columns = (
-        "joint",
-        "name",
-        "type",
-        "position",
-        "velocity",
-        "acceleration",
-        "torque",
-        "gear",
-        "per unit",
-        "mass [kg]",
-    )
+    columns = ("joint", "name", "type", "position", "velocity", "acceleration", "torque")
+    columns += ("gear", "per unit", "mass [kg]")
     console.print(table("Joints", Table(columns, [_row(joint) for joint in report.joints], words=3)))
     for finding in report.findings:
-        console.print(plain(f"{finding.severity}: {finding.where}: {finding.text}"), soft_wrap=True)
+        say(f"{finding.severity}: {finding.where}: {finding.text}", console)
     findings = check_drives(file)
     for finding in findings:
         show_finding(console, finding)
     require_sound(findings)
-    console.print(plain(f"{file}: valid"), soft_wrap=True)
+    say(f"{file}: valid", console)
 
 
 def _mass(report: RobotReport) -> str:

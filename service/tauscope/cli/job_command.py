@@ -5,16 +5,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
-import typer
 from pydantic import SecretStr
+from typer import Argument, Option
 
 from tauscope.cli.store_command import DatabaseUrl, DataFolder, open_database
-from tauscope.cli.terminal import output, plain, table
+from tauscope.cli.terminal import output, say, table
 from tauscope.cli.verbs import make_group
 from tauscope.errors import StoreError, TauscopeError
 from tauscope.number_text import ABSENT
 from tauscope.report.tables import Table
-from tauscope.server.http.services import Services, open_services
+from tauscope.server.http.services import open_services
 from tauscope.server.http.settings import Settings, default_data_folder
 from tauscope.server.schedules.repository import FiringEntry, ScheduleRepository
 from tauscope.server.schedules.scheduler import new_boot
@@ -22,17 +22,15 @@ from tauscope.server.store.data_folder import FolderLock, site_identifier, utc_n
 
 POLL_S = 0.5  # how often the end is looked for [s]
 PATIENCE_S = 30.0  # how long a service may take to take it on [s]
-
 GOOD_ENDS = ("succeeded", "finished")
 
 
 def run_job(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the schedule.")],
+    name: Annotated[str, Argument(metavar="NAME", help="Name of the schedule.")],
     data: DataFolder = None,
     database: DatabaseUrl = None,
-    timeout_s: Annotated[
-        float, typer.Option("--timeout", min=1.0, metavar="S", help="How long its end is waited for [s].")
-    ] = 6 * 3600.0,
+    timeout_s: Annotated[float, Option("--timeout", min=1.0, metavar="S", help="Longest wait for its end [s].")] = 6
+    * 3600.0,
 ) -> None:
     """Do what a schedule repeats now, and wait for its end: for systemd timers, cron and Kubernetes.
 
@@ -47,7 +45,13 @@ def run_job(
     if _is_free(folder):
         with open_services(settings) as services:
             firing = services.schedules.fire_now(name)
-            firing = _follow(firing, _fresh(services, firing.number), timeout_s)
+            number = firing.number
+
+            def look() -> FiringEntry:
+                services.index.sync()
+                return services.schedules.repository.firing(number)
+
+            firing = _follow(firing, look, timeout_s)
     else:
         firing = _ask_service(name, folder, database, timeout_s)
     _tell(name, firing)
@@ -86,16 +90,6 @@ def _ask_service(name: str, folder: Path, database: str | None, timeout_s: float
         return _follow(book.firing(number), lambda: book.firing(number), timeout_s)
 
 
-def _fresh(services: Services, number: int) -> Callable[[], FiringEntry]:
-    """How this process looks at a firing: the index is brought up to date first."""
-
-    def look() -> FiringEntry:
-        services.index.sync()
-        return services.schedules.repository.firing(number)
-
-    return look
-
-
 def _follow(firing: FiringEntry, look: Callable[[], FiringEntry], timeout_s: float) -> FiringEntry:
     deadline = time.monotonic() + timeout_s
     while not firing.is_final:
@@ -113,7 +107,7 @@ def _tell(name: str, firing: FiringEntry) -> None:
     what = f"{firing.item[0]} {firing.item[1]}"
     if firing.item_state not in GOOD_ENDS:
         raise StoreError(f"schedule {name}: {what} ended {firing.item_state}; look it up, and do what its problem says")
-    output().print(plain(f"schedule {name}: {what} {firing.item_state}"), soft_wrap=True)
+    say(f"schedule {name}: {what} {firing.item_state}")
 
 
 def _outcome(firing: FiringEntry | None) -> str:

@@ -4,10 +4,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from tauscope.cli.store_command import DatabaseUrl, DataFolder, open_database
-from tauscope.cli.terminal import output, plain, table
+from tauscope.cli.terminal import output, say, table
 from tauscope.cli.verbs import make_group
 from tauscope.errors import StoreError
 from tauscope.number_text import ABSENT, counted, significant
@@ -15,10 +15,10 @@ from tauscope.report.tables import Table
 from tauscope.server.history.model_history import ModelEntry, ModelHistory
 from tauscope.server.history.trend import parameter_trends
 
-RobotName = Annotated[str, typer.Argument(metavar="ROBOT", help="Name of the robot, as in its file.")]
-Identifier = Annotated[str, typer.Argument(metavar="MODEL", help="Identifier of the identification.")]
-Reason = Annotated[str, typer.Option(metavar="TEXT", help="Why; kept with the choice.")]
-Count = Annotated[int, typer.Option("--limit", min=1, max=1000, metavar="N", help="Most rows.")]
+RobotName = Annotated[str, Argument(metavar="ROBOT", help="Name of the robot, as in its file.")]
+Identifier = Annotated[str, Argument(metavar="MODEL", help="Identifier of the identification.")]
+Reason = Annotated[str, Option(metavar="TEXT", help="Why; kept with the choice.")]
+Count = Annotated[int, Option("--limit", min=1, max=1000, metavar="N", help="Most rows.")]
 
 
 def list_models(robot: RobotName, data: DataFolder = None, database: DatabaseUrl = None, limit: Count = 20) -> None:
@@ -37,11 +37,9 @@ def show_trend(robot: RobotName, data: DataFolder = None, database: DatabaseUrl 
         trends = parameter_trends(ModelHistory(opened).documents(robot))
     rows = []
     for trend in trends:
-        first, last, line = trend.points[0][1], trend.points[-1][1], trend.line
+        first, last, line = trend.points[0], trend.points[-1], trend.line
         slope = ABSENT if line is None else f"{significant(line.slope, 3)} ± {significant(line.slope_std, 2)}"
-        rows.append(
-            (trend.name, str(len(trend.points)), significant(first.value, 4), significant(last.value, 4), slope)
-        )
+        rows.append((trend.name, str(len(trend.points)), *(significant(end.value, 4) for end in (first, last)), slope))
     columns = ("parameter", "models", "first [SI]", "last [SI]", "change a week")
     output().print(table(f"Parameters of {robot}", Table(columns, rows)))
 
@@ -53,10 +51,10 @@ def show_events(robot: RobotName, data: DataFolder = None, database: DatabaseUrl
         history.policy(robot)
         events = history.events(robot, only_open=True, limit=limit)
     if not events:
-        output().print(plain(f"{robot}: nothing has drifted beyond its bounds"), soft_wrap=True)
+        say(f"{robot}: nothing has drifted beyond its bounds")
         return
     for event in events:
-        output().print(plain(event.text), soft_wrap=True)
+        say(event.text)
     hint = "look at the arm; `tauscope model reference` counts from a new model on"
     raise StoreError(f"{robot}: {counted(len(events), 'parameter')} drifted beyond the bounds; {hint}")
 
@@ -79,7 +77,7 @@ def _choose(identifier: str, role: str, reason: str, data: Path | None, database
     with open_database(data, database) as opened:
         entry = ModelHistory(opened).activate(identifier, role, reason, datetime.now(UTC))
     noun = "active model" if role == "active" else "reference"
-    output().print(plain(f"{entry.identifier} is the {noun} of {entry.robot}"), soft_wrap=True)
+    say(f"{entry.identifier} is the {noun} of {entry.robot}")
 
 
 def _state(entry: ModelEntry) -> str:

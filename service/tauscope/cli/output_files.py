@@ -13,10 +13,7 @@ STANDARD_OUTPUT = Path("-")  # stands for standard output where a file to write 
 
 
 def require_distinct(inputs: Sequence[Path]) -> None:
-    """Refuse a file that is given twice: it would count twice, or be judged by what it taught.
-
-    Raises typer.BadParameter naming the file.
-    """
+    """Refuse a file that is given twice: it would count twice, or judge itself. Raises typer.BadParameter."""
     seen: set[Path] = set()
     for path in inputs:
         real = path.resolve()
@@ -26,17 +23,16 @@ def require_distinct(inputs: Sequence[Path]) -> None:
 
 
 def require_free(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
-    """Refuse, before any work is done, to write where it cannot be done or would destroy an input.
-
-    Raises typer.BadParameter naming the file.
-    """
+    """Refuse, before any work, an output that would destroy an input. Raises typer.BadParameter."""
     read = {path.resolve() for path in inputs}
     written: set[Path] = set()
     for path in outputs:
         if path == STANDARD_OUTPUT:
             continue
         real = path.resolve()
-        if not read.isdisjoint((real, *real.parents)) or any(_is_same_file(real, other) for other in read):
+        if not read.isdisjoint((real, *real.parents)) or any(
+            real.exists() and each.exists() and real.samefile(each) for each in read
+        ):
             raise typer.BadParameter(f"output {str(path)!r} is an input of this command; inputs are never written to")
         if real in written:
             raise typer.BadParameter(f"output {str(path)!r} is asked for twice; name each output once")
@@ -48,10 +44,7 @@ def require_free(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
 
 
 def require_new(path: Path) -> None:
-    """Refuse, before any work is done, to make a file that is there already or whose folder is not.
-
-    Raises typer.BadParameter where its folder does not exist. Raises ExportError where it exists.
-    """
+    """Refuse, before any work, a file that exists. Raises typer.BadParameter or ExportError."""
     if not path.resolve().parent.is_dir():
         raise typer.BadParameter(f"output {str(path)!r}: folder {str(path.parent)!r} does not exist; make it first")
     if path.exists() or path.is_symlink():
@@ -59,10 +52,7 @@ def require_new(path: Path) -> None:
 
 
 def keep_file(source: Path, target: Path) -> None:
-    """Give a finished file its place; a file that is there already stays as it is.
-
-    Raises ExportError where there is a file by now, or it cannot be written.
-    """
+    """Name a finished file. Raises ExportError where there is one by now, or it cannot be written."""
     try:
         os.link(source, target)
     except FileExistsError:
@@ -74,10 +64,7 @@ def keep_file(source: Path, target: Path) -> None:
 
 
 def write_file(path: Path, content: bytes) -> None:
-    """Write a file that appears under its name only when it is complete.
-
-    Raises ExportError where it cannot be written.
-    """
+    """Write a file that appears only when it is complete. Raises ExportError where it cannot be written."""
     if path == STANDARD_OUTPUT:
         typer.echo(content, nl=False)
         return
@@ -101,7 +88,3 @@ def _replace(path: Path, content: bytes) -> None:
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
-
-
-def _is_same_file(path: Path, other: Path) -> bool:
-    return path.exists() and other.exists() and path.samefile(other)

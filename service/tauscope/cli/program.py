@@ -18,6 +18,7 @@ from importlib import import_module
 from typing import Annotated, Any
 
 import typer
+from typer import Option
 from typer.core import TyperGroup
 from typer.main import get_command, get_group
 
@@ -28,8 +29,6 @@ DEBUG = "TAUSCOPE_DEBUG"  # environment variable that makes every failure show i
 
 
 class ExitStatus(IntEnum):
-    """How the program ends."""
-
     DONE = 0
     CANNOT_ANSWER = 1
     WRONG_USAGE = 2
@@ -71,11 +70,9 @@ class Verbs(TyperGroup):
     """The verbs of the program, each loaded when it is needed."""
 
     def list_commands(self, ctx: typer.Context) -> list[str]:
-        """Names of all verbs."""
         return [*VERBS]
 
     def get_command(self, ctx: typer.Context, cmd_name: str) -> Any:
-        """A verb; None where there is none of that name."""
         if cmd_name not in VERBS:
             return None
         from tauscope.cli.verbs import add_verb
@@ -90,7 +87,6 @@ class Verbs(TyperGroup):
         return get_command(single)
 
     def format_commands(self, ctx: typer.Context, formatter: Any) -> None:
-        """Write one line a verb."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, words) for name, (_, words) in VERBS.items()])
 
@@ -108,7 +104,6 @@ app = typer.Typer(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the program."""
     if arguments is None:
         _prepare_process()
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -143,10 +138,9 @@ def _show_version(asked: bool) -> None:
 @app.callback()
 def _program(
     version: Annotated[
-        bool, typer.Option("--version", help="Show the version and exit.", callback=_show_version, is_eager=True)
+        bool, Option("--version", help="Show the version and exit.", callback=_show_version, is_eager=True)
     ] = False,
-) -> None:
-    """Options of the program itself."""
+) -> None: ...
 
 
 def _prepare_process() -> None:

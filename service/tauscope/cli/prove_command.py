@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import Annotated, NoReturn
 
-import typer
+from typer import Option
 
 from tauscope.errors import NotFoundError
 
@@ -15,21 +15,13 @@ REPORTING = 1_000_000  # first seed of reports: seeds below 10,000 were looked a
 
 def prove(
     *,
-    full: Annotated[bool, typer.Option("--full", help="The full set instead of the quick one; takes an hour.")] = False,
-    first_seed: Annotated[
-        int, typer.Option(metavar="N", min=0, help="First seed; below 10000 is for development.")
-    ] = REPORTING,
-    jobs: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Trials at the same time; one a core by default.")
-    ] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler of the cluster that makes the trials.")
-    ] = None,
-    out: Annotated[Path, typer.Option(metavar="DIR", file_okay=False, help="Folder for outcomes and page.")] = Path(
-        "proof-output"
-    ),
+    full: Annotated[bool, Option("--full", help="The full set instead of the quick one; takes an hour.")] = False,
+    first_seed: Annotated[int, Option(metavar="N", min=0, help="First seed; 10000 or more.")] = REPORTING,
+    jobs: Annotated[int | None, Option(metavar="N", min=1, help="Trials at a time; default: one a core.")] = None,
+    scheduler: Annotated[str | None, Option(metavar="ADDRESS", help="Dask scheduler that makes the trials.")] = None,
+    out: Annotated[Path, Option(metavar="DIR", file_okay=False, help="Folder of outcomes.")] = Path("proof-output"),
     page: Annotated[
-        Path | None, typer.Option(metavar="PAGE.md", dir_okay=False, help="Write the page here instead of into DIR.")
+        Path | None, Option(metavar="PAGE.md", dir_okay=False, help="Page, in place of one in DIR.")
     ] = None,
 ) -> None:
     """Put the diagnosis to the test: conceal effects, seal the truth, diagnose, open it, count.
@@ -46,10 +38,7 @@ def prove(
 
 
 def become_trials(repository: Path, words: list[str]) -> NoReturn:
-    """Run the trials of a clone in the place of this program: what ends it ends them, and their exit status is its own.
-
-    Raises NotFoundError where the program was installed without its tests.
-    """
+    """Run the trials of a clone in place of this program. Raises NotFoundError where its tests are missing."""
     tests = repository / "tests"
     if not (tests / "concealed").is_dir():
         raise NotFoundError(

@@ -7,7 +7,7 @@ from rich.console import Console
 
 from tauscope.cli.arguments import Json, ReadingFields, Report, RobotFile, complete_reading, name_input, name_recordings
 from tauscope.cli.task_run import name_files, run_task
-from tauscope.cli.terminal import output, plain, table
+from tauscope.cli.terminal import output, say, table
 from tauscope.cli.verbs import make_request
 from tauscope.closed_loop import RolloutDocument
 from tauscope.closed_loop.tables import recording_table, refinement_table, rollout_sentences, summary_table
@@ -19,7 +19,7 @@ from tauscope.tasks.task import ReadingOptions
 def rollout(
     robot: RobotFile,
     recordings: Annotated[
-        list[Path], name_recordings("Recordings with commands (qref), or with torque: CSV, Parquet, MCAP or rosbag2.")
+        list[Path], name_recordings("Recordings with commands (qref) or torque: CSV, Parquet, MCAP.")
     ],
     *,
     model: Annotated[
@@ -59,14 +59,13 @@ def rollout(
 
 
 def show_rollout(console: Console, document: RolloutDocument) -> None:
-    """Show the errors of all models."""
     joints, recordings = len(document.joints), len(document.recordings)
-    console.print(plain(f"Robot {document.robot}: {counted(joints, 'joint')}, {counted(recordings, 'recording')}"))
+    say(f"Robot {document.robot}: {counted(joints, 'joint')}, {counted(recordings, 'recording')}", console)
     for warning in document.warnings:
-        console.print(plain(f"! {warning.sentence}"), soft_wrap=True)
+        say(f"! {warning.sentence}", console)
     console.print(table("Position error, real against simulated motion", summary_table(document)))
     console.print(table("Error by time between restarts [mrad, mm]", recording_table(document)))
     if document.refinement is not None:
         console.print(table("Refined parameters", refinement_table(document.refinement)))
     for sentence in rollout_sentences(document):
-        console.print(plain(sentence), soft_wrap=True)
+        say(sentence, console)

@@ -10,11 +10,12 @@ from typing import Annotated, Any, Literal
 
 import typer
 from rich.console import Console
+from typer import Option
 
 from tauscope.cli.arguments import RobotFile, name_input
 from tauscope.cli.device_command import show_frames
 from tauscope.cli.output_files import keep_file, require_new
-from tauscope.cli.terminal import output, plain, show_progress, table
+from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
 from tauscope.errors import AcquisitionError
 from tauscope.number_text import ABSENT, counted, significant
@@ -30,13 +31,11 @@ from tauscope.tasks.task import LocalFiles
 
 Trajectory = Annotated[
     Path | None,
-    name_input(
-        "Motion to play: a trajectory (JSON, CSV). The default excitation is designed where none is given.", "FILE"
-    ),
+    name_input("Motion to play: a trajectory (JSON, CSV). A default one is designed where none is given.", "FILE"),
 ]
 Out = Annotated[
     Path | None,
-    typer.Option(
+    Option(
         metavar="RECORDING",
         dir_okay=False,
         help="File to make: .csv, .parquet, or .mcap (with the ramp). Never replaces a file; run-TIME.csv by default.",
@@ -53,24 +52,22 @@ SUFFIXES = (".csv", ".parquet", ".mcap")  # formats of a recording, by suffix
 def run(
     robot: RobotFile,
     *,
-    backend: Annotated[BackendName, typer.Option(help="What moves the arm.")] = DEFAULT_BACKEND,
+    backend: Annotated[BackendName, Option(help="What moves the arm.")] = DEFAULT_BACKEND,
     trajectory: Trajectory = None,
     out: Out = None,
     scenario: Scenario = None,
     time: Annotated[
-        Literal["virtual", "real"], typer.Option(help="Of the simulated arm: as fast as it computes, or by the clock.")
+        Literal["virtual", "real"], Option(help="Of the simulated arm: as fast as it computes, or by the clock.")
     ] = "virtual",
     start: Annotated[
-        str | None, typer.Option(metavar="Q1,Q2,...", help="Where the simulated arm stands at first [rad or m].")
+        str | None, Option(metavar="Q1,Q2,...", help="First posture of the simulated arm [rad or m].")
     ] = None,
     options: Annotated[dict[str, Any], OptionsOf(RunOptions)],
-    seed: Annotated[int, typer.Option(min=0, help="Of the default excitation.")] = 0,
+    seed: Annotated[int, Option(min=0, help="Of the default excitation.")] = 0,
     keep_settings: Annotated[
-        bool, typer.Option("--keep-settings", help="Leave in servos' EEPROM what the run changed; else it is put back.")
+        bool, Option("--keep-settings", help="Leave in servos' EEPROM what the run changed; else it is put back.")
     ] = False,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Show the frames that would be sent to the bus, and send none.")
-    ] = False,
+    dry_run: Annotated[bool, Option("--dry-run", help="Show the bus frames of the run, and send none.")] = False,
 ) -> None:
     """Move an arm and record it.
 
@@ -103,11 +100,7 @@ def require_options(backend: str, options: Collection[str]) -> None:
 
 
 def _run_arm(request: task.Request, asked: Path | None) -> None:
-    """Run to the end, keep the recording, and show what came.
-
-    Raises typer.BadParameter where an option is out of place. Raises TauscopeError where the run cannot start, or ended
-    before its time.
-    """
+    """Raises typer.BadParameter, or TauscopeError where the run cannot start or ended before its time."""
     out = _output(asked)
     folder, is_settled = _folder_beside(out), False
     try:
@@ -122,18 +115,13 @@ def _run_arm(request: task.Request, asked: Path | None) -> None:
             shutil.rmtree(folder, ignore_errors=True)
     show_run(output(), result.record, result.robot)
     if made:
-        output().print(plain(f"wrote {out}"), soft_wrap=True)
+        say(f"wrote {out}")
     if result.record.state is not RunState.FINISHED:
         raise AcquisitionError(explain_unfinished(result.record, out if made else None, journal))
 
 
 def keep_recording(result: task.Result, out: Path) -> bool:
-    """Give the recording of a run its place; no file is ever replaced.
-
-    Raises ExportError if there is such a file by now, or it cannot be written.
-
-    Returns bool: False where nothing was recorded.
-    """
+    """Name the recording; False where nothing was recorded. Raises ExportError if it cannot be kept."""
     recording = result.recording(out.suffix.lower().removeprefix("."))
     if recording is not None:
         keep_file(recording, out)
@@ -148,7 +136,6 @@ def _unsaved_journal(result: task.Result) -> Path | None:
 
 
 def explain_unfinished(record: RunRecord, recording: Path | None, journal: Path | None = None) -> str:
-    """One line on a run that did not finish."""
     reason = record.stop if record.problem is None else record.problem.detail
     until = "" if record.state is RunState.DEGRADED else " until then"
     kept = "nothing was recorded" if recording is None else f"what was recorded{until} is in {recording}"
@@ -189,20 +176,19 @@ def _folder_beside(out: Path) -> Path:
 
 
 def show_run(console: Console, record: RunRecord, robot: Robot) -> None:
-    """Show how a run went, and how it kept its time."""
     reason = f": {record.problem.detail}" if record.problem is not None else ""
-    console.print(plain(f"Robot {record.robot} on {record.backend}: {record.state}{reason}"), soft_wrap=True)
+    say(f"Robot {record.robot} on {record.backend}: {record.state}{reason}", console)
     for line in record.drives:
-        console.print(plain(f"! {line}."), soft_wrap=True)
+        say(f"! {line}.", console)
     for warning in robot.warnings:
-        console.print(plain(f"! {warning.sentence}."), soft_wrap=True)
+        say(f"! {warning.sentence}.", console)
     if record.holds and not find_driver(record.backend).is_simulated:
-        console.print(plain(HELD), soft_wrap=True)
+        say(HELD, console)
     console.print(table("Run", _whole(record)))
     if record.worst_following:
         console.print(table("Joints", _joints(record, robot)))
     for remark in record.recording.remarks if record.recording is not None else ():
-        console.print(plain(f"! {remark}"), soft_wrap=True)
+        say(f"! {remark}", console)
 
 
 def _whole(record: RunRecord) -> Table:

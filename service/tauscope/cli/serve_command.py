@@ -6,8 +6,10 @@ from typing import Annotated, Any
 
 import typer
 from pydantic import SecretStr, ValidationError
+from typer import Option
 
-from tauscope.cli.store_command import Kind
+from tauscope.cli.access_command import DataFolder
+from tauscope.cli.store_command import DatabaseUrl, Kind
 from tauscope.cli.verbs import OptionsOf
 from tauscope.server.http import server
 from tauscope.server.http.settings import Settings, default_data_folder
@@ -22,40 +24,23 @@ _DIRECT = (
 def serve(
     *,
     options: Annotated[dict[str, Any], OptionsOf(Settings, _DIRECT)],
-    data: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR", file_okay=False, help="Folder of everything that is kept; the user's own by default."
-        ),
-    ] = None,
-    database: Annotated[
-        str | None,
-        typer.Option(
-            metavar="URL",
-            envvar="TAUSCOPE_DATABASE",
-            show_default=False,
-            help="PostgreSQL database; SQLite in the data folder by default.",
-        ),
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, show_default="one a core", help="Analyses that are worked on at a time.")
-    ] = None,
-    name: Annotated[
-        list[str] | None, typer.Option(metavar="HOST", help="Host name by which it is called too; may be repeated.")
-    ] = None,
+    data: DataFolder = None,
+    database: DatabaseUrl = None,
+    workers: Annotated[int | None, Option(min=1, show_default="one a core", help="Analyses at a time.")] = None,
+    name: Annotated[list[str] | None, Option(metavar="HOST", help="Further host name; may be repeated.")] = None,
     trusted_proxy: Annotated[
         list[str] | None,
-        typer.Option(metavar="ADDRESS", help="Reverse proxy that tells the client's address; may be repeated."),
+        Option(metavar="ADDRESS", help="Reverse proxy that tells the client's address; may be repeated."),
     ] = None,
     requests_per_second: Annotated[
-        float | None, typer.Option(min=0.1, help="How often a caller may call; 200 with API keys, else unlimited.")
+        float | None, Option(min=0.1, help="How often a caller may call; 200 with API keys, else unlimited.")
     ] = None,
     prune_older_than: Annotated[
         float | None,
-        typer.Option(min=0.0, metavar="DAYS", help="Remove what ended longer ago, as `tauscope store prune` does."),
+        Option(min=0.0, metavar="DAYS", help="Remove what ended longer ago, as `tauscope store prune` does."),
     ] = None,
     prune_kind: Annotated[
-        list[Kind] | None, typer.Option(help="Kind of item that may go so, once for each; every kind by default.")
+        list[Kind] | None, Option(help="Kind that may go so; repeatable; default: every kind.")
     ] = None,
 ) -> None:
     """Offer everything over HTTP.
@@ -78,11 +63,7 @@ def serve(
 
 
 def run_server(data: Path | None, **choices: Any) -> None:
-    """Serve until interrupted.
-
-    Raises typer.BadParameter if a setting is out of its range. Raises TauscopeError if the address cannot be listened
-    at, or is one that others could reach without a key.
-    """
+    """Serve until interrupted. Raises typer.BadParameter or TauscopeError if a setting is not possible."""
     try:
         settings = Settings(data_folder=data or default_data_folder(), **choices)
     except ValidationError as error:

@@ -8,11 +8,11 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from tauscope.cli.arguments import name_input
 from tauscope.cli.output_files import require_new
-from tauscope.cli.terminal import output, plain, show_progress, table
+from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import make_group
 from tauscope.errors import StoreError
 from tauscope.number_text import ABSENT, counted
@@ -33,7 +33,7 @@ DataFolder = Annotated[
 ]
 DatabaseUrl = Annotated[
     str | None,
-    typer.Option(
+    Option(
         metavar="URL",
         envvar="TAUSCOPE_DATABASE",
         show_envvar=True,
@@ -55,8 +55,6 @@ _OWN_FILES = "its state, its order or its result"
 
 @dataclass(frozen=True, eq=False)
 class OpenStore:
-    """A data folder that is this process's own for a while."""
-
     folder: Path
     database: Database
     keeper: Indexer
@@ -64,11 +62,7 @@ class OpenStore:
 
 @contextmanager
 def open_store(data: Path | None, database: str | None) -> Iterator[OpenStore]:
-    """Take a data folder.
-
-    Raises StoreError if there is no such folder, or its database cannot be used. Raises TauscopeError if a service
-    works with it.
-    """
+    """Take a data folder. Raises StoreError if it cannot be used, TauscopeError if a service works with it."""
     folder = data or default_data_folder()
     if not folder.is_dir():
         raise StoreError(f"{folder}: there is no such data folder; name it with --data")
@@ -88,10 +82,7 @@ def open_store(data: Path | None, database: str | None) -> Iterator[OpenStore]:
 
 @contextmanager
 def open_database(data: Path | None, database: str | None) -> Iterator[Database]:
-    """Open the database alone, beside a service that may work with it.
-
-    Raises StoreError if there is none, or it cannot be used.
-    """
+    """Open the database beside a service. Raises StoreError if there is none, or it cannot be used."""
     path = (data or default_data_folder()) / FILE_NAME
     if database is None and not path.is_file():
         raise StoreError(f"{path}: there is no such database; name the data folder with --data, or serve it once")
@@ -105,7 +96,7 @@ def open_database(data: Path | None, database: str | None) -> Iterator[Database]
 def check_store(
     data: DataFolder = None,
     database: DatabaseUrl = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Compare sizes only, not every byte.")] = False,
+    quick: Annotated[bool, Option("--quick", help="Compare sizes only, not every byte.")] = False,
 ) -> None:
     """Compare every file of every finished item with what it was when the item ended.
 
@@ -118,7 +109,7 @@ def check_store(
         recordings = len(RecordingStore(store.folder / RECORDINGS).entries())
     kept = f"{counted(count, 'item')} and {counted(recordings, 'recording')}"
     if not changed:
-        output().print(plain(f"{store.folder}: {kept}, all as they were"), soft_wrap=True)
+        say(f"{store.folder}: {kept}, all as they were")
         return
     own = {"recording": "its bytes"}
     rows = [(item.kind, item.identifier, item.path or own.get(item.kind, _OWN_FILES)) for item in changed]
@@ -128,18 +119,12 @@ def check_store(
 
 
 def prune_store(
-    older_than: Annotated[
-        float, typer.Option("--older-than", min=0.0, metavar="DAYS", help="What ended longer ago may go.")
-    ],
+    older_than: Annotated[float, Option("--older-than", min=0.0, metavar="DAYS", help="What is older may go.")],
     data: DataFolder = None,
     database: DatabaseUrl = None,
-    kind: Annotated[
-        list[Kind] | None, typer.Option(help="Kind of item that may go, once for each; every kind by default.")
-    ] = None,
-    recordings: Annotated[
-        bool, typer.Option("--recordings", help="Recordings too that nothing which stays was made from.")
-    ] = False,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would go, and remove nothing.")] = False,
+    kind: Annotated[list[Kind] | None, Option(help="Kind that may go; repeatable; default: every kind.")] = None,
+    recordings: Annotated[bool, Option("--recordings", help="Recordings too that nothing else uses.")] = False,
+    dry_run: Annotated[bool, Option("--dry-run", help="Say what would go, and remove nothing.")] = False,
 ) -> None:
     """Remove what is old. Identifications of active models, and whatever is damaged, stay.
 
@@ -160,11 +145,11 @@ def prune_store(
     done = "would go" if dry_run else "removed"
     if rows:
         output().print(table(done.capitalize(), Table(("kind", "item", "robot"), rows, words=3)))
-    output().print(plain(f"{store.folder}: {counted(len(rows), 'item')} {done}"), soft_wrap=True)
+    say(f"{store.folder}: {counted(len(rows), 'item')} {done}")
 
 
 def backup(
-    file: Annotated[Path, typer.Argument(metavar="FILE", dir_okay=False, help="File to make, as in monday.tar.gz.")],
+    file: Annotated[Path, Argument(metavar="FILE", dir_okay=False, help="File to make, as in monday.tar.gz.")],
     data: DataFolder = None,
     database: DatabaseUrl = None,
 ) -> None:
@@ -177,12 +162,12 @@ def backup(
             count = write_backup(folder, opened, file, tauscope_version())
         except OSError as error:
             raise StoreError(f"{file}: cannot be written ({error.strerror or error}); choose another place") from error
-    output().print(plain(f"wrote {file}: {counted(count, 'file')} and the database"), soft_wrap=True)
+    say(f"wrote {file}: {counted(count, 'file')} and the database")
 
 
 def restore(
-    file: Annotated[Path, name_input("Of `tauscope backup`.", "FILE", typer.Argument)],
-    data: Annotated[Path, typer.Option(metavar="DIR", file_okay=False, help="Data folder to make.")],
+    file: Annotated[Path, name_input("Of `tauscope backup`.", "FILE", Argument)],
+    data: Annotated[Path, Option(metavar="DIR", file_okay=False, help="Data folder to make.")],
     database: DatabaseUrl = None,
 ) -> None:
     """Make a data folder from a backup; also where the database was one of the other kind."""
@@ -192,7 +177,7 @@ def restore(
             count = restore_backup(file, data, database)
         except OSError as error:
             raise StoreError(f"{data}: cannot be written ({error.strerror or error}); choose another place") from error
-    output().print(plain(f"restored {data}: {counted(count, 'file')} and the database"), soft_wrap=True)
+    say(f"restored {data}: {counted(count, 'file')} and the database")
 
 
 store = make_group("Look after what is kept.", check=check_store, prune=prune_store)

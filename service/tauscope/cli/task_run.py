@@ -8,7 +8,7 @@ from typing import Any
 import typer
 
 from tauscope.cli.output_files import STANDARD_OUTPUT, require_distinct, require_free, write_file
-from tauscope.cli.terminal import Told, output, plain, show_progress
+from tauscope.cli.terminal import Told, say, show_progress
 from tauscope.export.formats import SUFFIXES, ExportFile, ExportFormat
 from tauscope.robot import Robot, Severity, read_robot
 from tauscope.robot.messages import one_line
@@ -18,17 +18,10 @@ from tauscope.tasks.task import LocalFiles
 def run_task(
     task: ModuleType, request: Any, asked: Sequence[tuple[Path | None, str]], show: Callable[[Any], None] | None = None
 ) -> Any:
-    """Perform a task, write its outputs, and show the result.
-
-    Raises typer.BadParameter where files are given twice, or an output would destroy an input. Raises TauscopeError
-    where the data or the robot cannot answer.
-
-    `asked`: sequence of (Path, str), files to write, each with the name of its output; `show`: shows the result on the
-    terminal.
-    """
+    """Perform a task; `asked`: files to write, each with its output. Raises typer.BadParameter or TauscopeError."""
     outputs = [(path, name) for path, name in asked if path is not None]
     paths, robot_file = tuple(path for path, _ in outputs), Path(request.robot)
-    inputs = list_files(request)
+    inputs = [Path(name) for names in getattr(request, "inputs", {}).values() for name in names]
     require_distinct(inputs)
     require_free(paths, (robot_file, *inputs))
     robot = read_robot(robot_file)
@@ -39,36 +32,19 @@ def run_task(
         show(result)
     if STANDARD_OUTPUT not in paths:
         for path in written:
-            output().print(plain(f"wrote {path}"), soft_wrap=True)
+            say(f"wrote {path}")
     _show_warnings(robot, result, summarised=show is not None)
     return result
 
 
-def list_files(request: Any) -> list[Path]:
-    """Recordings and models that a request names."""
-    return [Path(name) for names in getattr(request, "inputs", {}).values() for name in names]
-
-
 def name_files(paths: Iterable[Path] | None) -> tuple[str, ...]:
-    """Files as a request names them."""
     return tuple(map(str, paths or ()))
 
 
 def write_outputs(
     task: ModuleType, request: Any, outputs: Mapping[Path, str], progress: Told
 ) -> tuple[Any, Iterable[Path]]:
-    """Perform a task and write its outputs: all of them, or none where one cannot be made.
-
-    Raises TauscopeError where the data or the robot cannot answer, a format cannot hold the model, or a file cannot be
-    written.
-
-    Returns
-    -------
-    result
-        of the task
-    iterable of Path
-        what was written; an output that the result does not have is left out
-    """
+    """The result, and the files that were written: all, or none. Raises TauscopeError if one cannot be made."""
     result = task.perform(request, LocalFiles({name: path for path, name in outputs.items()}), progress)
     progress("make outputs")
     made = result.outputs
@@ -80,10 +56,7 @@ def write_outputs(
 
 
 def export_outputs(paths: Sequence[Path], files: Mapping[ExportFormat, ExportFile]) -> list[tuple[Path, str]]:
-    """The outputs that ``--export`` asks for, by the files' suffixes.
-
-    Raises typer.BadParameter where a suffix names no format.
-    """
+    """Outputs of ``--export`` by their suffixes. Raises typer.BadParameter where one names no format."""
     return [(path, files[parse_export_format(path, files, "'--export'")].output) for path in paths]
 
 

@@ -17,7 +17,6 @@ PIPE_WIDTH = 240  # columns where nobody looks: wide enough for every table
 
 
 def output() -> Console:
-    """Standard output."""
     if sys.stdout.isatty():
         return Console(highlight=False, emoji=False)
     return Console(highlight=False, emoji=False, width=PIPE_WIDTH)
@@ -26,6 +25,11 @@ def output() -> Console:
 def plain(text: str) -> Text:
     """Text of a user's file: one line, and none of it taken for markup or for a terminal's command."""
     return Text(one_line(text))
+
+
+def say(text: str, console: Console | None = None) -> None:
+    """Print text of a user's file in one line, however long."""
+    (console or output()).print(plain(text), soft_wrap=True)
 
 
 def table(title: str, view: Table) -> RichTable:

@@ -12,20 +12,16 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 import typer
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
+from typer import Option
 from typer.core import TyperCommand, TyperOption
 
 SEVERAL = "..."  # A metavar that ends so marks an option that takes several values: what --help shows is what is parsed
-
 Model = TypeVar("Model", bound=BaseModel)
-
 _UNIT = re.compile(r"_(s|ms|m|hz|c|rad_s)$")
 
 
 def spread_values(words: Sequence[str], options: Collection[str]) -> list[str]:
-    """Write an option again before each of its values: ``--held-out a b`` becomes ``--held-out a --held-out b``.
-
-    An option's values end at the next option or at ``--``; ``--held-out=a`` takes this one value.
-    """
+    """Write ``--held-out a b`` as ``--held-out a --held-out b``: values end at the next option or at ``--``."""
     spread: list[str] = []
     option: str | None = None
     for index, word in enumerate(words):
@@ -45,7 +41,6 @@ class SeveralValuesCommand(TyperCommand):
     """A command of which some options take several values: those whose metavar ends in ``...``."""
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:
-        """Parse the command line after its options were repeated before each value."""
         several = [p for p in self.params if isinstance(p, TyperOption) and (p.metavar or "").endswith(SEVERAL)]
         return super().parse_args(ctx, spread_values(args, {name for option in several for name in option.opts}))
 
@@ -70,10 +65,7 @@ def make_group(words: str, **verbs: Callable[..., None]) -> typer.Typer:
 
 @dataclass(frozen=True)
 class OptionsOf:
-    """Marks a parameter that takes fields of a model, by name: each is an option, described and bounded as there.
-
-    `only`: the fields; all where empty. `without`: fields that the command states itself.
-    """
+    """A parameter that takes fields of a model as options: `only` these, or all `without` some."""
 
     model: type[BaseModel]
     only: tuple[str, ...] = ()
@@ -81,7 +73,6 @@ class OptionsOf:
 
     @property
     def fields(self) -> dict[str, FieldInfo]:
-        """The fields, in their order."""
         known = self.model.model_fields
         return {name: known[name] for name in self.only or known if name not in self.without}
 
@@ -138,10 +129,8 @@ def _list_options(group: OptionsOf) -> Iterator[inspect.Parameter]:
             flags = [f"{flag}/--no-{flag[2:]}" for flag in flags] if default else flags
         elif isinstance(default, tuple):
             default = ",".join(f"{value:g}" for value in default)
-        bounds = {
-            edge: getattr(mark, limit) for mark in field.metadata for edge, limit in _EDGES if hasattr(mark, limit)
-        }
-        option = typer.Option(
+        bounds = {edge: getattr(mark, name) for mark in field.metadata for edge, name in _EDGES if hasattr(mark, name)}
+        option = Option(
             *flags,
             help=describe_field(field),
             metavar="|".join(choices) or None,
@@ -156,7 +145,6 @@ _EDGES = (("min", "ge"), ("max", "le"))
 
 
 def describe_field(field: FieldInfo) -> str:
-    """What a field is, as a command's help says it."""
     words = re.sub(r"[;,] null(?: for|:)? (.*)", r" (by default \1)", field.description or "")
     return f"{words[:1].upper()}{words[1:]}."
 
@@ -177,9 +165,7 @@ def _option_type(field: FieldInfo) -> tuple[Any, list[str]]:
         return kinds[0], []
     if len(kinds) == 1 and not issubclass(kinds[0], tuple | Mapping):
         return kinds[0], []
-    choices = [
-        str(choice) for kind in kinds for choice in (get_args(kind) or getattr(kind, "__members__", {}).values())
-    ]
+    choices = [str(choice) for kind in kinds for choice in get_args(kind) or getattr(kind, "__members__", {}).values()]
     return str, choices or (["N,..."] if tuple in kinds else [])
 
 

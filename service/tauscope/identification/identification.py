@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -157,25 +158,9 @@ def identify(
     progress("evaluate residuals")
     (residuals,) = evaluate(motions, structure, [parameters]) if options.prior else (found.free,)
     progress("estimate uncertainty")
-    covariance = parameter_covariance(
-        motions,
-        structure,
-        parameters,
-        found.factors,
-        found.posterior.weights if options.prior else found.weights,
-        residuals.autoregressions,
-        shape_parameters(found.shapes),
-        found.posterior if options.prior else None,
-        scale_std=[max(each) for each in zip(*(r.effort_std for r in recordings if r.effort_std), strict=True)],
-    )
-    noise = _moving_noise(found, residuals.fit)
-    outside = np.maximum(residuals.fit.rms**2 - residuals.fit.band_rms**2, 0.0)
-
-    def predict(others: Dataset) -> tuple[Array, Array]:
-        """Expected residual of a motion, and what of it the parameters leave uncertain, (n,) each."""
-        uncertain = uncertain_torque(others, structure, parameters, shape_parameters(found.shapes), covariance, noise)
-        return np.sqrt(outside + noise**2 + uncertain**2), uncertain
-
+    scales = [max(each) for each in zip(*(r.effort_std for r in recordings if r.effort_std), strict=True)]
+    covariance = _estimate_covariance(motions, found, parameters, residuals, scales, options)
+    predict = partial(_predict_residual, found, parameters, residuals.fit, covariance)
     progress("evaluate held-out recordings")
     held_conditioners = [Conditioner.survey(recording, robot) for recording in held_out]
     predicted_train, known = predict(motions)
@@ -219,6 +204,37 @@ def identify(
         held_out_conditioning=tuple(conditioner.summary(cutoff) for conditioner in held_conditioners),
         identifiable=_identifiable(found, covariance),
     )
+
+
+def _estimate_covariance(
+    motions: Dataset,
+    found: _Estimates,
+    parameters: Array,
+    residuals: ResidualStatistics,
+    scales: list[float],
+    options: Options,
+) -> Array:
+    return parameter_covariance(
+        motions,
+        found.structure,
+        parameters,
+        found.factors,
+        found.posterior.weights if options.prior else found.weights,
+        residuals.autoregressions,
+        shape_parameters(found.shapes),
+        found.posterior if options.prior else None,
+        scale_std=scales,
+    )
+
+
+def _predict_residual(
+    found: _Estimates, parameters: Array, fit: Fit, covariance: Array, motions: Dataset
+) -> tuple[Array, Array]:
+    """Expected residual of motions, and what of it the parameters leave uncertain, (n,) each."""
+    noise, shapes = _moving_noise(found, fit), shape_parameters(found.shapes)
+    outside = np.maximum(fit.rms**2 - fit.band_rms**2, 0.0)
+    uncertain = uncertain_torque(motions, found.structure, parameters, shapes, covariance, noise)
+    return np.sqrt(outside + noise**2 + uncertain**2), uncertain
 
 
 def _require_joints(robot: Robot, recordings: Sequence[Recording]) -> None:

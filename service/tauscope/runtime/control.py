@@ -30,7 +30,6 @@ _LARGEST_EVENT = 4096
 def control(
     folder: Path, *, make: Callable[..., Connection] = make_backend, recorder: OpenRecorder = open_recorder
 ) -> int:
-    """Carry a run out, in the main thread of a process of its own."""
     report = _event_pipe()
     try:
         lock = RunLock(folder)

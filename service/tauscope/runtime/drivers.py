@@ -41,14 +41,12 @@ __all__ = [
 ]
 
 ENTRY_POINT_GROUP = "tauscope.drivers"
-
 DEFAULT_BACKEND = "sim"  # what moves the arm where nothing is said: it does no harm
 _UNSTATED_CONSTANT = 1.0  # A robot file that states no torque constant reads so
 
 
 @cache
 def _entries() -> Mapping[str, EntryPoint]:
-    """Every registered driver by its name, the default first."""
     found = sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda one: (one.name != DEFAULT_BACKEND, one.name))
     if not found:
         raise AcquisitionError("no driver is registered; install tauscope again (pip install -e . in a source tree)")
@@ -83,7 +81,6 @@ def find_driver(name: str) -> Driver:
 
 
 def bus_drivers() -> Mapping[str, BusDriver]:
-    """Every driver of a field bus by its name."""
     drivers = map(find_driver, driver_names())
     return {driver.name: driver for driver in drivers if isinstance(driver, BusDriver)}
 
@@ -104,10 +101,7 @@ def describe_neighbours(bus: BusDriver) -> str:
 
 
 def select_bus(robot: Robot) -> BusDriver:
-    """The driver of the field bus that a robot file's ``drive`` blocks speak of.
-
-    Raises AcquisitionError: none of them, or several.
-    """
+    """The driver of the bus that ``drive`` blocks speak of. Raises AcquisitionError: none of them, or several."""
     blocks = [joint.drive or {} for joint in robot.joints]
     meant = [bus for bus in bus_drivers().values() if any(map(bus.is_meant, blocks))]
     if len(meant) == 1:
@@ -123,13 +117,7 @@ def select_bus(robot: Robot) -> BusDriver:
 
 
 def make_backend(name: str, robot: Robot, settings: Mapping[str, Any], *, folder: Path | None = None) -> Connection:
-    """The backend of a name, not connected yet; moves nothing.
-
-    Raises AcquisitionError where there is no such backend, or a setting or a ``drive`` block is not valid. Raises
-    MissingExtraError where the backend's optional dependencies are not installed.
-
-    `settings`: the driver's own; `folder`: for files of the driver's own.
-    """
+    """A backend, not connected; `folder`: for its own files. Raises AcquisitionError or MissingExtraError."""
     driver = find_driver(name)
     for key in settings:
         if key not in driver.option_names:
@@ -142,10 +130,7 @@ def make_backend(name: str, robot: Robot, settings: Mapping[str, Any], *, folder
 def to_drive_joints(
     driver: Driver, robot: Robot, settings: Mapping[str, Any] = MappingProxyType({})
 ) -> tuple[DriveJoint, ...]:
-    """The joints as a driver sees them: files beside the robot file, on the bus of the settings where they name one.
-
-    Raises AcquisitionError where the driver is of a bus, and a joint has no ``drive`` block.
-    """
+    """The joints as a driver sees them. Raises AcquisitionError where a joint on a bus has no ``drive`` block."""
     joints = [_to_drive_joint(driver, robot, joint) for joint in robot.joints]
     if isinstance(driver, BusDriver):
         bus = {key: settings[key] for key in driver.bus_options if settings.get(key) is not None}
@@ -156,9 +141,7 @@ def to_drive_joints(
 def _to_drive_joint(driver: Driver, robot: Robot, joint: Joint) -> DriveJoint:
     if joint.drive is None and isinstance(driver, BusDriver):
         example = driver.block_example
-        raise AcquisitionError(
-            f"{robot.name}: {joint.name} has no drive block; state its drive, as in drive: {example}"
-        )
+        raise AcquisitionError(f"{robot.name}: {joint.name} has no drive block; state one, as in drive: {example}")
     drive = dict(joint.drive or {})
     for key in driver.file_keys:
         file = drive.get(key)
@@ -178,10 +161,7 @@ def _to_drive_joint(driver: Driver, robot: Robot, joint: Joint) -> DriveJoint:
 
 @contextmanager
 def translate_driver_errors() -> Iterator[None]:
-    """Turn what a driver refuses into an error of Tauscope's, in the same words.
-
-    Raises AcquisitionError in place of `DriverError`.
-    """
+    """Raises AcquisitionError in place of `DriverError`, in the same words."""
     try:
         yield
     except DriverError as error:

@@ -13,41 +13,23 @@ from tauscope_drivers import ArmState, DriveLimits, Setpoint
 
 
 class Rule(StrEnum):
-    """What a command and a state have to satisfy."""
-
-    NOT_FINITE = "not-finite"
-    """every target is a number"""
-    POSITION = "position"
-    """targets lie within the position limits, and the arm no further outside than the margin"""
-    VELOCITY = "velocity"
-    """targets and arm move no faster than the velocity limit"""
-    TORQUE = "torque"
-    """no more torque is commanded than the torque limit"""
-    FOLLOWING = "following-error"
-    """the arm is where it was sent"""
-    BRAKING = "braking-distance"
-    """the arm can come to rest before its position limit"""
-    TEMPERATURE = "temperature"
-    """no motor is too hot"""
-    STALE = "stale-state"
-    """every joint has answered lately"""
-    TIME = "time"
-    """time runs forward"""
-    LATE = "late"
-    """the loop is no later than the device's watchdog allows"""
-    FAULT = "fault"
-    """no drive reports a fault"""
-    NOT_ENABLED = "not-enabled"
-    """every drive is under power"""
+    NOT_FINITE = "not-finite"  # every target is a number
+    POSITION = "position"  # targets lie within the position limits, and the arm no further outside than the margin
+    VELOCITY = "velocity"  # targets and arm move no faster than the velocity limit
+    TORQUE = "torque"  # no more torque is commanded than the torque limit
+    FOLLOWING = "following-error"  # the arm is where it was sent
+    BRAKING = "braking-distance"  # the arm can come to rest before its position limit
+    TEMPERATURE = "temperature"  # no motor is too hot
+    STALE = "stale-state"  # every joint has answered lately
+    TIME = "time"  # time runs forward
+    LATE = "late"  # the loop is no later than the device's watchdog allows
+    FAULT = "fault"  # no drive reports a fault
+    NOT_ENABLED = "not-enabled"  # every drive is under power
 
 
 @dataclass(frozen=True)
 class Violation:
-    """One find_objection.
-
-    `joint`: name of the joint; None where it concerns the whole arm.
-    `value`: what was found, in the rule's unit; None where it is no number.
-    """
+    """`joint`: None where it concerns the whole arm; `value`: in the rule's unit, None where it is no number."""
 
     rule: Rule
     joint: str | None
@@ -68,16 +50,12 @@ class GuardViolationError(AcquisitionError):
 
 
 Array = NDArray[np.float64]
-
 DEFAULT_FOLLOWING = {JointType.REVOLUTE: 0.2, JointType.PRISMATIC: 0.05}
 """Following error that is allowed where nothing is stated [rad or m]."""
-
 DEFAULT_MARGIN = {JointType.REVOLUTE: 0.05, JointType.PRISMATIC: 0.01}
 """How far outside the position limits the arm itself, not a command, may be found [rad or m]."""
-
 SPEED_MARGIN = 1.5
 """Measured speed may be this many times the limit: a drive's velocity is noisy where it comes from its encoder."""
-
 _ROOM = 1.05
 
 
@@ -107,7 +85,6 @@ class GuardLimits:
 
     @property
     def drive_limits(self) -> DriveLimits:
-        """What the drives enforce: the same, with the room that the arm itself is given."""
         return DriveLimits(
             position_low=self.position_low - self.position_margin,
             position_high=self.position_high + self.position_margin,
@@ -146,7 +123,6 @@ def guard_limits(
 
 
 PERSISTENCE = 3  # cycles in a row after which a measured speed counts: one noisy reading is no runaway
-
 _ROUNDING = 1e-9
 _NANOSECOND = 1e-9
 _COMMAND_RULES = (Rule.POSITION, Rule.POSITION, Rule.VELOCITY, Rule.TORQUE)
@@ -155,10 +131,7 @@ _SPEED_RULES = (Rule.VELOCITY, Rule.BRAKING, Rule.BRAKING)
 
 
 class Guard:
-    """Holds every command, and the state that it answers to, against the limits; objects for good once it objects.
-
-    It keeps the command before and counts, and reads no clock and no device: the same calls give the same verdicts.
-    """
+    """Holds commands and states against the limits; reads no clock and no device: the same calls, the same verdicts."""
 
     def __init__(
         self,

@@ -35,13 +35,7 @@ class GuardedArm:
         return self._guard.stale
 
     def exchange(self, setpoint: Setpoint, due_ns: int) -> ArmState:
-        """Send a command that the guard passes, and read the arm.
-
-        Raises GuardViolationError where the guard objects; nothing was sent. Raises DriverError where the backend
-        cannot.
-
-        `due_ns`: when it was to be sent [ns].
-        """
+        """Send a command due at `due_ns` [ns]. Raises GuardViolationError before it is sent, or DriverError."""
         violation = self._guard.check(self.state, setpoint, self._backend.clock.now_ns(), due_ns)
         if violation is not None:
             raise GuardViolationError(violation)
@@ -72,7 +66,6 @@ class Cycles:
     late: NDArray[np.int64] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Make the one row that all cycles are written into."""
         n = self.plan.position.shape[1]
         self.worst_following = np.zeros(n)
         self.late = np.zeros(n, dtype=np.int64)
@@ -93,15 +86,10 @@ class Cycles:
 
     @property
     def mode(self) -> ControlMode:
-        """Who closes the loop."""
         return ControlMode.POSITION if self.control is None else ControlMode.TORQUE
 
     def play(self) -> None:
-        """Play the plan from its first cycle to its last.
-
-        Raises StopAskedError where it was asked to stop. Raises GuardViolationError where the guard objected. Raises
-        DriverError where the backend gave up.
-        """
+        """Raises StopAskedError, GuardViolationError or DriverError where it ends before the last cycle."""
         plan, metronome = self.plan, self.metronome
         while metronome.wait():
             raise_if_requested(self.stops)
@@ -112,10 +100,7 @@ class Cycles:
             self.each_cycle(self)
 
     def _log(self, cycle: int, state: ArmState, torque: Array) -> None:
-        """No answer at all, or one that is no newer than the one before, is no sample: the guard counts it.
-
-        Nor is one that came so late that nobody knows of which instant it tells.
-        """
+        """An answer that is missing, not newer, or too late to tell its instant is no sample: the guard counts it."""
         plan, row = self.plan, self._fields
         if state.late_ns > self.latest_ns:
             self.late += state.fresh
@@ -137,17 +122,14 @@ class Cycles:
 
 Report = Callable[[Mapping[str, Any]], None]
 """Takes an event: plain data with the key ``event``, one of ``state``, ``progress``, ``end``. Must be quick."""
-
 INTERVAL_S = 0.2  # time between two words about progress
 
 
 def state_event(state: RunState, at: datetime) -> dict[str, Any]:
-    """The event of a transition."""
     return {"event": "state", "state": state.value, "at": at.isoformat()}
 
 
 def end_event(record: RunRecord) -> dict[str, Any]:
-    """The last event of a run."""
     problem = None if record.problem is None else record.problem.detail
     samples = 0 if record.recording is None else record.recording.samples
     return {"event": "end", "state": record.state.value, "problem": problem, "stop": record.stop, "samples": samples}
@@ -193,7 +175,6 @@ class ProgressReporter:
         self._last_cycle = 0
 
     def __call__(self, cycles: Cycles, state: RunState) -> None:
-        """Report where it is time to."""
         now = time.monotonic()
         if now - self._last < INTERVAL_S:
             return

@@ -16,7 +16,6 @@ from tauscope_drivers import Capabilities, ControlMode, StopPolicy
 
 DEFAULT_RATE_HZ = 500.0  # cycles a second where nothing is stated and the bus allows as many
 RELEASE = "release"  # stop policy: hold, and let go once the arm stands still
-
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 
 
@@ -32,15 +31,9 @@ class RunOptions(StrictModel, strict=False):
         description="hold, damp, torque_off, or release (hold, then let go once the arm stands still); "
         "null for what the robot file's drives say, else hold",
     )
-    watchdog_s: Positive = Field(
-        default=0.1, le=10, description="time without a cycle after which the device stops itself"
-    )
-    heartbeat_s: Positive = Field(
-        default=1.0, le=60, description="silence of its owner after which a run in real time is interrupted"
-    )
-    following_error: Positive | None = Field(
-        default=None, description="allowed distance of arm and target, rad or m; null for 0.2 rad or 0.05 m"
-    )
+    watchdog_s: Positive = Field(default=0.1, le=10, description="time without a cycle until the device stops itself")
+    heartbeat_s: Positive = Field(default=1.0, le=60, description="silence of the owner until a real-time run ends")
+    following_error: Positive | None = Field(default=None, description="of arm and target; null: 0.2 rad or 0.05 m")
     # The second names are those of earlier versions, which stored runs have.
     missed: int = Field(
         default=3,
@@ -54,24 +47,15 @@ class RunOptions(StrictModel, strict=False):
         validation_alias=AliasChoices("lost_s", "stale_s"),
         description="time after which a joint that does not answer counts as lost",
     )
-    stale_ms: Positive = Field(
-        default=1.0, le=1000, description="how much later than usual an answer may come and still be a sample"
-    )
+    stale_ms: Positive = Field(default=1.0, le=1000, description="how late an answer may come and still be a sample")
     least_kept: Annotated[FiniteFloat, Field(ge=0.0, le=1.0)] = Field(
         default=0.98, description="share of the motion's samples that has to be kept, else the run ends as degraded"
     )
     temperature_c: Positive = Field(default=80.0, description="hottest motor that is allowed")
-    feed_forward: bool = Field(
-        default=True, description="whether the drives get the torque that the robot's model predicts"
-    )
+    feed_forward: bool = Field(default=True, description="whether the drives get the model's predicted torque")
     bandwidth_rad_s: Positive = Field(default=25.0, description="of the host's loop in torque mode")
-    settle_s: Annotated[FiniteFloat, Field(ge=0.0, le=60)] = Field(
-        default=0.25, description="pause between the ramp and the motion"
-    )
-    acknowledge_faults: bool = Field(
-        default=False,
-        description="whether faults that the drives have latched are cleared first, on the operator's word",
-    )
+    settle_s: Annotated[FiniteFloat, Field(ge=0.0, le=60)] = Field(default=0.25, description="pause after the ramp")
+    acknowledge_faults: bool = Field(default=False, description="whether latched drive faults are cleared first")
 
 
 def choose_rate_hz(options: RunOptions, capabilities: Capabilities) -> float:
@@ -91,13 +75,7 @@ def choose_rate_hz(options: RunOptions, capabilities: Capabilities) -> float:
 def choose_stop_policy(
     options: RunOptions, joints: Sequence[Joint], capabilities: Capabilities | None = None
 ) -> StopPolicy:
-    """How the arm is stopped: as the run says, else as the robot file's drives say, else under power where it is.
-
-    An arm that is released is held first. Raises AcquisitionError where the robot file states no policy, or several; or
-    the device cannot do it by itself.
-
-    `capabilities`: what the device can do by itself; None where it is not known yet.
-    """
+    """As the run says, else the drives, else hold. Raises AcquisitionError where there are several, or none can."""
     wanted = options.stop_policy or _read_policy(joints)
     policy = StopPolicy.HOLD if wanted == RELEASE else StopPolicy(wanted)
     if capabilities is not None and policy not in (able := capabilities.policies_in(options.mode)):
@@ -109,11 +87,7 @@ def choose_stop_policy(
 
 
 def is_released(options: RunOptions, joints: Sequence[Joint]) -> bool:
-    """Whether the arm is let go once it stands still at the end of its motion.
-
-    Raises AcquisitionError where it is asked for, and the robot file does not state that the arm is safe without
-    torque.
-    """
+    """Whether the arm is let go at the end. Raises AcquisitionError where it is not said to be safe without torque."""
     if options.stop_policy not in (None, RELEASE):
         return False
     is_stated = _read_policy(joints) == RELEASE
@@ -145,15 +119,11 @@ ORDER_FILE = "order.json"
 
 
 class BackendOrder(StrictModel):
-    """Which backend, and its own settings."""
-
     name: str = Field(default=DEFAULT_BACKEND, description="name of a driver")
     settings: dict[str, Any] = Field(default_factory=dict, description="the driver's own options")
 
 
 class RunOrder(StrictModel):
-    """One run."""
-
     form: Literal["tauscope.order/1"] = Field(default="tauscope.order/1", description="name and version of this form")
     robot: str = Field(description="path of the robot file")
     trajectory: str = Field(description="path of the trajectory file")

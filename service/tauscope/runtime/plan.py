@@ -17,7 +17,6 @@ from tauscope.trajectory.trajectory import Trajectory, ramp
 from tauscope_drivers import Capabilities, ControlMode
 
 Array = NDArray[np.float64]
-
 _MOST_POSTURES = 100_000
 
 
@@ -54,14 +53,12 @@ def compute_inertia(robot: Robot, position: Array) -> tuple[Array, int] | None:
 
 
 def _parameters(robot: Robot) -> Array | None:
-    """Θ of the model's links."""
     if robot.model.links is None:
         return None
     return np.concatenate([link.to_vector() for link in robot.model.links])
 
 
 MOST_CYCLES = 4_000_000  # A longer run must be a mistake: it is more than two hours at 500 cycles a second
-
 _ROUNDING = 1e-9
 
 
@@ -88,12 +85,10 @@ class Plan:
 
     @property
     def cycles(self) -> int:
-        """Number of cycles N."""
         return len(self.position)
 
     @property
     def ramp_cycles(self) -> int:
-        """Number of cycles before the motion."""
         return int(np.count_nonzero(self.phase == Phase.RAMP))
 
     @property
@@ -166,7 +161,6 @@ def _require_fitting(robot: Robot, trajectory: Trajectory, start: Array, capabil
 
 
 def _ramp(robot: Robot, start: Array, trajectory: Trajectory, rate_hz: float) -> MoveSegment:
-    """The way to the motion's start, a whole number of cycles long."""
     way = ramp(start, trajectory.start, motion_limits(robot))
     return MoveSegment(way.start, way.end, float(np.ceil(way.duration_s * rate_hz)) / rate_hz)
 

@@ -19,10 +19,7 @@ def child_environment() -> dict[str, str]:
 
 
 def read_process_start(pid: int) -> int | None:
-    """When a process was started, in the kernel's ticks; with its number it names a process for good.
-
-    Returns int or None: None where there is no such process.
-    """
+    """When a process was started, in the kernel's ticks; None where there is no such process."""
     try:
         status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -33,13 +30,10 @@ def read_process_start(pid: int) -> int | None:
 
 
 LOCK_FILE = ".lock"
-
 _POLL_S = 0.02
 
 
 class RunLock:
-    """Holds a run's folder for this process."""
-
     def __init__(self, folder: Path) -> None:
         """Take the folder. Raises AcquisitionError where another process holds it."""
         self._descriptor = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
@@ -50,15 +44,11 @@ class RunLock:
             raise AcquisitionError(f"{folder}: another process carries this run out; wait for it or stop it") from None
 
     def release(self) -> None:
-        """Let go of the folder."""
         os.close(self._descriptor)
 
 
 def wait_for_lock(folder: Path, patience_s: float) -> RunLock | None:
-    """Take a folder as soon as nobody holds it.
-
-    `patience_s`: how long to wait [s]. Returns RunLock or None: None where it is still held.
-    """
+    """Take a folder as soon as nobody holds it; None where it is still held after `patience_s` [s]."""
     deadline = time.monotonic() + patience_s
     while True:
         try:

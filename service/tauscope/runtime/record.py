@@ -32,21 +32,16 @@ class ProcessName(StrictModel):
 
     @staticmethod
     def of(pid: int) -> "ProcessName":
-        """The name of a living process."""
         return ProcessName(pid=pid, start=read_process_start(pid))
 
     @property
     def is_alive(self) -> bool:
-        """Whether it still runs, or is stopped and might."""
         start = read_process_start(self.pid)
         return start is not None and self.start in (None, start)
 
 
 def write_process(folder: Path, pid: int) -> None:
-    """Keep which process was started for a run, as soon as it was: it may never come to say so itself.
-
-    Raises OSError where the disk does not take it.
-    """
+    """Keep the process of a run as soon as it is started. Raises OSError where the disk does not take it."""
     write_atomically(folder / PROCESS_FILE, ProcessName.of(pid).model_dump_json().encode())
 
 
@@ -59,15 +54,11 @@ def read_process(folder: Path) -> ProcessName | None:
 
 
 class Transition(StrictModel):
-    """When a run came into a state."""
-
     state: RunState = Field(description="the state")
     at: AwareDatetime = Field(description="the moment")
 
 
 class RunProblem(StrictModel):
-    """Why a run did not finish."""
-
     code: str = Field(description="code of the error, as in tauscope.errors, or of the way the run ended")
     detail: str = Field(description="one line: what is wrong, where, and what to do")
     rule: str | None = Field(default=None, description="the guard's rule, where the guard objected")
@@ -77,7 +68,6 @@ class RunProblem(StrictModel):
 
     @staticmethod
     def of(violation: Violation) -> "RunProblem":
-        """The problem that a violation is."""
         return RunProblem(
             code=AcquisitionError.code,
             detail=str(violation),
@@ -89,20 +79,14 @@ class RunProblem(StrictModel):
 
 
 class RecordingFiles(StrictModel):
-    """What a run left behind."""
-
     samples: int = Field(description="samples of the motion, without the ramp")
     partial: bool = Field(description="whether the motion was not played to its end, or samples were lost")
-    lost_rows: int = Field(
-        description="cycles that the journal did not take because its disk was behind; -1 where unknown"
-    )
+    lost_rows: int = Field(description="cycles that the journal did not take: its disk was behind; -1 where unknown")
     files: tuple[str, ...] = Field(description="files of the recording in the run's folder, beside the journal")
     remarks: tuple[str, ...] = Field(default=(), description="what is missing, and why; one line each")
 
 
 class RunRecord(StrictModel):
-    """A run's state and what is known of it."""
-
     form: Literal["tauscope.run/1"] = Field(default="tauscope.run/1", description="name and version of this form")
     state: RunState = Field(description="where the run stands")
     robot: str = Field(description="name of the arm")
@@ -114,19 +98,13 @@ class RunRecord(StrictModel):
     stop_policy: str | None = Field(default=None, description="how the arm is stopped")
     ramp_s: float | None = Field(default=None, description="time from the first cycle to the motion's start")
     motion_s: float | None = Field(default=None, description="length of the motion")
-    drives: tuple[str, ...] = Field(
-        default=(), description="what the drives do not have, and what is done in place of it; one line each"
-    )
-    holds: bool | None = Field(
-        default=None, description="whether drives were under power when the run let go of the bus; null where unknown"
-    )
+    drives: tuple[str, ...] = Field(default=(), description="what the drives lack, and what is done instead")
+    holds: bool | None = Field(default=None, description="whether drives were powered at the end; null: unknown")
     played: float = Field(default=0.0, description="part of ramp and motion that was played, 0 to 1")
     kept: float | None = Field(default=None, description="part of the motion's samples that was kept, 0 to 1")
     timing: Timing | None = Field(default=None, description="how well the run kept its time")
     real_time: RealTime | None = Field(default=None, description="what the loop was given of what it asked for")
-    worst_following: tuple[float, ...] = Field(
-        default=(), description="largest distance of arm and target, one number a joint"
-    )
+    worst_following: tuple[float, ...] = Field(default=(), description="largest distance of arm and target, by joint")
     stop: str | None = Field(default=None, description="who asked for the stop, and how; null where nobody did")
     problem: RunProblem | None = Field(default=None, description="why the run did not finish")
     recording: RecordingFiles | None = Field(default=None, description="what the run left behind")
@@ -140,7 +118,6 @@ class RunRecord(StrictModel):
 
 
 def new_record(robot: str, backend: str, mode: str, now: datetime | None = None) -> RunRecord:
-    """The record of a run that has not begun."""
     created = Transition(state=RunState.CREATED, at=now or datetime.now(UTC))
     owner = ProcessName.of(os.getpid())
     return RunRecord(state=RunState.CREATED, robot=robot, backend=backend, mode=mode, history=(created,), owner=owner)
@@ -183,16 +160,12 @@ class RecordKeeper:
         self._thread.start()
 
     def keep(self, record: RunRecord) -> None:
-        """Have a record written; returns at once."""
         with self._changed:
             self._newest = record
             self._changed.notify_all()
 
     def close(self, patience_s: float = FLUSH_S) -> str | None:
-        """Wait for the last record to reach the disk.
-
-        `patience_s`: how long [s]. Returns str or None: why it did not, None where it did.
-        """
+        """Why the last record did not reach the disk within `patience_s` [s]; None where it did."""
         with self._changed:
             self._is_closed = True
             self._changed.notify_all()

@@ -30,7 +30,6 @@ from tauscope.runtime.states import Stops, raise_if_requested
 PIPE_BYTES = 2**20  # room between loop and writer: some seconds of cycles
 OPENING_S = 20.0  # time that the writer may take to start
 CLOSING_S = 5.0  # time that the writer may take to write what is left
-
 _LARGEST_FRAME = select.PIPE_BUF
 _ROWS_AT_ONCE = 32
 
@@ -75,12 +74,10 @@ class DirectRecorder:
             self._write()
 
     def event(self, time_ns: int, event: Mapping[str, Any]) -> None:
-        """Take an event. `time_ns`: when, by the clock of the rows [ns]."""
         self._write()
         self._writer.write_event(time_ns, event)
 
     def close(self) -> str | None:
-        """Bring everything to the file; why that did not work, None where it did."""
         try:
             self._write()
             self._writer.close()
@@ -94,16 +91,11 @@ class DirectRecorder:
             self._writer.write_rows(rows)
         except OSError as error:
             reason = error.strerror or error
-            raise AcquisitionError(
-                f"{self._path}: the journal cannot be written ({reason}); make room there"
-            ) from error
+            raise AcquisitionError(f"{self._path}: the journal cannot be written ({reason}); make room") from error
 
 
 class RecorderProcess:
-    """Hands the cycles to a process of its own, by a pipe that holds some seconds of them.
-
-    It outlives this process: what is in the pipe when this process is killed is still written.
-    """
+    """Hands the cycles to a process that outlives this one: what is in the pipe is still written."""
 
     def __init__(
         self, path: Path, header: JournalHeader, *, may_wait: bool = False, command: Sequence[str] | None = None
@@ -149,7 +141,6 @@ class RecorderProcess:
         self._send(self._buffer)
 
     def event(self, time_ns: int, event: Mapping[str, Any]) -> None:
-        """Take an event. `time_ns`: when, by the clock of the rows [ns]."""
         content = event_frame(time_ns, dict(event))
         if len(content) <= _LARGEST_FRAME:
             self._send(content)
@@ -178,7 +169,6 @@ class RecorderProcess:
 
 
 def _last_answer(said: bytes) -> dict[str, Any]:
-    """The last line that the writer said, empty where it said nothing."""
     lines = said.splitlines()
     return json.loads(lines[-1]) if lines else {}
 

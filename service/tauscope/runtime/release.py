@@ -13,15 +13,11 @@ from tauscope_drivers import ArmState, Backend, StopPolicy
 SETTLED_S = 0.5  # time for which every joint has to stand still [s]
 STILL = 1e-3  # most that a joint may move in that time: some counts of an encoder [rad or m]
 LONGEST_S = 5.0  # time after which an arm that does not come to rest stays held [s]
-
 _LOOK_S = 0.05
 
 
 def release_settled(backend: Backend, state: ArmState) -> ArmState:
-    """Hold an arm until it stands still, then let go of it; one that moves, or is not seen, stays held.
-
-    `state`: of an arm that was just stopped to hold.
-    """
+    """Hold an arm that was just stopped until it stands still, then let go; one that moves stays held."""
     clock = backend.clock
     begin_ns = since_ns = clock.now_ns()
     place = state.position
@@ -48,9 +44,7 @@ def release(backend_name: str, robot: Robot, settings: Mapping[str, Any]) -> Non
             backend.disconnect()
     held = [joint.name for joint, is_held in zip(robot.joints, state.enabled, strict=True) if is_held]
     if held:
-        raise AcquisitionError(
-            f"{', '.join(held)}: still under power; switch the arm's power off, and look at its drives"
-        )
+        raise AcquisitionError(f"{', '.join(held)}: still under power; switch the arm's power off, look at its drives")
     silent = [fault for fault in state.faults if fault.code == "silent"]
     if silent:
         raise AcquisitionError(f"{silent[0]}")

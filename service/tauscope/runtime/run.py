@@ -42,8 +42,6 @@ class Keeper(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class RunTask:
-    """What is to be run."""
-
     robot: Robot
     trajectory: Trajectory
     options: RunOptions
@@ -52,8 +50,6 @@ class RunTask:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What a run talks to while it runs."""
-
     folder: Path
     stops: Stops
     keeper: Keeper
@@ -65,11 +61,7 @@ LEAST_CYCLES_A_WATCHDOG = 2  # A watchdog has to outlast this many cycles, or ev
 
 
 def prepare(task: RunTask, backend: Backend, state: ArmState) -> Plan:
-    """Plan a run for the arm as it was found, or refuse it: no torque is on yet.
-
-    Raises AcquisitionError where the backend cannot do what was asked for, a drive reports a fault, or the motion does
-    not fit.
-    """
+    """Plan a run without torque. Raises AcquisitionError where backend, drives or motion do not allow it."""
     options, capabilities = task.options, backend.capabilities
     choose_stop_policy(options, task.robot.joints, capabilities)
     if options.mode not in capabilities.modes:
@@ -91,7 +83,6 @@ def prepare(task: RunTask, backend: Backend, state: ArmState) -> Plan:
 
 
 def journal_header(robot: Robot, plan: Plan, backend: Backend, state: ArmState, mode: str) -> JournalHeader:
-    """What all rows of a run's journal have in common."""
     unit = backend.capabilities.effort_unit
     return JournalHeader(
         robot=robot.name,
@@ -118,8 +109,6 @@ INTERNAL = "internal"  # code of a problem that is a fault of Tauscope's own
 
 
 class Run:
-    """Takes a run through its states."""
-
     def __init__(self, task: RunTask, record: RunRecord, around: Surroundings) -> None:
         """Prepare; nothing happens before `execute`."""
         self.record = record
@@ -136,7 +125,6 @@ class Run:
         self._progress = ProgressReporter(self._tell)
 
     def execute(self) -> RunRecord:
-        """Run to the end, whatever that is."""
         cause: BaseException | None = None
         try:
             self._move()
@@ -336,11 +324,7 @@ def run_trajectory(
     stops: Stops | None = None,
     report: Report | None = None,
 ) -> RunRecord:
-    """Run a motion in this process and return when it is over.
-
-    A run in real time belongs into a process of its own (`tauscope.runtime.RunProcess`), which does nothing else.
-    Raises AcquisitionError where the folder holds a run, or cannot be written to.
-    """
+    """Run a motion in this process, real time in one of its own. Raises AcquisitionError where the folder is taken."""
     options = options or RunOptions()
     prepare_folder(folder)
     record = new_record(robot.name, backend_name, options.mode.value)
@@ -363,10 +347,7 @@ def prepare_folder(folder: Path) -> None:
 
 
 def open_recorder(path: Path, header: JournalHeader, stops: Stops, is_real_time: bool) -> Recorder:
-    """Open a journal in the way that suits the arm's time.
-
-    Raises AcquisitionError where the journal cannot be created.
-    """
+    """Open a journal. Raises AcquisitionError where it cannot be created."""
     if not is_real_time:
         return DirectRecorder(path, header)
     recorder = RecorderProcess(path, header)

@@ -40,15 +40,12 @@ from tauscope.runtime.stop_listener import BEAT, STOP
 
 INTERRUPTED = "interrupted"  # code of the problem of a run whose process is gone
 PATIENCE_S = 5.0  # time that a control process without an owner may take to stop its arm before it is ended
-
 _WRITER_S = 10.0
 _POLL_S = 0.02
 _GONE = (
     "the process that moved the arm is gone: the device's watchdog has stopped the arm; look at it, then acknowledge "
     "the watchdog's fault and start again"
 )
-
-
 _NEVER_MOVED = (
     "the process that was to move the arm ended before the arm was under power: nothing has moved; "
     f"{LOG_FILE} in the run's folder may say why"
@@ -57,13 +54,7 @@ _WITHOUT_POWER = (RunState.CREATED, RunState.CONNECTING)
 
 
 def recover_runs(folder: Path, *, patience_s: float = PATIENCE_S) -> tuple[RunRecord, ...]:
-    """Show every run that nobody carries out any more as interrupted, and save what its journal holds.
-
-    A run whose owner lives is left to its owner. Nothing is ever moved by this. Raises AcquisitionError where a record
-    is damaged, or cannot be written.
-
-    `patience_s`: time that a control process whose owner is gone gets to stop its arm [s].
-    """
+    """Interrupt runs without owner, after `patience_s` [s]; nothing moves. Raises AcquisitionError."""
     runs = sorted(path.parent for path in folder.glob(f"*/{RUN_FILE}"))
     recovered = (recover_run(run, patience_s=patience_s) for run in runs)
     return tuple(record for record in recovered if record is not None)
@@ -72,13 +63,7 @@ def recover_runs(folder: Path, *, patience_s: float = PATIENCE_S) -> tuple[RunRe
 def recover_run(
     folder: Path, *, is_own: bool = False, was_asked_to_stop: bool = False, patience_s: float = PATIENCE_S
 ) -> RunRecord | None:
-    """Show a run as interrupted if nobody carries it out any more, or as stopped where that kept it from beginning.
-
-    Raises AcquisitionError where the record is damaged, or cannot be written.
-
-    `patience_s`: time that a control process whose owner is gone gets to stop its arm [s]. Returns RunRecord or None:
-    the new record; None where the run has ended by itself or goes on.
-    """
+    """The new record of a run without owner, None where it goes on or has ended. Raises AcquisitionError."""
     record = read_record(folder)
     if record.state.is_end or (not is_own and record.owner is not None and record.owner.is_alive):
         return None
@@ -112,7 +97,6 @@ def _see_to_its_end(control: ProcessName, patience_s: float) -> None:
 
 
 def _interrupt(folder: Path, record: RunRecord) -> RunRecord:
-    """Save what there is and write the end of a run whose process is gone."""
     recording = None
     journal = folder / JOURNAL_FILE
     if journal.exists():
@@ -132,7 +116,6 @@ def _write(folder: Path, record: RunRecord) -> RunRecord:
 
 
 BEATS_A_HEARTBEAT = 5  # how often an owner says that it is alive in the time after which it counts as gone
-
 _READ_BYTES = 2**16
 
 
@@ -182,7 +165,6 @@ class RunProcess:
 
     @property
     def pid(self) -> int:
-        """Number of the control process."""
         return self._process.pid
 
     @property
@@ -191,7 +173,6 @@ class RunProcess:
         return self._has_ended.is_set()
 
     def beat(self) -> None:
-        """Say that the owner is alive."""
         self._send(BEAT)
 
     def stop(self) -> None:
@@ -204,13 +185,7 @@ class RunProcess:
         threading.Thread(target=self._put_stop_file, name="stop-file", daemon=True).start()
 
     def wait(self, timeout_s: float | None = None) -> RunRecord:
-        """Wait for the end of the run.
-
-        Raises TimeoutError where it has not ended by then. Raises AcquisitionError where its record cannot be read or
-        written.
-
-        `timeout_s`: how long; for good where None [s].
-        """
+        """Wait for the end of the run [s]. Raises TimeoutError, or AcquisitionError where its record is lost."""
         if not self._has_ended.wait(timeout_s):
             raise TimeoutError(f"{self.folder}: the run has not ended within {timeout_s:g} s")
         if self._problem is not None:

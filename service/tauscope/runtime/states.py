@@ -23,10 +23,10 @@ class RunState(StrEnum):
 
     @property
     def is_end(self) -> bool:
-        """Whether nothing will happen to the run any more."""
         return not TRANSITIONS[self]
 
 
+_ENDS = frozenset([*RunState][-5:])
 _LEFT_BEHIND = frozenset({RunState.STOPPING, RunState.INTERRUPTED})
 
 TRANSITIONS: Mapping[RunState, frozenset[RunState]] = {
@@ -35,21 +35,14 @@ TRANSITIONS: Mapping[RunState, frozenset[RunState]] = {
     RunState.ENABLING: frozenset({RunState.RAMPING}) | _LEFT_BEHIND,
     RunState.RAMPING: frozenset({RunState.RUNNING}) | _LEFT_BEHIND,
     RunState.RUNNING: _LEFT_BEHIND,
-    RunState.STOPPING: frozenset(
-        {RunState.FINISHED, RunState.DEGRADED, RunState.STOPPED, RunState.FAILED, RunState.INTERRUPTED}
-    ),
-    RunState.FINISHED: frozenset(),
-    RunState.DEGRADED: frozenset(),
-    RunState.STOPPED: frozenset(),
-    RunState.FAILED: frozenset(),
-    RunState.INTERRUPTED: frozenset(),
+    RunState.STOPPING: _ENDS,
+    **dict.fromkeys(_ENDS, frozenset()),
 }
 """For each state, the states that may follow. No run ends without having been stopped, but for one whose process is
 gone: that is `interrupted`, and the device's watchdog has stopped the arm."""
 
 
 def may_follow(before: RunState, after: RunState) -> bool:
-    """Whether a run may go from one state to another."""
     return after in TRANSITIONS[before]
 
 
@@ -59,24 +52,17 @@ def after_stop(state: RunState) -> RunState:
 
 
 class StopSource(StrEnum):
-    """Who wants the run to stop."""
-
-    OPERATOR = "operator"
-    """a byte on the pipe, the stop file, or a signal"""
-    OWNER_GONE = "owner-gone"
-    """the process that started the run has died, or is silent while the arm runs in real time"""
+    OPERATOR = "operator"  # a byte on the pipe, the stop file, or a signal
+    OWNER_GONE = "owner-gone"  # the process that started the run has died, or is silent while the arm runs in real time
 
 
 @dataclass(frozen=True)
 class StopRequest:
-    """One request."""
-
     source: StopSource
     detail: str
 
     @property
     def end(self) -> RunState:
-        """The state in which the run ends for it."""
         return RunState.STOPPED if self.source is StopSource.OPERATOR else RunState.INTERRUPTED
 
 
@@ -89,8 +75,6 @@ class StopAskedError(Exception):
 
 
 class Stops(Protocol):
-    """Where a run looks for requests to stop."""
-
     @property
     def requested(self) -> StopRequest | None:
         """The first request, None where there is none."""
@@ -98,8 +82,7 @@ class Stops(Protocol):
     def enter_real_time(self) -> None:
         """The arm moves by the wall clock: apply the limits of real time from here on."""
 
-    def acknowledge(self) -> None:
-        """The run has begun to stop."""
+    def acknowledge(self) -> None: ...
 
     def done(self) -> None:
         """The arm is stopped, or nothing more can be done for it: nobody breaks into the run any more."""
@@ -113,19 +96,15 @@ class ManualStop:
         self.acknowledged = False
 
     def request(self, detail: str = "asked to stop", source: StopSource = StopSource.OPERATOR) -> None:
-        """Ask; the first request counts."""
         if self.requested is None:
             self.requested = StopRequest(source, detail)
 
-    def enter_real_time(self) -> None:
-        """A caller in this process has no limits."""
+    def enter_real_time(self) -> None: ...
 
     def acknowledge(self) -> None:
-        """The run has begun to stop."""
         self.acknowledged = True
 
-    def done(self) -> None:
-        """The arm is stopped."""
+    def done(self) -> None: ...
 
 
 def raise_if_requested(stops: Stops) -> None:

@@ -19,10 +19,8 @@ from types import FrameType
 from tauscope.runtime.states import StopAskedError, StopRequest, StopSource
 
 BEAT, STOP = b".", b"s"  # what an owner writes to its run's pipe: it is alive; the run has to stop
-
 NOTICE_S = 0.25  # time for a run to notice a request before a signal breaks it out of its call
 STOPPING_S = 2.0  # time for the drives to confirm the stop, in real time
-
 _POLL_S = 0.02
 _SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 _BREAK = signal.SIGUSR1
@@ -32,10 +30,6 @@ class StopListener:
     """Requests to stop a run in a process of its own; made and used in the main thread."""
 
     def __init__(self, command_pipe: int, stop_file: Path, heartbeat_s: float) -> None:
-        """Start to listen.
-
-        `heartbeat_s`: silence on the pipe after which the owner counts as gone, in real time [s].
-        """
         self.requested: StopRequest | None = None
         self.is_real_time = False
         self._pipe, self._stop_file, self._heartbeat_s = command_pipe, stop_file, heartbeat_s
@@ -50,7 +44,6 @@ class StopListener:
         threading.Thread(target=self._watch_file, name="stop-file", daemon=True).start()
 
     def enter_real_time(self) -> None:
-        """The arm moves by the wall clock: apply the limits of real time from here on."""
         self.is_real_time = True
 
     def acknowledge(self) -> None:
@@ -62,7 +55,6 @@ class StopListener:
         self._is_done = True
 
     def request(self, source: StopSource, detail: str) -> None:
-        """Ask; the first request counts."""
         if self.requested is None:
             self.requested = StopRequest(source, detail)
             self._asked_at = time.monotonic()

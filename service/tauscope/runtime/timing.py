@@ -17,14 +17,11 @@ from tauscope_drivers import Clock
 
 PRIORITY = 80  # real-time priority of the loop: above the drivers of most devices, below the kernel's own threads
 BESIDE = 20  # by how much the other threads of the process are below the loop
-
 _TASKS = Path("/proc/self/task")
 _LOCK_CURRENT_AND_FUTURE = 3
 
 
 class RealTime(StrictModel):
-    """What the loop was given of what it asked for."""
-
     scheduler: str = Field(description="fifo with its priority, or why the ordinary scheduler was used")
     memory_locked: bool = Field(description="whether no page of the process could be swapped out")
     collector_frozen: bool = Field(description="whether Python's garbage collector stood still")
@@ -71,7 +68,6 @@ def _enter_real_time(priority: int) -> str | None:
 
 
 def _threads() -> list[int]:
-    """The threads of this process; none where the system does not list them."""
     try:
         return [int(task.name) for task in _TASKS.iterdir()]
     except OSError:
@@ -100,20 +96,12 @@ _PERCENTILES = {"p50": 50.0, "p99": 99.0, "p99.9": 99.9, "max": 100.0}
 
 
 class Timing(StrictModel):
-    """How well a run kept its time."""
-
     rate_hz: float = Field(description="cycles a second that were asked for")
-    achieved_rate_hz: float | None = Field(
-        description="cycles that took place, by the time they took; null for less than two"
-    )
+    achieved_rate_hz: float | None = Field(description="cycles by the time they took; null for less than two")
     cycles: int = Field(description="cycles that took place")
     missed_periods: int = Field(description="cycles that were left out because the loop was late")
-    stale_samples: tuple[int, ...] = Field(
-        description="readings that a joint did not answer in time to tell their instant, one number a joint"
-    )
-    lateness_us: Mapping[str, float] = Field(
-        description="lateness of the cycles behind their deadlines: p50, p99, p99.9, max"
-    )
+    stale_samples: tuple[int, ...] = Field(description="readings that did not come in time, one number a joint")
+    lateness_us: Mapping[str, float] = Field(description="lateness behind the deadlines: p50, p99, p99.9, max")
     histogram_us: tuple[tuple[float | None, int], ...] = Field(
         description="upper edge and number of cycles of each bin of the lateness; the last bin has no edge"
     )
@@ -134,10 +122,7 @@ class Metronome:
         self.played = 0
 
     def wait(self) -> bool:
-        """Wait for the next deadline that is not a whole period past, and say in `index` which it is.
-
-        Returns bool: False where there is none left.
-        """
+        """Wait for the next deadline that is not a whole period past, its `index`; False where there is none left."""
         if self._next >= self._cycles:
             return False
         due = self._start + self._next * self._period

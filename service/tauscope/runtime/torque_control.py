@@ -9,9 +9,7 @@ from tauscope.runtime.plan import Plan, compute_inertia
 from tauscope_drivers import ArmState
 
 Array = NDArray[np.float64]
-
 LEAST_RATE_HZ = 200.0  # fewer cycles a second make the loop sluggish or unstable
-
 _VELOCITY_BANDWIDTHS = 5.0
 _LEAST_INERTIA = 0.1
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any
 
-from fastapi import Request, Response
+from fastapi import Response
 from pydantic import Field, ValidationError
 from starlette.exceptions import HTTPException
 
@@ -18,8 +18,6 @@ TYPE_PREFIX = "/docs/errors/"
 
 @dataclass(frozen=True)
 class ProblemKind:
-    """What all problems of a code have in common."""
-
     code: str
     status: HTTPStatus
     title: str
@@ -110,7 +108,6 @@ class ProblemError(HTTPException):
 
 
 def make_problem(code: str, detail: str, instance: str, errors: Sequence[FieldError] | None = None) -> Problem:
-    """The problem of a code."""
     kind = KINDS.get(code, KINDS["internal"])
     return Problem(
         type=f"{TYPE_PREFIX}{kind.code}",
@@ -124,18 +121,11 @@ def make_problem(code: str, detail: str, instance: str, errors: Sequence[FieldEr
 
 
 def problem_answer(problem: Problem, headers: Mapping[str, str] | None = None) -> Response:
-    """The answer that holds a problem."""
     content = problem.model_dump_json(exclude_none=True)
     return Response(content, problem.status, dict(headers or {}), media_type=MEDIA_TYPE)
 
 
-def make_code_answer(request: Request, code: str, detail: str) -> Response:
-    """The answer to a request that ends in a problem."""
-    return problem_answer(make_problem(code, detail, request.url.path))
-
-
 def field_errors(details: Sequence[Any], *, within: str = "") -> list[FieldError]:
-    """Pydantic's errors as fields of a request."""
     fields = []
     for detail in details[:100]:
         steps = [within, *detail["loc"]] if within else detail["loc"]
@@ -145,19 +135,16 @@ def field_errors(details: Sequence[Any], *, within: str = "") -> list[FieldError
 
 
 def invalid_request(error: ValidationError, *, within: str) -> ProblemError:
-    """The problem of data that do not fit their model."""
     fields = field_errors(error.errors(include_url=False, include_context=False, include_input=False), within=within)
     return ProblemError("invalid-request", summarise(fields), errors=fields)
 
 
 def summarise(fields: Sequence[FieldError]) -> str:
-    """One line on the fields in question."""
     more = f" (the first of {len(fields)} errors)" if len(fields) > 1 else ""
     return f"{fields[0].field}: {fields[0].message}{more}"
 
 
 def problem_responses(*codes: str) -> dict[int | str, dict[str, Any]]:
-    """Problems that a route may answer with, for the OpenAPI document."""
     responses: dict[int | str, dict[str, Any]] = {}
     for code in codes:
         kind = KINDS[code]

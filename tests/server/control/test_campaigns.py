@@ -12,9 +12,14 @@ from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.waiting import wait_until
 from tauscope.runtime.record import RunProblem
 from tauscope.runtime.states import RunState
-from tauscope.server.control import campaign_runner
-from tauscope.server.control.campaign import CampaignLinks, CampaignOrder, CampaignWorkspace
-from tauscope.server.control.campaign_runner import CampaignDependencies, CampaignManager
+from tauscope.server.control import campaign as campaign_runner
+from tauscope.server.control.campaign import (
+    CampaignDependencies,
+    CampaignLinks,
+    CampaignManager,
+    CampaignOrder,
+    CampaignWorkspace,
+)
 from tauscope.server.control.leases import BusyError, DeviceClaims
 from tauscope.server.control.run import RunWorkspace
 from tauscope.server.control.run_manager import RunManager, StartControl
@@ -91,7 +96,7 @@ class Bench:
         return record
 
     def ended(self, campaign: str) -> JobRecord:
-        wait_until(lambda: self.manager._threads.find(campaign) is None)
+        wait_until(lambda: self.manager.find(campaign) is None)
         return self.record(campaign)
 
     def steps(self, campaign: str) -> list[str]:
@@ -273,7 +278,7 @@ def test_stop_while_the_arm_moves_stops_the_arm_at_once(tmp_path: Path) -> None:
         bench.manager.stop(campaign)
         done.set()
 
-    with bench.jobs._lock, bench.manager._lock, bench.manager._threads._lock, bench.runs._lock, bench.claims._lock:
+    with bench.jobs._lock, bench.manager._lock, bench.manager._registering, bench.runs._lock, bench.claims._lock:
         threading.Thread(target=stop).start()
         assert done.wait(20.0)
         assert control.stops == 1

@@ -40,9 +40,7 @@ class Bench:
         workspace.prepare()
         (workspace.trajectories / "trajectory.json").touch()
         backend = BackendChoice(name="sim")
-        workspace.write_request(
-            RunRequestRecord(robot_file="arm.yaml", robot_name="arm", backend=backend, device=device)
-        )
+        workspace.write_order(RunRequestRecord(robot_file="arm.yaml", robot_name="arm", backend=backend, device=device))
         try:
             return self.manager.submit(staged, motion, holder)
         finally:
@@ -124,9 +122,7 @@ def test_stop_reaches_the_control_process_in_every_state(state: RunState, bench:
     control = bench.controls.next()
     control.go(state)
     for _ in range(3):
-        live = bench.manager.stop(run)
-        assert live is not None
-        assert live.state is state
+        assert bench.manager.stop(run) is state
     assert control.stops == 3
     control.go(RunState.STOPPING)
     assert bench.manager.stop(run) is not None
@@ -179,7 +175,7 @@ def test_stop_needs_no_lock_of_the_desk_nor_of_the_claims(bench: Bench) -> None:
         bench.manager.stop(run)
         done.set()
 
-    with bench.manager._lock, bench.manager._threads._lock, bench.claims._lock:
+    with bench.manager._lock, bench.manager._registering, bench.claims._lock:
         threading.Thread(target=stop).start()
         assert done.wait(20.0)
         assert control.stops == 1

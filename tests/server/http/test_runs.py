@@ -169,7 +169,7 @@ def test_stop_works_while_everything_else_is_stuck(
             thread.start()
         for _ in range(40):  # as many as there are threads for routes
             assert stuck.acquire(timeout=60.0)
-        with services.jobs._lock, services.runs._lock, services.runs._threads._lock, services.runs.claims._lock:
+        with services.jobs._lock, services.runs._lock, services.runs._registering, services.runs.claims._lock:
             stop = client.post(answer["links"]["stop"])
         assert (stop.status_code, stop.json()["state"]) == (202, "running")
         assert control.stops == 1

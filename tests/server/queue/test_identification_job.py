@@ -201,5 +201,5 @@ def test_unforeseen_failures_are_not_swallowed(
 
 @pytest.mark.parametrize("damage", [b"", b"[]", b"{}", b'{"schema": "other/1"}', b"\xff", b"[" * 100_000])
 def test_a_damaged_result_is_no_result(damage: bytes, workspace: IdentificationWorkspace) -> None:
-    workspace.result.write_bytes(damage)
+    workspace.folder.joinpath("result.json").write_bytes(damage)
     assert workspace.read_result() is None

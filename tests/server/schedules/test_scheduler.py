@@ -11,9 +11,8 @@ import pytest
 from tauscope.errors import NotFoundError, StoreError, TauscopeError
 from tauscope.server.control.leases import BusyError, LeasedError
 from tauscope.server.schedules.definition import ScheduleDefinition
-from tauscope.server.schedules.repeater import NothingToDoError, Repeater
 from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry, ScheduleRepository
-from tauscope.server.schedules.scheduler import FOLDER, Scheduler
+from tauscope.server.schedules.scheduler import FOLDER, NothingToDoError, Repeater, Scheduler
 from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index
 

@@ -3,6 +3,7 @@
 import hashlib
 import os
 from pathlib import Path
+from tempfile import mkdtemp
 
 import pytest
 
@@ -17,7 +18,7 @@ def store(tmp_path: Path) -> RecordingStore:
 
 
 def arrive(store: RecordingStore, name: str, content: bytes) -> KeptFile:
-    incoming = IncomingFile(store.stage(), name, limit=1000)
+    incoming = IncomingFile(Path(mkdtemp(dir=store.root, prefix=".incoming-")), name, limit=1000)
     for byte in content:
         incoming.write(bytes([byte]))
     return incoming.finish()
@@ -50,7 +51,7 @@ def test_a_name_that_is_a_path_is_refused(store: RecordingStore, tmp_path: Path)
 
 
 def test_a_file_that_grows_too_large_stops_at_the_limit(store: RecordingStore) -> None:
-    incoming = IncomingFile(store.stage(), "a.csv", limit=10)
+    incoming = IncomingFile(Path(mkdtemp(dir=store.root, prefix=".incoming-")), "a.csv", limit=10)
     incoming.write(b"0123456789")
     with pytest.raises(LimitExceededError, match=r"a\.csv: is larger than the 10 bytes"):
         incoming.write(b"0")

@@ -37,11 +37,7 @@ def chain_line(previous: Mapping[str, Any] | None, content: Mapping[str, Any]) -
 
 @dataclass(frozen=True)
 class Verification:
-    """What a log is worth.
-
-    `head`: hash of the last one; None where there is none.
-    `fault`: the first thing that is wrong, one line; None where nothing is.
-    """
+    """`head`: hash of the last entry, None without one; `fault`: the first thing that is wrong, None without one."""
 
     entries: int
     head: str | None
@@ -49,7 +45,6 @@ class Verification:
 
 
 def verify_lines(lines: Iterable[bytes], noted: str | None = None) -> Verification:
-    """Check every line against the one before."""
     count, head, is_noted_there = 0, GENESIS, noted is None
     torn: bytes | None = None
     for place, line in enumerate(lines, start=1):
@@ -102,7 +97,6 @@ def _fault(entry: dict[str, Any] | None, number: int, previous: str, torn: bytes
 
 
 def _digest(entry: Mapping[str, Any]) -> str:
-    """The hash of everything that an entry says, the hash of the entry before included."""
     return hashlib.sha256(_canonical(entry)).hexdigest()
 
 
@@ -111,7 +105,6 @@ def _canonical(entry: Mapping[str, Any]) -> bytes:
 
 
 _log = logging.getLogger("tauscope.audit")
-
 AUDIT_FILE = "audit.jsonl"  # name of the file, in the data folder
 _TAIL = 2**20  # where the last entry is looked for; entries are far shorter [bytes]
 MOST_WAITING = 10_000  # entries that wait for a disk that does not take them
@@ -126,7 +119,8 @@ class AuditLog:
 
     def append(self, actor: str, action: str, **details: Any) -> None:
         """Add an entry; it is on the disk when this returns. Raises OSError if it cannot be written."""
-        self._append(self._content(actor, action, details))
+        known = {name: value for name, value in details.items() if value is not None}
+        self._append({"time": self._clock().isoformat(), "actor": actor, "action": action, **known})
 
     def verify(self, noted: str | None = None) -> Verification:
         """Check the whole log. Raises NotFoundError if there is no log."""
@@ -135,10 +129,6 @@ class AuditLog:
                 return verify_lines(file, noted)
         except FileNotFoundError:
             raise NotFoundError(f"{self.path}: there is no audit log; name the service's data folder") from None
-
-    def _content(self, actor: str, action: str, details: Mapping[str, Any]) -> dict[str, Any]:
-        known = {name: value for name, value in details.items() if value is not None}
-        return {"time": self._clock().isoformat(), "actor": actor, "action": action, **known}
 
     def _append(self, content: dict[str, Any]) -> None:
         """Chain an entry to the last one; a line that a crash cut off stays, and the next entry says so."""

@@ -48,29 +48,17 @@ class RateLimit:
 
 
 CALLER = "tauscope.caller"  # where the request's ASGI scope holds its `Caller`
-
 FAILURES_PER_S, FAILURE_BURST = 0.5, 20.0
 """How often an address may come with a wrong key before it is told to wait; right keys always pass."""
 
 
 @dataclass(frozen=True, eq=False)
 class Access:
-    """Who may call, how often, and how much they may send [bytes]."""
-
     ring: KeyRing
     rate: RateLimit
     limits_local: bool = False
     uploads: RateLimit | None = None
     failures: RateLimit = field(default_factory=lambda: RateLimit(FAILURES_PER_S, FAILURE_BURST))
-
-
-@dataclass(frozen=True)
-class _Refusal:
-    """Why a request goes no further."""
-
-    code: str
-    detail: str
-    headers: dict[str, str] = field(default_factory=dict)
 
 
 class HttpMiddleware:
@@ -80,34 +68,32 @@ class HttpMiddleware:
         self.app = app
 
     async def __call__(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
-        """Answer a request, or pass it on."""
         await (self.answer if scope["type"] == "http" else self.app)(scope, receive, send)
 
     async def answer(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
-        """Answer a request over HTTP."""
         raise NotImplementedError
+
+    async def refuse(self, problem: ProblemError, scope: AsgiScope, receive: Receive, send: Send) -> None:
+        answer = problem_answer(make_problem(problem.code, problem.detail, scope["path"]), problem.headers)
+        await answer(scope, receive, send)
 
 
 class Gate(HttpMiddleware):
-    """Lets a request pass that comes with a key of the scope that it needs."""
-
     @override
     async def answer(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
         outcome = _admit(cast(Access, scope["app"].state.services.access), scope)
-        if isinstance(outcome, _Refusal):
+        if isinstance(outcome, ProblemError):
             _note_refusal(scope, outcome)
-            problem = make_problem(outcome.code, outcome.detail, scope["path"])
-            return await problem_answer(problem, outcome.headers)(scope, receive, send)
+            return await self.refuse(outcome, scope, receive, send)
         scope[CALLER] = outcome
         return await self.app(scope, receive, send)
 
 
 def find_caller(scope: AsgiScope) -> Caller:
-    """Who makes a request."""
     return cast(Caller, scope.get(CALLER, LOCAL))
 
 
-def _admit(access: Access, scope: AsgiScope) -> Caller | _Refusal:
+def _admit(access: Access, scope: AsgiScope) -> Caller | ProblemError:
     method, path = scope["method"], scope["path"]
     needed = find_needed_scope(method, path)
     if needed is None:
@@ -116,10 +102,12 @@ def _admit(access: Access, scope: AsgiScope) -> Caller | _Refusal:
     caller = access.ring.caller(_key(Headers(scope=scope)), may_be_expired=stops)
     if isinstance(caller, str):
         wait = access.failures.take((scope.get("client") or ("",))[0])
-        return _too_often(wait) if wait else _Refusal("unauthorized", caller, {"WWW-Authenticate": "Bearer"})
+        return (
+            _too_often(wait) if wait else ProblemError("unauthorized", caller, headers={"WWW-Authenticate": "Bearer"})
+        )
     if not caller.scope.includes(needed):
         text = f"{method} {path} needs a key of scope {needed}; the one of {caller.name} has {caller.scope}"
-        return _Refusal("forbidden", text)
+        return ProblemError("forbidden", text)
     # Whoever wants to stop an arm is never told to wait.
     if stops or (caller.key is None and not access.limits_local):
         return caller
@@ -127,7 +115,7 @@ def _admit(access: Access, scope: AsgiScope) -> Caller | _Refusal:
     return _too_often(wait) if wait else caller
 
 
-def _note_refusal(scope: AsgiScope, refusal: _Refusal) -> None:
+def _note_refusal(scope: AsgiScope, refusal: ProblemError) -> None:
     """Have it known who tried what; whoever only has to wait is not worth an entry."""
     if refusal.code != "rate-limited":
         audit, address = cast(AuditTrail, scope["app"].state.services.audit), (scope.get("client") or (None,))[0]
@@ -143,12 +131,7 @@ def _key(headers: Headers) -> str | None:
 
 
 def require_upload_quota(scope: AsgiScope) -> Callable[[int], None]:
-    """Refuse an upload of a caller who has sent enough for now.
-
-    Raises ProblemError if the caller has to wait.
-
-    Returns callable: counts what is sent [bytes].
-    """
+    """Counts what a caller sends [bytes]. Raises ProblemError if it has sent enough for now."""
     access, caller = cast(Access, scope["app"].state.services.access), find_caller(scope)
     quota, key = access.uploads, caller.key or caller.name
     if quota is None or (caller.key is None and not access.limits_local):
@@ -160,17 +143,16 @@ def require_upload_quota(scope: AsgiScope) -> Callable[[int], None]:
     return partial(quota.charge, key)
 
 
-def _too_often(wait_s: float) -> _Refusal:
+def _too_often(wait_s: float) -> ProblemError:
     seconds = max(1, math.ceil(wait_s))
-    return _Refusal("rate-limited", f"too many requests; go on after {seconds} s", {"Retry-After": str(seconds)})
+    headers = {"Retry-After": str(seconds)}
+    return ProblemError("rate-limited", f"too many requests; go on after {seconds} s", headers=headers)
 
 
 _log = logging.getLogger("tauscope.audit")
 
 
 class AuditedRequests(HttpMiddleware):
-    """Notes who asked for what, and what was answered."""
-
     @override
     async def answer(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
         if not is_audited(scope["method"], scope["path"]):
@@ -186,7 +168,7 @@ class AuditedRequests(HttpMiddleware):
             except OSError as error:
                 _log.error("the audit log takes no entry: %s", error.strerror)
                 text = "the audit log takes no entry, and nothing moves or goes without one; make room on the disk"
-                return await problem_answer(make_problem("storage-full", text, path))(scope, receive, send)
+                return await self.refuse(ProblemError("storage-full", text), scope, receive, send)
         status, subject = 500, None
 
         async def send_noting(message: Message) -> None:

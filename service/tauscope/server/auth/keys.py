@@ -5,7 +5,6 @@ import hmac
 import logging
 import re
 import secrets
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -27,27 +26,14 @@ from tauscope.strict_model import StrictModel
 class Scope(StrEnum):
     """What a key may do; each scope includes those before it."""
 
-    READ = "read"
-    """look at everything, and stop every arm"""
-    ANALYSE = "analyse"
-    """send recordings and robots, hand in and cancel analyses"""
-    MOVE = "move"
-    """take, arm and move arms"""
-    ADMIN = "admin"
-    """remove what was measured, take an arm from somebody else"""
+    READ = "read"  # look at everything, and stop every arm
+    ANALYSE = "analyse"  # send recordings and robots, hand in and cancel analyses
+    MOVE = "move"  # take, arm and move arms
+    ADMIN = "admin"  # remove what was measured, take an arm from somebody else
 
     def includes(self, other: "Scope") -> bool:
-        """Whether this scope is the other one, or a higher one."""
         order = list(Scope)
         return order.index(self) >= order.index(other)
-
-
-def parse_scope(text: str) -> Scope:
-    """The scope of a name. Raises TauscopeError if there is none of that name."""
-    try:
-        return Scope(text)
-    except ValueError:
-        raise TauscopeError(f"scope {text[:40]!r}: not known; give one of {', '.join(Scope)}") from None
 
 
 _ITEM = r"[^/]+"
@@ -93,17 +79,12 @@ def is_stop(method: str, path: str) -> bool:
 
 
 KEY_FILE = "keys.json"  # name of the file, in the data folder
-
 _PREFIX = "tsk"
 _NOBODY = "0" * 64
 
 
 class ApiKey(StrictModel):
-    """One key, without its secret.
-
-    The secret is 256 random bits, so that one SHA-256 with a salt is enough: there is nothing to guess that a slow hash
-    would protect, and a slow one would let strangers keep the service busy.
-    """
+    """The secret is 256 random bits: one salted SHA-256 is enough, and a slow hash would keep the service busy."""
 
     id: str = Field(pattern="^[0-9a-f]{8}$", description="public part of the key")
     name: str = Field(min_length=1, max_length=100, description="who has it")
@@ -115,15 +96,12 @@ class ApiKey(StrictModel):
     revoked: AwareDatetime | None = Field(default=None, description="when it was taken back")
 
     def state(self, now: datetime) -> Literal["valid", "expired", "revoked"]:
-        """What the key is worth."""
         if self.revoked is not None:
             return "revoked"
         return "expired" if self.expires is not None and now >= self.expires else "valid"
 
 
 class _KeyList(StrictModel):
-    """What the file holds."""
-
     form: Literal["tauscope.keys/1"] = "tauscope.keys/1"
     keys: tuple[ApiKey, ...] = ()
 
@@ -135,10 +113,7 @@ class KeyFile:
         self.path = folder / KEY_FILE
 
     def read(self) -> tuple[ApiKey, ...]:
-        """All keys ever made, revoked ones too; none where there is no file.
-
-        Raises TauscopeError if the file is damaged or cannot be read.
-        """
+        """All keys ever made; none without a file. Raises TauscopeError if the file is damaged or cannot be read."""
         try:
             return _KeyList.model_validate_json(self.path.read_bytes()).keys
         except FileNotFoundError:
@@ -209,15 +184,12 @@ def _hash(salt: str, secret: str) -> str:
 
 
 _log = logging.getLogger("tauscope.api")
-
 CHECK_S = 1.0
 """How often the file is looked at: a key that was revoked or added counts after this time at the latest [s]."""
 
 
 @dataclass(frozen=True)
 class Caller:
-    """Who makes a request."""
-
     name: str
     key: str | None
     scope: Scope
@@ -227,11 +199,7 @@ LOCAL = Caller("local", None, Scope.ADMIN)  # anybody on this machine, as long a
 
 
 class KeyRing:
-    """Tells callers by their keys.
-
-    Once a service has had a key, it asks for one, also after the last was revoked. A file that is damaged while the
-    service runs changes nothing: whoever could stop an arm can still do so.
-    """
+    """Asks for a key once there was one, also after the last was revoked; keeps its keys while the file is damaged."""
 
     def __init__(self, file: KeyFile, *, is_required: bool, clock: Callable[[], datetime] = utc_now) -> None:
         """Read the keys. Raises TauscopeError if the file is damaged."""
@@ -242,15 +210,12 @@ class KeyRing:
 
     @property
     def is_required(self) -> bool:
-        """Whether a key is asked for."""
         return self._is_required or bool(self._keys)
 
     def has_valid_key(self) -> bool:
-        """Whether anybody could get in."""
         return any(key.state(self._clock()) == "valid" for key in self._keys)
 
     def caller(self, text: str | None, *, may_be_expired: bool = False) -> Caller | str:
-        """Who calls, or why that is nobody."""
         if not self.is_required:
             return LOCAL
         if text is None:
@@ -264,32 +229,12 @@ class KeyRing:
         return Caller(key.name, key.id, key.scope)
 
     def look(self) -> None:
-        """Read the file again if it was changed."""
         try:
             stamp = self._file.stamp()
             if stamp != self._stamp:
-                keys = self._file.read()
-                self._keys, self._stamp = keys or self._revoke_all(), stamp
+                # Where the file was taken away, all known keys count as revoked.
+                now = self._clock()
+                gone = tuple(key.model_copy(update={"revoked": key.revoked or now}) for key in self._keys)
+                self._keys, self._stamp = self._file.read() or gone, stamp
         except (TauscopeError, OSError):
             _log.exception("the API keys could not be read again; those known so far count")
-
-    def _revoke_all(self) -> tuple[ApiKey, ...]:
-        """All known keys as revoked: their file was taken away."""
-        return tuple(key.model_copy(update={"revoked": key.revoked or self._clock()}) for key in self._keys)
-
-    @contextmanager
-    def watched(self) -> Iterator[None]:
-        """Look at the file again and again, within the context."""
-        is_over = threading.Event()
-
-        def watch() -> None:
-            while not is_over.wait(CHECK_S):
-                self.look()
-
-        thread = threading.Thread(target=watch, name="keys", daemon=True)
-        thread.start()
-        try:
-            yield
-        finally:
-            is_over.set()
-            thread.join()

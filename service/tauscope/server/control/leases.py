@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import count
-from typing import Protocol
 
 from typing_extensions import override
 
@@ -42,16 +41,12 @@ class DeviceClaims:
             self._holders[device] = holder
 
     def require_free(self, device: str) -> None:
-        """Say at once that somebody has an arm, before work is begun for whoever wants it.
-
-        Raises BusyError if somebody has it.
-        """
+        """Refuse an arm before work is begun for it. Raises BusyError if somebody has it."""
         holder = self._holders.get(device)
         if holder is not None:
             raise self._busy(device, holder)
 
     def release(self, device: str, holder: str) -> None:
-        """Let go of an arm; nothing happens where somebody else has it."""
         with self._lock:
             if self._holders.get(device) == holder:
                 del self._holders[device]
@@ -61,34 +56,21 @@ class DeviceClaims:
         return BusyError(one_line(f"{device}: {holder} has it; wait until that has ended, or stop it"))
 
 
-class Permit(Protocol):
-    """Somebody's leave to move one arm. Every method takes no lock, touches no disk and returns at once."""
+class Permit:
+    """Leave to move one arm, here one without lease; takes no lock, touches no disk and returns at once."""
 
     def require(self) -> None:
-        """Refuse a motion that may not begin. Raises LeaseError if it may not."""
+        """Raises LeaseError if a motion may not begin."""
 
     def find_end_reason(self) -> str | None:
-        """Why the motion may not go on; None while it may."""
-
-    def disarm(self) -> None:
-        """Somebody stopped the arm: before it moves again, it has to be armed again."""
-
-
-class FreePermit:
-    """Leave to move an arm that nobody has a lease of, where no lease is asked for."""
-
-    def require(self) -> None:
-        """Nothing to refuse."""
-
-    def find_end_reason(self) -> str | None:
-        """The motion may go on."""
+        """Why a motion may not go on; None while it may."""
         return None
 
     def disarm(self) -> None:
-        """Nothing to take back."""
+        """Ask for the arm to be armed again before it moves again."""
 
 
-FREE = FreePermit()  # leave that is never taken back
+FREE = Permit()  # leave that is never taken back
 
 
 class LeaseError(AcquisitionError):
@@ -116,13 +98,7 @@ LONGEST_TTL_S = 60.0  # longest time for which a lease may be given without a si
 
 @dataclass(eq=False)
 class Lease:
-    """One lease.
-
-    Attributes are replaced one at a time and never need a lock to be read.
-
-    `ttl_s`: how long it lasts without a sign of life [s].
-    `ends`: when it ends, on the clock of `Leases` [s].
-    """
+    """`ttl_s`: time without a heartbeat after which it ends, at `ends` [s]. Attributes are read without a lock."""
 
     id: str
     number: int
@@ -137,18 +113,15 @@ class Lease:
 
     @property
     def token(self) -> str:
-        """What its holder shows."""
         return f"{self.number}-{self.secret}"
 
 
-class LeasePermit:
-    """Leave by a lease that was shown."""
-
+class LeasePermit(Permit):
     def __init__(self, lease: Lease, find_end_reason: Callable[[Lease], str | None]) -> None:
         self._lease, self._end_of = lease, find_end_reason
 
+    @override
     def require(self) -> None:
-        """Refuse what its end would stop at once."""
         lost = self._end_of(self._lease)
         if lost is not None:
             raise LeaseLostError(one_line(f"{self._lease.device}: lease {self._lease.number} ended: {lost}"))
@@ -156,19 +129,19 @@ class LeasePermit:
             hint = f"POST /api/v1/leases/{self._lease.id}/arm first"
             raise NotArmedError(one_line(f"{self._lease.device}: its lease is not armed; {hint}"))
 
+    @override
     def find_end_reason(self) -> str | None:
-        """Why the motion has to end."""
         lost = self._end_of(self._lease)
         if lost is not None:
             return f"lease {self._lease.number} of {self._lease.holder} ended: {lost}"
         return None if self._lease.is_armed else f"lease {self._lease.number} of {self._lease.holder} was disarmed"
 
+    @override
     def disarm(self) -> None:
-        """A stop disarms."""
         self._lease.is_armed = False
 
 
-class UnleasedPermit(FreePermit):
+class UnleasedPermit(Permit):
     """Permit for one motion, by the claim of the arm alone; the arm cannot be leased while it lasts."""
 
     def __init__(self, device: str, require_unleased: Callable[[str], None]) -> None:
@@ -176,10 +149,10 @@ class UnleasedPermit(FreePermit):
 
     @override
     def require(self) -> None:
-        """Refuse an arm that is leased."""
         self._require_unleased(self._device)
 
 
+Clock = Callable[[], float]  # [s]
 LeaseEnd = Callable[[Lease, str], None]
 """Told that a lease has ended, and why; called by whoever notices, so that it must return at once."""
 
@@ -187,16 +160,13 @@ LeaseEnd = Callable[[Lease, str], None]
 class Leases:
     """The leases of all arms. Reading takes no lock; every change does, and none of them waits but for `acquire`."""
 
-    def __init__(
-        self, claims: DeviceClaims, *, clock: Callable[[], float] = time.monotonic, on_end: LeaseEnd | None = None
-    ) -> None:
+    def __init__(self, claims: DeviceClaims, *, clock: Clock = time.monotonic, on_end: LeaseEnd | None = None) -> None:
         self._claims, self._numbers, self._clock = claims, count(1), clock
         self._on_end = on_end or (lambda _lease, _why: None)
         self._lock = threading.Lock()
         self._active: Mapping[str, Lease] = {}
 
     def active(self) -> list[Lease]:
-        """Leases that hold, the newest first."""
         leases = [lease for lease in self._active.values() if self.find_end_reason(lease) is None]
         return sorted(leases, key=lambda lease: -lease.number)
 
@@ -205,12 +175,7 @@ class Leases:
         return max(0.0, lease.ends - self._clock())
 
     def acquire(self, device: str, holder: str, owner: str, ttl_s: float, *, take: bool = False) -> Lease:
-        """Lease an arm that nobody has.
-
-        Raises LeasedError if somebody has it and it is not taken. Raises BusyError if it moves without a lease.
-
-        `ttl_s`: how long it lasts without a sign of life [s].
-        """
+        """Lease an arm. Raises LeasedError if it is leased and not taken, BusyError if it moves without a lease."""
         with self._lock:
             present = self._present(device)
             if present is not None:
@@ -240,10 +205,7 @@ class Leases:
         return lease
 
     def renew(self, device: str, token: str, owner: str) -> Lease:
-        """Take a sign of life.
-
-        Raises LeaseLostError if that is not the present lease: one that has ended is not renewed.
-        """
+        """Take a heartbeat. Raises LeaseLostError if that is not the present lease: one that has ended stays so."""
         with self._lock:
             lease = self.require(device, token, owner)
             lease.ends = self._clock() + lease.ttl_s
@@ -257,20 +219,15 @@ class Leases:
         return lease
 
     def release(self, device: str, token: str, owner: str) -> None:
-        """Give an arm back; what moves by the lease stops.
-
-        Raises LeaseLostError if that is not the present lease; nothing happens to the present one.
-        """
+        """Give an arm back; what moves by the lease stops. Raises LeaseLostError if that is not the present lease."""
         with self._lock:
             self._finish(self.require(device, token, owner), "it was released")
 
     def disarm_all(self) -> None:
-        """Let no leased arm move before it is armed again; takes no lock."""
         for lease in self._active.values():
             lease.is_armed = False
 
     def find(self, identifier: str) -> Lease | None:
-        """The lease of an identifier, while it holds."""
         return next((lease for lease in self.active() if lease.id == identifier), None)
 
     def require(self, device: str, token: str, owner: str) -> Lease:
@@ -301,7 +258,6 @@ class Leases:
         return lease.lost
 
     def require_unleased(self, device: str) -> None:
-        """Refuse an arm that somebody has a lease of. Raises LeasedError if somebody has."""
         present = self._present(device)
         if present is not None:
             raise self._refuse_leased(present)

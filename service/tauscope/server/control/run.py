@@ -5,12 +5,12 @@ import shutil
 import threading
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import UTC
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field
+from typing_extensions import override
 
 from tauscope.errors import AcquisitionError
 from tauscope.runtime.drivers import find_driver
@@ -27,9 +27,7 @@ from tauscope.server.queue.job_folder import (
     JobRecord,
     JobState,
     Workspace,
-    read_stored,
     without_folders,
-    write_stored,
 )
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.task_job import TaskWorkspace
@@ -40,74 +38,53 @@ from tauscope.tasks.task import LocalFiles
 
 
 class RunRequestRecord(StrictModel):
-    """What was asked for."""
-
-    form: Literal["tauscope.run-request/1"] = Field(
-        default="tauscope.run-request/1", description="name and version of this form"
-    )
+    form: Literal["tauscope.run-request/1"] = "tauscope.run-request/1"
     robot_file: str = Field(description="name of the robot file in the run's robot folder")
     robot_name: str = Field(description="what the robot file calls the robot")
     backend: BackendChoice = Field(default=BackendChoice(), description="which arm is moved")
     device: str = Field(description="names the arm: one run at a time has it")
-    excitation: str | None = Field(
-        default=None, description="identifier of the excitation that is played; null for a trajectory from elsewhere"
-    )
+    excitation: str | None = Field(default=None, description="excitation that is played; null: a motion from elsewhere")
     campaign: str | None = Field(default=None, description="identifier of the campaign that it belongs to")
     options: RunOptions = Field(default=RunOptions(), description="how it is run")
 
 
-class RunWorkspace(JobFolder):
-    """Files of a run.
+class RunWorkspace(JobFolder[RunRequestRecord]):
+    """Input, and the folder ``control/`` of the control process; before there is one the record stands beside it."""
 
-    ``request.json``, ``robot/`` and ``trajectory/`` are its input; ``control/`` belongs to the control process and
-    holds its record, the journal and the recording. Before there is a control process, the record stands beside it.
-    """
+    order_type = RunRequestRecord
+    order_name = "request.json"
 
     def __init__(self, folder: Path) -> None:
-        """Look at a run's folder; nothing is opened yet."""
         super().__init__(folder)
-        self.robot = folder / "robot"
         self.trajectories = folder / "trajectory"
         self.control = folder / "control"
         self.scenario = folder / "scenario.json"
-        self._request = folder / "request.json"
 
+    @override
     def prepare(self) -> None:
-        """Make the folders that hold a run's input."""
-        self.robot.mkdir()
+        super().prepare()
         self.trajectories.mkdir()
 
     @property
     def trajectory(self) -> Path | None:
-        """The file of the motion; None before there is one."""
         return next(iter(sorted(self.trajectories.glob("*"))), None)
 
     def recording(self, format_: str) -> Path:
         """Where the recording of a format lies; the journal is the MCAP, ramp included."""
         return recording_file(self.control, format_)
 
-    def read_order(self) -> RunRequestRecord | None:
-        """What was asked for, or None where the file is missing or damaged."""
-        return read_stored(self._request, RunRequestRecord)
-
-    def write_request(self, request: RunRequestRecord) -> None:
-        """Keep what was asked for."""
-        write_stored(self._request, request)
-
     def create(self, request: RunRequestRecord) -> None:
-        """Write the record of a run that has not begun."""
         backend, mode = request.backend.name, request.options.mode.value
         write_record(self.folder, new_record(request.robot_name, backend, mode))
 
     def read_run(self) -> RunRecord | None:
-        """State and findings of the run, or None where the file is missing or damaged."""
         try:
             return read_record(self.control if self._has_begun else self.folder)
         except AcquisitionError:
             return None
 
+    @override
     def has_ended(self) -> bool:
-        """Whether nothing will happen to the run any more: it has ended, its record is damaged, or it is gone."""
         record = self.read_run()
         return record is None or record.state.is_end
 
@@ -119,10 +96,7 @@ class RunWorkspace(JobFolder):
         write_record(self.folder, record.moved(RunState.STOPPING).moved(state, problem=problem))
 
     def recover(self) -> None:
-        """Show a run that nobody carries out any more as interrupted; nothing happens to one that has ended.
-
-        Raises AcquisitionError if its record is damaged, or its control process does not end.
-        """
+        """Interrupt a run that nobody carries out. Raises AcquisitionError if its control process does not end."""
         if self._has_begun:
             recover_run(self.control)
             return
@@ -137,11 +111,9 @@ class RunWorkspace(JobFolder):
         return JobProblem(code=record.problem.code, detail=self.in_user_terms(record.problem.detail))
 
     def in_user_terms(self, text: str) -> str:
-        """A message without the server's folders."""
         return without_folders(text, self.control, self.trajectories, self.robot, self.folder)
 
     def tell_end(self) -> None:
-        """Tell that the run has ended, once."""
         record = self.read_run()
         if record is not None and record.state.is_end and not self.has_told_end():
             time = record.history[-1].at.astimezone(UTC)
@@ -153,11 +125,7 @@ class RunWorkspace(JobFolder):
 
 
 def start_control(workspace: RunWorkspace, report: Report, *, sim_socket: Path | None = None) -> RunProcess:
-    """Start the control process of a run whose folder holds everything that it needs.
-
-    Raises RobotFileError if the robot file was damaged meanwhile. Raises AcquisitionError if files are missing, or the
-    process cannot be started.
-    """
+    """Start the control process. Raises RobotFileError or AcquisitionError if files are damaged or it cannot start."""
     order, trajectory = workspace.read_order(), workspace.trajectory
     if order is None or trajectory is None:
         raise AcquisitionError("files of the run are missing or damaged; hand it in again")
@@ -180,43 +148,32 @@ Motion = Callable[[RunWorkspace, threading.Event], bool]
 
 Raises TauscopeError where there is none.
 """
-
 POLL_S = 0.05  # how often the state of a job is looked at by whoever waits for it [s]
 
 
 def ready_motion(run: RunWorkspace, stop: threading.Event) -> bool:
-    """The motion of a run whose trajectory is in its folder."""
     return run.trajectory is not None and not stop.is_set()
 
 
-@dataclass(frozen=True, eq=False)
-class DesignedMotion:
-    """A motion that a job designs meanwhile."""
+def await_design(jobs: JobQueue, excitations: JobKind, excitation: str) -> Motion:
+    """The motion that a job designs meanwhile. Raises TauscopeError, when it is needed, if the job has no result."""
 
-    jobs: JobQueue
-    excitations: JobKind
-    excitation: str
-
-    def __call__(self, run: RunWorkspace, stop: threading.Event) -> bool:
-        """Wait for the job and fetch its trajectory. Raises TauscopeError if the job has no result."""
-        design = ExcitationWorkspace(self.excitations.items.folder(self.excitation))
+    def fetch(run: RunWorkspace, stop: threading.Event) -> bool:
+        design = ExcitationWorkspace(excitations.items.folder(excitation))
         run.write_step("design the motion")
         record = wait_for_end(design, stop)
         if record is None:
-            self.jobs.cancel(self.excitations, self.excitation)
+            jobs.cancel(excitations, excitation)
             return False
-        require_succeeded(record, f"excitation {self.excitation}")
+        require_succeeded(record, f"excitation {excitation}")
         take_trajectory(design, run)
         return True
 
+    return fetch
+
 
 def wait_for_end(workspace: Workspace, stop: threading.Event) -> JobRecord | None:
-    """Wait until a job has ended.
-
-    Raises AcquisitionError if the job's state is damaged, or the job was removed.
-
-    Returns JobRecord or None: in an end state; None where the event came first.
-    """
+    """The end of a job, None where `stop` came first. Raises AcquisitionError if it was removed or is damaged."""
     while not stop.is_set():
         record = workspace.read_record()
         if record is None:
@@ -243,10 +200,7 @@ def require_succeeded(record: JobRecord, name: str) -> None:
 
 
 def take_trajectory(excitation: TaskWorkspace[Any], run: RunWorkspace) -> None:
-    """Give a run the trajectory of an excitation that succeeded.
-
-    Raises AcquisitionError if the trajectory is not there any more.
-    """
+    """Copy the trajectory of an excitation. Raises AcquisitionError if it is not there any more."""
     try:
         shutil.copyfile(excitation.trajectory, run.trajectories / excitation.trajectory.name)
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""Runs on their way: one supervisor each, and the manager that starts, stops and removes them."""
+"""Runs on their way: supervised threads, the manager that runs and campaigns share, and one supervisor a run."""
 
 import logging
 import threading
@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 from tauscope.errors import TauscopeError
 from tauscope.runtime.loop import Report
@@ -14,34 +14,110 @@ from tauscope.runtime.record import RunProblem, RunRecord
 from tauscope.runtime.states import RunState
 from tauscope.server.control.leases import FREE, BusyError, DeviceClaims, Permit
 from tauscope.server.control.run import Motion, RunWorkspace, StepFailedError
-from tauscope.server.control.supervised_threads import Manager
 from tauscope.server.queue.job_folder import StateEvent
 from tauscope.server.store.data_folder import ItemStore, staged_identifier
 from tauscope.server.store.files import KeptFile, hash_file
 from tauscope.server.store.recordings import RecordingStore
 
-_log = logging.getLogger("tauscope.jobs")
+CLOSE_TIMEOUT_S = 15.0
+"""How long a run or a campaign may take to stop when the service ends [s]. Its control process may last longer."""
 
+
+class Supervisor(Protocol):
+    @property
+    def state(self) -> Any: ...
+
+    def run(self) -> None: ...
+
+    def stop(self) -> None:
+        """Stop, in any state; takes no lock, returns at once, may be called repeatedly."""
+
+    def interrupt(self) -> None: ...
+
+
+S = TypeVar("S", bound=Supervisor)
+
+
+class Manager(Generic[S]):
+    """Active items, each with a thread, and the folders of all items. Every method may be called from any thread."""
+
+    def __init__(self, items: ItemStore) -> None:
+        self.items = items
+        self._lock, self._registering = threading.Lock(), threading.Lock()
+        # Replaced as a whole, never changed: reading takes no lock, so that a stuck thread cannot delay a stop.
+        self._active: Mapping[str, tuple[S, threading.Thread]] = {}
+        self._is_closed = False
+        items.tidy()
+
+    def find(self, identifier: str) -> S | None:
+        """The supervisor of an active item."""
+        supervisor, _ = self._active.get(identifier, (None, None))
+        return supervisor
+
+    def remove(self, identifier: str) -> bool:
+        """Remove an item that has ended, False where it is active. Raises NotFoundError if there is none."""
+        if self.find(identifier) is not None:
+            return False
+        self.items.remove(identifier)
+        return True
+
+    def stop(self, identifier: str) -> Any:
+        """Stop an item without any lock; returns the state in which it stood, None where it is not active."""
+        supervisor = self.find(identifier)
+        if supervisor is None:
+            return None
+        state = supervisor.state
+        supervisor.stop()
+        return state
+
+    def stop_all(self) -> list[str]:
+        """Stop all that is active, and accept further items; takes no lock. Returns the identifiers."""
+        active = self._active
+        for supervisor, _ in active.values():
+            supervisor.stop()
+        return [*active]
+
+    def begin_close(self) -> None:
+        """Stop all that is active and accept no further items; returns at once."""
+        self._is_closed = True
+        for supervisor, _ in self._active.values():
+            supervisor.interrupt()
+
+    def close(self) -> None:
+        """Stop all that is active, and wait for its end for at most `CLOSE_TIMEOUT_S` each."""
+        with self._lock:
+            self.begin_close()
+        for _, thread in self._active.values():
+            thread.join(CLOSE_TIMEOUT_S)
+
+    def _supervise(self, identifier: str, supervisor: S, then: Callable[[], None] = lambda: None) -> None:
+        def run() -> None:
+            try:
+                supervisor.run()
+                then()
+            finally:
+                with self._registering:
+                    self._active = {name: entry for name, entry in self._active.items() if name != identifier}
+
+        thread = threading.Thread(target=run, name=f"supervise-{identifier}", daemon=True)
+        with self._registering:
+            self._active = {**self._active, identifier: (supervisor, thread)}
+        thread.start()
+
+
+_log = logging.getLogger("tauscope.jobs")
 BEAT_S = 0.1  # how often the control process is told that its owner is alive, at least [s]
 BEATS_A_HEARTBEAT = 5  # how often it is told so in the time after which it counts its owner as gone
 
 
 class ControlProcess(Protocol):
-    """The process that moves the arm, as its owner sees it."""
-
     def stop(self) -> None:
         """Ask it to stop; returns at once, may be called at any time and any number of times."""
 
-    def beat(self) -> None:
-        """Say that the owner is alive."""
+    def beat(self) -> None: ...
 
     def wait(self, timeout_s: float | None = None) -> RunRecord:
-        """Wait for the end of the run.
-
-        Raises TimeoutError if it has not come by then.
-
-        `timeout_s`: how long; for good where None [s].
-        """
+        """Wait for the end of the run [s], for good where None. Raises TimeoutError if it has not come by then."""
         ...
 
 
@@ -51,18 +127,13 @@ StartControl = Callable[[RunWorkspace, Report], ControlProcess]
 
 @dataclass(frozen=True)
 class Live:
-    """What is known of a run that goes on."""
-
     state: RunState
     percent: float | None
     figures: Mapping[str, Any]
 
 
 class RunSupervisor:
-    """One run on its way.
-
-    `stop` takes no lock and touches no disk: whatever else is stuck, it reaches the control process.
-    """
+    """`stop` takes no lock and touches no disk: whatever else is stuck, it reaches the control process."""
 
     def __init__(
         self,
@@ -73,13 +144,14 @@ class RunSupervisor:
         permit: Permit = FREE,
     ) -> None:
         self.live = Live(RunState.CREATED, None, {})
-        self._workspace = workspace
-        self._start = start
-        self._motion = motion
-        self._is_alive = is_alive
-        self._permit = permit
+        self._workspace, self._start, self._motion = workspace, start, motion
+        self._is_alive, self._permit = is_alive, permit
         self._control: ControlProcess | None = None
         self._stop_requested = threading.Event()
+
+    @property
+    def state(self) -> RunState:
+        return self.live.state
 
     def stop(self) -> None:
         """Stop the run, in whatever state it is; the arm has to be armed again before it moves again."""
@@ -87,7 +159,6 @@ class RunSupervisor:
         self._halt()
 
     def interrupt(self) -> None:
-        """Stop because the service ends."""
         self.stop()
 
     def _halt(self) -> None:
@@ -115,7 +186,6 @@ class RunSupervisor:
             self._end(RunState.FAILED, "internal", "the run met a fault of Tauscope's own; the service's log says more")
 
     def _supervise(self) -> None:
-        """Start the control process, and stay with it until it has ended."""
         self._control = control = self._start(self._workspace, self._handle_event)
         if self._stop_requested.is_set():
             control.stop()
@@ -173,8 +243,6 @@ class RunSupervisor:
 
 
 class RunManager(Manager[RunSupervisor]):
-    """The active runs, and the folders of all runs."""
-
     def __init__(
         self,
         items: ItemStore,
@@ -185,23 +253,14 @@ class RunManager(Manager[RunSupervisor]):
         on_end: Callable[[RunRecord], None] = lambda _record: None,
     ) -> None:
         super().__init__(items)
-        self.claims = claims
-        self._recordings = recordings
-        self._start = start
-        self._is_alive = is_alive
-        self._on_end = on_end
+        self.claims, self._recordings, self._start = claims, recordings, start
+        self._is_alive, self._on_end = is_alive, on_end
         self._pending: dict[str, RunWorkspace] = {}
         for identifier in items.identifiers():
             self._end(RunWorkspace(items.folder(identifier)), None)
 
     def submit(self, staged: Path, motion: Motion, holder: str | None = None, permit: Permit = FREE) -> str:
-        """Start a run.
-
-        Raises BusyError if somebody else has the arm; the folder stays staged. Raises LeaseError if the arm may not be
-        moved by that leave; the folder stays staged.
-
-        `holder`: who has the arm already, to whom the run belongs; None where the run takes the arm itself.
-        """
+        """Start a run; `holder` has the arm already. Raises BusyError or LeaseError; the folder stays staged then."""
         workspace = RunWorkspace(staged)
         request = workspace.read_order()
         if request is None:
@@ -222,39 +281,22 @@ class RunManager(Manager[RunSupervisor]):
                 raise
             workspace = RunWorkspace(self.items.folder(identifier))
             supervisor = RunSupervisor(workspace, self._start, motion, self._is_alive, permit)
-            self._threads.start(identifier, supervisor, lambda: self._end_supervised(workspace, claim))
+            self._supervise(identifier, supervisor, lambda: self._end_supervised(workspace, claim))
         return identifier
 
-    def stop(self, identifier: str) -> Live | None:
-        """Stop a run, in whatever state it is: takes no lock, waits for nothing, may be called any number of times.
-
-        Returns Live or None: where the run stood; None where it does not go on.
-        """
-        supervisor = self._threads.find(identifier)
-        if supervisor is None:
-            return None
-        supervisor.stop()
-        return supervisor.live
-
     def live(self, identifier: str) -> Live | None:
-        """The status of an active run; None for any other."""
-        supervisor = self._threads.find(identifier)
+        supervisor = self.find(identifier)
         return None if supervisor is None else supervisor.live
 
     def list_live(self) -> list[Live]:
-        """The status of each active run."""
-        return [supervisor.live for supervisor in self._threads.supervisors()]
+        return [supervisor.live for supervisor, _ in self._active.values()]
 
     def settle(self) -> None:
-        """Keep the recordings that a full disk did not take; to be called again and again.
-
-        Raises OSError if the disk is in the way still.
-        """
+        """Keep recordings that a full disk did not take. Raises OSError if it still does not."""
         for workspace in list(self._pending.values()):
             self._conclude(workspace)
 
     def _end_supervised(self, workspace: RunWorkspace, claim: tuple[str, str] | None) -> None:
-        """Put everything in its place, and tell whoever counts."""
         self._end(workspace, claim)
         record = workspace.read_run()
         if record is not None:
@@ -288,7 +330,6 @@ class RunManager(Manager[RunSupervisor]):
         self._pending.pop(identifier, None)
 
     def _keep_recording(self, workspace: RunWorkspace) -> None:
-        """Give the CSV of a run a name among the recordings; both names share the bytes on the disk."""
         path, record = workspace.recording("csv"), workspace.read_run()
         if record is not None and record.state.is_end and path.is_file():
             name = run_recording_name(workspace.folder.name)
@@ -296,5 +337,4 @@ class RunManager(Manager[RunSupervisor]):
 
 
 def run_recording_name(identifier: str) -> str:
-    """What the recording of a run is called among the recordings."""
     return f"run-{identifier}.csv"

@@ -6,8 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 
-from tauscope.identification.result import FrictionEntry, IdentificationDocument
+from pydantic import Field
+
+from tauscope.identification.result import IdentificationDocument
 from tauscope.server.history.gates import ModelPolicy
+from tauscope.strict_model import entry
 
 FRICTION_TERMS = ("stiction", "stribeck", "viscous", "offset")
 _LINK = re.compile(r"\d+$")
@@ -15,12 +18,7 @@ _LINK = re.compile(r"\d+$")
 
 @dataclass(frozen=True)
 class NamedParameter:
-    """An identified parameter.
-
-    `value`: estimate [SI].
-    `std`: its standard error [SI].
-    `scale`: what a change is a part of [SI]: the value itself, or what is larger where the value is next to nothing.
-    """
+    """`value` and its standard error `std` [SI]; `scale`: what a change is a part of [SI]."""
 
     name: str
     joint: str
@@ -30,76 +28,59 @@ class NamedParameter:
 
 
 def extract_parameters(document: IdentificationDocument) -> tuple[NamedParameter, ...]:
-    """The parameters of an identification that its recordings tell.
-
-    The shape constants K_v and δ are left out: they describe the same curve as stiction and Stribeck friction, and
-    wander with them.
-    """
+    """All but the shape constants K_v and δ, which describe the same curve as stiction and Stribeck friction."""
     return (*_base(document), *_friction(document), *_rotors(document))
 
 
 def _base(document: IdentificationDocument) -> Iterator[NamedParameter]:
     """Base parameters; a value within three standard errors of zero counts as three standard errors."""
-    for entry in document.base_parameters:
-        if entry.std is None or entry.std <= 0.0:
+    for each in document.base_parameters:
+        if each.std is None or each.std <= 0.0:
             continue
-        match = _LINK.search(next(iter(entry.terms), ""))
+        match = _LINK.search(next(iter(each.terms), ""))
         link = int(match.group()) if match else 1
         joint = document.joints[min(max(link, 1), len(document.joints)) - 1]
-        scale = max(abs(entry.value), 3.0 * entry.std)
-        yield NamedParameter(entry.name, joint, entry.value, entry.std, scale)
+        scale = max(abs(each.value), 3.0 * each.std)
+        yield NamedParameter(each.name, joint, each.value, each.std, scale)
 
 
 def _friction(document: IdentificationDocument) -> Iterator[NamedParameter]:
     """Friction terms; those that add to the same torque are measured by the joint's whole dry friction."""
-    for entry in document.friction:
-        level = abs(entry.stiction) + abs(entry.stribeck)
+    for each in document.friction:
+        level = abs(each.stiction) + abs(each.stribeck)
         for term in FRICTION_TERMS:
-            std = entry.std.get(term)
-            if std is None or std <= 0.0 or not entry.identifiable.get(term, True):
+            std = each.std.get(term)
+            if std is None or std <= 0.0 or not each.identifiable.get(term, True):
                 continue
-            value = _value(entry, term)
+            value = float(getattr(each, term))
             scale = max(abs(value), 3.0 * std, 0.0 if term == "viscous" else level)
-            yield NamedParameter(f"{term} {entry.joint}", entry.joint, value, std, scale)
+            yield NamedParameter(f"{term} {each.joint}", each.joint, value, std, scale)
 
 
 def _rotors(document: IdentificationDocument) -> Iterator[NamedParameter]:
-    """Reflected rotor inertias."""
-    for entry in document.rotor_inertia:
-        if entry.std is not None and entry.std > 0.0:
-            scale = max(abs(entry.value), 3.0 * entry.std)
-            yield NamedParameter(f"rotor_inertia {entry.joint}", entry.joint, entry.value, entry.std, scale)
+    for each in document.rotor_inertia:
+        if each.std is not None and each.std > 0.0:
+            scale = max(abs(each.value), 3.0 * each.std)
+            yield NamedParameter(f"rotor_inertia {each.joint}", each.joint, each.value, each.std, scale)
 
 
-def _value(entry: FrictionEntry, term: str) -> float:
-    return float(getattr(entry, term))
-
-
-@dataclass(frozen=True)
+@entry
 class Drift:
-    """The change of one parameter.
-
-    `before`, `after`: values [SI].
-    `std`: standard error of the difference [SI]; of two identifications that share no recording.
-    """
-
-    name: str
-    joint: str
-    before: float
-    after: float
-    std: float
-    in_std: float
-    share: float
+    name: str = Field(description="of the parameter", examples=["viscous joint3"])
+    joint: str = Field(description="that it belongs to")
+    before: float = Field(description="in the model that it is compared with [SI]")
+    after: float = Field(description="in this model [SI]")
+    std: float = Field(description="standard error of the difference [SI]")
+    in_std: float = Field(description="difference in standard errors")
+    share: float = Field(description="difference in parts of the earlier value")
 
 
 def compute_drift(before: Sequence[NamedParameter], after: Sequence[NamedParameter]) -> tuple[Drift, ...]:
-    """The change of every parameter that both identifications tell."""
     later = {parameter.name: parameter for parameter in after}
     return tuple(_drift(parameter, later[parameter.name]) for parameter in before if parameter.name in later)
 
 
 def find_largest_by_joint(drifts: Sequence[Drift]) -> Mapping[str, Drift]:
-    """For each joint its most significant change."""
     largest: dict[str, Drift] = {}
     for drift in drifts:
         if drift.joint not in largest or abs(drift.in_std) > abs(largest[drift.joint].in_std):
@@ -108,12 +89,10 @@ def find_largest_by_joint(drifts: Sequence[Drift]) -> Mapping[str, Drift]:
 
 
 def is_beyond(drift: Drift, policy: ModelPolicy) -> bool:
-    """Whether a change is both significant and large."""
     return abs(drift.in_std) > policy.drift_std and abs(drift.share) > policy.drift_share
 
 
 def _drift(before: NamedParameter, after: NamedParameter) -> Drift:
-    """The change of one parameter."""
     difference, std = after.value - before.value, math.hypot(before.std, after.std)
     return Drift(before.name, before.joint, before.value, after.value, std, difference / std, difference / before.scale)
 
@@ -128,26 +107,20 @@ _NOUNS = {
 
 
 def describe_drift(drift: Drift, elapsed: timedelta) -> str:
-    """A change in one sentence."""
     term = drift.name.partition(" ")[0]
     noun = _NOUNS.get(term, drift.name) if drift.name == f"{term} {drift.joint}" else drift.name
     difference = drift.after - drift.before
     # A percentage means something only where the earlier value is what the change was measured by, or near it.
-    amount = f" {100 * difference / abs(drift.before):+.0f} %" if abs(drift.before) > 0.5 * _measure(drift) else ""
+    measure = abs(difference / drift.share) if drift.share else 0.0
+    amount = f" {100 * difference / abs(drift.before):+.0f} %" if abs(drift.before) > 0.5 * measure else ""
     figures = f"{drift.before:.3g} → {drift.after:.3g}, {abs(drift.in_std):.0f} standard errors"
     return f"{drift.joint}: {noun}{amount} in {duration_words(elapsed)} ({figures})"
 
 
 def duration_words(elapsed: timedelta) -> str:
-    """A length of time, as people say it."""
     for unit, length, most in (("hour", 3600, 48), ("day", 86400, 14), ("week", 7 * 86400, 9)):
         count = round(elapsed.total_seconds() / length)
         if count < most:
             return f"{count} {unit}{'' if count == 1 else 's'}"
     count = round(elapsed.total_seconds() / (30.44 * 86400))
     return f"{count} months"
-
-
-def _measure(drift: Drift) -> float:
-    """What the change was measured by [SI]."""
-    return abs((drift.after - drift.before) / drift.share) if drift.share else 0.0

@@ -1,14 +1,13 @@
 """Acceptance gates: the bounds by which a new model is judged, and each gate's finding."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field, FiniteFloat
 
 from tauscope.identification.result import IdentificationDocument, LinkEntry
-from tauscope.strict_model import ResultModel
+from tauscope.strict_model import ResultModel, entry
 
 Ratio = Annotated[FiniteFloat, Field(ge=1.0)]
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
@@ -17,43 +16,29 @@ Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 class ModelPolicy(ResultModel):
     """Bounds for one robot."""
 
-    held_out_error: Positive = Field(
-        default=0.2, description="largest relative error on held-out recordings with which a model may become active"
-    )
-    held_out_ratio: Ratio = Field(
-        default=1.5, description="largest residual on held-out recordings, in residuals of the training (or its noise)"
-    )
-    consistency_ratio: Ratio = Field(
-        default=1.2, description="largest residual of the model with bodies, in residuals of the free estimate"
-    )
+    held_out_error: Positive = Field(default=0.2, description="largest relative error on held-out recordings")
+    held_out_ratio: Ratio = Field(default=1.5, description="largest held-out residual, in training residuals or noise")
+    consistency_ratio: Ratio = Field(default=1.2, description="largest residual with bodies, in free residuals")
     condition_number: Ratio = Field(default=500.0, description="largest condition number of the regressor")
-    drift_std: Positive = Field(
-        default=6.0, description="change of a parameter beyond which it is told, in joint standard errors"
-    )
-    drift_share: Positive = Field(
-        default=0.25, description="and in parts of its earlier value: both bounds have to be passed"
-    )
+    drift_std: Positive = Field(default=6.0, description="change that counts as drift, in joint standard errors")
+    drift_share: Positive = Field(default=0.25, description="and in parts of the earlier value: both have to be passed")
 
 
-@dataclass(frozen=True)
+@entry
 class Gate:
-    """One condition."""
-
-    name: str
-    passed: bool
-    reason: str
+    name: str = Field(description="held_out, consistency, excitation, structure, newer, source or diagnosis")
+    passed: bool = Field(description="whether it is met")
+    reason: str = Field(description="what was found, what is allowed, and what to do where it is not met")
 
 
 def check_gates(
     document: IdentificationDocument, policy: ModelPolicy, active: IdentificationDocument | None = None
 ) -> tuple[Gate, ...]:
-    """Judge a model."""
     gates = [_held_out(document, policy), _consistency(document, policy), _excitation(document, policy)]
     return tuple(gates if active is None else [*gates, _structure(document, active)])
 
 
 def passes(gates: Sequence[Gate]) -> bool:
-    """Whether all gates are met."""
     return all(gate.passed for gate in gates)
 
 
@@ -90,7 +75,6 @@ def _consistency(document: IdentificationDocument, policy: ModelPolicy) -> Gate:
 
 
 def _excitation(document: IdentificationDocument, policy: ModelPolicy) -> Gate:
-    """The motion shows every parameter."""
     if document.undetermined:
         names = ", ".join(document.undetermined[:3])
         return Gate("excitation", False, f"the recordings say nothing about {names}; record a richer motion")
@@ -101,13 +85,10 @@ def _excitation(document: IdentificationDocument, policy: ModelPolicy) -> Gate:
 
 
 def _structure(document: IdentificationDocument, active: IdentificationDocument) -> Gate:
-    """It is a model of the same arm."""
     if document.joints != active.joints:
         return Gate("structure", False, "other joints than the active model's; activate it by hand if the arm changed")
     if _names(document) != _names(active):
-        reason = (
-            "other base parameters than the active model's: the kinematics differ; activate it by hand if that is so"
-        )
+        reason = "other base parameters than the active model's: the kinematics differ; if so, activate it by hand"
         return Gate("structure", False, reason)
     return Gate("structure", True, "the same joints and base parameters as the active model")
 
@@ -130,4 +111,4 @@ def _ratios(rms: Sequence[float], floor: Sequence[float], joints: Sequence[str])
 
 
 def _names(document: IdentificationDocument) -> list[str]:
-    return [entry.name for entry in document.base_parameters]
+    return [each.name for each in document.base_parameters]

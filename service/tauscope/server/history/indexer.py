@@ -33,7 +33,6 @@ WORKSPACES: Mapping[str, type[Any]] = {
     "campaign": CampaignWorkspace,
 }
 """The folder of each kind of item that has a job's record; a run has a record of its own."""
-
 _ANALYSES = (IdentificationWorkspace, DiagnosisWorkspace, RolloutWorkspace)
 DAMAGED = "damaged"
 _ROLES = ("recordings", "held_out", "simulated", "refine")
@@ -42,7 +41,6 @@ _LIVING = {"state.json", "events.jsonl", "progress", "cancel", "run.json", "stop
 
 
 def read_metadata(kind: str, folder: Path) -> ItemMetadata:
-    """What an item's folder shows."""
     facts = _read_run(folder) if kind == "run" else _read_job(kind, folder)
     if not facts.is_final:
         return facts
@@ -65,10 +63,7 @@ def stamp(kind: str, folder: Path) -> str:
 
 
 def find_changed_file(folder: Path, artefacts: tuple[FileMetadata, ...], *, deep: bool) -> str | None:
-    """The first file of an item that is not what it was when the item ended.
-
-    Returns str or None: its path below the folder; None where all are as they were.
-    """
+    """Path, below the folder, of the first file that is not what it was when the item ended; None without one."""
     for file in artefacts:
         path = folder / file.path
         if path.is_symlink() or not path.is_file() or path.stat().st_size != file.size:
@@ -79,7 +74,6 @@ def find_changed_file(folder: Path, artefacts: tuple[FileMetadata, ...], *, deep
 
 
 def _artefacts(folder: Path) -> Iterator[FileMetadata]:
-    """Every regular file of an item that stays as it is; links are not followed."""
     for root, folders, names in os.walk(folder):
         folders.sort()
         for name in sorted(names):
@@ -90,7 +84,6 @@ def _artefacts(folder: Path) -> Iterator[FileMetadata]:
 
 
 def _read_job(kind: str, folder: Path) -> ItemMetadata:
-    """What every job in the queue, and a campaign, shows."""
     workspace = WORKSPACES[kind](folder)
     mark, record, order = stamp(kind, folder), workspace.read_record(), workspace.read_order()
     if record is None or order is None:
@@ -116,7 +109,6 @@ def _read_job(kind: str, folder: Path) -> ItemMetadata:
 
 
 def _roles(order: Any) -> Iterator[RecordingRole]:
-    """The recordings of an order; motions have none."""
     for role in _ROLES:
         listed = getattr(order, role, None)
         for entry in listed if isinstance(listed, tuple) else ():
@@ -140,7 +132,6 @@ def _figures(kind: str, document: Mapping[str, Any]) -> dict[str, str | float | 
 
 
 def _describe_damage(kind: str, folder: Path, mark: str, file: str) -> ItemMetadata:
-    """An item that has lost a file without which nothing can be said of it."""
     detail = f"{folder.name}: {file} is missing or damaged; restore it from a backup, or remove it"
     created = identifier_time(folder.name)
     return ItemMetadata(kind, folder.name, DAMAGED, True, mark, created, problem=(DAMAGED, detail))
@@ -167,33 +158,23 @@ def _read_run(folder: Path) -> ItemMetadata:
 
 
 _log = logging.getLogger("tauscope.jobs")
-
 BATCH = 200  # items that are indexed at once
-
 LONGEST_WAIT_S = 1.0
 """How long a search waits for what is new; while an old folder is indexed it finds what is indexed until then [s]."""
 
 
 @dataclass(frozen=True)
 class ChangedItem:
-    """An item of which a file is not what it was when the item ended; or a recording that is not what was kept."""
-
     kind: str
     identifier: str
     path: str
 
 
 class Indexer:
-    """Compares the folders with the index. The folders are right, always; nothing here writes to them.
-
-    Jobs and runs know nothing of the index: a database that is locked or gone holds up none of them, and what was
-    missed meanwhile is made up for by the next comparison.
-    """
+    """Keeps the index like the folders, which are right; a database that is gone holds up no job."""
 
     def __init__(self, index: Index, items: Mapping[str, ItemStore], recordings: RecordingStore) -> None:
-        self.index = index
-        self._items = items
-        self._recordings = recordings
+        self.index, self._items, self._recordings = index, items, recordings
         self._lock = threading.Lock()
         self._known: dict[str, dict[str, tuple[str, bool]]] = {}
         self._seen_recordings: object = None
@@ -201,10 +182,7 @@ class Indexer:
         self._is_closing = threading.Event()
 
     def sync(self, *, thorough: bool = False) -> None:
-        """Bring the index up to date.
-
-        Raises StoreError if the database does not answer; the next call goes on where this one ended.
-        """
+        """Bring the index up to date. Raises StoreError if the database does not answer; the next call goes on."""
         with self._lock:
             thorough = thorough or not self._is_whole
             if thorough:
@@ -215,14 +193,10 @@ class Indexer:
             self._is_whole = not self._is_closing.is_set()
 
     def close(self) -> None:
-        """Have what is being indexed end after the present item."""
         self._is_closing.set()
 
     def refresh(self) -> None:
-        """Bring the index up to date, unless that takes long because somebody else is at it.
-
-        Raises StoreError if the database does not answer.
-        """
+        """As `sync`, unless another thread is at it for long. Raises StoreError if the database does not answer."""
         if self._lock.acquire(timeout=LONGEST_WAIT_S):
             self._lock.release()
             self.sync()
@@ -284,7 +258,6 @@ class Indexer:
     def _read_changed(
         self, kind: str, store: ItemStore, identifier: str, indexed: tuple[str, bool] | None
     ) -> ItemMetadata | None:
-        """What one item shows, where its state is another than the indexed one."""
         try:
             identifier_time(identifier)
             folder = store.folder(identifier)
@@ -308,9 +281,6 @@ class Indexer:
 
 
 def open_index(index: Index, items: Mapping[str, ItemStore], recordings: RecordingStore, label: str) -> Indexer:
-    """Open the index of a data folder; `Indexer.sync` fills it from the folders, and upgrades an old one so.
-
-    Raises StoreError if the database does not answer.
-    """
+    """Register the data folder; `Indexer.sync` fills its index. Raises StoreError if the database does not answer."""
     index.register(label, datetime.now(UTC))
     return Indexer(index, items, recordings)

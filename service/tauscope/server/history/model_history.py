@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
+from pydantic import Field
 from sqlalchemy import select
 from sqlalchemy.orm import Session, aliased, undefer
 
@@ -15,12 +16,11 @@ from tauscope.server.history.gates import Gate, ModelPolicy
 from tauscope.server.history.model_judgement import Candidate, choose, judge
 from tauscope.server.store.database.database import Database, read_row
 from tauscope.server.store.database.tables import Item, Model, ModelEvent, Robot, RobotPolicy
+from tauscope.strict_model import entry
 
 
 @dataclass(frozen=True)
 class ModelEntry:
-    """A model of a robot."""
-
     identifier: str
     site: str
     robot: str
@@ -32,20 +32,18 @@ class ModelEntry:
     is_reference: bool
 
 
-@dataclass(frozen=True)
+@entry
 class ModelEventEntry:
-    """Something about a robot that people should know."""
-
-    number: int
-    robot: str
-    kind: str
-    parameter: str
-    text: str
-    details: Mapping[str, Any]
-    raised: datetime
-    last_seen: datetime
-    closed: datetime | None
-    note: str | None
+    number: int = Field(description="of the event")
+    robot: str = Field(description="name of the robot")
+    kind: str = Field(description="drift", examples=["drift"])
+    parameter: str = Field(description="that drifted")
+    text: str = Field(description="one line", examples=["joint3: viscous friction +40 % in 6 weeks"])
+    details: Mapping[str, Any] = Field(exclude=True)
+    raised: datetime = Field(description="when it was seen first, UTC")
+    last_seen: datetime = Field(description="when it was seen last, UTC")
+    closed: datetime | None = Field(description="when somebody took note, UTC")
+    note: str | None = Field(description="what they wrote")
 
 
 class ModelHistory:
@@ -67,20 +65,13 @@ class ModelHistory:
             return list(session.scalars(query))
 
     def consider(self, candidate: Candidate, now: datetime) -> ModelEntry:
-        """Judge an identification: compare it, make it active where it passes, and raise what people should know.
-
-        Raises NotFoundError if its robot is not in the index. Raises IntegrityError if another service judged it
-        meanwhile.
-        """
+        """Judge an identification. Raises NotFoundError without its robot, IntegrityError if it was judged already."""
         with self._database.writing() as session:
             robot = _robot(session, candidate.robot)
             return _entry(judge(session, robot, candidate, _policy(session, robot), now))
 
     def activate(self, identifier: str, role: str, reason: str, now: datetime) -> ModelEntry:
-        """Make a model the active one, or the one that drift is counted from, on somebody's word.
-
-        Raises NotFoundError if there is no such model, or nobody could read it.
-        """
+        """Make a model active, or the reference. Raises NotFoundError if there is none, or it is unreadable."""
         with self._database.writing() as session:
             model = _model(session, identifier)
             if model.state == "unreadable":
@@ -95,15 +86,11 @@ class ModelHistory:
             return frozenset(session.scalars(select(Model.identifier).where(Model.is_active | Model.is_reference)))
 
     def find(self, identifier: str) -> ModelEntry:
-        """A model. Raises NotFoundError if no such identification was judged."""
         with self._database.reading() as session:
             return _entry(_model(session, identifier))
 
     def document(self, identifier: str) -> IdentificationDocument:
-        """What a model says; also where its identification was removed.
-
-        Raises NotFoundError if no such identification was judged, or its result could not be read.
-        """
+        """What a model says, also where its identification was removed. Raises NotFoundError without it."""
         with self._database.reading() as session:
             content = _model(session, identifier).document
         if content is None:
@@ -111,7 +98,6 @@ class ModelHistory:
         return IdentificationDocument.model_validate(content)
 
     def active(self, robot: str) -> ModelEntry | None:
-        """The active model of a robot; None where none has passed yet."""
         query = select(Model).join(Robot).where(Robot.name == robot, Model.is_active)
         with self._database.reading() as session:
             model = session.scalar(query)
@@ -129,7 +115,6 @@ class ModelHistory:
             return {name: (now, then) for name, now, then in session.execute(query)}
 
     def models(self, robot: str | None, limit: int) -> list[ModelEntry]:
-        """Models, the newest first."""
         query = select(Model).join(Robot).order_by(Model.created.desc(), Model.id.desc()).limit(limit)
         if robot is not None:
             query = query.where(Robot.name == robot)
@@ -137,10 +122,7 @@ class ModelHistory:
             return [_entry(model) for model in session.scalars(query)]
 
     def documents(self, robot: str, since: datetime | None = None) -> list[tuple[ModelEntry, IdentificationDocument]]:
-        """Every model of a robot that was ever active, with what it says; the oldest first.
-
-        Raises NotFoundError if there is no such robot.
-        """
+        """Models that were ever active, the oldest first. Raises NotFoundError if there is no such robot."""
         query = select(Model).options(undefer(Model.document)).where(Model.state.in_(("active", "kept")))
         if since is not None:
             query = query.where(Model.created >= since)
@@ -154,15 +136,11 @@ class ModelHistory:
             return _policy(session, _robot(session, robot))
 
     def set_policy(self, robot: str, policy: ModelPolicy) -> None:
-        """Set the bounds for a robot; models that were judged stay as they were judged.
-
-        Raises NotFoundError if there is no such robot.
-        """
+        """Set the bounds for models that are judged from now on. Raises NotFoundError without the robot."""
         with self._database.writing() as session:
             session.merge(RobotPolicy(robot_id=_robot(session, robot).id, document=policy.model_dump()))
 
     def events(self, robot: str | None, *, only_open: bool, limit: int) -> list[ModelEventEntry]:
-        """What people should know, the newest first."""
         query = select(ModelEvent).join(Robot).order_by(ModelEvent.last_seen.desc(), ModelEvent.id.desc()).limit(limit)
         if robot is not None:
             query = query.where(Robot.name == robot)
@@ -172,10 +150,7 @@ class ModelHistory:
             return [_event(event) for event in session.scalars(query)]
 
     def acknowledge(self, number: int, note: str, now: datetime) -> ModelEventEntry:
-        """Take note of an event; nothing happens to one that was closed before.
-
-        Raises NotFoundError if there is no such event.
-        """
+        """Close an event, unless it is closed. Raises NotFoundError if there is no such event."""
         with self._database.writing() as session:
             event = session.get(ModelEvent, number)
             if event is None:
@@ -196,7 +171,6 @@ def _robot(session: Session, name: str) -> Robot:
 
 
 def _policy(session: Session, robot: Robot) -> ModelPolicy:
-    """The bounds for a robot: its own, or the general ones."""
     row = session.get(RobotPolicy, robot.id)
     return ModelPolicy() if row is None else ModelPolicy.model_validate(row.document)
 

@@ -20,8 +20,6 @@ Document = TypeVar("Document", bound=BaseModel)
 
 
 class NamedFinding(BaseModel):
-    """A finding of a diagnosis."""
-
     effect: str
     joint: str | None
 
@@ -36,8 +34,6 @@ class ParameterShift(BaseModel):
 
 
 class OwnDiagnosis(BaseModel):
-    """As much of a diagnosis as a model is judged by."""
-
     verdict: str
     findings: list[NamedFinding]
     parameter_shifts: list[ParameterShift]
@@ -45,11 +41,7 @@ class OwnDiagnosis(BaseModel):
 
 @dataclass(frozen=True)
 class Candidate:
-    """An identification that is to be judged.
-
-    `result`: its document; None where it cannot be read.
-    `diagnosis`: document of the diagnosis of the same recordings; None where there is none.
-    """
+    """`result` and `diagnosis` of the same recordings: their documents, None where there is none to be read."""
 
     identifier: str
     site: str
@@ -61,7 +53,6 @@ class Candidate:
 
 
 def judge(session: Session, robot: Robot, candidate: Candidate, policy: ModelPolicy, now: datetime) -> Model:
-    """Judge an identification, and write down what came of it."""
     document = _parse(candidate.result, IdentificationDocument)
     active, reference = _current(session, robot, is_active=True), _current(session, robot, is_active=False)
     model = Model(
@@ -111,7 +102,6 @@ def choose(session: Session, model: Model, role: str, reason: str, now: datetime
 
 
 def compare_models(before: IdentificationDocument, after: IdentificationDocument) -> tuple[Drift, ...]:
-    """The change of every parameter that two models tell."""
     return compute_drift(extract_parameters(before), extract_parameters(after))
 
 
@@ -129,10 +119,7 @@ def _check_place(candidate: Candidate, active: Model | None) -> Sequence[Gate]:
 
 
 def _check_diagnosis(content: bytes | None, document: IdentificationDocument, policy: ModelPolicy) -> Iterator[Gate]:
-    """A model whose parameters hold without the physics that its own diagnosis names.
-
-    A parameter that the findings move by as much as counts as drift is wrong in the model.
-    """
+    """A parameter that the diagnosis' findings move by as much as counts as drift is wrong in the model."""
     diagnosis = _parse(content, OwnDiagnosis)
     if diagnosis is None:
         return

@@ -26,17 +26,13 @@ class ModelRegistry:
     """Brings identifications before the history of models, in the order in which they were handed in."""
 
     def __init__(self, history: ModelHistory, site: str, items: Mapping[str, ItemStore]) -> None:
-        self.history = history
-        self._site = site
+        self.history, self._site = history, site
         self._identifications = items["identification"]
         self._diagnoses, self._campaigns, self._runs = items["diagnosis"], items["campaign"], items["run"]
         self._failed: set[str] = set()
 
     def judge_new(self) -> list[ModelEntry]:
-        """Judge every identification in the index that was not judged yet.
-
-        Raises StoreError if the database does not answer; the next call goes on where this one ended.
-        """
+        """Judge every indexed identification that was not. Raises StoreError; the next call goes on there."""
         return [entry for identifier in self.history.list_unjudged(self._site) if (entry := self._consider(identifier))]
 
     def _consider(self, identifier: str) -> ModelEntry | None:
@@ -79,7 +75,6 @@ class ModelRegistry:
         return None
 
     def _diagnosis(self, identifier: str | None) -> bytes | None:
-        """The result of a diagnosis; None where it has none."""
         with suppress(NotFoundError):
             return None if identifier is None else DiagnosisWorkspace(self._diagnoses.folder(identifier)).read_result()
         return None
@@ -106,8 +101,6 @@ _MOST_EVENTS = 10_000
 
 @dataclass(frozen=True)
 class RobotDrift:
-    """The active model of a robot against the one that drift is counted from."""
-
     active: str
     reference: str
     drifts: tuple[Drift, ...]
@@ -122,10 +115,7 @@ class DriftMonitor:
         self.robots: Mapping[str, RobotDrift] = {}
 
     def look(self) -> None:
-        """Bring what is known up to date.
-
-        Raises StoreError if the database does not answer; what was known before stays.
-        """
+        """Compare the models. Raises StoreError if the database does not answer; what was known before stays."""
         pairs = self._history.active_and_reference(self._site)
         told = self._history.events(None, only_open=True, limit=_MOST_EVENTS) if pairs else []
         events = Counter(event.robot for event in told if event.kind == "drift")

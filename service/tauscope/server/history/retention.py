@@ -16,17 +16,16 @@ _ALL = 10**9
 
 @dataclass(frozen=True)
 class RetentionRule:
-    """What may go."""
-
     older_than: timedelta
     kinds: frozenset[str]
     recordings: bool = False
 
 
+Removers = Mapping[str, Callable[[str], object]]  # what removes an item, by its kind
+
+
 @dataclass(frozen=True)
 class Removal:
-    """What goes."""
-
     items: tuple[ItemEntry, ...]
     recordings: tuple[str, ...]
 
@@ -34,11 +33,7 @@ class Removal:
 def plan_removal(
     indexer: Indexer, history: ModelHistory, recordings: RecordingStore, rule: RetentionRule, now: datetime
 ) -> Removal:
-    """What a rule lets go.
-
-    The identification of an active model, or of one that drift is counted from, stays; so does what goes on, and what
-    is damaged: somebody should look at it. Raises StoreError if the database does not answer.
-    """
+    """What a rule lets go: nothing active, unfinished or damaged, and no reference. Raises StoreError."""
     indexer.sync(thorough=True)
     list_protected = history.list_protected()
     going = [
@@ -58,13 +53,8 @@ def plan_removal(
     return Removal(tuple(going), names)
 
 
-def remove(
-    removal: Removal, removers: Mapping[str, Callable[[str], object]], recordings: RecordingStore, indexer: Indexer
-) -> Removal:
-    """Remove what was planned; what somebody else removed meanwhile is left out.
-
-    Raises OSError if something cannot be removed; what was removed before is gone.
-    """
+def remove(removal: Removal, removers: Removers, recordings: RecordingStore, indexer: Indexer) -> Removal:
+    """Remove what was planned and is still there. Raises OSError if something cannot be removed."""
     items = tuple(entry for entry in removal.items if _is_gone(removers[entry.kind], entry.identifier))
     names = tuple(name for name in removal.recordings if _is_gone(recordings.remove, name))
     indexer.sync(thorough=True)
@@ -79,30 +69,19 @@ def _is_gone(remove_one: Callable[[str], object], name: str) -> bool:
     return True
 
 
-class RetentionSweeper:
-    """A rule that is kept to while the service works, by the same ways by which its routes remove something."""
-
-    def __init__(
-        self,
-        rule: RetentionRule,
-        indexer: Indexer,
-        history: ModelHistory,
-        recordings: RecordingStore,
-        removers: Mapping[str, Callable[[str], object]],
-        on_removed: Callable[[str, str], None],
-    ) -> None:
-        self._rule, self._indexer, self._history = rule, indexer, history
-        self._recordings, self._removers, self._on_removed = recordings, removers, on_removed
-
-    def tidy(self) -> None:
-        """Remove what the rule lets go.
-
-        Raises StoreError if the database does not answer; nothing goes then. Raises OSError if something cannot be
-        removed.
-        """
-        plan = plan_removal(self._indexer, self._history, self._recordings, self._rule, utc_now())
-        gone = remove(plan, self._removers, self._recordings, self._indexer)
-        for entry in gone.items:
-            self._on_removed(entry.kind, entry.identifier)
-        for name in gone.recordings:
-            self._on_removed("recording", name)
+def sweep(
+    rule: RetentionRule,
+    indexer: Indexer,
+    history: ModelHistory,
+    recordings: RecordingStore,
+    removers: Removers,
+    on_removed: Callable[[str, str], None],
+) -> None:
+    """Remove what a rule lets go, as the routes do. Raises StoreError, before anything goes, or OSError."""
+    plan = plan_removal(indexer, history, recordings, rule, utc_now())
+    gone = remove(plan, removers, recordings, indexer)
+    for kind, name in [
+        *((each.kind, each.identifier) for each in gone.items),
+        *(("recording", e) for e in gone.recordings),
+    ]:
+        on_removed(kind, name)

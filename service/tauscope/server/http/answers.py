@@ -25,8 +25,6 @@ class AnswerModel(StrictModel):
 
 
 class PageAnswer(AnswerModel):
-    """A page of a list."""
-
     next: str | None = Field(default=None, description="to be given as `after` for the next page; null: it is the last")
 
 
@@ -36,20 +34,13 @@ def _no_nan(value: Any) -> Any:
 
 
 Measured = Annotated[float | None, BeforeValidator(_no_nan)]  # A number, or null where there was nothing to measure
-
-
 Identifier = Annotated[str, Path(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])]
 Limit = Annotated[int, Query(ge=1, le=1000, description="most entries of the list")]
 After = Annotated[str | None, Query(max_length=255, description="`next` of the page before; null: the first page")]
-
 ENDINGS = ("not-finished", "cancelled", "interrupted", "damaged", "storage-full")
 """Problems of a job without result, beside those of its work."""
-
-
 SUBMISSION = ("bad-request", "limit-exceeded", "media-type", "robot-file", "invalid-request", "storage-full")
 """Problems of handing anything in that comes with a robot file."""
-
-
 MOTION = ("busy", "leased", "lease-needed", "lease-lost", "not-armed")
 """Problems of moving an arm that somebody else has, or that the lease does not let move."""
 
@@ -60,27 +51,19 @@ def collection(request: Request, steps_below: int) -> str:
 
 
 class Links(AnswerModel):
-    """Where to go on from any item."""
-
     self_: str = Field(alias="self", description="its state")
     events: str = Field(description="what happens to it, as server-sent events")
 
 
 class JobLinks(Links):
-    """Where to go on from a job."""
-
     result: str | None = Field(default=None, description="its result, once it succeeded")
 
 
 class MotionLinks(Links):
-    """Where to go on from what moves an arm."""
-
     stop: str = Field(description="where a POST stops it")
 
 
 class JobAnswer(AnswerModel):
-    """The state of a job."""
-
     id: str = Field(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])
     state: JobState | Literal["damaged"] = Field(
         description="where it stands; interrupted: the service ended first; damaged: its files are missing or damaged"
@@ -110,21 +93,16 @@ def describe_job(workspace: Workspace, here: str) -> dict[str, Any]:
 
 
 def describe_damaged(identifier: str, here: str) -> dict[str, Any]:
-    """The fields of `JobAnswer` of a job whose files are missing or damaged."""
     detail = f"files of {identifier} are missing or damaged; remove it and hand it in again"
     return {"id": identifier, "state": "damaged", "problem": make_problem("damaged", detail, here)}
 
 
 def convert_problem(problem: JobProblem | None, here: str) -> Problem | None:
-    """The problem that a job ended in, as answers hold it."""
     return None if problem is None else make_problem(problem.code, problem.detail, here)
 
 
 def require_success(workspace: Workspace) -> None:
-    """Refuse to go on with a job that has no result.
-
-    Raises ProblemError if it has not succeeded: the problem that it ended in, or that it has not ended.
-    """
+    """Raises ProblemError if a job has not succeeded: the problem that it ended in, or that it has not ended."""
     identifier, record = workspace.folder.name, workspace.read_record()
     if record is None:
         raise ProblemError("damaged", f"the state of {identifier} is missing or damaged; remove it")
@@ -136,12 +114,7 @@ def require_success(workspace: Workspace) -> None:
 
 
 def require_document(content: bytes | None, identifier: str) -> bytes:
-    """The result of a job that succeeded.
-
-    Raises ProblemError if it is damaged.
-
-    `content`: as its folder holds it; None where it is damaged.
-    """
+    """The result of a job. Raises ProblemError where it is damaged: None."""
     if content is None:
         raise ProblemError("damaged", f"the result of {identifier} is missing or damaged; hand it in again")
     return content

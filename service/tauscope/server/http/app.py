@@ -33,29 +33,15 @@ from tauscope.server.http.services import open_services
 from tauscope.server.http.settings import Settings
 from tauscope.server.page.router import router as page
 
-API_VERSION = "1.22.0"
+API_VERSION = "1.23.0"
 """Of the interface, not of the package; a change of tests/server/http/openapi.json goes with a change here."""
-
 PREFIX = "/api/v1"
-
+_RESOURCES = (campaigns, excitations, runs, recordings, identifications, diagnoses, rollouts, robots, items, history)
 VERBS = (
-    campaigns.router,
-    excitations.router,
-    runs.router,
-    recordings.router,
-    recordings.mapping_router,
-    identifications.router,
-    diagnoses.router,
-    rollouts.router,
-    robots.router,
-    items.router,
-    history.router,
-    schedules.router,
-    leases.router,
-    leases.stop_router,
+    *(module.router for module in (*_RESOURCES, schedules, leases)),
+    *(recordings.mapping_router, leases.stop_router),
 )
 """Routers of everything that a client may ask for, below `PREFIX`."""
-
 PAGES = (health.router, pages.router, page)
 
 

@@ -14,7 +14,7 @@ from python_multipart.exceptions import FormParserError
 from python_multipart.multipart import MultipartParser, parse_options_header
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.errors import LimitExceededError
+from tauscope.errors import LimitExceededError, TauscopeError
 from tauscope.robot.messages import one_line, shown
 from tauscope.server.auth.gate import require_upload_quota
 from tauscope.server.problems import ProblemError, invalid_request
@@ -25,29 +25,21 @@ if TYPE_CHECKING:
 
 
 JSON = "application/json"
-
 Model = TypeVar("Model", bound=BaseModel)
 
 
 def media_type(request: Request) -> str:
-    """The media type of a request's body, without parameters."""
     return request.headers.get("content-type", "").partition(";")[0].strip().lower()
 
 
 def refuse_media_type(request: Request, *accepted: str) -> ProblemError:
-    """The problem of a body of another media type."""
     found = media_type(request) or "of no stated media type"
     headers = {"Accept-Post": ", ".join(accepted)}
     return ProblemError("media-type", f"the body is {found}; send {' or '.join(accepted)}", headers=headers)
 
 
 async def read_document(request: Request, kind: type[Model], limit: int) -> Model:
-    """The JSON body of a request.
-
-    Raises ProblemError if the body is not as the model wants it. Raises LimitExceededError if it is too large.
-
-    `limit`: largest body [bytes].
-    """
+    """The JSON body of a request, up to `limit` [bytes]. Raises ProblemError or LimitExceededError."""
     if media_type(request) != JSON:
         raise refuse_media_type(request, JSON)
     content = bytearray()
@@ -66,13 +58,13 @@ def parse_document(content: bytes, kind: type[Model], *, within: str) -> Model:
         raise invalid_request(error, within=within) from None
 
 
-def to_json_text(value: Any) -> str | None:
-    """Plain data as JSON; None where it holds NaN or infinity, or text that is not Unicode."""
+def to_json_text(value: Any, place: str, kind: type[TauscopeError]) -> str:
+    """Plain data as JSON. Raises an error of a kind where it holds NaN or infinity, or text that is not Unicode."""
     try:
         text = json.dumps(value, ensure_ascii=False, allow_nan=False)
         text.encode()
     except (ValueError, RecursionError):
-        return None
+        raise kind(f"{place}: holds NaN, infinity or text that is not Unicode; write plain numbers and text") from None
     return text
 
 
@@ -90,12 +82,7 @@ FORM = "multipart/form-data"
 
 @dataclass(frozen=True)
 class PartRule:
-    """What a part of a form may be.
-
-    `limit`: largest size [bytes].
-    `folder`: where its files are written; None for text that is kept in memory.
-    `default_name`: name of a file that was sent without one; None where it has to have one.
-    """
+    """`limit`: largest size [bytes]; `folder`: of its files, None for text; `default_name`: of a file without one."""
 
     limit: int
     folder: Path | None = None
@@ -105,23 +92,16 @@ class PartRule:
 
 @dataclass
 class ReceivedForm:
-    """A form that arrived as a whole."""
-
     texts: dict[str, bytes] = field(default_factory=dict)
     files: dict[str, list[KeptFile]] = field(default_factory=dict)
 
     def file(self, name: str) -> KeptFile | None:
-        """The only file of a part, or None."""
         files = self.files.get(name, [])
         return files[0] if files else None
 
 
 async def receive_form(request: Request, rules: Mapping[str, PartRule]) -> ReceivedForm:
-    """Read the form of a request; two files of one part never share a name.
-
-    Raises ProblemError if the body is no form, or has a part that is not foreseen, or a file of a name that is not
-    allowed; or the caller has sent enough for now. Raises LimitExceededError if a part is too large.
-    """
+    """Read a form. Raises ProblemError if a part or a name is not allowed, LimitExceededError if one is too large."""
     if media_type(request) != FORM:
         raise refuse_media_type(request, FORM)
     charge = require_upload_quota(request.scope)
@@ -159,8 +139,6 @@ def _form_errors() -> Iterator[None]:
 
 
 class _Receiver:
-    """Takes the parser's events and makes a form of them."""
-
     def __init__(self, rules: Mapping[str, PartRule]) -> None:
         self.form = ReceivedForm()
         self.has_ended = False

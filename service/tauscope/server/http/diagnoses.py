@@ -43,14 +43,8 @@ class DiagnosisRequest(RecordingsRequest):
         description="names of the recordings that are to be explained: files of this form, or on the server; null: all"
         " files sent as part `recordings`",
     )
-    held_out: Names | None = Field(
-        default=None,
-        description="names of the recordings that confirm findings; null: all files sent as part `held_out`",
-    )
-    simulated: Names | None = Field(
-        default=None,
-        description="names of recordings made in your own simulator; null: all files sent as part `simulated`",
-    )
+    held_out: Names | None = Field(default=None, description="recordings that confirm findings; null: all sent")
+    simulated: Names | None = Field(default=None, description="recordings of your own simulator; null: all sent")
     model: str | dict[str, Any] | None = Field(
         default=None,
         description="model to compare with, for `against` saved: a model document, or the identifier of a diagnosis"
@@ -83,29 +77,21 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 
 
 class DiagnosisLinksAnswer(JobLinks):
-    """Where to go on from a diagnosis."""
-
     plots: str | None = Field(default=None, description="data of its figures, once it succeeded")
     report: str | None = Field(default=None, description="its report as a page, once it succeeded")
     model: str | None = Field(default=None, description="the model with all findings, once it succeeded")
     scenario: str | None = Field(default=None, description="its findings for the simulated arm, once it succeeded")
-    improved_robot: str | None = Field(
-        default=None, description="the robot file with what was identified, once it succeeded"
-    )
+    improved_robot: str | None = Field(default=None, description="the robot file with the findings, once it succeeded")
     exports: dict[str, str] = Field(default={}, description="its compensation code by format, once it succeeded")
     next_trajectory: str | None = Field(default=None, description="the motion to record next, where one was planned")
 
 
 class DiagnosisAnswer(JobAnswer):
-    """The state of a diagnosis."""
-
     recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what is explained")
     held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what findings are confirmed by")
     simulated: tuple[OrderedRecording, ...] = Field(default=(), description="what the user's simulator recorded")
     options: DiagnosisOptions | None = Field(default=None, description="how it is diagnosed")
-    refused_exports: dict[str, str] = Field(
-        default={}, description="formats that cannot hold this model, each with the reason"
-    )
+    refused_exports: dict[str, str] = Field(default={}, description="reason by format that cannot hold this model")
     links: DiagnosisLinksAnswer = Field(description="where to go on")
 
 
@@ -113,11 +99,7 @@ YAML = "text/yaml"  # an alias of application/yaml (RFC 9512), which generators 
 
 
 def place_model(received: Received[DiagnosisRequest], services: Services, workspace: Any) -> dict[str, str | None]:
-    """Put the model that is compared with into its place; what is compared with and what was sent belong together.
-
-    Raises ProblemError where they do not, or the model came twice. Raises NotFoundError if there is no diagnosis of
-    that identifier.
-    """
+    """Put the model into its place. Raises ProblemError if it came twice or is not `against`, or NotFoundError."""
     document, file = received.document, received.form.file("model")
     against, has_simulated = document.options.against, bool(received.form.files.get("simulated") or document.simulated)
     if (against == "simulation") != has_simulated:

@@ -25,9 +25,7 @@ from tauscope.trajectory.csv_format import PIECE_ROWS
 class ExcitationRequest(RobotRequest):
     """Which motion is wanted."""
 
-    options: ExcitationDesignOptions = Field(
-        default=ExcitationDesignOptions(), description="how the motion is designed"
-    )
+    options: ExcitationDesignOptions = Field(default=ExcitationDesignOptions(), description="how the motion is made")
 
 
 EXAMPLES: dict[str, tuple[str, Any]] = {
@@ -40,15 +38,11 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 
 
 class ExcitationLinks(JobLinks):
-    """Where to go on from an excitation."""
-
     result: str | None = Field(default=None, description="its document, once it succeeded")
     trajectory: str | None = Field(default=None, description="its trajectory, once it succeeded")
 
 
 class ExcitationAnswer(JobAnswer):
-    """The state of an excitation."""
-
     options: ExcitationDesignOptions | None = Field(default=None, description="how the motion is designed")
     links: ExcitationLinks = Field(description="where to go on")
 
@@ -68,7 +62,7 @@ EXCITATIONS = QueuedTask(
     examples=EXAMPLES,
     summary="Have a motion designed",
     words="The robot is checked at once, the motion is designed by the job: follow `Location` until it has ended.",
-    submission_problems=("queue-full",),
+    problems=("queue-full",),
     work_problems=("excitation", "robot-file"),
     documents=(
         JobDocument(

@@ -17,15 +17,11 @@ router = APIRouter(tags=["health"])
 
 
 class HealthAnswer(AnswerModel):
-    """The service is there."""
-
     status: Literal["ok"] = Field(description="always ok: a service that cannot answer does not")
     version: str = Field(description="of Tauscope", examples=["0.1.0"])
 
 
 class ReadyAnswer(AnswerModel):
-    """The service can work."""
-
     status: Literal["ready"] = Field(description="always ready: else the answer is a problem")
 
 

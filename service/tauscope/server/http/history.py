@@ -1,9 +1,8 @@
 """Models over HTTP: their history, gates, trends, policies and events."""
 
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Mapping
 from datetime import UTC, datetime
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import Field
@@ -11,11 +10,11 @@ from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
-from tauscope.server.history.drift import find_largest_by_joint
-from tauscope.server.history.gates import ModelPolicy
-from tauscope.server.history.model_history import ModelEntry
+from tauscope.server.history.drift import Drift, find_largest_by_joint
+from tauscope.server.history.gates import Gate, ModelPolicy
+from tauscope.server.history.model_history import ModelEntry, ModelEventEntry
 from tauscope.server.history.model_judgement import compare_models
-from tauscope.server.history.trend import parameter_trends
+from tauscope.server.history.trend import ParameterTrend, parameter_trends
 from tauscope.server.http.answers import AnswerModel, Identifier, Limit, collection
 from tauscope.server.http.bodies import read_document
 from tauscope.server.http.openapi import json_request
@@ -27,29 +26,15 @@ from tauscope.strict_model import StrictModel
 class ReasonRequest(StrictModel):
     """Why somebody decides something; kept with the decision."""
 
-    reason: Annotated[str, Field(min_length=1, max_length=1000)] = Field(
-        description="one line", examples=["gear oil changed on 3 November"]
-    )
-
-
-class GateAnswer(AnswerModel):
-    """A condition for becoming the active model."""
-
-    name: str = Field(description="held_out, consistency, excitation, structure, newer or source")
-    passed: bool = Field(description="whether it is met")
-    reason: str = Field(description="what was found, what is allowed, and what to do where it is not met")
+    reason: Annotated[str, Field(min_length=1, max_length=1000)] = Field(description="one line", examples=["new oil"])
 
 
 class ModelLinksAnswer(AnswerModel):
-    """Where to go on from a model."""
-
     self_: str = Field(alias="self", description="the model")
     document: str = Field(description="what it says: the identification's document")
 
 
 class ModelAnswer(AnswerModel):
-    """A model of a robot: an identification that was judged."""
-
     id: str = Field(description="identifier of the identification", examples=["20261103T101502Z-1f2e3d4c"])
     site: str = Field(description="identifier of the data folder that holds the identification")
     robot: str = Field(description="name of the robot")
@@ -60,138 +45,43 @@ class ModelAnswer(AnswerModel):
         description="active: in use; kept: was in use; refused: did not pass a gate; unreadable: its result is damaged"
     )
     is_reference: bool = Field(description="whether drift is counted from this model")
-    gates: tuple[GateAnswer, ...] = Field(description="what it had to show")
+    gates: tuple[Gate, ...] = Field(description="what it had to show")
     links: ModelLinksAnswer = Field(description="where to go on")
 
 
 class ModelListAnswer(AnswerModel):
-    """Models of a robot."""
-
     models: list[ModelAnswer] = Field(description="the newest first")
 
 
-class DriftAnswer(AnswerModel):
-    """The change of a parameter."""
-
-    name: str = Field(description="of the parameter", examples=["viscous joint3"])
-    joint: str = Field(description="that it belongs to")
-    before: float = Field(description="in the model that it is compared with [SI]")
-    after: float = Field(description="in this model [SI]")
-    std: float = Field(description="standard error of the difference [SI]")
-    in_std: float = Field(description="difference in standard errors")
-    share: float = Field(description="difference in parts of the earlier value")
-
-
 class ComparisonAnswer(AnswerModel):
-    """One model compared with another."""
-
     before: str = Field(description="identifier of the model that it is compared with")
     after: str = Field(description="identifier of this model")
-    parameters: list[DriftAnswer] = Field(description="every parameter that both tell")
-    joints: dict[str, DriftAnswer] = Field(description="for each joint its most significant change")
-
-
-class TrendPointAnswer(AnswerModel):
-    """A parameter in one model."""
-
-    time: datetime = Field(description="when its identification was handed in, UTC")
-    value: float = Field(description="estimate [SI]")
-    std: float = Field(description="its standard error [SI]")
-    model: str = Field(description="identifier of the model")
-
-
-class LineAnswer(AnswerModel):
-    """The straight line through the points."""
-
-    count: int = Field(description="number of points")
-    slope: float = Field(description="change a week [SI]")
-    slope_std: float = Field(description="its standard error, scatter of the points included [SI]")
-    scatter: float = Field(description="1 where the points scatter as their standard errors say")
-    change: float = Field(description="of the line from the first point to the last [SI]")
-    in_std: float = Field(description="slope in its standard errors")
-
-
-class ParameterTrendAnswer(AnswerModel):
-    """A parameter over time."""
-
-    name: str = Field(description="of the parameter")
-    joint: str = Field(description="that it belongs to")
-    points: list[TrendPointAnswer] = Field(description="in every model that was ever active, the oldest first")
-    line: LineAnswer | None = Field(description="null before there are three points")
+    parameters: tuple[Drift, ...] = Field(description="every parameter that both tell")
+    joints: Mapping[str, Drift] = Field(description="for each joint its most significant change")
 
 
 class TrendAnswer(AnswerModel):
-    """Every parameter of a robot over time."""
-
     robot: str = Field(description="name of the robot")
-    parameters: list[ParameterTrendAnswer] = Field(description="in the order of the newest model")
-
-
-class EventAnswer(AnswerModel):
-    """Something about a robot that people should know."""
-
-    number: int = Field(description="of the event")
-    robot: str = Field(description="name of the robot")
-    kind: str = Field(description="drift", examples=["drift"])
-    parameter: str = Field(description="that drifted")
-    text: str = Field(
-        description="one line", examples=["joint3: viscous friction +40 % in 6 weeks (0.5 → 0.7, 12 standard errors)"]
-    )
-    raised: datetime = Field(description="when it was seen first, UTC")
-    last_seen: datetime = Field(description="when it was seen last, UTC")
-    closed: datetime | None = Field(description="when somebody took note, UTC")
-    note: str | None = Field(description="what they wrote")
+    parameters: list[ParameterTrend] = Field(description="in the order of the newest model")
 
 
 class EventListAnswer(AnswerModel):
-    """What people should know."""
-
-    events: list[EventAnswer] = Field(description="the newest first")
+    events: list[ModelEventEntry] = Field(description="the newest first")
 
 
 def make_model_answer(entry: ModelEntry, collection: str) -> ModelAnswer:
-    """The answer that holds a model."""
     here = f"{collection}/{entry.identifier}"
     links = ModelLinksAnswer(self=here, document=f"{here}/document")
     return ModelAnswer.describe(entry, id=entry.identifier, links=links)
 
 
-def comparison_answer(
-    before: str, earlier: IdentificationDocument, after: str, later: IdentificationDocument
-) -> ComparisonAnswer:
-    """The answer that compares two models."""
-    drifts = compare_models(earlier, later)
-    return ComparisonAnswer(
-        before=before,
-        after=after,
-        parameters=[DriftAnswer.model_validate(drift) for drift in drifts],
-        joints={joint: DriftAnswer.model_validate(drift) for joint, drift in find_largest_by_joint(drifts).items()},
-    )
-
-
-def trend_answer(robot: str, models: Sequence[tuple[ModelEntry, IdentificationDocument]]) -> TrendAnswer:
-    """The answer that shows a robot's parameters over time.
-
-    `models`: sequence of (ModelEntry, IdentificationDocument), every model that was ever active, the oldest first.
-    """
-    parameters = []
-    for trend in parameter_trends(models):
-        points = [TrendPointAnswer(**asdict(point), model=model) for model, point in trend.points]
-        line = None if trend.line is None else LineAnswer.model_validate(trend.line)
-        parameters.append(ParameterTrendAnswer(name=trend.name, joint=trend.joint, points=points, line=line))
-    return TrendAnswer(robot=robot, parameters=parameters)
-
-
 router = APIRouter(tags=["models"], responses=problem_responses("store"))
-
 RobotName = Annotated[str, Query(alias="robot", min_length=1, max_length=1000, description="name of the robot")]
-AnyRobot = Annotated[
-    str | None, Query(alias="robot", max_length=1000, description="name of the robot; any where absent")
-]
+AnyRobot = Annotated[str | None, Query(alias="robot", max_length=1000, description="name of the robot; default: any")]
 Number = Annotated[int, Path(ge=1, le=2**31 - 1, description="number of the event")]
-
 _REASON = {"why": ("Why", {"reason": "gear oil changed on 3 November"})}
-_BODY_PROBLEMS = ("bad-request", "limit-exceeded", "media-type", "not-found")
+_BODY_PROBLEMS = problem_responses("bad-request", "limit-exceeded", "media-type", "not-found")
+_WITH_REASON: Any = {"responses": _BODY_PROBLEMS, "openapi_extra": json_request(ReasonRequest, _REASON)}
 
 
 @router.get("/models", summary="List models")
@@ -236,26 +126,17 @@ def get_model_drift(
     before = since or next((each.identifier for each in history.models(robot, 10_000) if each.is_reference), None)
     if before is None:
         raise NotFoundError("no model of this robot has passed yet, so there is no reference; name one with since")
-    return comparison_answer(before, history.document(before), identifier, after)
+    drifts = compare_models(history.document(before), after)
+    return ComparisonAnswer(before=before, after=identifier, parameters=drifts, joints=find_largest_by_joint(drifts))
 
 
-@router.post(
-    "/models/{identifier}/activate",
-    summary="Make a model the active one",
-    responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra=json_request(ReasonRequest, _REASON),
-)
+@router.post("/models/{identifier}/activate", summary="Make a model the active one", **_WITH_REASON)
 async def activate_model(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
     """Also one that was refused; the one before is kept. The reason is kept with the choice."""
     return await _choose(request, identifier, services, "active")
 
 
-@router.post(
-    "/models/{identifier}/make-reference",
-    summary="Count drift from a model",
-    responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra=json_request(ReasonRequest, _REASON),
-)
+@router.post("/models/{identifier}/make-reference", summary="Count drift from a model", **_WITH_REASON)
 async def make_reference(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
     """After maintenance, say; drifts that are open are closed."""
     return await _choose(request, identifier, services, "reference")
@@ -265,7 +146,7 @@ async def make_reference(request: Request, identifier: Identifier, services: Ser
 def get_trend(services: ServicesDep, robot: RobotName) -> TrendAnswer:
     """Every parameter in every model that was ever active, and the straight line through it."""
     _bring_up_to_date(services)
-    return trend_answer(robot, services.models.history.documents(robot))
+    return TrendAnswer(robot=robot, parameters=parameter_trends(services.models.history.documents(robot)))
 
 
 @router.get("/model-policy", summary="Look up the bounds of a robot", responses=problem_responses("not-found"))
@@ -277,10 +158,8 @@ def get_policy(services: ServicesDep, robot: RobotName) -> ModelPolicy:
 @router.put(
     "/model-policy",
     summary="Set the bounds of a robot",
-    responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra=json_request(
-        ModelPolicy, {"drift": ("Tell smaller changes", {"drift_share": 0.1, "drift_std": 5.0})}
-    ),
+    responses=_BODY_PROBLEMS,
+    openapi_extra=json_request(ModelPolicy, {"drift": ("Tell smaller changes", {"drift_share": 0.1, "drift_std": 5})}),
 )
 async def set_policy(request: Request, services: ServicesDep, robot: RobotName) -> ModelPolicy:
     """They hold for models that are judged from now on; what is left out takes its default."""
@@ -298,21 +177,15 @@ def list_events(
 ) -> EventListAnswer:
     """Parameters that have drifted beyond the bounds; one event for each, brought up to date while it is open."""
     _bring_up_to_date(services)
-    events = services.models.history.events(robot, only_open=only_open, limit=limit)
-    return EventListAnswer(events=[EventAnswer.model_validate(event) for event in events])
+    return EventListAnswer(events=services.models.history.events(robot, only_open=only_open, limit=limit))
 
 
-@router.post(
-    "/events/{number}/acknowledge",
-    summary="Take note of an event",
-    responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra=json_request(ReasonRequest, _REASON),
-)
-async def acknowledge_event(request: Request, number: Number, services: ServicesDep) -> EventAnswer:
+@router.post("/events/{number}/acknowledge", summary="Take note of an event", **_WITH_REASON)
+async def acknowledge_event(request: Request, number: Number, services: ServicesDep) -> ModelEventEntry:
     """It is closed; another one is raised when the parameter is found beyond its bounds again."""
     body = await read_document(request, ReasonRequest, services.settings.max_document_bytes)
     history, now = services.models.history, datetime.now(UTC)
-    return EventAnswer.model_validate(await run_in_threadpool(history.acknowledge, number, body.reason, now))
+    return await run_in_threadpool(history.acknowledge, number, body.reason, now)
 
 
 async def _choose(request: Request, identifier: str, services: Services, role: str) -> ModelAnswer:

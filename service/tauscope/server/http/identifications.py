@@ -26,10 +26,7 @@ class IdentificationRequest(RecordingsRequest):
         description="names of the recordings that the model is made from: files of this form, or on the server;"
         " null: all files sent as part `recordings`",
     )
-    held_out: Names | None = Field(
-        default=None,
-        description="names of the recordings that it is judged by; null: all files sent as part `held_out`",
-    )
+    held_out: Names | None = Field(default=None, description="recordings that judge it; null: every part `held_out`")
     options: IdentificationOptions = Field(default=IdentificationOptions(), description="how it is identified")
 
 
@@ -47,8 +44,6 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 
 
 class LinksAnswer(JobLinks):
-    """Where to go on from an identification."""
-
     plots: str | None = Field(default=None, description="data of its figures, once it succeeded")
     report: str | None = Field(default=None, description="its report as a page, once it succeeded")
     model: str | None = Field(default=None, description="the identified model, once it succeeded")
@@ -56,14 +51,10 @@ class LinksAnswer(JobLinks):
 
 
 class IdentificationAnswer(JobAnswer):
-    """The state of an identification."""
-
     recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what the model is made from")
     held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what it is judged by")
     options: IdentificationOptions | None = Field(default=None, description="how it is identified")
-    refused_exports: dict[str, str] = Field(
-        default={}, description="formats that cannot hold this model, each with the reason"
-    )
+    refused_exports: dict[str, str] = Field(default={}, description="reason by format that cannot hold this model")
     links: LinksAnswer = Field(description="where to go on")
 
 
@@ -83,9 +74,7 @@ IDENTIFICATIONS = QueuedTask(
     work_problems=("robot-file", "recording", "recording-mismatch", "identification", "invalid-request"),
     documents=(
         result_document("an identification", "identify", IdentificationDocument),
-        plots_document(
-            "the identification", IdentificationPlots, "torque over time and friction over velocity, joint by joint"
-        ),
+        plots_document("the identification", IdentificationPlots, "torque over time, friction over velocity"),
         JobDocument(
             "model",
             MODEL_FILE,

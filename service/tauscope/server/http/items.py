@@ -11,12 +11,10 @@ from tauscope.server.http.robot_files import RobotVersionAnswer
 from tauscope.server.http.services import ServicesDep
 from tauscope.server.problems import problem_responses
 from tauscope.server.store.data_folder import FOLDERS, ItemKind
-from tauscope.server.store.database.index import ItemEntry, ItemQuery
+from tauscope.server.store.database.index import ItemEntry, ItemQuery, RobotEntry
 
 
 class ItemAnswer(AnswerModel):
-    """Something that is kept, as a search finds it."""
-
     kind: str = Field(description="excitation, run, identification, diagnosis, rollout or campaign", examples=["run"])
     id: str = Field(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])
     site: str = Field(description="identifier of the data folder that holds it")
@@ -34,29 +32,16 @@ class ItemAnswer(AnswerModel):
 
 
 class ItemListAnswer(AnswerModel):
-    """What a search found."""
-
     items: list[ItemAnswer] = Field(description="the newest first")
     before: datetime | None = Field(description="to be given as `before` for the next ones; null where there are none")
 
 
-class KnownRobotAnswer(AnswerModel):
-    """A robot that something is kept about."""
-
-    name: str = Field(description="as in its file")
-    first_seen: datetime = Field(description="when the first item about it was handed in, UTC")
-    last_seen: datetime = Field(description="when the last one was, UTC")
-
-
 class RobotListAnswer(AnswerModel):
-    """Robots that something is kept about."""
-
-    robots: list[KnownRobotAnswer] = Field(description="by name")
+    robots: list[RobotEntry] = Field(description="by name")
     versions: list[RobotVersionAnswer] = Field(description="robots that were sent to be kept, the newest first")
 
 
 router = APIRouter(tags=["items"], responses=problem_responses("store"))
-
 Kind = Annotated[ItemKind | None, Query(description="kind of item")]
 State = Annotated[str | None, Query(max_length=40, description="where it stands", examples=["succeeded", "damaged"])]
 RobotName = Annotated[str | None, Query(max_length=1000, description="name of the robot")]
@@ -85,19 +70,15 @@ def search_items(
     services.index.refresh()
     query = ItemQuery(kind, state, robot, None, recording_sha256, before, limit)
     found = [_answer(entry, services.index.index.site) for entry in services.index.index.search(query)]
-    return ItemListAnswer(items=found, before=_next(found, limit))
+    return ItemListAnswer(items=found, before=found[-1].created if len(found) == limit else None)
 
 
 @router.get("/robots", tags=["robots"], summary="List the robots")
 def list_robots(services: ServicesDep) -> RobotListAnswer:
     """Every robot that something is or was kept about; its name is the one in its file."""
     services.index.refresh()
-    known = [KnownRobotAnswer.model_validate(each) for each in services.index.index.robots()]
+    known = services.index.index.robots()
     return RobotListAnswer(robots=known, versions=[RobotVersionAnswer.of(each) for each in services.robots.versions()])
-
-
-def _next(found: list[ItemAnswer], limit: int) -> datetime | None:
-    return found[-1].created if len(found) == limit else None
 
 
 def _answer(entry: ItemEntry, site: str) -> ItemAnswer:

@@ -27,13 +27,9 @@ class LeaseRequest(StrictModel):
 
     robot: str = Field(min_length=1, max_length=200, description="what the robot file calls the robot")
     backend: BackendName | None = Field(default=None, description="what moves it; null: the service's own")
-    ttl_s: float = Field(
-        default=10.0, ge=1.0, le=LONGEST_TTL_S, description="how long the lease lasts without a heartbeat [s]"
-    )
+    ttl_s: float = Field(default=10.0, ge=1.0, le=LONGEST_TTL_S, description="how long it lasts without heartbeat [s]")
     holder: str = Field(default="", max_length=100, description="who wants it, for others to read; default: the key")
-    take: bool = Field(
-        default=False, description="take the arm from whoever has its lease, and stop it; needs the scope admin"
-    )
+    take: bool = Field(default=False, description="take the arm from its holder, and stop it; needs the scope admin")
 
 
 EXAMPLES: dict[str, tuple[str, Any]] = {
@@ -42,8 +38,6 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 
 
 class LeaseLinks(AnswerModel):
-    """What its holder does with a lease."""
-
     self_: str = Field(alias="self", description="the lease; DELETE gives it back")
     heartbeat: str = Field(description="where a POST is a sign of life")
     arm: str = Field(description="where a POST lets the arm move")
@@ -51,13 +45,9 @@ class LeaseLinks(AnswerModel):
 
 
 class LeaseAnswer(AnswerModel):
-    """A lease that holds."""
-
     id: str = Field(description="identifier", examples=["lease-7"])
     number: int = Field(description="above that of every earlier lease since the service started")
-    token: str | None = Field(
-        default=None, description="what to send as header Lease-Token; told to whoever takes the lease, once"
-    )
+    token: str | None = Field(default=None, description="for the header Lease-Token; told once, to its holder")
     arm: str = Field(description="the arm", examples=["two-joint-arm on sim"])
     holder: str = Field(description="who has it")
     armed: bool = Field(description="whether the arm may move")
@@ -67,14 +57,10 @@ class LeaseAnswer(AnswerModel):
 
 
 class LeaseListAnswer(AnswerModel):
-    """Leases that hold."""
-
     leases: list[LeaseAnswer] = Field(description="the newest first")
 
 
 class StopAllAnswer(AnswerModel):
-    """What was stopped."""
-
     runs: list[str] = Field(description="identifiers of the runs that were asked to stop")
     campaigns: list[str] = Field(description="identifiers of the campaigns that were asked to stop")
     time: datetime = Field(description="when, UTC")
@@ -93,7 +79,6 @@ LeaseToken = Annotated[
 
 
 def find_owner(request: Request) -> str:
-    """Whose a lease is that this request takes or uses."""
     return find_caller(request.scope).key or "local"
 
 
@@ -105,11 +90,9 @@ def permit_of(request: Request, services: Services, device: str) -> Permit:
 
 router = APIRouter(prefix="/leases", tags=["leases"])
 stop_router = APIRouter(tags=["runs"])
-
 Identifier = Annotated[str, Path(description="identifier of the lease", examples=["lease-7"])]
-
 _HELD = problem_responses("lease-lost", "unauthorized")
-_NO_BODY = {"requestBody": {"required": False, "content": {}}}
+NO_BODY = {"requestBody": {"required": False, "content": {}}}
 
 
 @router.post(
@@ -155,21 +138,21 @@ async def get_lease(request: Request, identifier: Identifier, services: Services
     return _answer(services, lease, request.url.path.rsplit("/", 1)[0])
 
 
-@router.post("/{identifier}/heartbeat", summary="Keep a lease", responses=_HELD, openapi_extra=_NO_BODY)
+@router.post("/{identifier}/heartbeat", summary="Keep a lease", responses=_HELD, openapi_extra=NO_BODY)
 async def keep_lease(request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken) -> LeaseAnswer:
     """A sign of life: the lease lasts for its whole time again. One that has ended is not brought back."""
     lease = services.leases.renew(_device(services, identifier), token or "", find_owner(request))
     return _answer(services, lease, request.url.path.rsplit("/", 2)[0])
 
 
-@router.post("/{identifier}/arm", summary="Arm a lease", responses=_HELD, openapi_extra=_NO_BODY)
+@router.post("/{identifier}/arm", summary="Arm a lease", responses=_HELD, openapi_extra=NO_BODY)
 async def arm_lease(request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken) -> LeaseAnswer:
     """From now on the arm moves when a run or a campaign is handed in with the lease. Every stop disarms."""
     lease = services.leases.arm(_device(services, identifier), token or "", find_owner(request), armed=True)
     return _answer(services, lease, request.url.path.rsplit("/", 2)[0])
 
 
-@router.post("/{identifier}/disarm", summary="Disarm a lease", responses=_HELD, openapi_extra=_NO_BODY)
+@router.post("/{identifier}/disarm", summary="Disarm a lease", responses=_HELD, openapi_extra=NO_BODY)
 async def disarm_lease(
     request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken
 ) -> LeaseAnswer:
@@ -184,7 +167,7 @@ async def release_lease(request: Request, identifier: Identifier, services: Serv
     services.leases.release(_device(services, identifier), token or "", find_owner(request))
 
 
-@stop_router.post("/stop", status_code=202, summary="Stop every arm", openapi_extra=_NO_BODY)
+@stop_router.post("/stop", status_code=202, summary="Stop every arm", openapi_extra=NO_BODY)
 async def stop_everything(services: ServicesDep) -> StopAllAnswer:
     """Stops all runs and campaigns and disarms all leases; needs no lease and no body, and waits for nothing."""
     services.leases.disarm_all()

@@ -3,11 +3,11 @@
 import threading
 import time
 from collections import Counter as Tally
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor, Future
 from typing import Any
 
-from prometheus_client import CollectorRegistry, Counter, Histogram, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
@@ -16,7 +16,6 @@ from tauscope.server.control.run_manager import Live
 from tauscope.server.history.model_registry import DriftMonitor
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
-
 _JOB_BUCKETS_S = (0.1, 0.5, 1, 5, 10, 30, 60, 120, 300, 600, 1800, 3600)
 
 
@@ -27,11 +26,9 @@ class Metrics:
         self.registry = CollectorRegistry()
         self.loops = LoopTimes()
         self.registry.register(self.loops)
-        self.requests = Counter(
-            "tauscope_requests", "Requests answered", ["method", "route", "status"], registry=self.registry
-        )
+        self.requests = Counter("tauscope_requests", "Requests", ["method", "route", "status"], registry=self.registry)
         self.request_seconds = Histogram(
-            "tauscope_request_seconds", "Time until the answer began", ["method", "route"], registry=self.registry
+            "tauscope_request_seconds", "Time to the answer", ["method", "route"], registry=self.registry
         )
         self.job_seconds = Histogram(
             "tauscope_job_seconds",
@@ -40,25 +37,29 @@ class Metrics:
             buckets=_JOB_BUCKETS_S,
             registry=self.registry,
         )
-        self.runs = Counter(
-            "tauscope_runs_ended", "Runs by backend and end", ["backend", "end"], registry=self.registry
-        )
+        self.runs = Counter("tauscope_runs_ended", "Runs by backend, end", ["backend", "end"], registry=self.registry)
 
     def run_ended(self, record: RunRecord) -> None:
-        """Count a run."""
         self.runs.labels(record.backend, record.state.value).inc()
         self.loops.add(record)
 
-    def watch_drift(self, drift: DriftMonitor) -> None:
-        """Have it told how models drift."""
-        self.registry.register(ModelDrift(drift))
-
     def watch(self, name: str, text: str, value: Callable[[], float]) -> None:
-        """Have a number asked for whenever somebody looks."""
-        self.registry.register(_Watched(name, text, value))
+        """Have a number asked for whenever somebody looks; NaN where that fails."""
+
+        def ask() -> float:
+            try:
+                return value()
+            except OSError:
+                return float("nan")
+
+        Gauge(name, text, registry=self.registry).set_function(ask)
+
+    def watch_readiness(self, checks: Mapping[str, Callable[[], str | None]]) -> None:
+        gauge = Gauge("tauscope_ready", "Whether a part can work: 1, or 0", ["part"], registry=self.registry)
+        for part, check in checks.items():
+            gauge.labels(part).set_function(lambda check=check: float(check() is None))
 
     def text(self) -> bytes:
-        """Everything, in Prometheus' text format."""
         return generate_latest(self.registry)
 
 
@@ -73,7 +74,6 @@ class LoopTimes(Collector):
         self._stale: Tally[str] = Tally()
 
     def add(self, record: RunRecord) -> None:
-        """Count the cycles of a run that has ended."""
         if record.timing is None:
             return
         with self._lock:
@@ -84,7 +84,6 @@ class LoopTimes(Collector):
             self._stale[record.backend] += sum(record.timing.stale_samples)
 
     def collect(self) -> Iterator[Metric]:
-        """Everything that is known of the loops."""
         histogram = HistogramMetricFamily(
             "tauscope_loop_lateness_seconds", "Lateness of control cycles behind their deadlines", labels=["backend"]
         )
@@ -96,7 +95,7 @@ class LoopTimes(Collector):
                 missed.add_metric([backend], self._missed[backend])
                 stale.add_metric([backend], self._stale[backend])
         recent = GaugeMetricFamily(
-            "tauscope_loop_lateness_recent_seconds", "The same of the last second, the worst run's", labels=["quantile"]
+            "tauscope_loop_lateness_recent_seconds", "The same of the last second", labels=["quantile"]
         )
         lives = list(self.live())
         figures = [live.figures.get("lateness_us") for live in lives]
@@ -117,17 +116,12 @@ class ModelDrift(Collector):
         self._watch = watch
 
     def collect(self) -> Iterator[Metric]:
-        """Everything that is known of the models."""
         labels = ["robot", "parameter"]
         share = GaugeMetricFamily(
-            "tauscope_model_drift_ratio", "Change of a parameter since the reference, in parts of it", labels=labels
+            "tauscope_model_drift_ratio", "Change of a parameter, in parts of its reference", labels=labels
         )
-        errors = GaugeMetricFamily(
-            "tauscope_model_drift_standard_errors", "The same change in its standard errors", labels=labels
-        )
-        events = GaugeMetricFamily(
-            "tauscope_model_drift_events", "Drifts beyond their bounds that nobody took note of", labels=["robot"]
-        )
+        errors = GaugeMetricFamily("tauscope_model_drift_standard_errors", "The same in standard errors", labels=labels)
+        events = GaugeMetricFamily("tauscope_model_drift_events", "Open drifts beyond their bounds", labels=["robot"])
         for robot, found in self._watch.robots.items():
             events.add_metric([robot], found.open_events)
             for drift in found.drifts:
@@ -137,13 +131,10 @@ class ModelDrift(Collector):
 
 
 class TimedExecutor(Executor):
-    """An executor whose work is timed; what it does is another executor's."""
-
     def __init__(self, executor: Executor, seconds: Histogram) -> None:
         self._executor, self._seconds = executor, seconds
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
-        """Have a function called."""
         began = time.monotonic()
         kind = getattr(getattr(fn, "func", fn), "__name__", "work").removeprefix("run_")
         future = self._executor.submit(fn, *args, **kwargs)
@@ -156,22 +147,7 @@ class TimedExecutor(Executor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the work."""
         self._executor.shutdown(wait=wait, cancel_futures=cancel_futures)
-
-
-class _Watched(Collector):
-    """A gauge whose value is asked for."""
-
-    def __init__(self, name: str, text: str, value: Callable[[], float]) -> None:
-        self._name, self._text, self._value = name, text, value
-
-    def collect(self) -> Iterator[Metric]:
-        try:
-            value = self._value()
-        except OSError:
-            value = float("nan")
-        yield GaugeMetricFamily(self._name, self._text, value=value)
 
 
 def _cumulative(counts: Tally[float]) -> list[tuple[str, float]]:

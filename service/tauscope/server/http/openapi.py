@@ -3,9 +3,10 @@
 import json
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import reduce
 from http import HTTPStatus
+from itertools import count
 from operator import getitem
 from typing import Any
 
@@ -21,26 +22,12 @@ from tauscope.server.http.repeated_requests import LONGEST_KEY, is_repeatable
 from tauscope.server.problems import MEDIA_TYPE, Problem, problem_responses
 
 _COMMON = (
-    "bad-request",
-    "host",
-    "origin",
-    "unauthorized",
-    "forbidden",
-    "invalid-request",
-    "limit-exceeded",
-    "media-type",
-    "rate-limited",
-    "queue-full",
-    "internal",
-    "worker-lost",
-    "store",
-    "storage-full",
+    *("bad-request", "host", "origin", "unauthorized", "forbidden", "invalid-request", "limit-exceeded", "media-type"),
+    *("rate-limited", "queue-full", "internal", "worker-lost", "store", "storage-full"),
 )
 """Problems that any request to the interface may meet, before its route or in it."""
-
 _VALUES = ("examples", "default", "enum", "const")  # keywords of a schema that hold plain data
 _LEAST_SHARED = 150  # A shorter schema is not worth a name and two references [characters]
-
 SCHEMAS = "#/components/schemas/"
 
 
@@ -60,7 +47,6 @@ def share_parts(document: dict[str, Any]) -> None:
 
 
 def format_address(name: str) -> str:
-    """Where the schema of a file's format is read."""
     return f"/docs/schemas/{name}"
 
 
@@ -79,7 +65,6 @@ def _refer_to_formats(document: dict[str, Any]) -> None:
 
 
 def _drop_unused(document: dict[str, Any]) -> None:
-    """Remove schemas to which nothing leads."""
     schemas = document["components"]["schemas"]
     used = _find_schemas(schemas, document["paths"])
     document["components"]["schemas"] = {name: schema for name, schema in schemas.items() if name in used}
@@ -150,11 +135,7 @@ def _shorten_answers(operation: dict[str, Any]) -> None:
 
 
 def _share_problems(document: dict[str, Any]) -> None:
-    """Put each problem's example, and each set of problems, into the document once.
-
-    The answer `default` of an operation with a scope holds the problems of any request; a status that has no others
-    is left out.
-    """
+    """Hold each problem's example once; `default` holds those of any request, and a status without others goes."""
     examples: dict[str, Any] = {}
     shared: dict[str, dict[str, Any]] = {}
     for operation in _operations(document):
@@ -196,7 +177,6 @@ def _refer(
 
 
 def merge_problems(answers: dict[str, Any], status: str, answer: dict[str, Any]) -> None:
-    """Add problems to those that a status has."""
     present = answers.setdefault(status, answer)
     if present is not answer:
         examples = present["content"][MEDIA_TYPE]["examples"]
@@ -205,78 +185,71 @@ def merge_problems(answers: dict[str, Any], status: str, answer: dict[str, Any])
         }
 
 
-def _share_parameters(document: dict[str, Any]) -> None:
-    """Put each parameter that several operations have into the document once."""
-    lists = [operation["parameters"] for operation in _operations(document) if "parameters" in operation]
-    counts = Counter(json.dumps(each, sort_keys=True) for each in (each for found in lists for each in found))
-    shared: dict[str, Any] = {}
+Slot = tuple[Any, Any]  # a list or an object, and the place in it that holds a part
+
+
+def _share(slots: Sequence[Slot], section: str, shared: Any, name: Callable[[Slot], str], least: int) -> None:
+    """Put each part of at least so many characters that several slots hold into a section of the document once."""
+    counts = Counter(json.dumps(holder[key], sort_keys=True) for holder, key in slots)
     names: dict[str, str] = {}
-    for parameters in lists:
-        for place, parameter in enumerate(parameters):
-            text = json.dumps(parameter, sort_keys=True)
-            if counts[text] == 1:
-                continue
-            if text not in names:
-                alike = sum(each["name"] == parameter["name"] for each in shared.values())
-                names[text] = f"{parameter['name']}-{alike + 1}" if alike else parameter["name"]
-                shared[names[text]] = parameter
-            parameters[place] = {"$ref": f"#/components/parameters/{names[text]}"}
+    for holder, key in slots:
+        text = json.dumps(holder[key], sort_keys=True)
+        if counts[text] == 1 or len(text) < least or "$ref" in holder[key]:
+            continue
+        if text not in names:
+            names[text] = name((holder, key))
+            shared[names[text]] = holder[key]
+        holder[key] = {"$ref": f"#/components/{section}/{names[text]}"}
+
+
+def _share_parameters(document: dict[str, Any]) -> None:
+    lists = [operation["parameters"] for operation in _operations(document) if "parameters" in operation]
+    shared: dict[str, Any] = {}
+
+    def name(slot: Slot) -> str:
+        own = slot[0][slot[1]]["name"]
+        alike = sum(each["name"] == own for each in shared.values())
+        return f"{own}-{alike + 1}" if alike else own
+
+    _share([(each, place) for each in lists for place in range(len(each))], "parameters", shared, name, 0)
     document["components"]["parameters"] = dict(sorted(shared.items()))
 
 
 def _share_answers(document: dict[str, Any]) -> None:
-    """Put each answer that several operations have, and that is no problem, into the document once."""
-    counts = Counter(
-        json.dumps(answer) for operation in _operations(document) for answer in operation["responses"].values()
-    )
-    names: dict[str, str] = {}
-    for operation in _operations(document):
-        for status, answer in operation["responses"].items():
-            text = json.dumps(answer)
-            if "$ref" not in answer and counts[text] > 1 and len(text) > _LEAST_SHARED:
-                found = re.search(r'schemas/(\w+)"', text)
-                name = names.setdefault(text, f"{found[1] if found else 'answer'}-{len(names) + 1}")
-                document["components"]["responses"][name] = answer
-                operation["responses"][status] = {"$ref": f"#/components/responses/{name}"}
+    answers, numbers = [operation["responses"] for operation in _operations(document)], count(1)
+
+    def name(slot: Slot) -> str:
+        found = re.search(r'schemas/(\w+)"', json.dumps(slot[0][slot[1]]))
+        return f"{found[1] if found else 'answer'}-{next(numbers)}"
+
+    slots = [(each, status) for each in answers for status in each]
+    _share(slots, "responses", document["components"]["responses"], name, _LEAST_SHARED)
 
 
 def _share_properties(document: dict[str, Any]) -> None:
-    """Put each long schema that several properties have into the document once, under the property's name."""
     schemas = document["components"]["schemas"]
-    places = [
-        (node["properties"], name)
-        for node in [*_schema_nodes(document)]
-        if isinstance(node.get("properties"), dict)
-        for name in node["properties"]
-    ]
-    counts = Counter(json.dumps(properties[name], sort_keys=True) for properties, name in places)
-    names: dict[str, str] = {}
-    for properties, property_ in places:
-        text = json.dumps(properties[property_], sort_keys=True)
-        if counts[text] == 1 or len(text) < _LEAST_SHARED or "$ref" in properties[property_]:
-            continue
-        if text not in names:
-            name = "".join(part.capitalize() for part in property_.split("_"))
-            while name in schemas:
-                name += "Field"
-            names[text], schemas[name] = name, properties[property_]
-        properties[property_] = {"$ref": SCHEMAS + names[text]}
+    nodes = [node["properties"] for node in _schema_nodes(document) if isinstance(node.get("properties"), dict)]
+
+    def name(slot: Slot) -> str:
+        name = "".join(part.capitalize() for part in slot[1].split("_"))
+        while name in schemas:
+            name += "Field"
+        return name
+
+    _share([(each, key) for each in nodes for key in each], "schemas", schemas, name, _LEAST_SHARED)
     document["components"]["schemas"] = dict(sorted(schemas.items()))
 
 
 _REFERENCE = SCHEMAS + "{model}"
-
 Examples = Mapping[str, tuple[str, Any]]  # for each example its summary and its value
 
 
 def json_body(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
-    """A JSON body of an operation. `examples`: mapping of str to (str, plain data), summary and value by name."""
     shown = {name: {"summary": summary, "value": value} for name, (summary, value) in examples.items()}
     return {"application/json": {"schema": refer_to_model(model), "examples": shown}}
 
 
 def json_request(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
-    """The further entries of an operation that takes JSON alone."""
     return {"requestBody": {"required": True, "content": json_body(model, examples)}}
 
 
@@ -294,20 +267,21 @@ _FILE = {"type": "string", "format": "binary", "contentMediaType": _BYTES}
 
 
 def binary_part(description: str) -> dict[str, Any]:
-    """The schema of a file in a form."""
     return {**_FILE, "description": description}
 
 
 def binary_parts(description: str) -> dict[str, Any]:
-    """The schema of several files in a form."""
     return {"type": "array", "items": _FILE, "description": description}
 
 
-def file_contents(*media_types: str) -> dict[str, Any]:
-    """The content of an answer that is a file of one of several types.
+ROBOT_PARTS = {
+    "robot": binary_part("the robot file (YAML)"),
+    "urdf": binary_part("the URDF that the robot file names, by its bare name"),
+}
 
-    Generators of clients read by the first type: bytes where there is one, else text.
-    """
+
+def file_contents(*media_types: str) -> dict[str, Any]:
+    """A file of one of several types; generators of clients read by the first: bytes where there is one, else text."""
     ranks = {_BYTES: 0, "application/json": 2}
     ordered = sorted(media_types, key=lambda each: (ranks.get(each, 0 if each.startswith("text/") else 1), each))
     schemas = {_BYTES: {"type": "string", "format": "binary"}, "application/json": {}}
@@ -315,7 +289,6 @@ def file_contents(*media_types: str) -> dict[str, Any]:
 
 
 def file_responses(media_types: Sequence[str], *problems: str, description: str = "the file") -> dict[int | str, Any]:
-    """The answers of a route that sends a file, and its problems by their codes."""
     return {200: {"content": file_contents(*media_types), "description": description}, **problem_responses(*problems)}
 
 
@@ -323,13 +296,11 @@ _referred: set[type[BaseModel]] = {Problem}  # models of bodies that the framewo
 
 
 def refer_to_model(model: type[BaseModel]) -> dict[str, str]:
-    """A reference to a model, which the document then holds."""
     _referred.add(model)
     return {"$ref": _REFERENCE.format(model=model.__name__)}
 
 
 def resolve_reference(document: Mapping[str, Any], node: dict[str, Any]) -> dict[str, Any]:
-    """A part of a document, or that to which it refers."""
     while "$ref" in node:
         _, *steps = node["$ref"].split("/")
         node = reduce(getitem, steps, document)
@@ -337,10 +308,7 @@ def resolve_reference(document: Mapping[str, Any], node: dict[str, Any]) -> dict
 
 
 def install_openapi(app: FastAPI) -> None:
-    """Have the application's OpenAPI document hold all models, and refer to formats of files by their address.
-
-    ``app.state.schemas`` then holds every model in full, as text by name: a reference is the other model's name.
-    """
+    """Fit the document to 150 kB; ``app.state.schemas`` holds every model in full, as text by name."""
 
     def document() -> dict[str, Any]:
         if app.openapi_schema is None:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cache
 from http import HTTPStatus
 from pathlib import Path
-from pathlib import Path as FilePath
 from types import MappingProxyType
 from typing import Any
 
@@ -22,17 +21,13 @@ from tauscope.server.http.openapi import resolve_reference
 from tauscope.server.problems import KINDS
 
 SECTIONS = ("errors", "how-to")
-
 _ROOTS = (Path(__file__).parent / "handbook_pages", Path(__file__).parents[4] / "docs")
 """Where the pages lie: beside this file where the package was installed, in docs/ of a source tree."""
-
 _markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
 
 
 @dataclass(frozen=True)
 class Chapter:
-    """A page as it is shown."""
-
     title: str
     html: str
 
@@ -82,9 +77,8 @@ def _target(link: str, path: str, known: Mapping[str, object]) -> str | None:
 
 
 router = APIRouter(prefix="/docs", include_in_schema=False)
-
 _METHODS = ("get", "post", "put", "delete")
-_FOLDER = FilePath(__file__).parent / "templates"
+_FOLDER = Path(__file__).parent / "templates"
 _templates = Environment(
     loader=FileSystemLoader(_FOLDER), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
 )
@@ -108,7 +102,6 @@ def get_style() -> Response:
 
 @router.get("/errors/{code}")
 def show_problem_kind(code: str) -> Response:
-    """What a code means."""
     kind = KINDS.get(code)
     if kind is None:
         raise NotFoundError(one_line(f"there is no error code {shown(code)}; /docs lists them"))
@@ -118,7 +111,6 @@ def show_problem_kind(code: str) -> Response:
 
 @router.get("/how-to/{name}")
 def show_guide(name: str) -> Response:
-    """How something is done."""
     chapter = load_chapters().get(f"how-to/{name}")
     if chapter is None:
         raise NotFoundError(one_line(f"there is no page {shown(name)}; /docs lists them"))
@@ -145,7 +137,11 @@ def _operations(document: dict[str, Any]) -> list[dict[str, Any]]:
             "parameters": [resolve_reference(document, each) for each in operation.get("parameters", [])],
             "bodies": _bodies(document, operation.get("requestBody", {}).get("content", {})),
             "statuses": [
-                (status, _name_status(status), resolve_reference(document, answer)["description"])
+                (
+                    status,
+                    HTTPStatus(int(status)).phrase if status.isdecimal() else "of any request",
+                    resolve_reference(document, answer)["description"],
+                )
                 for status, answer in sorted(operation["responses"].items())
             ],
         }
@@ -153,10 +149,6 @@ def _operations(document: dict[str, Any]) -> list[dict[str, Any]]:
         for method, operation in operations.items()
         if method in _METHODS
     ]
-
-
-def _name_status(status: str) -> str:
-    return HTTPStatus(int(status)).phrase if status.isdecimal() else "of any request"
 
 
 def _bodies(document: dict[str, Any], content: dict[str, Any]) -> list[dict[str, Any]]:

@@ -21,7 +21,6 @@ from tauscope.server.problems import (
     FieldError,
     ProblemError,
     field_errors,
-    make_code_answer,
     make_problem,
     problem_answer,
     summarise,
@@ -31,10 +30,7 @@ from tauscope.server.store.recordings import NameTakenError
 
 
 async def require_known_query(request: Request) -> None:
-    """Refuse a request with a query parameter that its route does not know; a stop is never refused.
-
-    Raises ProblemError naming the parameter.
-    """
+    """Raises ProblemError for a query parameter that the route does not know; a stop is never refused."""
     if not request.query_params or is_stop(request.method, request.url.path):
         return
     known = set(_find_names(request.scope["route"].dependant))
@@ -56,7 +52,7 @@ Methods = Sequence[tuple[re.Pattern[str], frozenset[str]]]  # for each route the
 
 
 def collect_methods(routers: Iterable[tuple[str, APIRouter]]) -> Methods:
-    """The methods of all routes. `routers`: iterable of (str, APIRouter), each with the prefix of its paths."""
+    """The methods of all routes; `routers` with the prefix of their paths."""
     return tuple(
         (compile_path(prefix + route.path)[0], frozenset(route.methods or ()))
         for prefix, router in routers
@@ -65,14 +61,12 @@ def collect_methods(routers: Iterable[tuple[str, APIRouter]]) -> Methods:
     )
 
 
-def find_methods(methods: Methods, path: str) -> list[str]:
-    """The methods that an address knows, sorted."""
-    return sorted({method for pattern, known in methods if pattern.match(path) for method in known})
-
-
 _log = logging.getLogger("tauscope.api")
 
-_OF_LEASE: Mapping[type[Exception], str] = {
+_OF_ERROR: Mapping[type[Exception], str] = {
+    QueueFullError: "queue-full",
+    BusyError: "busy",
+    NameTakenError: "name-taken",
     LeasedError: "leased",
     LeaseNeededError: "lease-needed",
     LeaseLostError: "lease-lost",
@@ -82,7 +76,6 @@ _OF_STATUS: Mapping[int, str] = {404: "not-found", 405: "method-not-allowed", 41
 
 
 def install_problem_handlers(app: FastAPI) -> None:
-    """Have every exception of a route answered with a problem."""
     app.add_exception_handler(TauscopeError, _tauscope_error)
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(HTTPException, _http_exception)
@@ -91,14 +84,9 @@ def install_problem_handlers(app: FastAPI) -> None:
 
 
 async def _tauscope_error(request: Request, error: Exception) -> Response:
-    if isinstance(error, QueueFullError):
-        return problem_answer(make_problem("queue-full", str(error), request.url.path), {"Retry-After": "10"})
-    if isinstance(error, BusyError):
-        return problem_answer(make_problem("busy", str(error), request.url.path), {"Retry-After": "10"})
-    if isinstance(error, NameTakenError):
-        return make_code_answer(request, "name-taken", str(error))
-    code = _OF_LEASE.get(type(error)) or (error.code if isinstance(error, TauscopeError) else "internal")
-    return make_code_answer(request, code, str(error))
+    code = _OF_ERROR.get(type(error)) or getattr(error, "code", "internal")
+    headers = {"Retry-After": "10"} if code in ("queue-full", "busy") else None
+    return problem_answer(make_problem(code, str(error), request.url.path), headers)
 
 
 async def _validation_error(request: Request, error: Exception) -> Response:
@@ -119,7 +107,9 @@ async def _http_exception(request: Request, error: Exception) -> Response:
     }.get(error.status_code, error.detail)
     headers = dict(error.headers or {})
     if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
-        headers["Allow"] = ", ".join(find_methods(request.app.state.methods, path))
+        headers["Allow"] = ", ".join(
+            sorted({each for rule, known in request.app.state.methods if rule.match(path) for each in known})
+        )
     return problem_answer(make_problem(_OF_STATUS.get(error.status_code, "bad-request"), detail, path), headers)
 
 
@@ -127,9 +117,8 @@ async def _system_error(request: Request, error: Exception) -> Response:
     """A full disk is said; any other failure of the system is a fault to look into."""
     if isinstance(error, OSError) and is_disk_full(error):
         _log.error("the disk is full")
-        return make_code_answer(
-            request, "storage-full", "the service's disk is full; remove recordings or identifications"
-        )
+        text = "the service's disk is full; remove recordings or identifications"
+        return problem_answer(make_problem("storage-full", text, request.url.path))
     raise error
 
 

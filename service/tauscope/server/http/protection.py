@@ -16,16 +16,13 @@ from typing_extensions import override
 from tauscope.errors import LimitExceededError
 from tauscope.server.auth.gate import HttpMiddleware, find_caller
 from tauscope.server.http.metrics import Metrics
-from tauscope.server.problems import make_problem, problem_answer
+from tauscope.server.problems import ProblemError, make_problem, problem_answer
 
 _request_log = logging.getLogger("tauscope.requests")
-
 REQUEST_ID = "X-Request-Id"
 
 
 class RequestLog(HttpMiddleware):
-    """Counts, times and logs requests."""
-
     @override
     async def answer(self, scope: Scope, receive: Receive, send: Send) -> None:
         number, began, status, answered = uuid.uuid4().hex, time.monotonic(), 500, None
@@ -101,8 +98,7 @@ class ResponseProtection(HttpMiddleware):
             if has_begun:
                 raise
             detail = "the request met a fault of Tauscope's own; the service's log has the details"
-            answer = problem_answer(make_problem("internal", detail, scope["path"]))
-            await answer(scope, receive, send_safely)
+            await self.refuse(ProblemError("internal", detail), scope, receive, send_safely)
 
 
 class OriginCheck(HttpMiddleware):
@@ -115,8 +111,7 @@ class OriginCheck(HttpMiddleware):
     @override
     async def answer(self, scope: Scope, receive: Receive, send: Send) -> None:
         if reason := self._reason(Headers(scope=scope)):
-            answer = problem_answer(make_problem(*reason, scope["path"]))
-            return await answer(scope, receive, send)
+            return await self.refuse(ProblemError(*reason), scope, receive, send)
         return await self.app(scope, receive, send)
 
     def _reason(self, headers: Headers) -> tuple[str, str] | None:
@@ -143,14 +138,9 @@ LONGEST_WAIT_S = 30.0  # how long a client that has its answer may go on sending
 
 
 class BodyLimit(HttpMiddleware):
-    """Ends a request whose body is larger than allowed, by its own word or by count, with problem `limit-exceeded`.
-
-    Whenever a request is answered before its body was read, the rest is read and dropped: else a client that is still
-    sending would see a broken connection in place of the answer.
-    """
+    """Ends a request whose body is too large; reads the rest, else a client that sends sees a broken connection."""
 
     def __init__(self, app: ASGIApp, limit: int) -> None:
-        """Limit bodies to `limit` [bytes]."""
         super().__init__(app)
         self.limit = limit
 
@@ -186,11 +176,8 @@ class BodyLimit(HttpMiddleware):
 
 
 class _CountedBody:
-    """The body of a request on its way to the application."""
-
     def __init__(self, headers: Headers, receive: Receive, limit: int) -> None:
-        self._receive = receive
-        self._limit = limit
+        self._receive, self._limit = receive, limit
         self._count = 0
         announced = headers.get("content-length", "")
         length = int(announced) if announced.isdecimal() else 0
@@ -199,7 +186,6 @@ class _CountedBody:
         self.is_pending = (length > 0 or "transfer-encoding" in headers) and "expect" not in headers
 
     async def receive(self) -> Message:
-        """The next part, unless it is one too many."""
         message = await self._next()
         if self._count > self._limit:
             self.is_exceeded = True
@@ -220,17 +206,13 @@ class _CountedBody:
 
 READERS = 2  # reading requests at a time: more threads of one interpreter read no faster
 SLOT_TIMEOUT_S = 0.5  # a reader that a disk or a lock holds up loses its slot after this time [s]
-
 _READING = ("GET", "HEAD")
 _PROBES = ("/healthz", "/readyz")
 """Probes have a slot of their own: a supervisor that gets no answer restarts the service, which stops its arms."""
 
 
 class ConcurrencyLimiter(HttpMiddleware):
-    """Admits a few reading requests at a time, first come first served; all other requests pass at once.
-
-    A slot is free again when the answer begins: a stream of events keeps no other request waiting.
-    """
+    """Admits a few readers at a time, until their answers begin: a stream keeps nobody waiting; others pass."""
 
     def __init__(
         self,
@@ -254,8 +236,8 @@ class ConcurrencyLimiter(HttpMiddleware):
         if slots is self._slots and self._is_closing():  # hundreds that wait would hold up the end
             slots.release()
             text = "the service is ending; ask again when it has started"
-            problem = make_problem("not-ready", text, scope["path"])
-            return await problem_answer(problem, {"Retry-After": "5"})(scope, receive, send)
+            problem = ProblemError("not-ready", text, headers={"Retry-After": "5"})
+            return await self.refuse(problem, scope, receive, send)
         slot = _Slot(slots, self._slot_timeout_s)
 
         async def send_and_free_slot(message: Message) -> None:

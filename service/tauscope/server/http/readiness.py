@@ -6,7 +6,7 @@ import socket
 import tempfile
 import threading
 import time
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -14,8 +14,6 @@ from pathlib import Path
 
 import anyio
 from anyio import CapacityLimiter, to_thread
-from prometheus_client.core import GaugeMetricFamily, Metric
-from prometheus_client.registry import Collector
 
 from tauscope.errors import StoreError
 
@@ -24,18 +22,14 @@ SILENCE_S = 2.0  # silence of the event loop after which it counts as stuck [s]
 
 
 class Heartbeat:
-    """The last sign of life of the event loop."""
-
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self._last = clock()
 
     def beat(self) -> None:
-        """Show a sign of life."""
         self._last = self._clock()
 
     def is_alive(self) -> bool:
-        """Whether the last sign of life is recent."""
         return self._clock() - self._last < SILENCE_S
 
     @asynccontextmanager
@@ -65,7 +59,6 @@ async def _repeat(call: Callable[[], object], interval_s: float | None) -> Async
 
 
 def notify(state: str, environment: Mapping[str, str] = os.environ) -> bool:
-    """Tell systemd a state."""
     address = environment.get("NOTIFY_SOCKET", "")
     if not address.startswith(("/", "@")):
         return False
@@ -97,19 +90,14 @@ async def notify_systemd() -> AsyncIterator[None]:
 
 LEAST_FREE_BYTES = 64 * 2**20  # room on the disk below which no run should begin [bytes]
 TIMEOUT_S = 2.0  # how long each part may take to answer [s]
-
 EARLIEST = datetime(2026, 1, 1, tzinfo=UTC)
 """A clock before this moment was never set: identifiers, leases and schedules would be wrong."""
-
 MOST_SETBACK_S = 60.0  # how far the clock may be set back while the service runs: items are sorted by it [s]
 
 
 @dataclass(frozen=True, eq=False)
 class Readiness:
-    """Everything that may stand in the way of work.
-
-    `checks`: what is asked, by name; each tells an obstacle in a few words, or None, and may hang.
-    """
+    """`checks`: what is asked, by name; each tells an obstacle in a few words, or None, and may hang."""
 
     checks: Mapping[str, Callable[[], str | None]]
     limiter: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(8))
@@ -129,20 +117,6 @@ class Readiness:
         return [obstacle for name in self.checks if (obstacle := found[name]) is not None]
 
 
-class ReadyMetrics(Collector):
-    """Whether each part can work, as a gauge."""
-
-    def __init__(self, readiness: Readiness) -> None:
-        self._readiness = readiness
-
-    def collect(self) -> Iterator[Metric]:
-        """Ask every part."""
-        family = GaugeMetricFamily("tauscope_ready", "Whether a part can work: 1, or 0", labels=["part"])
-        for name, check in self._readiness.checks.items():
-            family.add_metric([name], float(check() is None))
-        yield family
-
-
 def check_disk(folder: Path) -> str | None:
     """What is wrong with the data folder: a file is really written."""
     try:
@@ -158,7 +132,6 @@ def check_disk(folder: Path) -> str | None:
 
 
 def check_database(check: Callable[[], None]) -> str | None:
-    """What is wrong with the database."""
     try:
         check()
     except StoreError as error:
@@ -175,7 +148,6 @@ class Clock:
         self._lock = threading.Lock()
 
     def check(self) -> str | None:
-        """What is wrong with the clock."""
         now = self._now()
         if now < EARLIEST.timestamp():
             return f"the clock says {datetime.fromtimestamp(now, UTC):%Y-%m-%d}; set it (NTP)"

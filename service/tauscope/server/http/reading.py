@@ -14,7 +14,6 @@ from tauscope.server.problems import ProblemError
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
-
 WIDTH = 2  # files that are read at a time; a caller has one of them, so that another caller finds a process free
 MOST_WAITING = 32  # requests that wait for a process
 MOST_WAITING_EACH = 8  # requests of one caller that wait, a page's worth of plots
@@ -38,17 +37,11 @@ class ReadingQueue:
     async def call(
         self, request: Request, function: Callable[Arguments, Result], *args: Arguments.args, **kwargs: Arguments.kwargs
     ) -> Result:
-        """Call a function in a process, for the caller of a request.
-
-        Raises ProblemError if too many requests wait, or the process died. Raises LimitExceededError if it takes too
-        long, or too much memory. Raises ClientDisconnect if the client has gone; the process is ended then.
-        """
+        """Call in a process that ends with its client. Raises ProblemError, LimitExceededError or ClientDisconnect."""
         who = find_caller(request.scope)
         caller = who.key or who.name
         if len(self) >= MOST_WAITING + WIDTH or self._waiting[caller] > MOST_WAITING_EACH:
-            text = (
-                f"{self._waiting[caller]} of your requests wait for a file to be read; repeat this one in {RETRY_S} s"
-            )
+            text = f"{self._waiting[caller]} of your requests wait for a file; repeat this one in {RETRY_S} s"
             raise ProblemError("queue-full", text, headers={"Retry-After": str(RETRY_S)})
         self._waiting[caller] += 1
         try:
@@ -70,7 +63,6 @@ class ReadingQueue:
 
 
 async def _await_unless_gone(request: Request, answer: Coroutine[Any, Any, Result]) -> Result:
-    """The answer to a request, unless its client goes."""
     task = asyncio.ensure_future(answer)
     try:
         while not (await asyncio.wait({task}, timeout=POLL_S))[0]:

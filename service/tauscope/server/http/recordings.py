@@ -1,31 +1,31 @@
 """Recordings over HTTP: sent, listed, checked, and how one is read before it is sent for good."""
 
 from datetime import datetime
+from pathlib import Path as FilePath
 from typing import Annotated
 from urllib.parse import quote
 
 from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi.concurrency import contextmanager_in_threadpool
 from fastapi.responses import FileResponse
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.recording import EffortKind
 from tauscope.server.http.answers import After, AnswerModel, Measured, PageAnswer
-from tauscope.server.http.bodies import PartRule, file_answer, parse_document, receive_form
-from tauscope.server.http.evidence import require_no_evidence
-from tauscope.server.http.openapi import binary_part, file_responses, form_body, refer_to_model
+from tauscope.server.http.bodies import PartRule, ReceivedForm, file_answer, parse_document, receive_form
+from tauscope.server.http.openapi import ROBOT_PARTS, binary_part, file_responses, form_body, refer_to_model
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robot_files import FindingAnswer, read_received_robot, robot_part_rules
-from tauscope.server.http.services import ServicesDep
+from tauscope.server.http.services import ServicesDep, require_no_evidence
 from tauscope.server.problems import ProblemError, problem_responses
-from tauscope.server.queue.kept_recordings import check_kept_recording, read_kept_samples, understand_recording
+from tauscope.server.queue.analyses import check_kept_recording, read_kept_samples, understand_recording
+from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import StoredRecording
 from tauscope.tasks.task import ReadingOptions
 
 
 class RecordingAnswer(AnswerModel):
-    """A recording that lies on the server."""
-
     name: str = Field(description="by which requests refer to it", examples=["log-2026-11-03.csv"])
     size: int = Field(description="number of bytes", examples=[1830221])
     modified: datetime = Field(description="when it was last written, UTC")
@@ -34,8 +34,6 @@ class RecordingAnswer(AnswerModel):
 
 
 class RecordingListAnswer(PageAnswer):
-    """Recordings on the server."""
-
     recordings: list[RecordingAnswer] = Field(description="by name")
 
 
@@ -58,29 +56,21 @@ class GapsAnswer(AnswerModel):
 
 
 class PeriodsAnswer(AnswerModel):
-    """Repeats of the excitation."""
-
     count: int = Field(description="how many are marked")
     shortest: int = Field(description="samples of the shortest")
     longest: int = Field(description="samples of the longest")
 
 
 class ChannelsAnswer(AnswerModel):
-    """One joint's channels."""
-
     position: tuple[Measured, Measured] = Field(description="least and greatest value [rad or m]; null without samples")
     effort: tuple[Measured, Measured] = Field(description="least and greatest value [Nm, N or drive units]")
     position_step: float | None = Field(description="step in multiples of which the position moves [rad or m]")
     wraps: int = Field(description="jumps of the position by about 2π")
     first_wrap: Measured = Field(description="time of the first of them [s]")
-    clipped: tuple[tuple[float, int], ...] = Field(
-        description="levels at which the effort stays, and number of samples"
-    )
+    clipped: tuple[tuple[float, int], ...] = Field(description="levels at which the effort stays, and samples there")
 
 
 class RecordingReportAnswer(AnswerModel):
-    """What a recording holds, and what to look at before trusting it."""
-
     name: str = Field(description="of the recording")
     samples: int = Field(description="number of samples")
     duration_s: float = Field(description="from the first to the last sample [s]")
@@ -101,8 +91,6 @@ class ReadingRequest(ReadingOptions):
 
 
 class MappingAnswer(AnswerModel):
-    """Which columns of a file are read as which."""
-
     header: tuple[str, ...] = Field(description="names of the file's columns; numbers from 1 where it has no names")
     columns: dict[str, str] = Field(description="the file's column for t, q1, tau1, …; only those that were found")
     units: dict[str, str] = Field(description="of t, q, qd and tau")
@@ -118,13 +106,10 @@ class UnderstandingAnswer(AnswerModel):
 
 
 router = APIRouter(prefix="/recordings", tags=["recordings"])
-
 Name = Annotated[str, Path(description="name of the recording", examples=["log-2026-11-03.csv"])]
 JointCount = Annotated[int | None, Query(gt=0, le=1000, description="joints that the recording must have")]
 MostSamples = Annotated[int, Query(ge=2, le=1_000_000, description="samples to return, about")]
-
 RecordingLimit = Annotated[int, Query(ge=1, le=10_000, description="most entries of the list")]
-
 _BODY = form_body({"file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database")}, required=["file"])
 
 
@@ -141,15 +126,10 @@ _BODY = form_body({"file": binary_part("the recording: CSV, Parquet, MCAP or a r
 )
 async def keep_recording(request: Request, response: Response, services: ServicesDep) -> RecordingAnswer:
     """The file is kept under its own name; nothing is ever overwritten."""
-    folder = await run_in_threadpool(services.recordings.stage)
-    try:
-        rules = {"file": PartRule(services.settings.max_upload_bytes, folder)}
-        file = (await receive_form(request, rules)).file("file")
-        if file is None:
-            raise ProblemError("invalid-request", "the form has no part file; send the recording as part file")
+    async with contextmanager_in_threadpool(services.recordings.stage()) as folder:
+        rules = {"file": PartRule(services.settings.max_upload_bytes, FilePath(folder))}
+        file = _require_file(await receive_form(request, rules))
         kept, is_new = await run_in_threadpool(services.recordings.keep, file)
-    finally:
-        await run_in_threadpool(services.recordings.discard, folder)
     response.status_code = 201 if is_new else 200
     response.headers["Location"] = f"{request.url.path}/{quote(kept.name)}"
     return _answer(kept)
@@ -239,8 +219,7 @@ mapping_router = APIRouter(prefix="/mappings", tags=["recordings"], responses=pr
 _MAPPING_BODY = form_body(
     {
         "file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database"),
-        "robot": binary_part("the robot file, whose joints, limits and layout it is read by"),
-        "urdf": binary_part("the URDF that the robot file names, by its bare name"),
+        **ROBOT_PARTS,
         "request": refer_to_model(ReadingRequest),
     },
     required=["file"],
@@ -255,22 +234,24 @@ _MAPPING_BODY = form_body(
 )
 async def check_sent_recording(request: Request, services: ServicesDep) -> UnderstandingAnswer:
     """Its columns and units as they are understood, and what it holds when it is read so; nothing is kept."""
-    folder = await run_in_threadpool(services.recordings.stage)
-    try:
-        settings, robots = services.settings, folder / "robot"
+    async with contextmanager_in_threadpool(services.recordings.stage()) as folder:
+        settings, robots = services.settings, FilePath(folder) / "robot"
         await run_in_threadpool(robots.mkdir)
         rules = {
             "request": PartRule(settings.max_document_bytes),
-            "file": PartRule(settings.max_upload_bytes, folder),
+            "file": PartRule(settings.max_upload_bytes, FilePath(folder)),
             **robot_part_rules(robots),
         }
         form = await receive_form(request, rules)
-        file, robot_file = form.file("file"), form.file("robot")
-        if file is None:
-            raise ProblemError("invalid-request", "the form has no part file; send the recording as part file")
+        file, robot_file = _require_file(form), form.file("robot")
         options = parse_document(form.texts.get("request", b"{}"), ReadingRequest, within="part request")
         robot = robot_file and await run_in_threadpool(read_received_robot, robots, robot_file.name)
         found = await services.reading.call(request, understand_recording, file.path, robot, options.reading)
         return UnderstandingAnswer.model_validate(found)
-    finally:
-        await run_in_threadpool(services.recordings.discard, folder)
+
+
+def _require_file(form: ReceivedForm) -> KeptFile:
+    file = form.file("file")
+    if file is None:
+        raise ProblemError("invalid-request", "the form has no part file; send the recording as part file")
+    return file

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import cast
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 from python_multipart.multipart import parse_options_header
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
@@ -21,28 +21,21 @@ from typing_extensions import override
 
 from tauscope.files import sync_folder, write_atomically
 from tauscope.server.auth.gate import HttpMiddleware, find_caller
-from tauscope.server.problems import make_problem, problem_answer
+from tauscope.server.problems import ProblemError, make_problem, problem_answer
+from tauscope.server.store.files import read_stored
 from tauscope.strict_model import StrictModel
 
 LIFE_S = 24 * 3600.0  # how long an answer is kept [s]
 
 
 class KeptAnswer(StrictModel):
-    """What was answered."""
-
     fingerprint: str = Field(description="of the request's body, in hexadecimal")
     status: int = Field(description="of the answer")
     headers: tuple[tuple[str, str], ...] = Field(description="of the answer")
     body: str = Field(description="of the answer, in base64")
 
     def content(self) -> bytes:
-        """The body as it was sent."""
         return base64.b64decode(self.body)
-
-
-def request_name(caller: str, path: str, key: str) -> str:
-    """What a request is called: nobody meets another caller's answers."""
-    return hashlib.sha256("\n".join((caller, path, key)).encode()).hexdigest()
 
 
 _TIDY_EVERY = 500
@@ -52,7 +45,6 @@ class StoredAnswers:
     """Answers that outlast the service, each request durably claimed."""
 
     def __init__(self, folder: Path, clock: Callable[[], float] = time.time) -> None:
-        """Open the store; its folder is made where it is missing, and answers that are too old go."""
         self._folder, self._clock = folder, clock
         self._lock = threading.Lock()
         self._begun = 0
@@ -60,12 +52,7 @@ class StoredAnswers:
         self._tidy()
 
     def begin(self, name: str) -> bool:
-        """Claim a request before anything is done.
-
-        Raises OSError if that has to be written down and cannot be.
-
-        Raises OSError if that cannot be written down. Returns bool: False where the request was begun before.
-        """
+        """Claim a request before anything is done; False where it was begun before. Raises OSError."""
         with self._lock:
             self._begun += 1
             if self._begun % _TIDY_EVERY == 0:
@@ -87,13 +74,9 @@ class StoredAnswers:
 
     def find(self, name: str) -> KeptAnswer | None:
         """The answer to a request; None where there is none (yet)."""
-        try:
-            return KeptAnswer.model_validate_json((self._folder / name).read_bytes())
-        except (OSError, ValidationError):
-            return None
+        return read_stored(self._folder / name, KeptAnswer)
 
     def _tidy(self) -> None:
-        """Remove what is too old."""
         for entry in self._folder.iterdir():
             try:
                 if self._clock() - entry.stat().st_mtime > LIFE_S:
@@ -112,7 +95,6 @@ class Fingerprint:
         self._held = b""
 
     def add(self, piece: bytes) -> None:
-        """Take the next bytes."""
         if not self._boundary:
             self._hash.update(piece)
             return
@@ -123,16 +105,13 @@ class Fingerprint:
         self._held = text[len(text) - keep :]
 
     def digest(self) -> str:
-        """The hash of everything so far, in hexadecimal."""
         whole = self._hash.copy()
         whole.update(self._held)
         return whole.hexdigest()
 
 
 HEADER = "Idempotency-Key"
-
 LONGEST_KEY = 200  # most characters of the header's value
-
 _REPEATABLE = re.compile(
     r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|rollouts|recordings|robots(?:/check)?|schedules/[^/]+/run)"
 )
@@ -140,8 +119,6 @@ _KEY = re.compile(rf"[\x21-\x7e]{{1,{LONGEST_KEY}}}")
 
 
 class IdempotentRequests(HttpMiddleware):
-    """Answers a request that came before with the answer of then."""
-
     def __init__(self, app: ASGIApp) -> None:
         super().__init__(app)
         self._underway: set[str] = set()
@@ -153,15 +130,17 @@ class IdempotentRequests(HttpMiddleware):
             return await self.app(scope, receive, send)
         if not _KEY.fullmatch(key):
             text = f"header {HEADER}: give 1 to {LONGEST_KEY} characters without blanks, for example a UUID"
-            return await problem_answer(make_problem("invalid-request", text, scope["path"]))(scope, receive, send)
+            return await self.refuse(ProblemError("invalid-request", text), scope, receive, send)
         store = _answers_of(scope)
-        name = request_name(find_caller(scope).key or "local", scope["path"], key)
+        # Nobody meets another caller's answers.
+        words = (find_caller(scope).key or "local", scope["path"], key)
+        name = hashlib.sha256("\n".join(words).encode()).hexdigest()
         is_underway = name in self._underway
         try:
             is_new = not is_underway and await run_in_threadpool(store.begin, name)
         except OSError:
             text = "the request could not be written down, so that it was not begun; make room on the disk"
-            return await problem_answer(make_problem("storage-full", text, scope["path"]))(scope, receive, send)
+            return await self.refuse(ProblemError("storage-full", text), scope, receive, send)
         if not is_new:
             return await (await _repeat(scope, receive, store, name, is_underway))(scope, receive, send)
         self._underway.add(name)

@@ -48,8 +48,6 @@ class RobotCheckRequest(StrictModel):
 
 
 class RobotVersionAnswer(AnswerModel):
-    """A robot that is kept."""
-
     version: str = Field(description="of its content; a request's robot may be {version: …}")
     name: str = Field(description="as in its file")
     robot_file: str = Field(description="which of its files is the robot file")
@@ -58,7 +56,6 @@ class RobotVersionAnswer(AnswerModel):
 
     @classmethod
     def of(cls, robot: RobotVersion) -> "RobotVersionAnswer":
-        """The answer that holds a version."""
         return cls(**asdict(robot), link=f"/api/v1/robots/versions/{robot.version}")
 
 
@@ -72,8 +69,6 @@ class LimitsAnswer(AnswerModel):
 
 
 class JointAnswer(AnswerModel):
-    """One joint."""
-
     number: int = Field(description="from 1, base first")
     name: str = Field(description="of the joint")
     type: JointType = Field(description="how it moves")
@@ -84,23 +79,17 @@ class JointAnswer(AnswerModel):
     origin: tuple[float, float, float] = Field(description="of the link frame at q = 0, in the frame before [m]")
     axis: tuple[float, float, float] = Field(description="unit vector of the joint axis, in the frame before")
     mass: float | None = Field(description="of the link that it carries, as the model believes [kg]")
-    before: tuple[float, ...] = Field(
-        description="4 × 4 transform, row by row: link frame = frame before · before · motion about (along) z · after"
-    )
+    before: tuple[float, ...] = Field(description="4 × 4, by rows: link = before's · before · motion about z · after")
     after: tuple[float, ...] = Field(description="4 × 4 transform, row by row, from the joint to the link frame [m]")
 
 
 class FindingAnswer(AnswerModel):
-    """One remark."""
-
     severity: Severity = Field(description="warning: may spoil results; info: good to know")
     where: str = Field(description="file and place, or column, that it is about")
     text: str = Field(description="what is so, and what to do about it")
 
 
 class RobotReportAnswer(AnswerModel):
-    """A robot file at a glance."""
-
     name: str = Field(description="of the robot")
     gravity: tuple[float, float, float] = Field(description="in the base frame [m/s²]")
     total_mass: float | None = Field(description="of all moving links, as the model believes [kg]")
@@ -109,19 +98,16 @@ class RobotReportAnswer(AnswerModel):
 
     @classmethod
     def of(cls, report: RobotReport) -> "RobotReportAnswer":
-        """The answer that holds a report."""
         return cls.model_validate(report)
 
 
 FOLDERS = frozenset({"assetdir", "meshdir", "texturedir"})  # attributes of an MJCF that name a folder
-
 _MOST_BODIES = 1000
 _MOST_CELLS = 2**24  # a texture of 4096 by 4096
 INLINE_NAME = "robot.json"  # file name of a robot that came as JSON; YAML readers read JSON
 
 
 def robot_part_rules(folder: Path) -> dict[str, PartRule]:
-    """Parts of a form that bring a robot."""
     return {
         "robot": PartRule(LARGEST_ROBOT_FILE, folder, default_name="robot.yaml"),
         "urdf": PartRule(LARGEST_XML, folder),
@@ -129,22 +115,14 @@ def robot_part_rules(folder: Path) -> dict[str, PartRule]:
 
 
 def keep_inline_robot(folder: Path, robot: Mapping[str, Any]) -> str:
-    """Write a robot that came as JSON to a robot file.
-
-    Raises RobotFileError if the content is not plain data, or larger than a robot file may be.
-    """
-    text = to_json_text(robot)
-    if text is None:
-        raise RobotFileError("robot: holds NaN, infinity or text that is not Unicode; write plain numbers and text")
+    """Write a robot that came as JSON. Raises RobotFileError if it is not plain data, or too large."""
+    text = to_json_text(robot, "robot", RobotFileError)
     (folder / INLINE_NAME).write_text(text, encoding="utf-8")
     return INLINE_NAME
 
 
 def read_received_robot(folder: Path, file_name: str) -> Robot:
-    """The robot of a received file.
-
-    Raises RobotFileError if it is not valid, or names a file that was not sent with it.
-    """
+    """Raises RobotFileError if it is not valid, or names a file that was not sent with it."""
     try:
         _confine_files(folder, file_name)
         return read_robot(folder / file_name)
@@ -153,10 +131,7 @@ def read_received_robot(folder: Path, file_name: str) -> Robot:
 
 
 def check_received_robot(folder: Path, file_name: str) -> RobotReport:
-    """The report on a received file.
-
-    Raises RobotFileError if it cannot be read at all, or names a file that was not sent with it.
-    """
+    """Raises RobotFileError if it cannot be read at all, or names a file that was not sent with it."""
     try:
         _confine_files(folder, file_name)
         report = check_robot(folder / file_name)

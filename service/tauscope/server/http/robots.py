@@ -1,16 +1,15 @@
 """Robots over HTTP: checked, kept, listed."""
 
-import shutil
-import tempfile
 from pathlib import Path as FilePath
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
 from fastapi import APIRouter, Path, Request, Response
+from fastapi.concurrency import contextmanager_in_threadpool
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.server.http.bodies import FORM, JSON, media_type, read_document, receive_form, refuse_media_type
-from tauscope.server.http.evidence import require_no_identification
-from tauscope.server.http.openapi import binary_part, form_body, json_body
+from tauscope.server.http.openapi import ROBOT_PARTS, form_body, json_body
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robot_files import (
     EXAMPLE_ROBOT,
@@ -22,22 +21,15 @@ from tauscope.server.http.robot_files import (
     read_received_robot,
     robot_part_rules,
 )
-from tauscope.server.http.services import ServicesDep
+from tauscope.server.http.services import ServicesDep, require_no_identification
 from tauscope.server.http.tasks.router import JobRobotAnswer, describe_robot
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.store.robots import VERSION_PATTERN
 
 router = APIRouter(prefix="/robots", tags=["robots"])
-
 _BODY = {
     **json_body(RobotCheckRequest, {"inline": ("A robot as JSON", {"robot": EXAMPLE_ROBOT})}),
-    **form_body(
-        {
-            "robot": binary_part("the robot file (YAML)"),
-            "urdf": binary_part("the URDF that the robot file names, by its bare name"),
-        },
-        required=["robot"],
-    ),
+    **form_body(ROBOT_PARTS, required=["robot"]),
 }
 
 
@@ -50,12 +42,10 @@ _BODY = {
 )
 async def check_robot_file(request: Request, services: ServicesDep) -> RobotReportAnswer:
     """Summary and findings; nothing is kept. A model that no rigid body can have is among the findings."""
-    folder = FilePath(await run_in_threadpool(tempfile.mkdtemp, prefix="tauscope-robot-"))
-    try:
+    async with contextmanager_in_threadpool(TemporaryDirectory(prefix="tauscope-robot-")) as name:
+        folder = FilePath(name)
         file_name = await _receive_robot(request, services, folder)
         return RobotReportAnswer.of(await services.reading.call(request, check_received_robot, folder, file_name))
-    finally:
-        await run_in_threadpool(shutil.rmtree, folder, ignore_errors=True)
 
 
 Version = Annotated[str, Path(description="version of the robot", pattern=VERSION_PATTERN)]
@@ -109,7 +99,6 @@ def remove_robot_version(version: Version, services: ServicesDep) -> None:
 
 
 async def _receive_robot(request: Request, services: ServicesDep, folder: FilePath) -> str:
-    """Write the robot of a request into a folder; returns the robot file's name."""
     if media_type(request) == JSON:
         body = await read_document(request, RobotCheckRequest, services.settings.max_document_bytes)
         return await run_in_threadpool(keep_inline_robot, folder, body.robot)

@@ -51,14 +51,10 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 
 
 class RolloutLinksAnswer(JobLinks):
-    """Where to go on from a rollout."""
-
     report: str | None = Field(default=None, description="its report as a page, once it succeeded")
 
 
 class RolloutAnswer(JobAnswer):
-    """The state of a rollout."""
-
     recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what is rolled out")
     refine: tuple[OrderedRecording, ...] = Field(default=(), description="what the model is refined by")
     options: ReadingOptions | None = Field(default=None, description="how the recordings are read")
@@ -66,11 +62,7 @@ class RolloutAnswer(JobAnswer):
 
 
 def place_model(received: Received[RolloutRequest], services: Services, workspace: Any) -> dict[str, str | None]:
-    """Put the model into its place.
-
-    Raises ProblemError where it came twice, or what is named has not succeeded. Raises NotFoundError if there is
-    neither an identification nor a diagnosis of that identifier.
-    """
+    """Put the model into its place. Raises ProblemError if it came twice, NotFoundError if it is unknown."""
 
     def read(identifier: str) -> bytes:
         try:

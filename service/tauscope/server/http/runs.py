@@ -8,10 +8,12 @@ from functools import partial
 from typing import Annotated, Any, Literal, Self
 
 from fastapi import Query, Request
+from fastapi.concurrency import contextmanager_in_threadpool
 from fastapi.responses import FileResponse
 from pydantic import Field, JsonValue, model_validator
 from pydantic_core import PydanticCustomError
 from starlette.concurrency import run_in_threadpool
+from typing_extensions import override
 
 from tauscope.errors import ExcitationError, NotFoundError
 from tauscope.robot import Robot
@@ -21,14 +23,14 @@ from tauscope.runtime.states import RunState
 from tauscope.runtime.timing import RealTime, Timing
 from tauscope.server.control.leases import Permit
 from tauscope.server.control.run import (
-    DesignedMotion,
     Motion,
     RunRequestRecord,
     RunWorkspace,
+    await_design,
     ready_motion,
     take_trajectory,
 )
-from tauscope.server.control.run_manager import run_recording_name
+from tauscope.server.control.run_manager import RunManager, run_recording_name
 from tauscope.server.http.answers import AnswerModel, Identifier, MotionLinks, convert_problem
 from tauscope.server.http.bodies import PartRule, file_answer, to_json_text
 from tauscope.server.http.excitations import EXCITATIONS
@@ -36,7 +38,7 @@ from tauscope.server.http.leases import permit_of
 from tauscope.server.http.openapi import binary_part, file_responses
 from tauscope.server.http.robot_files import EXAMPLE_ROBOT, read_received_robot
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
+from tauscope.server.http.tasks.router import MovingResource
 from tauscope.server.http.tasks.submission import (
     BackendRequest,
     Received,
@@ -44,11 +46,10 @@ from tauscope.server.http.tasks.submission import (
     choose_backend,
     keep_robot,
     receive_request,
-    stage_request,
 )
 from tauscope.server.problems import Problem, ProblemError, make_problem
 from tauscope.server.queue.analyses import ExcitationOrder, ExcitationWorkspace, check_trajectory
-from tauscope.server.queue.task_job import submit_job
+from tauscope.server.queue.task_job import stage_workspace, submit_job
 from tauscope.server.store.event_log import EventLog
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.run import BackendChoice
@@ -65,9 +66,7 @@ class RunRequest(RunOptions, RobotRequest, strict=True):
         description="identifier of an excitation that succeeded; its robot is taken where none is sent; null, and no"
         " trajectory: the default motion is designed first",
     )
-    trajectory: dict[str, Any] | None = Field(
-        default=None, description="a trajectory document; in a form, the part `trajectory` may hold the file instead"
-    )
+    trajectory: dict[str, Any] | None = Field(default=None, description="a trajectory document; in a form, also a part")
 
     seed: int = Field(default=0, ge=0, lt=2**63, description="of the default motion")
 
@@ -94,15 +93,11 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 
 
 class RunLinks(MotionLinks):
-    """Where to go on from a run."""
-
     excitation: str | None = Field(default=None, description="the excitation that it plays")
     recordings: dict[RecordingFormat, str] = Field(default={}, description="its recording by format, once there is one")
 
 
 class RunRecordingAnswer(AnswerModel):
-    """What a run left behind."""
-
     name: str | None = Field(description="by which identifications refer to it; null where it is not on the server")
     samples: int = Field(description="samples of the motion, without the ramp")
     partial: bool = Field(description="whether the motion was not played to its end, or samples were lost")
@@ -111,8 +106,6 @@ class RunRecordingAnswer(AnswerModel):
 
 
 class RunAnswer(AnswerModel):
-    """The state of a run."""
-
     id: str = Field(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])
     state: RunState | Literal["damaged"] = Field(
         description="where it stands; interrupted: the service ended first; damaged: its files are missing or damaged"
@@ -129,18 +122,12 @@ class RunAnswer(AnswerModel):
     stop_policy: str | None = Field(default=None, description="how the arm is stopped")
     ramp_s: float | None = Field(default=None, description="time from the first cycle to the motion's start")
     motion_s: float | None = Field(default=None, description="length of the motion")
-    holds: bool | None = Field(
-        default=None, description="whether the arm was under power when the run ended; null where unknown"
-    )
-    drives: tuple[str, ...] = Field(
-        default=(), description="what the drives do not have or what was changed in them; one line each"
-    )
+    holds: bool | None = Field(default=None, description="whether the arm was powered at the end; null: unknown")
+    drives: tuple[str, ...] = Field(default=(), description="what the drives lack, or what was changed in them")
     kept: float | None = Field(default=None, description="part of the motion's samples that was kept, 0 to 1")
     timing: Timing | None = Field(default=None, description="rate, jitter, missed and stale samples")
     real_time: RealTime | None = Field(default=None, description="what the control loop was given of what it asked for")
-    worst_following: tuple[float, ...] = Field(
-        default=(), description="largest distance of arm and target, one number a joint"
-    )
+    worst_following: tuple[float, ...] = Field(default=(), description="largest distance of arm and target, by joint")
     stop: str | None = Field(default=None, description="who asked for the stop; null where nobody did")
     problem: Problem | None = Field(default=None, description="why it did not finish")
     recording: RunRecordingAnswer | None = Field(default=None, description="what it left behind, once it has ended")
@@ -148,18 +135,11 @@ class RunAnswer(AnswerModel):
 
 
 class StopAnswer(AnswerModel):
-    """What became of the wish to stop a run."""
-
     id: str = Field(description="identifier of the run")
     state: RunState = Field(description="where the run stood; it stops unless that is an end state")
 
 
 FORMATS: tuple[RecordingFormat, ...] = ("mcap", "csv", "parquet")
-
-
-def find_run(services: Services, identifier: str) -> RunWorkspace:
-    """The folder of a run. Raises NotFoundError if there is none."""
-    return RunWorkspace(services.runs.items.folder(identifier))
 
 
 @dataclass(frozen=True)
@@ -170,49 +150,9 @@ class FollowedRun:
     has_ended: Callable[[], bool]
 
 
-def follow_run(services: Services, identifier: str) -> FollowedRun:
-    """A run whose events are followed. Raises NotFoundError if there is none."""
-    workspace = find_run(services, identifier)
-
-    def has_ended() -> bool:
-        return services.runs.live(identifier) is None and workspace.has_ended()
-
-    return FollowedRun(workspace.events, has_ended)
-
-
-def describe(services: Services, identifier: str, root: str) -> RunAnswer:
-    """The state of a run; one whose files are damaged is said to be so. Raises NotFoundError if there is none."""
-    workspace, live = find_run(services, identifier), services.runs.live(identifier)
-    here = f"{root}/runs/{identifier}"
-    record, request = workspace.read_run(), workspace.read_order()
-    if record is None or request is None:
-        detail = f"files of {identifier} are missing or damaged; remove it and hand it in again"
-        problem = make_problem("damaged", detail, here)
-        return RunAnswer(id=identifier, state="damaged", problem=problem, links=_links(here, None, None, workspace))
-    goes_on = live is not None and not record.state.is_end
-    return RunAnswer.describe(
-        record,
-        id=identifier,
-        step=workspace.read_step() if goes_on else None,
-        percent=live.percent if live is not None and goes_on else 100.0 * record.played,
-        figures=dict(live.figures) if live is not None and goes_on else {},
-        created=record.history[0].at,
-        ended=record.history[-1].at if record.state.is_end else None,
-        backend=request.backend,
-        options=request.options,
-        campaign=request.campaign,
-        problem=convert_problem(workspace.problem(), here),
-        recording=_recording(services, identifier, record),
-        links=_links(here, request.excitation and f"{root}/excitations/{request.excitation}", record, workspace),
-    )
-
-
 def require_recording(services: Services, identifier: str, format_: RecordingFormat) -> RunWorkspace:
-    """The folder of a run that left a recording of a format.
-
-    Raises NotFoundError if there is no such run, or no such file. Raises ProblemError if the run goes on.
-    """
-    workspace = find_run(services, identifier)
+    """A run that left a recording of a format. Raises NotFoundError, or ProblemError while it goes on."""
+    workspace = RUNS.find(services, identifier)
     if not workspace.has_ended() or services.runs.live(identifier) is not None:
         text = f"{identifier} goes on; ask for its recording when its state is an end state"
         raise ProblemError("not-finished", text, headers={"Retry-After": "2"})
@@ -231,53 +171,17 @@ def _recording(services: Services, identifier: str, record: RunRecord) -> RunRec
 
 
 def _links(here: str, excitation: str | None, record: RunRecord | None, workspace: RunWorkspace) -> RunLinks:
-    """Where to go on: to the recording, once there is one."""
     has_ended = record is not None and record.state.is_end
-    recordings: dict[RecordingFormat, str] = {
+    made: dict[RecordingFormat, str] = {
         name: f"{here}/recording?format={name}" for name in FORMATS if has_ended and workspace.recording(name).is_file()
     }
-    return RunLinks(
-        self=here, events=f"{here}/events", stop=f"{here}/stop", excitation=excitation, recordings=recordings
-    )
+    return RunLinks(self=here, events=f"{here}/events", stop=f"{here}/stop", excitation=excitation, recordings=made)
 
 
 LARGEST_TRAJECTORY = 64 * 2**20  # bytes of the largest trajectory file that is accepted
 
 
-async def submit_run(request: Request, services: Services) -> str:
-    """Take a request for a run.
-
-    Raises ProblemError if the request is not as documented. Raises TauscopeError if the robot or the motion is not
-    valid, somebody else has the arm, or the lease does not let it move.
-    """
-    async with stage_request(services.runs.items, RunWorkspace) as workspace:
-        most = min(LARGEST_TRAJECTORY, services.settings.max_upload_bytes)
-        parts = {"trajectory": PartRule(most, workspace.trajectories, default_name="trajectory.json")}
-        received = await receive_request(request, RunRequest, services.settings, workspace.robot, parts)
-        robot_file = await run_in_threadpool(_put_robot, received, services, workspace)
-        robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
-        wanted = await run_in_threadpool(_prepare, received, services, workspace, robot_file, robot)
-        permit = permit_of(request, services, wanted.backend.device(wanted.robot.name))
-        if wanted.uploaded:
-            await services.reading.call(
-                request, check_trajectory, workspace.trajectories, workspace.robot / wanted.robot_file
-            )
-        return await run_in_threadpool(_submit, wanted, services, workspace, permit)
-
-
-@dataclass(frozen=True, eq=False)
-class _Wanted:
-    """A request whose files are in their places."""
-
-    document: RunRequest
-    robot_file: str
-    robot: Robot
-    backend: BackendChoice
-    uploaded: bool
-
-
 def _put_robot(received: Received[RunRequest], services: Services, workspace: RunWorkspace) -> str:
-    """Put the robot into its place; returns its file's name."""
     document, has_robot = received.document, received.form.file("robot") or received.document.robot
     if document.excitation is None or has_robot:
         return keep_robot(received, workspace.robot, services.robots)
@@ -289,111 +193,138 @@ def _put_robot(received: Received[RunRequest], services: Services, workspace: Ru
 
 def _prepare(
     received: Received[RunRequest], services: Services, workspace: RunWorkspace, robot_file: str, robot: Robot
-) -> _Wanted:
-    document = received.document
-    uploaded = received.form.file("trajectory") is not None
+) -> tuple[RunRequestRecord, bool]:
+    """What is asked for, and whether its trajectory was sent."""
+    document, is_sent = received.document, received.form.file("trajectory") is not None
     if document.trajectory is not None:
-        if uploaded:
+        if is_sent:
             raise ProblemError("invalid-request", "the trajectory came twice, as a part and in part request; send one")
-        text = to_json_text(document.trajectory)
-        if text is None:
-            raise ExcitationError("trajectory: holds NaN, infinity or text that is not Unicode; write plain numbers")
+        text = to_json_text(document.trajectory, "trajectory", ExcitationError)
         (workspace.trajectories / "trajectory.json").write_text(text, encoding="utf-8")
-        uploaded = True
-    if uploaded and document.excitation is not None:
+        is_sent = True
+    if is_sent and document.excitation is not None:
         raise ProblemError("invalid-request", "excitation and trajectory were both given; give one motion")
     backend = choose_backend(services.settings, document.backend, robot)
-    return _Wanted(document, robot_file, robot, backend, uploaded)
-
-
-def _submit(wanted: _Wanted, services: Services, workspace: RunWorkspace, permit: Permit) -> str:
-    document, backend = wanted.document, wanted.backend
-    device = backend.device(wanted.robot.name)
-    services.runs.claims.require_free(device)
-    excitation, motion = _motion(wanted, services, workspace)
-    workspace.write_request(
-        RunRequestRecord(
-            robot_file=wanted.robot_file,
-            robot_name=wanted.robot.name,
-            backend=backend,
-            device=device,
-            excitation=excitation,
-            options=RunOptions.model_validate(document.model_dump(include=set(RunOptions.model_fields))),
-        )
+    order = RunRequestRecord(
+        robot_file=robot_file,
+        robot_name=robot.name,
+        backend=backend,
+        device=backend.device(robot.name),
+        excitation=document.excitation,
+        options=RunOptions.model_validate(document.model_dump(include=set(RunOptions.model_fields))),
     )
+    return order, is_sent
+
+
+def _submit(
+    order: RunRequestRecord, seed: int | None, services: Services, workspace: RunWorkspace, permit: Permit
+) -> str:
+    """Start a run; `seed`: of the motion that is designed first, None where there is one."""
+    services.runs.claims.require_free(order.device)
+    motion: Motion = ready_motion
+    if order.excitation is not None:
+        take_trajectory(EXCITATIONS.finished(services, order.excitation), workspace)
+    elif seed is not None:
+        options = ExcitationDesignOptions(seed=seed)
+        design = ExcitationOrder(robot_file=order.robot_file, robot_name=order.robot_name, options=options)
+        put_robot = partial(shutil.copytree, workspace.robot, dirs_exist_ok=True)
+        identifier = submit_job(services.jobs, services.excitations, ExcitationWorkspace, design, put_robot)
+        order = order.model_copy(update={"excitation": identifier})
+        motion = await_design(services.jobs, services.excitations, identifier)
+    workspace.write_order(order)
     try:
         return services.runs.submit(workspace.folder, motion, permit=permit)
     except BaseException:
-        if excitation is not None and document.excitation is None:
-            services.jobs.cancel(services.excitations, excitation)
+        if motion is not ready_motion:
+            services.jobs.cancel(services.excitations, order.excitation or "")
         raise
-
-
-def _motion(wanted: _Wanted, services: Services, workspace: RunWorkspace) -> tuple[str | None, Motion]:
-    """The excitation that is played, if it is one, and how the run gets its trajectory."""
-    identifier = wanted.document.excitation
-    if wanted.uploaded:
-        return None, ready_motion
-    if identifier is not None:
-        take_trajectory(EXCITATIONS.finished(services, identifier), workspace)
-        return identifier, ready_motion
-    options = ExcitationDesignOptions(seed=wanted.document.seed)
-    order = ExcitationOrder(robot_file=wanted.robot_file, robot_name=wanted.robot.name, options=options)
-    put_robot = partial(shutil.copytree, workspace.robot, dirs_exist_ok=True)
-    identifier = submit_job(services.jobs, services.excitations, ExcitationWorkspace, order, put_robot)
-    return identifier, DesignedMotion(services.jobs, services.excitations, identifier)
 
 
 Format = Annotated[RecordingFormat, Query(alias="format", description="mcap: the journal, ramp included; else columns")]
 
-RUNS = Resource(
+
+class Runs(MovingResource):
+    @override
+    def manager(self, services: Services) -> RunManager:
+        return services.runs
+
+    @override
+    def find(self, services: Services, identifier: str) -> RunWorkspace:
+        return RunWorkspace(services.runs.items.folder(identifier))
+
+    @override
+    def follow(self, services: Services, identifier: str) -> FollowedRun:
+        workspace = self.find(services, identifier)
+        return FollowedRun(workspace.events, lambda: services.runs.live(identifier) is None and workspace.has_ended())
+
+    @override
+    def read_state(self, services: Services, identifier: str) -> RunState | None:
+        record = self.find(services, identifier).read_run()
+        return None if record is None else record.state
+
+    @override
+    def describe(self, services: Services, identifier: str, root: str) -> RunAnswer:
+        workspace, live = self.find(services, identifier), services.runs.live(identifier)
+        here = f"{root}/runs/{identifier}"
+        record, request = workspace.read_run(), workspace.read_order()
+        if record is None or request is None:
+            detail = f"files of {identifier} are missing or damaged; remove it and hand it in again"
+            problem = make_problem("damaged", detail, here)
+            return RunAnswer(id=identifier, state="damaged", problem=problem, links=_links(here, None, None, workspace))
+        goes_on = live is not None and not record.state.is_end
+        return RunAnswer.describe(
+            record,
+            id=identifier,
+            step=workspace.read_step() if goes_on else None,
+            percent=live.percent if live is not None and goes_on else 100.0 * record.played,
+            figures=dict(live.figures) if live is not None and goes_on else {},
+            created=record.history[0].at,
+            ended=record.history[-1].at if record.state.is_end else None,
+            backend=request.backend,
+            options=request.options,
+            campaign=request.campaign,
+            problem=convert_problem(workspace.problem(), here),
+            recording=_recording(services, identifier, record),
+            links=_links(here, request.excitation and f"{root}/excitations/{request.excitation}", record, workspace),
+        )
+
+    @override
+    async def submit(self, request: Request, services: Services) -> str:
+        async with contextmanager_in_threadpool(stage_workspace(services.runs.items, RunWorkspace)) as workspace:
+            most = min(LARGEST_TRAJECTORY, services.settings.max_upload_bytes)
+            parts = {"trajectory": PartRule(most, workspace.trajectories, default_name="trajectory.json")}
+            received = await receive_request(request, RunRequest, services.settings, workspace.robot, parts)
+            robot_file = await run_in_threadpool(_put_robot, received, services, workspace)
+            robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
+            order, is_sent = await run_in_threadpool(_prepare, received, services, workspace, robot_file, robot)
+            permit = permit_of(request, services, order.device)
+            if is_sent:
+                await services.reading.call(
+                    request, check_trajectory, workspace.trajectories, workspace.robot / robot_file
+                )
+            seed = None if is_sent else received.document.seed
+            return await run_in_threadpool(_submit, order, seed, services, workspace, permit)
+
+
+RUNS = Runs(
     noun="a run",
     plural="runs",
     models=(RunRequest, RunAnswer),
     examples=EXAMPLES,
-    items=lambda services: services.runs.items,
-    find=find_run,
-    followed=follow_run,
-    submit=submit_run,
-    describe=describe,
     summary="Begin a run",
     words="The arm moves as soon as there is a motion: follow `Location` until it has ended, or stop it at any time."
     "\n\n"
     "One run at a time has an arm. Where somebody has the arm's lease, only they move it; it stops when the lease ends."
     "\nEvery command passes a guard that keeps the robot file's limits.",
     problems=("not-found", "not-finished", "excitation", "queue-full"),
-    moves_arm=True,
     parts={"trajectory": binary_part("the motion: a trajectory document (.json), or samples (.csv)")},
+    stop_model=StopAnswer,
+    stop_words="Stops the arm by the run's stop policy; legal in every state, any number of times; needs no body.\n\n"
+    "It waits for nothing: neither for other requests nor for jobs. The recording up to the stop is kept.",
+    remove_words="One that has ended is removed with all its files; its recording stays among the recordings.",
 )
 
-router = make_router(RUNS)
-
-
-def _stop(services: Services, identifier: str) -> RunState | None:
-    """Stop a run; None where it does not go on."""
-    live = services.runs.stop(identifier)
-    return None if live is None else live.state
-
-
-def _read_state(services: Services, identifier: str) -> RunState | None:
-    """Where a run stands; None where its record is damaged."""
-    record = find_run(services, identifier).read_run()
-    return None if record is None else record.state
-
-
-add_stopping(
-    router,
-    RUNS,
-    StopAnswer,
-    _stop,
-    _read_state,
-    lambda services, identifier: services.runs.remove(identifier),
-    (
-        "Stops the arm by the run's stop policy; legal in every state, any number of times; needs no body.\n\n"
-        "It waits for nothing: neither for other requests nor for jobs. The recording up to the stop is kept.",
-        "One that has ended is removed with all its files; its recording stays among the recordings.",
-    ),
-)
+router = RUNS.router()
 
 
 @router.get(

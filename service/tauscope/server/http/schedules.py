@@ -1,6 +1,6 @@
 """Schedules over HTTP: set up, changed, run now, and their firings."""
 
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Request
@@ -14,10 +14,9 @@ from tauscope.server.http.openapi import json_request
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.problems import problem_responses
 from tauscope.server.schedules.definition import ScheduleDefinition
-from tauscope.server.schedules.repeater import make_schedule
 from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry
-from tauscope.server.schedules.scheduler import read_definition
-from tauscope.server.store.data_folder import FOLDERS
+from tauscope.server.schedules.scheduler import make_schedule, read_definition
+from tauscope.server.store.data_folder import FOLDERS, utc_now
 from tauscope.strict_model import StrictModel
 
 
@@ -29,9 +28,7 @@ class ScheduleRequest(StrictModel):
         " options are repeated",
         examples=["20261103T101502Z-1f2e3d4c"],
     )
-    anywhere: bool = Field(
-        default=False, description="whether any service of the same database may do it; else only this one"
-    )
+    anywhere: bool = Field(default=False, description="whether any service of the database may do it, or this one")
     definition: ScheduleDefinition = Field(description="when it is due")
 
 
@@ -60,8 +57,6 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 
 
 class ScheduleAnswer(AnswerModel):
-    """A schedule."""
-
     name: str = Field(description="of it")
     site: str | None = Field(description="data folder whose service does it; null: whichever comes first")
     robot: str | None = Field(description="name of the robot")
@@ -72,36 +67,25 @@ class ScheduleAnswer(AnswerModel):
 
 
 class ScheduleListAnswer(AnswerModel):
-    """All schedules."""
-
     schedules: list[ScheduleAnswer] = Field(description="by name")
 
 
 class FiringAnswer(AnswerModel):
-    """One time that a schedule was due."""
-
     number: int = Field(description="of the firing")
     due: datetime = Field(description="when it was, UTC")
     is_asked: bool = Field(description="whether somebody asked for it")
-    state: str = Field(
-        description="asked, claimed, started, skipped, missed, failed, interrupted or withdrawn; nothing is repeated"
-    )
+    state: str = Field(description="asked, claimed, started, skipped, missed, failed, interrupted or withdrawn")
     reason: str | None = Field(description="why nothing was started")
     item: str | None = Field(description="path of what was started, as on the service that started it")
     item_state: str | None = Field(description="where that stands, as far as the index knows")
 
 
 class FiringListAnswer(AnswerModel):
-    """Firings of a schedule."""
-
     firings: list[FiringAnswer] = Field(description="the newest first")
 
 
 router = APIRouter(prefix="/schedules", tags=["schedules"], responses=problem_responses("store"))
-
-Name = Annotated[
-    str, Path(pattern="^[a-z0-9][a-z0-9-]{0,62}$", description="of the schedule", examples=["cell3-nightly"])
-]
+Name = Annotated[str, Path(pattern="^[a-z0-9][a-z0-9-]{0,62}$", description="its name", examples=["cell3-nightly"])]
 _BODY_PROBLEMS = ("bad-request", "limit-exceeded", "media-type", "not-found")
 
 
@@ -163,9 +147,7 @@ async def run_schedule(request: Request, name: Name, services: ServicesDep) -> F
 def _put(name: str, body: ScheduleRequest, services: Services) -> ScheduleEntry:
     scheduler = services.schedules
     site = None if body.anywhere else scheduler.repository.site
-    scheduler.repository.put(
-        make_schedule(name, body.like, body.definition, scheduler.repeater, site, datetime.now(UTC))
-    )
+    scheduler.repository.put(make_schedule(name, body.like, body.definition, scheduler.repeater, site, utc_now()))
     return scheduler.repository.find(name)
 
 

@@ -25,7 +25,6 @@ _HIDDEN = "[hidden]"
 
 
 def log_as_json(level: int = logging.INFO, stream: TextIO | None = None) -> None:
-    """Have everything that this process logs written as JSON."""
     shared = [
         structlog.stdlib.add_log_level,
         structlog.stdlib.add_logger_name,
@@ -62,18 +61,12 @@ def hide_secrets(_logger: Any, _method: str, event: MutableMapping[str, Any]) ->
 
 
 GRACE_S = 5  # how long open requests may take when the service is asked to stop
-
-
 SWITCH_S = 0.0005
 """How long a thread computes while the event loop waits for the interpreter [s]; Python's own 5 ms add up in a stop."""
 
 
 def serve(settings: Settings, announce: Callable[[str], None]) -> None:
-    """Answer requests until SIGINT or SIGTERM.
-
-    Raises TauscopeError if the address cannot be had, others could reach it and there is no API key, or another service
-    works with the data folder; or the certificate cannot be used.
-    """
+    """Answer requests until SIGINT or SIGTERM. Raises TauscopeError if the service cannot start."""
     _check_certificate(settings)
     require_data_folder(settings)
     if settings.log_format == "json":
@@ -114,10 +107,7 @@ class _Server(uvicorn.Server):
         self._open = AsyncExitStack()
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Open the services, answer requests, and only then say so.
-
-        Raises TauscopeError if the services cannot be opened.
-        """
+        """Announce only once the services are open and answer. Raises TauscopeError if they cannot be opened."""
         await self._open.enter_async_context(self._app.router.lifespan_context(self._app))
         try:
             await super().startup(sockets)

@@ -3,56 +3,60 @@
 import logging
 import shutil
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import timedelta
 from functools import partial
-from typing import Annotated, cast
+from typing import Annotated, Any, cast
 
 from anyio import CapacityLimiter
 from fastapi import Depends, Request
 
-from tauscope.errors import TauscopeError
+from tauscope.errors import NotFoundError, TauscopeError
 from tauscope.server.auth.audit_log import AuditLog, AuditTrail
 from tauscope.server.auth.gate import Access, RateLimit
-from tauscope.server.auth.keys import KeyFile, KeyRing
-from tauscope.server.control.campaign_runner import CampaignDependencies, CampaignManager
+from tauscope.server.auth.keys import CHECK_S, KeyFile, KeyRing
+from tauscope.server.control.campaign import CampaignDependencies, CampaignManager
 from tauscope.server.control.leases import DeviceClaims, Lease, Leases
 from tauscope.server.control.run import start_control
 from tauscope.server.control.run_manager import RunManager, StartControl
 from tauscope.server.history.indexer import Indexer, open_index
 from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.history.model_registry import DriftMonitor, ModelRegistry
-from tauscope.server.history.retention import RetentionRule, RetentionSweeper
-from tauscope.server.http.metrics import Metrics, TimedExecutor
-from tauscope.server.http.readiness import Clock, Heartbeat, Readiness, ReadyMetrics, check_database, check_disk
+from tauscope.server.history.retention import RetentionRule, sweep
+from tauscope.server.http.metrics import Metrics, ModelDrift, TimedExecutor
+from tauscope.server.http.readiness import Clock, Heartbeat, Readiness, check_database, check_disk
 from tauscope.server.http.reading import WIDTH, ReadingQueue
 from tauscope.server.http.repeated_requests import StoredAnswers
 from tauscope.server.http.settings import Settings
 from tauscope.server.http.tasks.event_feeds import EventFeeds
-from tauscope.server.queue.analyses import run_diagnosis, run_excitation, run_identification, run_rollout
+from tauscope.server.problems import ProblemError
+from tauscope.server.queue.analyses import (
+    IdentificationWorkspace,
+    run_diagnosis,
+    run_excitation,
+    run_identification,
+    run_rollout,
+)
 from tauscope.server.queue.cluster_executor import ClusterExecutor, open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.worker_pool import WorkerPool
-from tauscope.server.schedules.repeater import Repeater
 from tauscope.server.schedules.repository import ScheduleRepository
-from tauscope.server.schedules.scheduler import Scheduler, new_boot
+from tauscope.server.schedules.scheduler import Repeater, Scheduler, new_boot
 from tauscope.server.store.data_folder import FOLDERS, FolderLock, ItemStore, item_stores, site_identifier
 from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index
 from tauscope.server.store.recordings import RecordingStore
-from tauscope.server.store.robots import RobotStore
+from tauscope.server.store.robots import RobotStore, hash_robot
 
 _log = logging.getLogger("tauscope.jobs")
 
 
 @dataclass(frozen=True)
 class Services:
-    """What the routes work with."""
-
     settings: Settings
     recordings: RecordingStore
     robots: RobotStore
@@ -91,12 +95,8 @@ async def _services_of(request: Request) -> Services:
 
 
 ServicesDep = Annotated[Services, Depends(_services_of)]  # the services, as an argument of a route
-
-
 PRUNING_S = 3600.0  # how often what is old is removed, where the operator asked for it [s]
-
 DAY_S = 86400.0
-
 REQUESTS_PER_S = 200.0  # how often a key may call in the long run, where the operator says nothing [1/s]
 
 
@@ -104,10 +104,7 @@ REQUESTS_PER_S = 200.0  # how often a key may call in the long run, where the op
 def open_services(
     settings: Settings, executor: Executor | None = None, start: StartControl | None = None
 ) -> Iterator[Services]:
-    """Take the data folder, and end all work on leaving: first what moves, then the rest.
-
-    Raises TauscopeError if another service works with the data folder, or its database cannot be used.
-    """
+    """Take the data folder; end all work on leaving. Raises TauscopeError if the folder or database is unusable."""
     settings.data_folder.mkdir(0o700, parents=True, exist_ok=True)
     access = _open_access(settings)
     lock = FolderLock(settings.data_folder)
@@ -117,12 +114,13 @@ def open_services(
         lock.release()
         raise
     readers = open_readers(settings)
-    services = _assemble(_Ground(settings, access, database, site), executor, readers, start)
+    services = _assemble(settings, access, database, site, executor, readers, start)
     drift = DriftMonitor(services.models.history, site)
     _watch(services, drift)
     housekeeping = Housekeeping(
         [services.jobs.settle, services.runs.settle, services.index.sync, services.models.judge_new, drift.look]
     )
+    keys = Housekeeping([services.access.ring.look], CHECK_S)
     clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
     filling = threading.Thread(target=_fill_index, args=(services,), name="index", daemon=True)
     filling.start()
@@ -135,11 +133,12 @@ def open_services(
     try:
         with services.audit.writing():
             services.audit.note("service", "began")
+            keys.start()
             try:
-                with services.access.ring.watched():
-                    yield services
+                yield services
             finally:
                 services.begin_to_close()
+                keys.close()
                 clock.close()
                 pruning.close()
                 services.runs.close()
@@ -168,32 +167,26 @@ def _fill_index(services: Services) -> None:
         _log.warning("the index is not filled: %s; it is tried again", error)
 
 
-@dataclass(frozen=True, eq=False)
-class _Ground:
-    """What everything else stands on."""
-
-    settings: Settings
-    access: Access
-    database: Database
-    site: str
-
-
-def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, start: StartControl | None) -> Services:
+def _assemble(
+    settings: Settings,
+    access: Access,
+    database: Database,
+    site: str,
+    executor: Executor | None,
+    readers: Executor,
+    start: StartControl | None,
+) -> Services:
     """Everything that the routes work with; nothing of it moves yet, and unfinished analysis goes on."""
-    settings, database, site = ground.settings, ground.database, ground.site
     items, metrics, heartbeat = item_stores(settings.data_folder), Metrics(), Heartbeat()
     recordings = RecordingStore(settings.recordings_folder)
     recordings.tidy()
     identifications, diagnoses, excitations, rollouts = kinds = _kinds(settings, items)
     pool = executor or open_executor(settings.workers, deadline_s=settings.job_timeout_s)
     timed = TimedExecutor(pool, metrics.job_seconds)
-    new_queue = partial(
-        JobQueue, kinds, timed, most_waiting=settings.max_waiting, most_each=settings.max_jobs_per_caller
-    )
+    bounds: dict[str, Any] = {"slots": settings.workers, "most_waiting": settings.max_waiting}
     if isinstance(pool, ClusterExecutor):  # it comes and goes, and so do its workers
-        jobs = new_queue(slots=lambda: pool.width, is_there=pool.is_there)
-    else:
-        jobs = new_queue(slots=settings.workers)
+        bounds |= {"slots": lambda: pool.width, "is_there": pool.is_there}
+    jobs = JobQueue(kinds, timed, most_each=settings.max_jobs_per_caller, **bounds)
     audit = AuditTrail(AuditLog(settings.data_folder))
     claims, closing = DeviceClaims(settings.max_arms), threading.Event()
     leases = Leases(claims, on_end=partial(_note_end, audit))
@@ -217,12 +210,12 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
         runs=runs,
         campaigns=campaigns,
         reading=ReadingQueue(readers),
-        access=ground.access,
+        access=access,
         leases=leases,
         audit=audit,
         answers=StoredAnswers(settings.data_folder / "idempotency"),
         metrics=metrics,
-        readiness=Readiness(_collect_checks(ground, jobs, readers, audit, closing)),
+        readiness=Readiness(_collect_checks(settings, database, jobs, readers, audit, closing)),
         closing=closing,
         feeds=EventFeeds(closing),
         heartbeat=heartbeat,
@@ -233,7 +226,12 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
 
 
 def _collect_checks(
-    ground: _Ground, jobs: JobQueue, readers: Executor, audit: AuditTrail, closing: threading.Event
+    settings: Settings,
+    database: Database,
+    jobs: JobQueue,
+    readers: Executor,
+    audit: AuditTrail,
+    closing: threading.Event,
 ) -> dict[str, Callable[[], str | None]]:
     def check_workers() -> str | None:
         if not jobs.can_work():
@@ -242,8 +240,8 @@ def _collect_checks(
 
     return {
         "service": lambda: "the service is ending" if closing.is_set() else None,
-        "database": partial(check_database, ground.database.check),
-        "disk": partial(check_disk, ground.settings.data_folder),
+        "database": partial(check_database, database.check),
+        "disk": partial(check_disk, settings.data_folder),
         "workers": check_workers,
         "clock": Clock().check,
         "audit log": lambda: f"{audit.lost} entries of the audit log were lost" if audit.lost else None,
@@ -251,7 +249,6 @@ def _collect_checks(
 
 
 def open_readers(settings: Settings) -> Executor:
-    """Processes that read files of strangers; none is started before it is needed."""
     bounds = {"deadline_s": settings.reading_timeout_s, "memory_bytes": settings.reading_memory_bytes}
     return WorkerPool(WIDTH, **bounds)
 
@@ -267,7 +264,6 @@ def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind,
 
 
 def _retention(services: Services) -> list[Callable[[], object]]:
-    """What removes old items; nothing where the operator did not ask for it."""
     settings, jobs = services.settings, services.jobs
     if settings.prune_older_than_days is None:
         return []
@@ -285,14 +281,11 @@ def _retention(services: Services) -> list[Callable[[], object]]:
     def note(kind: str, name: str) -> None:
         services.audit.note("service", "pruned", subject=name, kind=kind)
 
-    history = services.models.history
-    sweeper = RetentionSweeper(rule, services.index, history, services.recordings, removers, note)
-
     def prune() -> None:
         # What was not judged yet may become the active model, which stays.
         services.index.sync()
         services.models.judge_new()
-        sweeper.tidy()
+        sweep(rule, services.index, services.models.history, services.recordings, removers, note)
 
     return [prune]
 
@@ -300,8 +293,8 @@ def _retention(services: Services) -> list[Callable[[], object]]:
 def _watch(services: Services, drift: DriftMonitor) -> None:
     metrics, folder = services.metrics, services.settings.data_folder
     metrics.loops.live = services.runs.list_live
-    metrics.watch_drift(drift)
-    metrics.registry.register(ReadyMetrics(services.readiness))
+    metrics.registry.register(ModelDrift(drift))
+    metrics.watch_readiness(services.readiness.checks)
     metrics.watch("tauscope_jobs_waiting", "Jobs that wait", services.jobs.waiting)
     metrics.watch("tauscope_leases", "Leases that hold", lambda: len(services.leases.active()))
     metrics.watch("tauscope_audit_lost", "Entries that the audit log did not take", lambda: services.audit.lost)
@@ -325,11 +318,7 @@ def _open_access(settings: Settings) -> Access:
 
 
 def require_data_folder(settings: Settings) -> None:
-    """Make the data folder, and refuse one that cannot be worked with.
-
-    Raises TauscopeError if it cannot be made or written to, another service works with it, or it has no key where one
-    is needed.
-    """
+    """Raises TauscopeError if the folder cannot be used, another service has it, or a key is needed."""
     folder = settings.data_folder
     try:
         folder.mkdir(0o700, parents=True, exist_ok=True)
@@ -338,3 +327,40 @@ def require_data_folder(settings: Settings) -> None:
     except OSError as error:
         text = f"{folder}: cannot be used as data folder ({error.strerror}); name a folder that can be written to"
         raise TauscopeError(text) from None
+
+
+def require_no_model(services: Services, identifier: str) -> None:
+    _judge_new(services)
+    _require_free(services, identifier, {identifier})
+
+
+def require_no_evidence(services: Services, recording: str) -> None:
+    """Raises ProblemError if an active model or a reference was made from or judged by a recording."""
+    _judge_new(services)
+    _require_free(services, recording, services.index.index.list_users(recording))
+
+
+def require_no_identification(services: Services, version: str) -> None:
+    """Raises ProblemError if an active model or a reference was identified with a robot."""
+    _judge_new(services)
+    users = set()
+    for identifier in services.models.history.list_protected():
+        with suppress(NotFoundError):  # of another service
+            workspace = IdentificationWorkspace(services.identifications.items.folder(identifier))
+            order = workspace.read_order()
+            if order is not None and hash_robot(workspace.robot, order.robot_file) == version:
+                users.add(identifier)
+    _require_free(services, version, users)
+
+
+def _judge_new(services: Services) -> None:
+    """Judge every identification: one that ended a moment ago may become the active model."""
+    services.index.refresh()
+    services.models.judge_new()
+
+
+def _require_free(services: Services, name: str, users: Collection[str]) -> None:
+    models = services.models.history.list_protected().intersection(users)
+    if models:
+        hint = "make another model active, and the reference, first; identify again where there is no other"
+        raise ProblemError("in-use", f"{name}: model {min(models)} is in use and rests on it; {hint}")

@@ -37,19 +37,16 @@ model:
 
 SPRING_NM_PER_RAD = 2.5
 """Stiffness of the concealed spring at the elbow, at rest at 0 rad: about half of the elbow's torque."""
-
 NOISE_STD_NM = 0.1
 RATE_HZ = 100.0
 PERIOD_S, PERIODS = 10.0, 2
 HARMONICS = 5
-
 MOTIONS = {"example-train.csv": (1, 1.5), "example-held-out.csv": (2, 1.1)}
 """Seed and reach [rad] of each recording: training moves wider than the motion that judges it."""
 
 
 @cache
 def example_files() -> dict[str, bytes]:
-    """The files by name."""
     robot = _robot()
     made = {name: _recording(robot, reach, np.random.default_rng(seed)) for name, (seed, reach) in MOTIONS.items()}
     return {"example-arm.yaml": ROBOT.encode(), **made}

@@ -16,19 +16,15 @@ from tauscope.runtime.drivers import driver_names, find_driver
 from tauscope.server.page.example import example_files
 
 router = APIRouter(include_in_schema=False)
-
 STATIC = Path(__file__).parent / "static"
-
 MEDIA_TYPES: Mapping[str, str] = {
     ".html": "text/html; charset=utf-8",
     ".css": "text/css; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
     ".svg": "image/svg+xml",
 }
-
 PLOT_LIBRARY: Mapping[str, str] = {"uplot.js": "uplot/static/uPlot.iife.js", "uplot.css": "uplot/static/uPlot.min.css"}
 """Files of the installed package uplot-python, by the names that the page knows them by."""
-
 HEADERS: Mapping[str, str] = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:;"
     " connect-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'none'",
@@ -38,8 +34,6 @@ HEADERS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Asset:
-    """A file of the page."""
-
     content: bytes
     media_type: str
     tag: str
@@ -47,13 +41,11 @@ class Asset:
 
 @router.get("/")
 def show_page(request: Request) -> Response:
-    """The page."""
     return _answer(request, "index.html")
 
 
 @router.get("/page/{name}")
 def show_asset(request: Request, name: str) -> Response:
-    """A file of the page."""
     return _answer(request, name)
 
 
@@ -69,7 +61,6 @@ def _answer(request: Request, name: str) -> Response:
 
 @router.get("/example/{name}")
 def show_example(name: str) -> Response:
-    """A file of the example, for the page to fetch."""
     content = example_files().get(name)
     if content is None:
         raise NotFoundError(one_line(f"the example has no file {shown(name)}; it has {', '.join(example_files())}"))
@@ -78,7 +69,6 @@ def show_example(name: str) -> Response:
 
 @cache
 def assets() -> Mapping[str, Asset]:
-    """All files of the page by name: ours, the plotting library's, and the list of drivers."""
     package = distribution("uplot-python")
     paths = {path.name: path for path in sorted(STATIC.iterdir()) if path.suffix in MEDIA_TYPES}
     paths |= {name: Path(str(package.locate_file(file))) for name, file in PLOT_LIBRARY.items()}

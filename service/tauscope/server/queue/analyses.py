@@ -1,15 +1,23 @@
-"""Jobs of the queue: what each kind of order holds, what its folder holds, and the work."""
+"""Jobs of the queue: what each kind of order and folder holds, the work, and recordings as a worker reads them."""
 
+import json
 from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
-from tauscope.errors import LimitExceededError, NotFoundError
+from tauscope.errors import LimitExceededError, NotFoundError, RecordingError
 from tauscope.export.formats import CODE_FILES, EXPORT_FILES
-from tauscope.robot import read_robot
-from tauscope.server.queue.job_folder import JobProblem, hide_folders
+from tauscope.recording import ColumnMapping, Reading, RecordingReport, check_recording, find_mapping, read_recording
+from tauscope.recording.recording import Array
+from tauscope.report.series import envelope_indices
+from tauscope.robot import Robot, read_robot
+from tauscope.server.queue.job_folder import JobProblem, hide_folders, without_folders
 from tauscope.server.queue.task_job import TRAJECTORY, OrderedRecording, TaskOrder, TaskWorkspace, perform_job
 from tauscope.tasks import design_excitation, diagnose, identify, rollout
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
@@ -21,8 +29,6 @@ from tauscope.trajectory.csv_format import write_trajectory_rows
 
 
 class IdentificationOrder(TaskOrder):
-    """Input of an identification job."""
-
     task = identify
 
     form: Literal["tauscope.order/1"] = Field(default="tauscope.order/1", description="name and version of this form")
@@ -32,8 +38,6 @@ class IdentificationOrder(TaskOrder):
 
 
 class IdentificationWorkspace(TaskWorkspace[IdentificationOrder]):
-    """Files of an identification job."""
-
     order_type = IdentificationOrder
     noun = "identification"
     roles = ("recordings", "held_out")
@@ -47,18 +51,13 @@ class IdentificationWorkspace(TaskWorkspace[IdentificationOrder]):
 
 
 def run_identification(folder: Path, server_recordings: Path) -> JobProblem | None:
-    """Do an identification job; returns why there is no result."""
     return perform_job(IdentificationWorkspace(folder), server_recordings)
 
 
 class DiagnosisOrder(TaskOrder):
-    """Input of a diagnosis job."""
-
     task = diagnose
 
-    form: Literal["tauscope.diagnosis-order/1"] = Field(
-        default="tauscope.diagnosis-order/1", description="name and version of this form"
-    )
+    form: Literal["tauscope.diagnosis-order/1"] = "tauscope.diagnosis-order/1"
     recordings: tuple[OrderedRecording, ...] = Field(description="what is to be explained")
     held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what findings are confirmed by")
     simulated: tuple[OrderedRecording, ...] = Field(default=(), description="what the user's simulator recorded")
@@ -67,8 +66,6 @@ class DiagnosisOrder(TaskOrder):
 
 
 class DiagnosisWorkspace(TaskWorkspace[DiagnosisOrder]):
-    """Files of a diagnosis job."""
-
     order_type = DiagnosisOrder
     noun = "diagnosis"
     roles = ("recordings", "held_out", "simulated")
@@ -86,18 +83,13 @@ class DiagnosisWorkspace(TaskWorkspace[DiagnosisOrder]):
 
 
 def run_diagnosis(folder: Path, server_recordings: Path) -> JobProblem | None:
-    """Do a diagnosis job; returns why there is no result."""
     return perform_job(DiagnosisWorkspace(folder), server_recordings)
 
 
 class RolloutOrder(TaskOrder):
-    """Input of a rollout job."""
-
     task = rollout
 
-    form: Literal["tauscope.rollout-order/1"] = Field(
-        default="tauscope.rollout-order/1", description="name and version of this form"
-    )
+    form: Literal["tauscope.rollout-order/1"] = "tauscope.rollout-order/1"
     recordings: tuple[OrderedRecording, ...] = Field(description="what is rolled out")
     refine: tuple[OrderedRecording, ...] = Field(default=(), description="what the model is refined by")
     model: str | None = Field(default=None, description="name of the model, in the folder `against`")
@@ -105,8 +97,6 @@ class RolloutOrder(TaskOrder):
 
 
 class RolloutWorkspace(TaskWorkspace[RolloutOrder]):
-    """Files of a rollout job."""
-
     order_type = RolloutOrder
     noun = "rollout"
     roles = ("recordings", "refine")
@@ -115,7 +105,6 @@ class RolloutWorkspace(TaskWorkspace[RolloutOrder]):
 
 
 def run_rollout(folder: Path, server_recordings: Path) -> JobProblem | None:
-    """Do a rollout job; returns why there is no result."""
     return perform_job(RolloutWorkspace(folder), server_recordings)
 
 
@@ -123,39 +112,24 @@ MOST_ROWS = 2_000_000  # rows of the longest CSV that is made on request
 
 
 class ExcitationOrder(TaskOrder):
-    """Input of an excitation job."""
-
     task = design_excitation
 
-    form: Literal["tauscope.excitation-order/1"] = Field(
-        default="tauscope.excitation-order/1", description="name and version of this form"
-    )
-    options: ExcitationDesignOptions = Field(
-        default=ExcitationDesignOptions(), description="how the motion is designed"
-    )
+    form: Literal["tauscope.excitation-order/1"] = "tauscope.excitation-order/1"
+    options: ExcitationDesignOptions = Field(default=ExcitationDesignOptions(), description="how the motion is made")
 
 
 class ExcitationWorkspace(TaskWorkspace[ExcitationOrder]):
-    """Files of an excitation job."""
-
     order_type = ExcitationOrder
     noun = "excitation"
     outputs: ClassVar[Mapping[str, str | None]] = {TRAJECTORY: None, "result.json": "tauscope.excitation/1"}
 
 
 def run_excitation(folder: Path) -> JobProblem | None:
-    """Do an excitation job; returns why there is no result."""
     return perform_job(ExcitationWorkspace(folder), folder)
 
 
 def write_trajectory_piece(workspace: TaskWorkspace[Any], rate_hz: float, start: int) -> bytes:
-    """Rows of the trajectory of an excitation that succeeded, as CSV; empty beyond the last one.
-
-    Raises NotFoundError if the file is missing. Raises ExcitationError if the file was damaged. Raises
-    LimitExceededError if the CSV would be too long.
-
-    `rate_hz`: samples a second [Hz].
-    """
+    """CSV rows at `rate_hz` [Hz]; empty beyond the last. Raises NotFoundError, ExcitationError, LimitExceededError."""
     try:
         content, order = workspace.trajectory.read_bytes(), workspace.read_order()
     except OSError:
@@ -172,10 +146,65 @@ def write_trajectory_piece(workspace: TaskWorkspace[Any], rate_hz: float, start:
 
 
 def check_trajectory(folder: Path, robot_file: Path) -> None:
-    """Read a trajectory that a client sent, as a worker process does it.
-
-    Raises ExcitationError if it is not valid, or was made for an arm of another number of joints.
-    """
+    """Read a trajectory as a worker does. Raises ExcitationError if it is not valid, or not for this arm."""
     (path,) = folder.iterdir()
     with hide_folders(folder, robot_file.parent):
         read_trajectory(path, read_robot(robot_file))
+
+
+def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport:
+    """Report on a recording. Raises RecordingError, whose message calls the file by its name alone."""
+    with hide_folders(path.parent):
+        return replace(check_recording(path, joint_count), name=path.name)
+
+
+@dataclass(frozen=True)
+class Understanding:
+    """`mapping`: None for a log, which names its joints; `problem`: why the file is refused, without `report`."""
+
+    mapping: ColumnMapping | None
+    report: RecordingReport | None
+    problem: str | None
+
+
+def understand_recording(path: Path, robot: Robot | None, reading: Reading) -> Understanding:
+    """Find columns and units, guessed ones too, and report what a file holds when it is read so."""
+    mapping = None
+    with suppress(RecordingError):  # a log, or a file that the check refuses, too
+        mapping = find_mapping(path, robot, reading)
+    if mapping is not None and mapping.is_guessed and reading.columns is None:
+        reading = replace(reading, columns=mapping.columns, units={**mapping.units, **reading.units})
+    try:
+        report = check_recording(path, None, robot, reading)
+    except RecordingError as error:
+        return Understanding(mapping, None, without_folders(str(error), path.parent))
+    return Understanding(mapping, replace(report, name=path.name), None)
+
+
+def read_kept_samples(path: Path, most: int) -> bytes:
+    """Samples of a plot, thinned to extremes: header length (4 bytes), JSON header, columns of 32-bit floats."""
+    with hide_folders(path.parent):
+        recording = read_recording(path)
+    samples = recording.samples()
+    effort = recording.effort_kind.value
+    values = np.hstack([samples.position, samples.effort])
+    kept = _choose_rows(values, most)
+    joints = range(1, recording.joint_count + 1)
+    header = {
+        "columns": ["t", *(f"q{j}" for j in joints), *(f"{effort}{j}" for j in joints)],
+        "joint_count": recording.joint_count,
+        "effort": effort,
+        "samples": len(samples.time),
+        "shown": len(kept),
+    }
+    text = json.dumps(header).encode()
+    text += b" " * (-len(text) % 4)
+    columns = np.vstack([samples.time[kept] - samples.time[0], values[kept].T]).astype("<f4")
+    return len(text).to_bytes(4, "little") + text + columns.tobytes()
+
+
+def _choose_rows(values: Array, most: int) -> NDArray[np.intp]:
+    if len(values) <= most:
+        return np.arange(len(values))
+    share = max(most // values.shape[1], 2)
+    return np.unique(np.concatenate([envelope_indices(column, share) for column in values.T]))

@@ -17,11 +17,7 @@ if TYPE_CHECKING:
 
 
 class LoopThread:
-    """One event loop for every client that reaches for a cluster, one after the other.
-
-    Dask gives each client a loop of its own otherwise, and one that does not reach its scheduler leaves it running:
-    a thread more with every attempt.
-    """
+    """One event loop for all clients: Dask leaves a loop running for each that does not reach its scheduler."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -45,10 +41,7 @@ class LoopThread:
         return self._loop
 
     def stop(self, within_s: float) -> None:
-        """End the thread, with whatever its clients still had under way.
-
-        `within_s`: how long to wait for its end [s].
-        """
+        """End the thread, with whatever its clients still had under way, within [s]."""
         if self._loop is not None:
             self._loop.add_callback(self._stopping.set)
             self._thread.join(within_s)
@@ -56,12 +49,9 @@ class LoopThread:
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
-
 _log = logging.getLogger("tauscope.jobs")
-
 SCHEDULER = "DASK_SCHEDULER_ADDRESS"
 """Environment variable that names the scheduler of a Dask cluster, as in ``tcp://scheduler:8786``."""
-
 TIMEOUT_S = 10  # how long a scheduler may take to answer [s]
 CHECK_S = 1.0  # how often the scheduler is looked at: whether it is there, and how many workers it has [s]
 
@@ -71,27 +61,17 @@ class ClusterUnavailableError(BrokenExecutor):
 
 
 class ClusterExecutor(Executor):
-    """A Dask cluster; a task whose worker dies again and again ends with BrokenExecutor, as in a pool of processes.
-
-    Dask's own client gives up for good where the scheduler is away for longer than it waits. A thread reaches the
-    scheduler again then; meanwhile `is_there` is false, tasks end with `ClusterUnavailableError`.
-    """
+    """A Dask cluster that is reached again where Dask's client has given up; `is_there` is false meanwhile."""
 
     def __init__(self, address: str, wait_s: float = 0.0) -> None:
-        """Reach the scheduler.
-
-        Raises StoreError if it does not answer, or Dask is not installed.
-
-        `wait_s`: how long `submit` waits for a scheduler that is away [s].
-        """
+        """`wait_s`: for a scheduler that is away [s]. Raises StoreError if it does not answer, or without Dask."""
         self._address, self._wait_s = address, wait_s
         self._width = 1
         self._closing = threading.Event()
         self._there = threading.Event()
         self._loop = LoopThread("cluster loop")
         try:
-            self._client = self._open_client()
-            self._executor = _executor_of(self._client)
+            self._client, self._executor = self._open_client()
             self._look()
         except (ImportError, OSError, ValueError) as error:
             self._loop.stop(TIMEOUT_S)
@@ -111,10 +91,7 @@ class ClusterExecutor(Executor):
     def submit(
         self, fn: Callable[Arguments, Result], /, *args: Arguments.args, **kwargs: Arguments.kwargs
     ) -> "Future[Result]":
-        """Have a function called by a worker.
-
-        Raises ClusterUnavailableError if the scheduler is away. Raises RuntimeError after `shutdown`.
-        """
+        """Raises ClusterUnavailableError if the scheduler is away, RuntimeError after `shutdown`."""
         if self._closing.is_set():
             raise RuntimeError("the cluster was left")
         if not self.is_there():
@@ -131,7 +108,6 @@ class ClusterExecutor(Executor):
         return outer
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Leave the cluster."""
         self._closing.set()
         self._watcher.join(2 * TIMEOUT_S)
         try:
@@ -143,14 +119,14 @@ class ClusterExecutor(Executor):
         finally:
             self._loop.stop(TIMEOUT_S)
 
-    def _open_client(self) -> "Client":
-        """A connection of its own; raises what Dask raises."""
+    def _open_client(self) -> "tuple[Client, Executor]":
         from distributed import Client
 
-        return Client(self._address, self._loop.open(), timeout=TIMEOUT_S, set_as_default=False)
+        client = Client(self._address, self._loop.open(), timeout=TIMEOUT_S, set_as_default=False)
+        # The same function of the same folder is no known result: its files may be others by now.
+        return client, client.get_executor(pure=False)
 
     def _watch(self) -> None:
-        """Look at the scheduler until it is left."""
         while not self._closing.wait(CHECK_S):
             try:
                 self._look()
@@ -158,11 +134,9 @@ class ClusterExecutor(Executor):
                 _log.debug("the cluster could not be looked at", exc_info=True)
 
     def _look(self) -> None:
-        """Count the workers, or reach a scheduler anew that was given up."""
         if self._client.status == "closed":
             self._there.clear()
-            self._client = self._open_client()
-            self._executor = _executor_of(self._client)
+            self._client, self._executor = self._open_client()
             _log.warning("the Dask scheduler at %s is back", self._address)
         if self.is_there():
             # `Client.nthreads` asks the same, and waits for ever where the scheduler is lost meanwhile.
@@ -200,19 +174,7 @@ def _not_reached(address: str, error: Exception) -> StoreError:
     return StoreError(f"{SCHEDULER}={address}: does not answer ({type(error).__name__}); {hint}")
 
 
-def _executor_of(client: "Client") -> Executor:
-    """Dask's own executor. The same function of the same folder is no known result: its files may be others by now."""
-    return client.get_executor(pure=False)
-
-
 def open_executor(workers: int, wait_s: float = 0.0, deadline_s: float | None = None) -> Executor:
-    """Where analysis is done: on the cluster that the environment names, else in processes of our own.
-
-    The workers of a cluster have to see the data folder under the same path. Raises StoreError if the cluster does not
-    answer, or Dask is not installed.
-
-    `wait_s`: how long a task waits for a cluster that is away before it ends [s]; `deadline_s`: how long a task may
-    take in a process of our own [s].
-    """
+    """The cluster that the environment names, or processes of our own; bounds in [s]. Raises StoreError."""
     address = os.environ.get(SCHEDULER, "")
     return ClusterExecutor(address, wait_s) if address else WorkerPool(workers, deadline_s=deadline_s)

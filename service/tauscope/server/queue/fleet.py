@@ -28,8 +28,6 @@ AWAY = "the Dask cluster was away for too long; see to its scheduler, and give t
 
 @dataclass(frozen=True)
 class FleetEntry:
-    """A robot of a manifest."""
-
     row: int
     name: str
     robot: Path
@@ -39,8 +37,6 @@ class FleetEntry:
 
 @dataclass(frozen=True)
 class FleetResult:
-    """What came of a robot."""
-
     entry: FleetEntry
     figures: dict[str, str]
     error: str | None
@@ -52,11 +48,7 @@ FleetWork = Callable[[FleetEntry, Path], FleetResult]
 
 
 def read_manifest(path: Path) -> Iterator[FleetEntry]:
-    """The robots of a manifest, line by line; paths are relative to it.
-
-    A CSV file with the columns `COLUMNS`; several recordings are separated by ``;``, `held_out` may be empty. Raises
-    RecordingError naming the line.
-    """
+    """Robots of a CSV with the columns `COLUMNS`; paths are relative to it. Raises RecordingError naming the line."""
     names: dict[str, int] = {}
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
@@ -73,12 +65,7 @@ def read_manifest(path: Path) -> Iterator[FleetEntry]:
 def analyse_fleet(
     entries: Iterator[FleetEntry], work: FleetWork, folder: Path, executor: Executor, width: int
 ) -> Iterator[FleetResult]:
-    """Analyse every robot; results come as they are done.
-
-    No more robots than `width` and as many again wait in the executor, so that the memory that is needed here does not
-    grow with the fleet. Where a worker dies, or a cluster goes away, those that were in the executor are done again one
-    by one: what kills its worker then is to blame itself.
-    """
+    """Results as they come, 2 `width` in the executor; after a lost worker, what it held is done one by one."""
     pending: dict[Future[FleetResult], FleetEntry] = {}
     suspects: list[FleetEntry] = []
     is_exhausted = False
@@ -101,12 +88,10 @@ def analyse_fleet(
 
 
 def identify_robot(entry: FleetEntry, folder: Path) -> FleetResult:
-    """Identify a robot."""
     return _time(identify, entry, folder)
 
 
 def diagnose_robot(entry: FleetEntry, folder: Path) -> FleetResult:
-    """Diagnose a robot, against the best model that its recordings allow."""
     return _time(diagnose, entry, folder)
 
 

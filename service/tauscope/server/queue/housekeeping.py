@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from tauscope.errors import TauscopeError
 
 _log = logging.getLogger("tauscope.jobs")
-
 PERIOD_S = 1.0  # how often the tasks are done [s]
 
 
@@ -16,8 +15,7 @@ class Housekeeping:
 
     def __init__(self, tasks: Sequence[Callable[[], object]], period_s: float = PERIOD_S) -> None:
         """Prepare; nothing is done before `start`. `period_s`: pause between two rounds [s]."""
-        self._tasks = tasks
-        self._period_s = period_s
+        self._tasks, self._period_s = tasks, period_s
         self._closing = threading.Event()
         self._failing: set[Callable[[], object]] = set()
         self._thread = threading.Thread(target=self._run, name="housekeeping", daemon=True)
@@ -27,7 +25,6 @@ class Housekeeping:
         self._thread.start()
 
     def close(self) -> None:
-        """Do no further task, and wait for the one that is being done."""
         self._closing.set()
         if self._thread.is_alive():
             self._thread.join()

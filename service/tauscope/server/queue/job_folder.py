@@ -7,13 +7,15 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
 
-from pydantic import AwareDatetime, Field, JsonValue, ValidationError
+from pydantic import AwareDatetime, Field, JsonValue
+from typing_extensions import override
 
 from tauscope.errors import TauscopeError
-from tauscope.files import is_disk_full, write_atomically
+from tauscope.files import is_disk_full
 from tauscope.server.store.event_log import EventLog
+from tauscope.server.store.files import read_stored, write_stored
 from tauscope.strict_model import StrictModel
 
 
@@ -45,39 +47,29 @@ class JobState(StrEnum):
 
     @property
     def is_end(self) -> bool:
-        """Whether nothing will happen to the job any more."""
         return not TRANSITIONS[self]
 
 
+_ENDS = frozenset([*JobState][-4:])
 TRANSITIONS: Mapping[JobState, frozenset[JobState]] = {
     JobState.QUEUED: frozenset({JobState.RUNNING, JobState.CANCELLED, JobState.INTERRUPTED}),
-    JobState.RUNNING: frozenset(
-        {JobState.QUEUED, JobState.SUCCEEDED, JobState.FAILED, JobState.CANCELLED, JobState.INTERRUPTED}
-    ),
-    JobState.SUCCEEDED: frozenset(),
-    JobState.FAILED: frozenset(),
-    JobState.CANCELLED: frozenset(),
-    JobState.INTERRUPTED: frozenset(),
+    JobState.RUNNING: _ENDS | {JobState.QUEUED},
+    **dict.fromkeys(_ENDS, frozenset()),
 }
 """For each state, the states that may follow. A job goes back to `queued` where the service ended before it did, and is
 `interrupted` where that happens again and again, or where it moves an arm."""
 
 
 def may_follow(before: JobState, after: JobState) -> bool:
-    """Whether a job may go from one state to another."""
     return after in TRANSITIONS[before]
 
 
 class JobProblem(StrictModel):
-    """Why a job did not succeed."""
-
     code: str = Field(description="code of the error, as in tauscope.errors, or of the way the job ended")
     detail: str = Field(description="one line: what is wrong, where, and what to do")
 
 
 class JobRecord(StrictModel):
-    """A job's state and times."""
-
     form: Literal["tauscope.job/1"] = Field(default="tauscope.job/1", description="name and version of this form")
     state: JobState = Field(description="where the job stands")
     created: AwareDatetime = Field(description="when it was handed in")
@@ -87,7 +79,6 @@ class JobRecord(StrictModel):
     attempts: int = Field(default=0, ge=0, description="how often its work was begun and not given up in good order")
 
     def may_become(self, state: JobState) -> bool:
-        """Whether a state may follow."""
         return may_follow(self.state, state)
 
     def moved(self, state: JobState, now: datetime, problem: JobProblem | None = None) -> "JobRecord":
@@ -144,22 +135,6 @@ JobEvent = Annotated[StateEvent | StepEvent | ProgressEvent | EndedEvent, Field(
 """Any of the four."""
 
 
-Stored = TypeVar("Stored", bound=StrictModel)
-
-
-def read_stored(path: Path, kind: type[Stored]) -> Stored | None:
-    """A stored model, or None where the file is missing or damaged."""
-    try:
-        return kind.model_validate_json(path.read_bytes())
-    except (OSError, ValidationError):
-        return None
-
-
-def write_stored(path: Path, model: StrictModel) -> None:
-    """Keep a model."""
-    write_atomically(path, model.model_dump_json(indent=1).encode())
-
-
 def read_document(path: Path, schema: str) -> bytes | None:
     """A JSON document as it was written, or None where the file is missing, damaged or of another schema."""
     try:
@@ -179,19 +154,35 @@ def read_bytes(path: Path) -> bytes | None:
 
 
 _log = logging.getLogger("tauscope.jobs")
+Order = TypeVar("Order", bound=StrictModel)
 
 
-class JobFolder:
-    """Step, events and the wish to stop."""
+class JobFolder(Generic[Order]):
+    """What every item keeps in its folder: what was asked for, its robot, steps and events."""
+
+    order_type: ClassVar[type[Any]]
+    order_name: ClassVar[str] = "order.json"
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
+        self.folder, self.robot = folder, folder / "robot"
         self.events = EventLog(folder / "events.jsonl")
         self._progress = folder / "progress"
         self._cancel = folder / "cancel"
 
+    def prepare(self) -> None:
+        self.robot.mkdir()
+
+    def read_order(self) -> Order | None:
+        return read_stored(self.folder / self.order_name, self.order_type)
+
+    def write_order(self, order: Order) -> None:
+        write_stored(self.folder / self.order_name, order)
+
+    def has_ended(self) -> bool:
+        """Whether nothing will happen to it any more: it has ended, its record is damaged, or it is gone."""
+        raise NotImplementedError
+
     def read_step(self) -> str | None:
-        """The step that the work is in; None before it began."""
         try:
             return self._progress.read_text(encoding="utf-8")
         except (OSError, ValueError):
@@ -205,7 +196,6 @@ class JobFolder:
         self.tell(StepEvent(time=datetime.now(UTC), step=step))
 
     def write_progress(self, percent: float | None, figures: Mapping[str, JsonValue]) -> None:
-        """Tell how far the work is."""
         self.tell(ProgressEvent(time=datetime.now(UTC), percent=percent, figures=dict(figures)))
 
     def tell(self, event: JobEvent) -> None:
@@ -216,7 +206,6 @@ class JobFolder:
             _log.warning("an event of job %s could not be written", self.folder.name, exc_info=True)
 
     def has_told_end(self) -> bool:
-        """Whether the end was told."""
         last = self.events.last()
         if last is not None and last.get("kind") == "ended":
             return True
@@ -224,7 +213,6 @@ class JobFolder:
         return any(event.content.get("kind") == "ended" for event in self.events.follow().read())
 
     def ask_to_stop(self) -> None:
-        """Ask the work to stop at its next step."""
         self._cancel.touch()
 
     def is_asked_to_stop(self) -> bool:
@@ -232,29 +220,22 @@ class JobFolder:
         return self._cancel.exists() or not self.folder.exists()
 
 
-class Workspace(JobFolder):
-    """A job in the queue: its state beside its step and its events.
-
-    ``state.json`` is written by whoever leads the job only, ``progress`` by the work only, ``events.jsonl`` by both;
-    input is written by whoever hands the job in, and never again.
-    """
+class Workspace(JobFolder[Order]):
+    """``state.json`` is written by whoever leads the job, ``progress`` by the work, ``events.jsonl`` by both."""
 
     def __init__(self, folder: Path) -> None:
-        """Look at a job's folder; nothing is opened yet."""
         super().__init__(folder)
         self._record = folder / "state.json"
 
     def read_record(self) -> JobRecord | None:
-        """The job's state, or None where the file is missing or damaged."""
         return read_stored(self._record, JobRecord)
 
+    @override
     def has_ended(self) -> bool:
-        """Whether nothing will happen to the job any more: it has ended, its state is damaged, or it is gone."""
         record = self.read_record()
         return record is None or record.state.is_end
 
     def write_record(self, record: JobRecord) -> None:
-        """Keep the job's state, and tell it."""
         write_stored(self._record, record)
         self._tell_state(record)
 
@@ -284,10 +265,7 @@ class StoppedError(Exception):
 
 
 def do_work(workspace: Workspace, work: Callable[[], None], *folders: Path) -> JobProblem | None:
-    """Do the work of a job, and say why it has no result.
-
-    Returns JobProblem or None: why there is no result; None where there is one.
-    """
+    """Do the work of a job; returns why it has no result, None where it has one."""
     try:
         work()
     except StoppedError:

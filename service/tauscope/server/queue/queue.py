@@ -15,12 +15,9 @@ from tauscope.server.store.data_folder import ItemStore
 
 Work = Callable[[Path], JobProblem | None]
 """Does the job of a folder; returns why it failed. It may run in another process."""
-
 _log = logging.getLogger("tauscope.jobs")
-
 MOST_ATTEMPTS = 3
 """How often the work of a job is begun whose service was killed meanwhile: it may be what brought the service down."""
-
 TOO_OFTEN = JobProblem(
     code="interrupted",
     detail=f"the service ended {MOST_ATTEMPTS} times in the middle of this job; look into its log, and hand less in",
@@ -29,10 +26,7 @@ TOO_OFTEN = JobProblem(
 
 @dataclass(frozen=True, eq=False)
 class JobKind:
-    """A kind of job: where its folders lie and what is done with them.
-
-    `is_heavy`: whether its work takes minutes: where there are several slots, one stays free of such work.
-    """
+    """`is_heavy`: whether its work takes minutes: of several slots one stays free of such work."""
 
     items: ItemStore
     work: Work
@@ -41,8 +35,6 @@ class JobKind:
 
 @dataclass(frozen=True)
 class QueuedJob:
-    """A job that has not ended."""
-
     kind: JobKind
     identifier: str
 
@@ -52,7 +44,6 @@ class QueuedJob:
         return self.kind.items.folder(self.identifier)
 
     def attempts(self) -> int:
-        """How often the work was begun and not given up in good order; 0 where nobody can tell."""
         try:
             record = Workspace(self.folder).read_record()
         except NotFoundError:
@@ -60,14 +51,7 @@ class QueuedJob:
         return 0 if record is None else record.attempts
 
     def move(self, state: JobState, problem: JobProblem | None = None) -> bool:
-        """Write a new state, if it may follow the present one.
-
-        An earlier attempt may have written it and failed after that, as on a disk that became full in between. Raises
-        OSError if the disk does not take it.
-
-        Returns bool: whether the job is in that state now; False where it may not be, its record is damaged, or it is
-        gone.
-        """
+        """Write a state; False where it may not follow, is damaged or gone. Raises OSError if the disk is full."""
         try:
             workspace = Workspace(self.folder)
         except NotFoundError:
@@ -119,19 +103,11 @@ class QueueFullError(LimitExceededError):
     """So many jobs are waiting that no further one is accepted."""
 
 
-@dataclass(frozen=True)
-class _End:
-    """How a job ended."""
-
-    state: JobState
-    problem: JobProblem | None
+_End = tuple[JobState, JobProblem | None]  # how a job ended
 
 
 class JobQueue:
-    """Jobs waiting for an executor, and jobs in it; the only writer of their states.
-
-    Every method may be called from any thread.
-    """
+    """Jobs that wait, and jobs in an executor; the only writer of their states, called from any thread."""
 
     def __init__(
         self,
@@ -146,9 +122,7 @@ class JobQueue:
         """Make the queue; jobs that an earlier service left unfinished are done again, in their order."""
         self._executor = executor
         self._slots = slots if callable(slots) else lambda: slots
-        self._is_there = is_there
-        self._most_waiting = most_waiting
-        self._most_each = most_each
+        self._is_there, self._most_waiting, self._most_each = is_there, most_waiting, most_each
         self._callers: dict[QueuedJob, str] = {}
         self._lock = threading.RLock()
         self._waiting: deque[QueuedJob] = deque()
@@ -165,10 +139,7 @@ class JobQueue:
             self._go_on()
 
     def submit(self, kind: JobKind, staged: Path, caller: str = "") -> str:
-        """Take a job; what campaigns and schedules hand in has no caller.
-
-        Raises QueueFullError if too many jobs are waiting, or too many of the caller's; the folder stays staged.
-        """
+        """Take a job. Raises QueueFullError if too many wait, or too many of the caller's; it stays staged."""
         with self._lock:
             if self._is_closed or len(self._waiting) >= self._most_waiting:
                 raise QueueFullError(f"{len(self._waiting)} jobs are waiting already; try again when one has ended")
@@ -187,13 +158,7 @@ class JobQueue:
             raise QueueFullError(f"{open_jobs} jobs of {caller} have not ended; try again when one has")
 
     def cancel_or_remove(self, kind: JobKind, identifier: str) -> bool:
-        """Cancel a job that has not ended; remove one that has, or whose record is damaged.
-
-        Cancelled work stops at its next step; what it still does until then is dropped. Raises NotFoundError if there
-        is no such job.
-
-        Returns bool: True where the job was removed.
-        """
+        """Cancel a job, or remove one that has ended: True then. Raises NotFoundError if there is none."""
         with self._lock:
             if self.cancel(kind, identifier):
                 return False
@@ -202,12 +167,7 @@ class JobQueue:
             return True
 
     def cancel(self, kind: JobKind, identifier: str) -> bool:
-        """Cancel a job that has not ended.
-
-        Raises NotFoundError if there is no such job.
-
-        Returns bool: False where it had ended, or its record is damaged.
-        """
+        """Cancel a job; False where it had ended or is damaged. Raises NotFoundError if there is none."""
         with self._lock:
             job, workspace = QueuedJob(kind, identifier), Workspace(kind.items.folder(identifier))
             if workspace.has_ended() or not job.move(JobState.CANCELLED, CANCELLED):
@@ -220,19 +180,13 @@ class JobQueue:
             return True
 
     def waiting(self) -> int:
-        """How many jobs wait."""
         return len(self._waiting)
 
     def can_work(self) -> bool:
-        """Whether the executor can work at present; jobs wait where it cannot."""
         return self._is_there()
 
     def settle(self) -> None:
-        """Do what was hindered by a full disk or an executor that was away: write ends, and begin what waits.
-
-        To be called again and again; while nothing is in the way there is nothing to do. Raises OSError if the disk is
-        in the way still.
-        """
+        """Write ends, and begin what waits. Raises OSError if a full disk is still in the way."""
         with self._lock:
             try:
                 self._write_ends()
@@ -288,7 +242,7 @@ class JobQueue:
             return
         except (BrokenExecutor, RuntimeError, OSError):
             _log.exception("job %s could not be handed to a worker", job.identifier)
-            self._unwritten[job] = _End(JobState.FAILED, WORKER_LOST)
+            self._unwritten[job] = (JobState.FAILED, WORKER_LOST)
             self._write_ends()
             return
         self._running[job] = future
@@ -304,9 +258,9 @@ class JobQueue:
     def _write_ends(self) -> None:
         """Write how jobs ended; what fails is left for the next time, or done again after the next start."""
         for job, end in list(self._unwritten.items()):
-            has_moved = job.move(end.state, end.problem)
+            has_moved = job.move(*end)
             del self._unwritten[job]
-            if has_moved and end.state is JobState.QUEUED and not self._is_closed:
+            if has_moved and end[0] is JobState.QUEUED and not self._is_closed:
                 self._waiting.appendleft(job)
 
     def _end_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> _End:
@@ -314,15 +268,15 @@ class JobQueue:
             problem = self._problem_of(job, future)
         except (ClusterUnavailableError, BrokenExecutor) as error:
             return self._end_lost(job, error)
-        return _End(JobState.SUCCEEDED if problem is None else JobState.FAILED, problem)
+        return (JobState.SUCCEEDED if problem is None else JobState.FAILED), problem
 
     def _end_lost(self, job: QueuedJob, error: Exception) -> _End:
         """A job that was lost with its worker waits again, unless that happened too often: it may be the cause."""
         if job.attempts() >= MOST_ATTEMPTS:
             _log.error("job %s: lost with its worker %d times", job.identifier, MOST_ATTEMPTS)
-            return _End(JobState.FAILED, WORKER_LOST)
+            return JobState.FAILED, WORKER_LOST
         _log.warning("job %s waits again: %s", job.identifier, error)
-        return _End(JobState.QUEUED, None)
+        return JobState.QUEUED, None
 
     def _problem_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> JobProblem | None:
         """Why the work of a job has no result; None where it has one. Raises an error where its worker was lost."""

@@ -5,24 +5,24 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
-from typing import Any, ClassVar, Generic, Literal, Protocol, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar
 
 from pydantic import Field
+from typing_extensions import override
 
 from tauscope.errors import ExportError, NotFoundError, RecordingError, TauscopeError
 from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.files import write_atomically
 from tauscope.server.queue.job_folder import (
+    JobFolder,
     JobProblem,
     Workspace,
     begin_step,
     do_work,
     read_bytes,
     read_document,
-    read_stored,
     require_wanted,
     without_folders,
-    write_stored,
 )
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.store.data_folder import ItemStore
@@ -35,16 +35,12 @@ TRAJECTORY, SAVED_MODEL = "trajectory.json", "against"
 
 
 class OrderedRecording(StrictModel):
-    """A recording of an order."""
-
     name: str = Field(description="its file name")
     origin: Literal["uploaded", "server"] = Field(description="sent with the request, or lying on the server")
     sha256: str = Field(description="of its bytes when the job was handed in, in hexadecimal")
 
 
 class TaskOrder(StrictModel):
-    """Input of a job: the request of a task, its files by their names in the job's folder."""
-
     robot_file: str = Field(description="name of the robot file in the job's robot folder")
     robot_name: str = Field(description="what the robot file calls the robot")
 
@@ -52,7 +48,6 @@ class TaskOrder(StrictModel):
 
     @property
     def request(self) -> Any:
-        """The request of the task; its files are called by their bare names."""
         fields: dict[str, Any] = {name: getattr(self, name) for name in ("model", "options") if hasattr(self, name)}
         for role in ROLES:
             if role != "model" and hasattr(self, role):
@@ -63,14 +58,9 @@ class TaskOrder(StrictModel):
 Order = TypeVar("Order", bound=TaskOrder)
 
 
-class TaskWorkspace(Workspace, Generic[Order]):
-    """Files of a job: ``order.json``, ``robot/`` and a folder for each role of recordings; the task's outputs.
+class TaskWorkspace(Workspace[Order]):
+    """`outputs`: the files that a job leaves, each JSON document with its schema; `formats`: its exports."""
 
-    `roles` are the order's lists of recordings; `outputs` the files that the job leaves, each JSON document with its
-    schema; `formats` its exports.
-    """
-
-    order_type: ClassVar[type[TaskOrder]]
     noun: ClassVar[str]
     roles: ClassVar[tuple[str, ...]] = ()
     takes_model: ClassVar[bool] = False
@@ -78,34 +68,20 @@ class TaskWorkspace(Workspace, Generic[Order]):
     formats: ClassVar[Mapping[ExportFormat, ExportFile]] = {}
 
     def __init__(self, folder: Path) -> None:
-        """Look at a job's folder; nothing is opened yet."""
         super().__init__(folder)
-        self.robot = folder / "robot"
         self.exports = folder / "exports"
-        self.result = folder / "result.json"
-        self._order = folder / "order.json"
 
     @property
     def trajectory(self) -> Path:
-        """The motion that was designed or planned."""
         return self.folder / TRAJECTORY
 
+    @override
     def prepare(self) -> None:
-        """Make the folders that hold a job's input."""
         for folder in (self.robot, *map(self.uploads, (*self.roles, *([SAVED_MODEL] if self.takes_model else [])))):
             folder.mkdir()
 
     def uploads(self, role: str) -> Path:
-        """The folder of files that came with the request."""
         return self.folder / role
-
-    def read_order(self) -> Order | None:
-        """The job's input, or None where the file is missing or damaged."""
-        return read_stored(self._order, self.order_type)  # type: ignore[return-value]
-
-    def write_order(self, order: Order) -> None:
-        """Keep the job's input."""
-        write_stored(self._order, order)
 
     def read_output(self, name: str) -> bytes | None:
         """An output, or None where the file is missing, damaged or of another schema."""
@@ -113,7 +89,6 @@ class TaskWorkspace(Workspace, Generic[Order]):
         return read_bytes(self.folder / name) if schema is None else read_document(self.folder / name, schema)
 
     def read_result(self) -> bytes | None:
-        """The task's document, or None where the file is missing or damaged."""
         return self.read_output("result.json")
 
     def refused_exports(self) -> dict[str, str]:
@@ -150,17 +125,11 @@ class JobFiles:
     """Files of a request in a job's folder, or among the recordings of the server with the bytes that were ordered."""
 
     def __init__(self, workspace: TaskWorkspace[Any], order: TaskOrder, server_recordings: Path) -> None:
-        """Look at the folders; nothing is opened yet."""
-        self._workspace = workspace
-        self._order = order
-        self._server_recordings = server_recordings
+        self._workspace, self._order, self._server_recordings = workspace, order, server_recordings
         self._checked: set[Path] = set()
 
     def find(self, role: str, name: str) -> Path:
-        """Where an input lies.
-
-        Raises RecordingError if a recording was changed or removed after the job was handed in.
-        """
+        """Where an input lies. Raises RecordingError if a recording was changed since the job was handed in."""
         if role in ("robot", "model"):
             return self._workspace.uploads("robot" if role == "robot" else SAVED_MODEL) / name
         entry = next(entry for entry in getattr(self._order, role) if entry.name == name)
@@ -183,10 +152,7 @@ class JobFiles:
 
 
 def perform_job(workspace: TaskWorkspace[Any], server_recordings: Path) -> JobProblem | None:
-    """Do a job, as a worker process does it.
-
-    Returns JobProblem or None: why there is no result; None where there is one.
-    """
+    """Do a job as a worker does; returns why there is no result, None where there is one."""
     folders = (*map(workspace.uploads, (*workspace.roles, SAVED_MODEL)), workspace.robot, server_recordings)
 
     def tell(step: str, percent: float | None = None, figures: Mapping[str, Any] = {}) -> None:
@@ -207,14 +173,7 @@ def perform_job(workspace: TaskWorkspace[Any], server_recordings: Path) -> JobPr
     return do_work(workspace, work, *folders)
 
 
-class Preparable(Protocol):
-    """A folder whose input has places of its own."""
-
-    def prepare(self) -> None:
-        """Make the folders that hold the input."""
-
-
-Staged = TypeVar("Staged", bound=Preparable)
+Staged = TypeVar("Staged", bound=JobFolder[Any])
 
 
 @contextmanager
@@ -232,12 +191,7 @@ def stage_workspace(items: ItemStore, kind: Callable[[Path], Staged]) -> Iterato
 def submit_job(
     jobs: JobQueue, kind: JobKind, workspace: type[TaskWorkspace[Order]], order: Order, put_robot: Callable[[Path], Any]
 ) -> str:
-    """Hand in a job whose files lie on the server already; returns its identifier.
-
-    Raises QueueFullError if too many jobs are waiting.
-
-    `put_robot`: writes the robot's files into a folder.
-    """
+    """Hand in a job whose files lie on the server; returns its identifier. Raises QueueFullError."""
     with stage_workspace(kind.items, workspace) as staged:
         put_robot(staged.robot)
         staged.write_order(order)

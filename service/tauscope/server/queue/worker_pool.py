@@ -45,7 +45,6 @@ def serve_connection(connection: Connection, memory_bytes: int | None) -> None:
 
 
 def _call(function: Callable[..., Any], arguments: tuple[Any, ...], options: dict[str, Any]) -> tuple[bool, Any]:
-    """What comes of a call: whether it succeeded, and its result or exception."""
     try:
         return True, function(*arguments, **options)
     except BaseException as error:
@@ -67,36 +66,22 @@ def _end_with_service() -> None:
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
-
 START_S = 120.0  # how long a process may take to start on a busy machine [s]
-
 _THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _environment = threading.Lock()
 
 
-@dataclass(frozen=True, eq=False)
-class _Task:
-    """Work that was handed in."""
-
-    future: "Future[Any]"
-    call: tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
+_Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
 
 
 class WorkerPool(Executor):
-    """A pool of spawned processes, one BLAS thread each; a process that dies takes its own work with it only.
-
-    A future stays pending while its work goes on: `Future.cancel` succeeds until the end, and kills the process.
-    Work ends with BrokenProcessPool where its process died, with LimitExceededError beyond a bound.
-    """
+    """Spawned processes, one BLAS thread each; `Future.cancel` kills the process, and a bound ends it."""
 
     def __init__(self, workers: int, *, deadline_s: float | None = None, memory_bytes: int | None = None) -> None:
-        """Make the pool; no process is started before it is needed.
-
-        `deadline_s`: how long a call may take [s]; `memory_bytes`: data that a process may hold [bytes].
-        """
+        """`deadline_s`: of a call [s]; `memory_bytes`: data that a process may hold. Processes start when needed."""
         self._deadline_s, self._memory_bytes = deadline_s, memory_bytes
         self._condition = threading.Condition()
-        self._waiting: deque[_Task] = deque()
+        self._waiting: deque[tuple[Future[Any], _Call]] = deque()
         self._idle: list[_Worker] = []
         self._busy: set[_Worker] = set()
         self._is_closed = False
@@ -118,17 +103,16 @@ class WorkerPool(Executor):
                 atexit.register(self._kill_all)  # before multiprocessing waits for its processes
                 for thread in self._threads:
                     thread.start()
-            self._waiting.append(_Task(future, (fn, args, kwargs)))
+            self._waiting.append((future, (fn, args, kwargs)))
             self._condition.notify()
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes."""
         with self._condition:
             self._is_closed = True
             if cancel_futures:
-                for task in self._waiting:
-                    task.future.cancel()
+                for future, _ in self._waiting:
+                    future.cancel()
                 for worker in self._busy:
                     worker.kill()
             self._condition.notify_all()
@@ -149,31 +133,31 @@ class WorkerPool(Executor):
                 self._condition.wait_for(lambda: self._waiting or self._is_closed)
                 if not self._waiting:
                     break
-                task = self._waiting.popleft()
-            if not task.future.cancelled():
-                self._do(task)
+                future, call = self._waiting.popleft()
+            if not future.cancelled():
+                self._do(future, call)
         with self._condition:
             idle, self._idle = self._idle, []
         for worker in idle:
             worker.close()
 
-    def _do(self, task: _Task) -> None:
+    def _do(self, future: "Future[Any]", call: _Call) -> None:
         try:
             worker = self._take_worker()
         except OSError as error:
             self.obstacle = f"no worker process can be started ({error.strerror})"
-            return _settle(task.future, BrokenProcessPool(self.obstacle))
+            return _settle(future, BrokenProcessPool(self.obstacle))
         # A cancelled future is done at once: whatever works on it is of no use any more.
-        task.future.add_done_callback(lambda done: worker.kill() if done.cancelled() else None)
-        outcome = self._call(worker, task)
-        is_reusable = outcome.is_clean and not task.future.cancelled()
+        future.add_done_callback(lambda done: worker.kill() if done.cancelled() else None)
+        outcome = self._call(worker, call)
+        is_reusable = outcome.is_clean and not future.cancelled()
         with self._condition:
             self._busy.discard(worker)
             if is_reusable:
                 self._idle.append(worker)
         if not is_reusable:
             worker.close()
-        _settle(task.future, outcome.error, outcome.result)
+        _settle(future, outcome.error, outcome.result)
 
     def _take_worker(self) -> "_Worker":
         """A process that is ready; raises OSError where none can be started."""
@@ -184,9 +168,9 @@ class WorkerPool(Executor):
             self._busy.add(worker)
         return worker
 
-    def _call(self, worker: "_Worker", task: _Task) -> "_Outcome":
+    def _call(self, worker: "_Worker", call: _Call) -> "_Outcome":
         try:
-            worker.begin(task.call)
+            worker.begin(call)
         except (OSError, EOFError):
             self.obstacle = "worker processes end before their work begins"
             return _Outcome(BrokenProcessPool(self.obstacle), is_clean=False)
@@ -230,8 +214,6 @@ def _settle(future: "Future[Any]", error: BaseException | None, result: Any = No
 
 
 class _Worker:
-    """One process, and the connection to it."""
-
     def __init__(self, memory_bytes: int | None) -> None:
         context = get_context("spawn")
         self.connection: Connection
@@ -244,7 +226,7 @@ class _Worker:
         finally:
             theirs.close()  # the process has the only other end: when it dies, the connection does
 
-    def begin(self, call: tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]) -> None:
+    def begin(self, call: _Call) -> None:
         """Have it call a function. Raises OSError, EOFError if it has ended."""
         if not self._is_ready:
             if not self.connection.poll(START_S):
@@ -254,7 +236,6 @@ class _Worker:
         self.connection.send(call)
 
     def kill(self) -> None:
-        """End it; nothing happens where it has ended."""
         with suppress(ValueError):  # closed already
             self._process.kill()
 

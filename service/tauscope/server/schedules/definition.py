@@ -34,7 +34,6 @@ class Window(StrictModel):
     end: ClockTime = Field(description="first moment after it; the same as `start` for the whole day")
 
     def holds(self, moment: datetime) -> bool:
-        """Whether work may be started."""
         start, end = time.fromisoformat(self.start), time.fromisoformat(self.end)
         now, today = moment.time(), DAYS[moment.weekday()]
         yesterday = DAYS[(moment - timedelta(days=1)).weekday()]
@@ -46,9 +45,7 @@ class Window(StrictModel):
 class RecordingChoice(StrictModel):
     """Which recordings on the server an analysis takes: the newest of those that match."""
 
-    pattern: str = Field(
-        min_length=1, max_length=200, description="of their names, as in a shell", examples=["cell3-*"]
-    )
+    pattern: str = Field(min_length=1, max_length=200, description="of names, as in a shell", examples=["cell3-*"])
     train: int = Field(default=1, ge=1, le=100, description="how many the model is made from")
     held_out: int = Field(default=1, ge=0, le=100, description="how many it is judged by: the newest ones")
 
@@ -69,17 +66,12 @@ class ScheduleDefinition(StrictModel):
         default=None,
         description="program in the folder `interlocks` of the data folder that says whether the arm is free",
     )
-    grace_s: int = Field(
-        default=600, ge=1, le=7 * 86400, description="how late it may be started; later, it is passed over"
-    )
+    grace_s: int = Field(default=600, ge=1, le=7 * 86400, description="how late it may start; later, it is passed over")
     enabled: bool = Field(default=True, description="whether it is ever due")
-    recordings: RecordingChoice | None = Field(
-        default=None, description="of an identification or a diagnosis; a campaign makes its own"
-    )
+    recordings: RecordingChoice | None = Field(default=None, description="of an analysis; a campaign makes its own")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        """One trigger; recordings where they are needed."""
         if (self.cron is None) == (self.every_s is None):
             raise PydanticCustomError("trigger", "has to have either cron or every_s")
         if (self.kind == "campaign") == (self.recordings is not None):
@@ -100,7 +92,6 @@ class ScheduleDefinition(StrictModel):
         return None if found is None else found.astimezone(UTC)
 
     def is_open(self, now: datetime) -> bool:
-        """Whether the window holds a moment."""
         return self.window is None or self.window.holds(now.astimezone(ZoneInfo(self.timezone)))
 
     def _trigger(self, created: datetime) -> BaseTrigger:

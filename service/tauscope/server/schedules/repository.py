@@ -18,10 +18,7 @@ UNDECIDED = ("asked", "claimed")  # states of a firing that will become another 
 
 @dataclass(frozen=True)
 class ScheduleEntry:
-    """A schedule.
-
-    `site`: of the data folder whose service does it; None for whichever comes first.
-    """
+    """`site`: of the data folder whose service does it; None for whichever comes first."""
 
     name: str
     site: str | None
@@ -34,10 +31,7 @@ class ScheduleEntry:
 
 @dataclass(frozen=True)
 class FiringEntry:
-    """One time that a schedule was due.
-
-    `item`: (str, str), kind and identifier of what was started.
-    """
+    """`item`: kind and identifier of what was started."""
 
     number: int
     schedule: str
@@ -49,11 +43,6 @@ class FiringEntry:
     item: tuple[str, str] | None
     item_state: str | None
     is_final: bool
-
-
-def schedule_entry(row: Schedule) -> ScheduleEntry:
-    """What is given out of a schedule."""
-    return read_row(ScheduleEntry, row)
 
 
 def firing_entry(session: Session, row: Firing) -> FiringEntry:
@@ -77,9 +66,7 @@ class ScheduleRepository:
     """Schedules and their firings, as one site sees them. Every method is one short transaction."""
 
     def __init__(self, database: Database, site: str, boot: str) -> None:
-        self._database = database
-        self.site = site
-        self._boot = boot
+        self._database, self.site, self._boot = database, site, boot
 
     def put(self, entry: ScheduleEntry) -> None:
         """Set a schedule up, or replace one of the same name; its firings stay."""
@@ -99,25 +86,20 @@ class ScheduleRepository:
     def find(self, name: str) -> ScheduleEntry:
         """A schedule. Raises NotFoundError if there is none."""
         with self._database.reading() as session:
-            return schedule_entry(_schedule(session, name))
+            return read_row(ScheduleEntry, _schedule(session, name))
 
     def schedules(self) -> list[ScheduleEntry]:
-        """All schedules of all sites, by name."""
         with self._database.reading() as session:
-            return [schedule_entry(row) for row in session.scalars(select(Schedule).order_by(Schedule.name))]
+            return [read_row(ScheduleEntry, row) for row in session.scalars(select(Schedule).order_by(Schedule.name))]
 
     def due(self, now: datetime) -> list[ScheduleEntry]:
         """Schedules that this site may do and that are due, the longest first."""
         query = select(Schedule).where(Schedule.next_due <= now, self._is_mine()).order_by(Schedule.next_due)
         with self._database.reading() as session:
-            return [schedule_entry(row) for row in session.scalars(query)]
+            return [read_row(ScheduleEntry, row) for row in session.scalars(query)]
 
     def claim(self, entry: ScheduleEntry, next_due: datetime | None, now: datetime) -> int | None:
-        """Take the firing of a schedule on that is due; once only, whoever else tries.
-
-        Returns int or None: number of the firing; None where somebody else has it, or the schedule was changed
-        meanwhile.
-        """
+        """Number of the firing of a due schedule; None where another service has it, or it was changed."""
         with self._database.writing() as session:
             moved = session.execute(
                 update(Schedule)
@@ -142,10 +124,7 @@ class ScheduleRepository:
             return firing.id
 
     def claim_asked(self, now: datetime, number: int | None = None) -> tuple[int, ScheduleEntry] | None:
-        """Take a firing on that was asked for; once only, whoever else tries.
-
-        Returns (int, ScheduleEntry) or None, number and schedule; None where there is none.
-        """
+        """Number and schedule of a firing that was asked for and is taken now; None where there is none."""
         query = select(Firing).join(Schedule).where(Firing.state == "asked", self._is_mine()).order_by(Firing.id)
         if number is not None:
             query = query.where(Firing.id == number)
@@ -154,7 +133,7 @@ class ScheduleRepository:
             if firing is None:
                 return None
             firing.state, firing.claimed, firing.site, firing.boot = "claimed", now, self.site, self._boot
-            return firing.id, schedule_entry(firing.schedule)
+            return firing.id, read_row(ScheduleEntry, firing.schedule)
 
     def withdraw(self, number: int) -> bool:
         """Take back what was asked for; False where somebody has taken it on."""
@@ -191,7 +170,6 @@ class ScheduleRepository:
         return or_(Schedule.site == self.site, Schedule.site.is_(None))
 
     def _move(self, where: ColumnElement[bool], before: str, **values: Any) -> int:
-        """Change firings of a state; how many there were."""
         statement = update(Firing).where(where, Firing.state == before).values(**values).returning(Firing.id)
         with self._database.writing() as session:
             return len(session.scalars(statement).all())

@@ -1,34 +1,132 @@
-"""The scheduler: each firing happens once, has a definite end, and is never repeated by itself."""
+"""The scheduler: each firing happens once, has a definite end, and is never repeated by itself; what it starts."""
 
+import json
 import logging
 import stat
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
+from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
-from tauscope.errors import TauscopeError
+from tauscope.errors import NotFoundError, TauscopeError
 from tauscope.robot.messages import one_line
-from tauscope.server.control.leases import BusyError, LeasedError
-from tauscope.server.queue.job_folder import without_folders
+from tauscope.server.control.campaign import CampaignDependencies, CampaignManager, CampaignOrder, CampaignWorkspace
+from tauscope.server.control.leases import FREE, BusyError, LeasedError, Permit
+from tauscope.server.history.indexer import WORKSPACES
+from tauscope.server.queue.analyses import DiagnosisOrder, IdentificationOrder
+from tauscope.server.queue.job_folder import Workspace, without_folders
 from tauscope.server.queue.queue import QueueFullError
-from tauscope.server.schedules.definition import ScheduleDefinition
-from tauscope.server.schedules.repeater import NothingToDoError, Repeater
+from tauscope.server.queue.task_job import OrderedRecording, order_kept, stage_workspace, submit_job
+from tauscope.server.schedules.definition import RecordingChoice, ScheduleDefinition
 from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry, ScheduleRepository
-from tauscope.server.store.data_folder import utc_now
+from tauscope.server.store.data_folder import ItemStore, utc_now
+from tauscope.server.store.recordings import RecordingStore
+from tauscope.strict_model import StrictModel
 from tauscope.tasks.run import BackendChoice
+
+Order = TypeVar("Order", bound=StrictModel)
+
+
+class NothingToDoError(TauscopeError):
+    """There is no new recording: what would be found is known already."""
+
+
+@dataclass(frozen=True, eq=False)
+class Repeater:
+    dependencies: CampaignDependencies
+    campaigns: CampaignManager
+    permit_for: Callable[[str], Permit] = field(default_factory=lambda: lambda _device: FREE)
+
+    def start(self, entry: ScheduleEntry, since: datetime | None) -> tuple[str, str]:
+        """Start it; returns kind and identifier. Raises NothingToDoError without a new recording, or TauscopeError."""
+        definition = ScheduleDefinition.model_validate(dict(entry.definition), strict=False)
+        if definition.kind == "campaign":
+            return "campaign", self._campaign(entry)
+        assert definition.recordings is not None  # noqa: S101 - checked by the definition
+        train, held_out = newest_recordings(self.dependencies.recordings, definition.recordings, since)
+        return definition.kind, self._analyse(definition.kind, entry, {"recordings": train, "held_out": held_out})
+
+    def goes_on(self, kind: str, identifier: str) -> bool:
+        """Whether something that was started has not ended; what was removed has."""
+        try:
+            return not Workspace(self.items(kind).folder(identifier)).has_ended()
+        except NotFoundError:
+            return False
+
+    def items(self, kind: str) -> ItemStore:
+        if kind == "campaign":
+            return self.campaigns.items
+        return (self.dependencies.identifications if kind == "identification" else self.dependencies.diagnoses).items
+
+    def _campaign(self, entry: ScheduleEntry) -> str:
+        order = _order(entry, CampaignOrder)
+        with stage_workspace(self.campaigns.items, CampaignWorkspace) as workspace:
+            write_robot(workspace.robot, entry)
+            workspace.write_order(order)
+            return self.campaigns.submit(workspace.folder, self.permit_for(order.backend.device(order.robot_name)))
+
+    def _analyse(self, kind: str, entry: ScheduleEntry, recordings: Mapping[str, tuple[OrderedRecording, ...]]) -> str:
+        is_diagnosis = kind == "diagnosis"
+        order = _order(entry, DiagnosisOrder if is_diagnosis else IdentificationOrder).model_copy(update=recordings)
+        job = self.dependencies.diagnoses if is_diagnosis else self.dependencies.identifications
+        return submit_job(self.dependencies.jobs, job, WORKSPACES[kind], order, partial(write_robot, entry=entry))
+
+
+def newest_recordings(
+    store: RecordingStore, choice: RecordingChoice, since: datetime | None
+) -> tuple[tuple[OrderedRecording, ...], tuple[OrderedRecording, ...]]:
+    """Training, then held-out recordings; the newest are held out. Raises NothingToDoError if none is new."""
+    found = [entry for entry in store.entries() if fnmatchcase(entry.name, choice.pattern)]
+    wanted = sorted(found, key=lambda entry: (entry.modified, entry.name))[-(choice.train + choice.held_out) :]
+    if len(wanted) < choice.train + choice.held_out:
+        needed = choice.train + choice.held_out
+        raise NothingToDoError(f"{len(wanted)} recordings match {choice.pattern}, {needed} are needed; record more")
+    if since is not None and wanted[-1].modified <= since:
+        raise NothingToDoError(f"no recording that matches {choice.pattern} is newer than the last time; record more")
+    names = [entry.name for entry in wanted]
+    return order_kept(store, names[: choice.train]), order_kept(store, names[choice.train :])
+
+
+def write_robot(folder: Path, entry: ScheduleEntry) -> None:
+    for name, text in entry.files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+def _order(entry: ScheduleEntry, kind: type[Order]) -> Order:
+    return kind.model_validate(dict(entry.order), strict=False)
+
+
+def make_schedule(
+    name: str, like: str, definition: ScheduleDefinition, repeater: Repeater, site: str | None, now: datetime
+) -> ScheduleEntry:
+    """Repeat an item, at any `site` where None. Raises NotFoundError if it is missing or damaged."""
+    workspace = WORKSPACES[definition.kind](repeater.items(definition.kind).folder(like))
+    order = workspace.read_order()
+    if order is None:
+        raise NotFoundError(f"{definition.kind} {like}: its order is missing or damaged; name another one")
+    # A campaign's `held_out` is a motion, all others' names recordings.
+    is_campaign = definition.kind == "campaign"
+    lists = set[str]() if is_campaign else {"recordings", "held_out", "simulated", "model"}
+    plain = json.loads(order.model_dump_json(exclude=lists)) | ({} if is_campaign else {"recordings": []})
+    try:
+        files = {path.name: path.read_text(encoding="utf-8") for path in sorted(workspace.robot.iterdir())}
+    except (OSError, UnicodeDecodeError):
+        text = f"{definition.kind} {like}: its robot file is missing or damaged; name another one"
+        raise NotFoundError(text) from None
+    due = definition.next_after(now, now)
+    return ScheduleEntry(name, site, definition.model_dump(mode="json"), plain, files, now, due)
+
 
 FOLDER = "interlocks"
 TIMEOUT_S = 10.0  # how long the program may take [s]
 
 
 def find_objection(data_folder: Path, name: str, robot: str, device: str) -> str | None:
-    """Ask whether an arm is free. Whatever goes wrong with asking counts as no.
-
-    Only programs in the folder are called, never a command that came over the network.
-
-    Returns str or None: one line: why it is not free; None where it is.
-    """
+    """Why an arm is not free, None where it is. Only the operator's programs in the folder are called."""
     path = data_folder / FOLDER / name
     fault = _fault(path)
     if fault is not None:
@@ -65,7 +163,6 @@ def _fault(path: Path) -> str | None:
 
 
 _log = logging.getLogger("tauscope.jobs")
-
 _Outcome = tuple[str, str | None, tuple[str, str] | None]  # state of a firing, its reason, and what was started
 
 
@@ -80,9 +177,7 @@ class Scheduler:
         clock: Callable[[], datetime] = utc_now,
     ) -> None:
         """Prepare. Firings that an earlier start left undecided become `interrupted`: nothing is repeated."""
-        self.repository = repository
-        self.repeater = repeater
-        self._data_folder = data_folder
+        self.repository, self.repeater, self._data_folder = repository, repeater, data_folder
         self._clock = clock
         self._unwritten: dict[int, _Outcome] = {}
         repository.interrupt_claims()
@@ -132,7 +227,9 @@ class Scheduler:
         if reason is not None:
             return "skipped", reason, None
         try:
-            return "started", None, self.repeater.start(entry, self._last_start(entry))
+            firings = self.repository.firings(entry.name, 100)
+            last = next((each.due for each in firings if each.state == "started"), None)
+            return "started", None, self.repeater.start(entry, last)
         except (BusyError, LeasedError, QueueFullError, NothingToDoError) as error:
             return "skipped", str(error), None
         except TauscopeError as error:
@@ -147,7 +244,6 @@ class Scheduler:
         return latest is None or latest > now
 
     def _find_obstacle(self, entry: ScheduleEntry, definition: ScheduleDefinition) -> str | None:
-        """Why nothing may be started now."""
         window = definition.window
         if window is not None and not definition.is_open(self._clock()):
             days = ", ".join(window.days)
@@ -162,17 +258,12 @@ class Scheduler:
         return find_objection(self._data_folder, definition.interlock, robot, backend.device(robot))
 
     def _goes_on(self, firing: FiringEntry, kind: str, identifier: str) -> bool:
-        """Whether what was started has not ended; of another site only the index knows."""
         if firing.site == self.repository.site:
             return self.repeater.goes_on(kind, identifier)
         return firing.item_state is not None and not firing.is_final
 
-    def _last_start(self, entry: ScheduleEntry) -> datetime | None:
-        return next((each.due for each in self.repository.firings(entry.name, 100) if each.state == "started"), None)
-
 
 def read_definition(entry: ScheduleEntry) -> ScheduleDefinition:
-    """When a schedule is due."""
     return ScheduleDefinition.model_validate(dict(entry.definition), strict=False)
 
 

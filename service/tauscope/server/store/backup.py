@@ -46,10 +46,7 @@ def dump_lines(engine: Engine) -> Iterator[bytes]:
 
 
 def load_lines(engine: Engine, lines: Iterable[bytes]) -> None:
-    """Fill an empty database, and bring it to this program's form; all of it, or nothing.
-
-    Raises StoreError if there is something in the database, or the lines are of a newer program.
-    """
+    """Fill an empty database and upgrade it. Raises StoreError if it is not empty, or the lines are newer."""
     rows = (json.loads(line) for line in lines)
     revision = next(rows)["revision"]
     if revision not in revisions():
@@ -70,7 +67,6 @@ def load_lines(engine: Engine, lines: Iterable[bytes]) -> None:
 
 
 def _tables(connection: Connection) -> list[Table]:
-    """The tables as they are, each behind those that it refers to."""
     metadata = MetaData()
     metadata.reflect(connection)
     return [table for table in metadata.sorted_tables if table.name != _FORM]
@@ -115,11 +111,7 @@ _PIECE = 2**20
 
 
 def write_backup(data_folder: Path, database: Database, target: Path, version: str) -> int:
-    """Write a backup; the file appears under its name only when it is complete.
-
-    The database comes first, and in every folder the state before what it speaks of: what is copied later can only be
-    newer, and the start of a service puts that right as it does after a crash. Raises OSError if it cannot be written.
-    """
+    """The database first, then each folder's state: copies can only be newer, as after a crash. Raises OSError."""
     partial = target.with_name(f".{target.name}-{secrets.token_hex(4)}.partial")
     hashes: dict[str, dict[str, Any]] = {}
     try:
@@ -142,11 +134,7 @@ def write_backup(data_folder: Path, database: Database, target: Path, version: s
 
 
 def restore_backup(source: Path, data_folder: Path, address: str | None) -> int:
-    """Make a data folder and its database from a backup; nothing appears before everything was found sound.
-
-    Raises StoreError if the backup is damaged or of a newer program, or there is something already. Raises OSError if
-    it cannot be written.
-    """
+    """Make a data folder; nothing appears before all was found sound. Raises StoreError or OSError."""
     if data_folder.exists() and (not data_folder.is_dir() or any(data_folder.iterdir())):
         raise StoreError(f"{data_folder}: there is something already; name a folder that is not there yet")
     data_folder.parent.mkdir(parents=True, exist_ok=True)
@@ -202,8 +190,6 @@ def _add(
 
 
 class _Hashing:
-    """Reads a file no further than it went at first, and hashes what is read."""
-
     def __init__(self, file: IO[bytes], size: int) -> None:
         self._file, self._left, self._hash = file, size, hashlib.sha256()
 
@@ -280,9 +266,7 @@ def _fill_database(lines: Path, address: Path | str) -> None:
         with lines.open("rb") as file:
             load_lines(engine, file)
     except SQLAlchemyError as error:
-        raise StoreError(
-            f"the database cannot be filled ({str(error).splitlines()[0]}); give it an empty one"
-        ) from None
+        raise StoreError(f"the database cannot be filled ({str(error).splitlines()[0]}); give an empty one") from None
     finally:
         engine.dispose()
 

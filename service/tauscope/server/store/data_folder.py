@@ -20,18 +20,12 @@ _REMOVED = ".removed-"
 
 
 def utc_now() -> datetime:
-    """The present moment in UTC."""
     return datetime.now(UTC)
 
 
 class ItemStore:
-    """Folders named by identifiers, below one folder."""
-
     def __init__(self, root: Path, noun: str, clock: Callable[[], datetime] = utc_now) -> None:
-        """Open the store; its folder is made where it is missing."""
-        self.root = root
-        self.noun = noun
-        self.clock = clock
+        self.root, self.noun, self.clock = root, noun, clock
         root.mkdir(parents=True, exist_ok=True)
 
     def stage(self) -> Path:
@@ -54,7 +48,6 @@ class ItemStore:
         return identifier
 
     def discard(self, staged: Path) -> None:
-        """Remove a staged folder; nothing happens where it was published."""
         shutil.rmtree(staged, ignore_errors=True)
 
     def identifiers(self) -> list[str]:
@@ -101,7 +94,6 @@ FOLDERS = {
     "campaign": "campaigns",
 }
 """The folder of each kind of item, below the data folder; its collection has the same name at the API."""
-
 RECORDINGS = "recordings"
 
 
@@ -127,7 +119,6 @@ class FolderLock:
             raise TauscopeError(f"{folder}: another tauscope service works with this folder; {hint}") from None
 
     def release(self) -> None:
-        """Let go of the folder."""
         os.close(self._descriptor)
 
 
@@ -135,10 +126,7 @@ FILE_NAME = "site.json"
 
 
 def site_identifier(data_folder: Path) -> str:
-    """The identifier of a data folder; given to it when it is opened for the first time, and kept with it.
-
-    Raises StoreError if its ``site.json`` is damaged.
-    """
+    """The identifier of a data folder, made when it is first opened. Raises StoreError if it is damaged."""
     path = data_folder / FILE_NAME
     try:
         identifier = json.loads(path.read_bytes())["identifier"]

@@ -15,30 +15,20 @@ _TAIL = 2**16
 
 @dataclass(frozen=True)
 class LoggedEvent:
-    """One line of a log.
-
-    `number`: of the line, from 1: who has read it goes on with the next.
-    """
+    """`number`: of the line, from 1."""
 
     number: int
     content: dict[str, Any]
 
 
 class EventLog:
-    """A file of JSON objects, one a line, that only ever grows.
-
-    Who appends holds the file's lock meanwhile: lines of several processes never mix, and a line that another has half
-    written is not taken for one that a full disk cut off. Such a line keeps its number and is passed over.
-    """
+    """Lines of JSON, appended under a lock; one that a full disk cut off keeps its number and is passed over."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def append(self, content: Mapping[str, Any]) -> None:
-        """Add a line; a crash of the machine may lose the last ones.
-
-        Raises OSError if it cannot be written, or only in part; what is there of it is passed over by readers.
-        """
+        """Add a line; a crash may lose the last ones. Raises OSError if it cannot be written as a whole."""
         line = json.dumps(content, ensure_ascii=False, allow_nan=False).encode() + b"\n"
         with lock_file(self.path, os.O_APPEND, 0o640) as descriptor:
             size = os.fstat(descriptor).st_size
@@ -59,7 +49,6 @@ class EventLog:
         return _parse(lines[-2]) if len(lines) > 1 else None
 
     def follow(self, after: int = 0) -> "LogFollower":
-        """A reader of what comes after a line."""
         return LogFollower(self.path, after)
 
 
@@ -67,13 +56,11 @@ class LogFollower:
     """Reads a log from where it last ended; holds no file open between two readings."""
 
     def __init__(self, path: Path, after: int) -> None:
-        self._path = path
-        self._after = after
+        self._path, self._after = path, after
         self._number = 0
         self._offset = 0
 
     def read(self) -> list[LoggedEvent]:
-        """Every whole line that was added since the last call."""
         try:
             with self._path.open("rb") as file:
                 file.seek(self._offset)

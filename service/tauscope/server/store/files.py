@@ -11,14 +11,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TypeVar
+
+from pydantic import ValidationError
 
 from tauscope.errors import LimitExceededError
+from tauscope.files import write_atomically
+from tauscope.strict_model import StrictModel
 
 FILE_NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.+=@ -]{0,127}$"
 """What a file name looks like, for JSON schemas; `is_file_name` is the rule itself."""
-
 FILE_NAME_RULE = "use at most 128 letters a-z, digits and _ . + = @ - or blanks, beginning with a letter, digit or _"
-
 _FILE_NAME = re.compile(FILE_NAME_PATTERN.removeprefix("^").removesuffix("$"))
 _IDENTIFIER = re.compile(r"[0-9]{8}T[0-9]{6}Z-[0-9a-f]{8}")
 
@@ -29,12 +32,10 @@ def is_file_name(text: str) -> bool:
 
 
 def new_identifier(now: datetime) -> str:
-    """A new identifier; sorted as text, identifiers are sorted by the second of their creation."""
     return f"{now.astimezone(UTC):%Y%m%dT%H%M%SZ}-{secrets.token_hex(4)}"
 
 
 def is_identifier(text: str) -> bool:
-    """Whether a text has the form of an identifier."""
     return _IDENTIFIER.fullmatch(text) is not None
 
 
@@ -48,10 +49,7 @@ _PIECE = 2**20
 
 @dataclass(frozen=True)
 class KeptFile:
-    """A file that arrived as a whole.
-
-    `sha256`: of its bytes, in hexadecimal.
-    """
+    """`sha256`: of its bytes, in hexadecimal."""
 
     path: Path
     name: str
@@ -68,15 +66,11 @@ class IncomingFile:
         self._file = os.fdopen(descriptor, "wb")
         self._hash = hashlib.sha256()
         self.path = Path(path)
-        self.name = name
-        self.limit = limit
+        self.name, self.limit = name, limit
         self.size = 0
 
     def write(self, piece: bytes) -> None:
-        """Append some bytes.
-
-        Raises LimitExceededError if the file grows beyond its limit; nothing more is written then.
-        """
+        """Raises LimitExceededError if the file grows beyond its limit; nothing more is written then."""
         self.size += len(piece)
         if self.size > self.limit:
             raise LimitExceededError(f"{self.name}: is larger than the {self.limit} bytes accepted here; send less")
@@ -91,7 +85,6 @@ class IncomingFile:
         return KeptFile(self.path, self.name, self.size, self._hash.hexdigest())
 
     def discard(self) -> None:
-        """Close and remove the file; may be called twice."""
         self._file.close()
         self.path.unlink(missing_ok=True)
 
@@ -109,9 +102,23 @@ def lock_file(path: Path, flags: int = 0, mode: int = 0o600) -> Iterator[int]:
 
 
 def hash_file(path: Path) -> str:
-    """The sha256 of a file's bytes, in hexadecimal."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while piece := file.read(_PIECE):
             digest.update(piece)
     return digest.hexdigest()
+
+
+Stored = TypeVar("Stored", bound=StrictModel)
+
+
+def read_stored(path: Path, kind: type[Stored]) -> Stored | None:
+    """A stored model, or None where the file is missing or damaged."""
+    try:
+        return kind.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError):
+        return None
+
+
+def write_stored(path: Path, model: StrictModel) -> None:
+    write_atomically(path, model.model_dump_json(indent=1).encode())

@@ -10,75 +10,74 @@ import threading
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Self
 
 from tauscope.errors import NotFoundError, RecordingError
 from tauscope.files import sync_folder, write_atomically
 from tauscope.robot.messages import one_line, shown
-from tauscope.server.store.files import FILE_NAME_RULE, KeptFile, hash_file, is_file_name
+from tauscope.server.store.files import FILE_NAME_RULE, KeptFile, hash_file, is_file_name, read_stored
+from tauscope.strict_model import StrictModel
 
 _log = logging.getLogger("tauscope.store")
 
 
-@dataclass(frozen=True)
-class KnownHash:
-    """What is known of a recording's bytes.
+class KnownHash(StrictModel):
+    """`sha256`: of the present bytes; `kept`: of those that were sent or recorded, None for an operator's own file."""
 
-    `sha256`: of the bytes, in hexadecimal.
-    `kept`: of the bytes that were sent or recorded; None for a file that an operator put there, and may change.
-    """
-
+    size: int
+    modified_ns: int
     sha256: str
-    kept: str | None
+    kept: str | None = None
+    check: int | None = None
+
+    @classmethod
+    def of(cls, status: os.stat_result, sha256: str, kept: str | None) -> Self:
+        known = cls(size=status.st_size, modified_ns=status.st_mtime_ns, sha256=sha256, kept=kept)
+        return known.model_copy(update={"check": known.compute_check()})
 
     @property
     def is_damaged(self) -> bool:
-        """Whether the bytes are not those that were kept."""
         return self.kept not in (None, self.sha256)
+
+    def compute_check(self) -> int:
+        """A flipped bit here must not be taken for a damaged recording."""
+        return zlib.crc32(json.dumps([self.size, self.modified_ns, self.sha256, self.kept]).encode())
 
 
 class RecordingHashes:
-    """A small file a recording, which names the size and the time of the file that its hash belongs to.
-
-    What is missing or damaged here can be computed again; only what the recording was in the beginning is lost then.
-    """
+    """A file a recording, with the size and time that its hash belongs to; only `kept` cannot be computed again."""
 
     def __init__(self, root: Path) -> None:
-        """Open the memory; its folder is made where it is missing."""
         self._root = root
         root.mkdir(parents=True, exist_ok=True)
 
     def of(self, name: str, status: os.stat_result) -> KnownHash | None:
         """What is known of a recording, unless its file was written since."""
-        content = self._read(name)
-        if content is None or (content["size"], content["modified_ns"]) != (status.st_size, status.st_mtime_ns):
-            return None
-        return KnownHash(content["sha256"], content.get("kept"))
+        known = self._read(name)
+        is_same = known is not None and (known.size, known.modified_ns) == (status.st_size, status.st_mtime_ns)
+        return known if is_same else None
 
-    def is_kept(self, name: str) -> bool:
-        """Whether it is known what a recording was in the beginning."""
-        content = self._read(name)
-        return content is not None and content.get("kept") is not None
+    def was_kept(self, name: str) -> bool:
+        return (known := self._read(name)) is not None and known.kept is not None
 
     def keep(self, name: str, status: os.stat_result, sha256: str) -> None:
         """Write down what is about to be kept. Raises OSError if the disk does not take it."""
-        self._write(name, status, KnownHash(sha256, kept=sha256))
+        self._write(name, KnownHash.of(status, sha256, kept=sha256))
 
     def remember(self, name: str, status: os.stat_result, sha256: str) -> KnownHash:
         """Remember the present hash of a recording; a disk that takes nothing costs the memory alone."""
         before = self._read(name)
-        known = KnownHash(sha256, None if before is None else before.get("kept"))
+        known = KnownHash.of(status, sha256, before and before.kept)
         try:
-            self._write(name, status, known)
+            self._write(name, known)
         except OSError:
             _log.warning("the hash of recording %s could not be remembered", name, exc_info=True)
         return known
 
     def forget(self, name: str) -> None:
-        """Forget a recording."""
         self._path(name).unlink(missing_ok=True)
 
     def tidy(self, is_there: Callable[[str], bool]) -> None:
@@ -87,33 +86,17 @@ class RecordingHashes:
             if not is_there(path.name.removesuffix(".json")):
                 path.unlink(missing_ok=True)
 
-    def _write(self, name: str, status: os.stat_result, known: KnownHash) -> None:
-        """Write what is known, unless that is written already."""
-        content = {"size": status.st_size, "modified_ns": status.st_mtime_ns, **asdict(known)}
-        content |= {"check": _check(content)}
-        if content != self._read(name):
-            write_atomically(self._path(name), json.dumps(content).encode())
+    def _write(self, name: str, known: KnownHash) -> None:
+        if known != self._read(name):
+            write_atomically(self._path(name), known.model_dump_json().encode())
 
     def _path(self, name: str) -> Path:
         return self._root / f"{name}.json"
 
-    def _read(self, name: str) -> dict[str, Any] | None:
-        """What is remembered; None where that is missing or damaged."""
-        try:
-            content = json.loads(self._path(name).read_bytes())
-        except (OSError, ValueError, RecursionError):
-            return None
-        if not isinstance(content, dict) or not isinstance(content.get("sha256"), str):
-            return None
-        # Earlier versions remembered neither a check nor what was kept.
-        is_whole = "check" not in content or content["check"] == _check(content)
-        return content if is_whole and {"size", "modified_ns"} <= content.keys() else None
-
-
-def _check(content: dict[str, Any]) -> int:
-    """A number that other content does not have: a flipped bit here must not be taken for a damaged recording."""
-    values = [content.get(key) for key in ("size", "modified_ns", "sha256", "kept")]
-    return zlib.crc32(json.dumps(values).encode())
+    def _read(self, name: str) -> KnownHash | None:
+        known = read_stored(self._path(name), KnownHash)
+        # Earlier versions remembered no check.
+        return known if known is not None and known.check in (None, known.compute_check()) else None
 
 
 _HASHES = ".sha256"
@@ -126,10 +109,7 @@ class NameTakenError(RecordingError):
 
 @dataclass(frozen=True)
 class StoredRecording:
-    """A recording that lies on the server.
-
-    `sha256`: of its bytes, in hexadecimal; None where it was not computed yet.
-    """
+    """`sha256`: of its bytes, in hexadecimal; None where it was not computed yet."""
 
     name: str
     size: int
@@ -139,49 +119,29 @@ class StoredRecording:
 
 
 class RecordingStore:
-    """The folder of recordings; files that an operator puts there by hand belong to it too.
-
-    Only regular files are seen: a symbolic link could lead out of the folder.
-    """
+    """Regular files by name, an operator's too; a symbolic link could lead out of the folder."""
 
     def __init__(self, root: Path) -> None:
-        """Open the store; its folder is made where it is missing."""
         self.root = root
         self._hashes = RecordingHashes(root / _HASHES)
         self._naming = threading.Lock()
 
-    def stage(self) -> Path:
-        """A new hidden folder on the same disk, for a file that is still arriving; `discard` it in the end."""
-        return Path(tempfile.mkdtemp(prefix=_INCOMING, dir=self.root))
-
-    def discard(self, staged: Path) -> None:
-        """Remove a staged folder and what is in it."""
-        shutil.rmtree(staged, ignore_errors=True)
+    def stage(self) -> tempfile.TemporaryDirectory[str]:
+        """A new hidden folder on the same disk, for a file that is still arriving."""
+        return tempfile.TemporaryDirectory(prefix=_INCOMING, dir=self.root, ignore_cleanup_errors=True)
 
     def keep(self, file: KeptFile) -> tuple[StoredRecording, bool]:
-        """Give a file in a staged folder its place among the recordings.
-
-        Raises RecordingError if the name is not allowed. Raises NameTakenError if other bytes are kept under that name.
-
-        Returns
-        -------
-        StoredRecording
-            the recording
-        bool
-            False where the very same bytes were already kept under that name
-        """
+        """Name a staged file; False where the same bytes were kept. Raises RecordingError or NameTakenError."""
         if not is_file_name(file.name):
             raise RecordingError(one_line(f"{shown(file.name)}: no name for a recording; {FILE_NAME_RULE}"))
         is_new = self._give_name(file)
         return self.find(file.name), is_new
 
     def path(self, name: str) -> Path:
-        """Where a recording lies. Raises NotFoundError if no regular file of this name is in the folder."""
         self._status(name)
         return self.root / name
 
     def holds(self, name: str) -> bool:
-        """Whether there is a recording of a name."""
         try:
             self._status(name)
         except NotFoundError:
@@ -189,10 +149,7 @@ class RecordingStore:
         return True
 
     def find(self, name: str) -> StoredRecording:
-        """A recording with its sha256, which is computed where it is not known.
-
-        Raises NotFoundError if there is no such recording.
-        """
+        """A recording with its sha256, computed where it is not known. Raises NotFoundError if there is none."""
         status = self._status(name)
         known = self._hashes.of(name, status)
         if known is None:
@@ -200,10 +157,7 @@ class RecordingStore:
         return StoredRecording(name, status.st_size, _read_modified(status), known.sha256, known.is_damaged)
 
     def digest(self, name: str) -> str:
-        """The sha256 of a recording's bytes, in hexadecimal, for who will work with them.
-
-        Raises NotFoundError if there is no such recording. Raises RecordingError if it is damaged.
-        """
+        """The sha256 of a recording's bytes. Raises NotFoundError, or RecordingError if it is damaged."""
         found = self.find(name)
         if found.sha256 is None or found.is_damaged:
             hint = "restore it from a backup, or remove it and send it again"
@@ -217,7 +171,7 @@ class RecordingStore:
             try:
                 status = self._status(entry.name)
                 known = self._hashes.of(entry.name, status)
-                if known is None and self._hashes.is_kept(entry.name):
+                if known is None and self._hashes.was_kept(entry.name):
                     found.append(self.find(entry.name))
                     continue
             except (NotFoundError, FileNotFoundError):
@@ -243,7 +197,7 @@ class RecordingStore:
     def tidy(self) -> None:
         """Remove what a crash left of uploads; to be called before anything arrives."""
         for entry in self.root.glob(f"{_INCOMING}*"):
-            self.discard(entry)
+            shutil.rmtree(entry, ignore_errors=True)
         self._hashes.tidy(self.holds)
 
     def _status(self, name: str) -> os.stat_result:
@@ -260,10 +214,7 @@ class RecordingStore:
         return status
 
     def _give_name(self, file: KeptFile) -> bool:
-        """Link the file to its name, which fails where the name is in use; True where it is new.
-
-        What its bytes are is written down first: no recording is ever there of which that is not known.
-        """
+        """Link a file to its name, its hash written first; False where the same bytes have that name."""
         target = self.root / file.name
         with self._naming:
             if os.path.lexists(target):

@@ -32,8 +32,6 @@ class RobotVersion:
 
 
 class RobotStore:
-    """Folders named by versions, below one folder."""
-
     def __init__(self, root: Path, clock: Callable[[], datetime] = utc_now) -> None:
         """Open the store; its folder is made where it is missing, and what a crash left half made goes."""
         self._root, self._clock = root, clock
@@ -42,7 +40,6 @@ class RobotStore:
             self.discard(entry)
 
     def stage(self) -> Path:
-        """A new folder for files of a robot; `keep` or `discard` it."""
         staged = Path(tempfile.mkdtemp(prefix=_STAGED, dir=self._root)) / _FILES
         staged.mkdir()
         return staged
@@ -61,11 +58,9 @@ class RobotStore:
         return robot, True
 
     def discard(self, staged: Path) -> None:
-        """Remove a staged folder; nothing happens where it was kept."""
         shutil.rmtree(staged.parent if staged.name == _FILES else staged, ignore_errors=True)
 
     def versions(self) -> list[RobotVersion]:
-        """All versions, the newest first."""
         found = []
         for entry in self._root.iterdir():
             try:

@@ -16,16 +16,10 @@ LAST_WAIT_S = 3.0  # how long the end event of a job that has ended is waited fo
 
 
 class EventSource(Protocol):
-    """Anything that has events."""
-
     @property
-    def events(self) -> EventLog:
-        """What happened."""
-        ...
+    def events(self) -> EventLog: ...
 
-    def has_ended(self) -> bool:
-        """Whether nothing more will happen."""
-        ...
+    def has_ended(self) -> bool: ...
 
 
 class Feed:
@@ -55,7 +49,6 @@ class Feed:
         return has_ended, events[: next(ends, None)]
 
     def take(self, has_ended: bool, events: list[LoggedEvent]) -> None:
-        """Show what was read to all followers."""
         self.events += events
         self._waited_s += POLL_S if has_ended else 0.0
         is_ended = any(event.content.get("kind") == "ended" for event in events)
@@ -65,12 +58,10 @@ class Feed:
             self._wake()
 
     def end(self) -> None:
-        """Let the followers go."""
         self.is_over = True
         self._wake()
 
     def _wake(self) -> None:
-        """Wake everybody who waits; who waits next waits for the next news."""
         news, self._news = self._news, asyncio.Event()
         news.set()
 
@@ -85,7 +76,6 @@ class EventFeeds:
 
     @contextmanager
     def follow(self, source: EventSource) -> Iterator[Feed]:
-        """The feed of a job, which is read as long as somebody follows it."""
         path = source.events.path
         feed = self._feeds.get(path)
         if feed is None or feed.is_over:
@@ -101,7 +91,6 @@ class EventFeeds:
                 del self._feeds[path]
 
     async def _read_all(self) -> None:
-        """Read every feed that somebody follows, round after round, until nobody does."""
         while self._feeds:
             feeds = [feed for feed in self._feeds.values() if not feed.is_over]
             if self._closing.is_set():

@@ -17,11 +17,8 @@ from tauscope.server.queue.job_folder import EndedEvent, ProgressEvent, StateEve
 from tauscope.server.store.event_log import LoggedEvent
 
 EVENT_MODELS = (StateEvent, StepEvent, ProgressEvent, EndedEvent)
-
 HEARTBEAT_S = 10.0  # silence after which a comment says that the connection lives [s]
 RETRY_MS = 1000  # how long a client waits before it connects again [ms]
-
-
 PRESENCE_S = 1.0  # how often a client without news is looked for [s]
 
 

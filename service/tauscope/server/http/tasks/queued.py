@@ -5,14 +5,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fastapi import APIRouter, Request
-from pydantic import BaseModel
+from fastapi.concurrency import contextmanager_in_threadpool
 from starlette.concurrency import run_in_threadpool
+from typing_extensions import override
 
 from tauscope.errors import LimitExceededError
 from tauscope.server.auth.gate import find_caller
 from tauscope.server.http.answers import describe_damaged, describe_job, require_success
 from tauscope.server.http.bodies import PartRule
-from tauscope.server.http.openapi import Examples
 from tauscope.server.http.robot_files import read_received_robot
 from tauscope.server.http.services import Services
 from tauscope.server.http.tasks.router import (
@@ -21,13 +21,13 @@ from tauscope.server.http.tasks.router import (
     add_cancelling,
     add_document_route,
     add_export_route,
-    make_router,
 )
-from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request, stage_request
+from tauscope.server.http.tasks.submission import Received, keep_robot, receive_request
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.job_folder import JobState
 from tauscope.server.queue.queue import JobKind
-from tauscope.server.queue.task_job import OrderedRecording, TaskWorkspace
+from tauscope.server.queue.task_job import OrderedRecording, TaskWorkspace, stage_workspace
+from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import RecordingStore
 
@@ -35,79 +35,46 @@ _SHOWN = ("recordings", "held_out", "simulated", "refine", "options")
 """Fields of an order that its answer shows, where it has them."""
 
 
-def no_further(_received: Received[Any], _services: Services, _workspace: Any) -> dict[str, Any]:
-    """No fields of an order but those that all have."""
-    return {}
+@dataclass(frozen=True, eq=False, kw_only=True)
+class QueuedTask(Resource):
+    """`further`: more fields of an order; `further_parts`: folder and limit [bytes] of other files; `links`: routes."""
 
-
-@dataclass(frozen=True, eq=False)
-class QueuedTask:
-    """What is special about such a resource.
-
-    `further`: checks a request whose recordings are listed, and returns further fields of its order.
-    `further_parts`: mapping of str to (str, int), files of a form that are no recordings: their folder, and the largest
-        size [bytes].
-    `links`: further routes that it links to, once it succeeded.
-    """
-
-    noun: str
-    plural: str
     kind: Callable[[Services], JobKind]
     workspace: type[TaskWorkspace[Any]]
-    models: tuple[type[RobotRequest], type[BaseModel]]
-    examples: Examples
-    summary: str
-    words: str
     documents: Sequence[JobDocument]
-    submission_problems: Sequence[str] = ("recording", "not-found", "queue-full")
+    problems: Sequence[str] = ("recording", "not-found", "queue-full")
     work_problems: Sequence[str] = ("robot-file", "recording", "recording-mismatch", "identification")
-    parts: Mapping[str, Any] = field(default_factory=dict)
     export_words: str = ""
     links: Sequence[str] = ()
-    further: Callable[[Received[Any], Services, Any], dict[str, Any]] = no_further
+    further: Callable[[Received[Any], Services, Any], dict[str, Any]] = lambda *_: {}
     further_parts: Mapping[str, tuple[str, int]] = field(default_factory=dict)
 
+    @override
+    def items(self, services: Services) -> ItemStore:
+        return self.kind(services).items
+
+    @override
     def find(self, services: Services, identifier: str) -> TaskWorkspace[Any]:
-        """The folder of a job. Raises NotFoundError if there is none."""
-        return self.workspace(self.kind(services).items.folder(identifier))
+        return self.workspace(self.items(services).folder(identifier))
 
     def finished(self, services: Services, identifier: str) -> TaskWorkspace[Any]:
-        """The folder of a job that succeeded.
-
-        Raises NotFoundError if there is none. Raises ProblemError if it has not succeeded: the problem that it ended
-        in, or that it has not ended.
-        """
+        """Raises NotFoundError if there is none, ProblemError if it has not succeeded."""
         workspace = self.find(services, identifier)
         require_success(workspace)
         return workspace
 
+    @override
     def router(self) -> APIRouter:
-        """All its routes."""
-        resource = Resource(
-            noun=self.noun,
-            plural=self.plural,
-            models=self.models,
-            examples=self.examples,
-            items=lambda services: self.kind(services).items,
-            find=self.find,
-            followed=self.find,
-            submit=self.submit,
-            describe=self.describe,
-            summary=self.summary,
-            words=self.words,
-            problems=self.submission_problems,
-            parts=self.parts,
-        )
-        router = make_router(resource)
-        add_cancelling(router, resource, self.kind)
+        router = super().router()
+        add_cancelling(router, self, self.kind)
         for document in self.documents:
             add_document_route(router, self.finished, document, self.work_problems)
         if self.workspace.formats:
             add_export_route(router, self.finished, self.workspace.formats, self.export_words)
         return router
 
+    @override
     def describe(self, services: Services, identifier: str, root: str) -> Any:
-        """The state of a job; one whose files are damaged is said to be so. Raises NotFoundError if there is none."""
         answer, workspace = self.models[1], self.find(services, identifier)
         here, order = f"{root}/{self.plural}/{identifier}", workspace.read_order()
         links: dict[str, Any] = {"self": here, "events": f"{here}/events"}
@@ -125,14 +92,10 @@ class QueuedTask:
         fields |= {"refused_exports": refused} if workspace.formats else {}
         return answer(**fields, robot=order.robot_name, links=links)
 
+    @override
     async def submit(self, request: Request, services: Services) -> str:
-        """Take a request: what was sent is kept in a job's folder, and checked as far as that is quick.
-
-        Raises ProblemError if the request is not as documented. Raises TauscopeError if the robot is not valid, a
-        recording is not there, or something is too large.
-        """
         settings = services.settings
-        async with stage_request(self.kind(services).items, self.workspace) as workspace:
+        async with contextmanager_in_threadpool(stage_workspace(self.items(services), self.workspace)) as workspace:
             most, largest = settings.max_recordings, settings.max_upload_bytes
             rules = {role: PartRule(largest, workspace.uploads(role), most) for role in workspace.roles}
             for part, (folder, limit) in self.further_parts.items():
@@ -162,11 +125,7 @@ class QueuedTask:
 
 
 def order_recordings(role: str, received: Received[Any], store: RecordingStore) -> tuple[OrderedRecording, ...]:
-    """The recordings of a role: each a file of the form, or else a recording on the server.
-
-    Raises ProblemError if a file was sent but is not listed. Raises NotFoundError if a recording is neither sent nor on
-    the server.
-    """
+    """Raises ProblemError if a file was sent but is not listed, NotFoundError if one is not there."""
     files: dict[str, KeptFile] = {file.name: file for file in received.form.files.get(role, [])}
     listed: Sequence[str] | None = getattr(received.document, role)
     names = list(files) if listed is None else listed
@@ -185,10 +144,7 @@ def order_recordings(role: str, received: Received[Any], store: RecordingStore) 
 
 
 def check_recordings(recordings: Mapping[str, Sequence[OrderedRecording]], most: int) -> None:
-    """There is something to work on, not too much, and no recording is its own judge.
-
-    Raises ProblemError naming the recording. Raises LimitExceededError for too many.
-    """
+    """Raises ProblemError if there is none or two are the same, LimitExceededError for too many."""
     if not recordings["recordings"]:
         text = "no recording was sent or named; send part recordings, or name recordings on the server"
         raise ProblemError("invalid-request", text)

@@ -1,20 +1,23 @@
 """One router for every resource that performs a task: handed in, listed, followed, its outputs fetched, removed."""
 
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any, ClassVar
 
 from fastapi import APIRouter, Depends, Path, Request, Response
 from pydantic import BaseModel, Field, create_model
 from starlette.concurrency import run_in_threadpool
+from typing_extensions import override
 
 from tauscope.errors import ExportError, NotFoundError
 from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
+from tauscope.server.control.run_manager import Manager
 from tauscope.server.http.answers import (
     ENDINGS,
     MOTION,
@@ -27,35 +30,30 @@ from tauscope.server.http.answers import (
     collection,
     require_document,
 )
-from tauscope.server.http.evidence import require_no_model
-from tauscope.server.http.leases import LeaseToken
+from tauscope.server.http.leases import NO_BODY, LeaseToken
 from tauscope.server.http.openapi import Examples, file_contents
 from tauscope.server.http.reading import READING
 from tauscope.server.http.robot_files import RobotReportAnswer, check_received_robot
-from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.services import Services, ServicesDep, require_no_model
 from tauscope.server.http.tasks.event_feeds import EventSource
 from tauscope.server.http.tasks.events import add_events_route
 from tauscope.server.http.tasks.submission import RobotRequest, request_body
 from tauscope.server.problems import ProblemError, problem_responses
+from tauscope.server.queue.job_folder import JobFolder
 from tauscope.server.queue.queue import JobKind
 from tauscope.server.store.data_folder import ItemStore
 
 HTML = "text/html"
-
 PAGE_HEADERS = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; sandbox"}
 """A report brings its style with it, runs no script, and may do nothing in the name of whoever reads it."""
 
 
 class RobotFileAnswer(AnswerModel):
-    """A file of a robot."""
-
     name: str = Field(description="its bare name")
     content: str = Field(description="its text")
 
 
 class JobRobotAnswer(AnswerModel):
-    """The robot of a job."""
-
     report: RobotReportAnswer = Field(description="the robot at a glance")
     robot_file: str = Field(description="which of the files is the robot file")
     files: list[RobotFileAnswer] = Field(description="robot file and URDF as they were sent")
@@ -63,11 +61,7 @@ class JobRobotAnswer(AnswerModel):
 
 @dataclass(frozen=True)
 class JobDocument:
-    """An output of a task that has a route of its own.
-
-    `output`: its name among the outputs.
-    `missing`: what is said where the task made none; None where it always makes one.
-    """
+    """`output`: its name among the outputs; `missing`: what is said where the task may make none, and made none."""
 
     name: str
     output: str
@@ -86,100 +80,97 @@ def text_document(name: str, output: str, media_type: str, summary: str, words: 
 
 
 def result_document(noun: str, verb: str, model: type[BaseModel]) -> JobDocument:
-    """The result of a command that has ``--json``."""
     answer = {"model": model, "description": f"the same document as `tauscope {verb} --json`"}
     words = f"The result of {noun} that succeeded; else the problem that it ended in."
     return JobDocument("result", "result.json", "Fetch the result", words, answer)
 
 
 def report_document(verb: str) -> JobDocument:
-    """The page of a command that has ``--report``."""
-    words = "The report as one page: no script, no request to anywhere, ready to print."
-    return text_document(
-        "report", "report.html", HTML, "Fetch the report", words, f"page as `tauscope {verb} --report`"
-    )
+    text = "The report as one page: no script, no request to anywhere, ready to print."
+    return text_document("report", "report.html", HTML, "Fetch the report", text, f"page as `tauscope {verb} --report`")
 
 
 def plots_document(noun: str, model: type[BaseModel], words: str) -> JobDocument:
-    """Data of the figures."""
     answer, summary = {"model": model, "description": words}, "Fetch the data of its figures"
     return JobDocument("plots", "plots.json", summary, f"What figures of {noun} are drawn from.", answer)
 
 
-class Folder(Protocol):
-    """What every resource keeps in a folder."""
-
-    robot: FilePath
-
-    def read_order(self) -> Any:
-        """What was asked for; None where that is damaged."""
-
-    def has_ended(self) -> bool:
-        """Whether nothing more will happen."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class Resource:
-    """What is special about a resource.
-
-    `submit`: takes a request; returns the identifier.
-    `describe`: the answer, from services, identifier and the path of the interface.
-    `followed`: what has events.
-    `summary`, `words`: of handing in.
-    `parts`: files of a form beside the robot's.
-    """
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Resource(ABC):
+    """What is special about a resource; `words`: of handing in; `parts`: files of a form beside the robot's."""
 
     noun: str
     plural: str
     models: tuple[type[RobotRequest], type[BaseModel]]
     examples: Examples
-    items: Callable[[Services], ItemStore]
-    find: Callable[[Services, str], Folder]
-    followed: Callable[[Services, str], EventSource]
-    submit: Callable[[Request, Services], Awaitable[str]]
-    describe: Callable[[Services, str, str], BaseModel]
     summary: str
     words: str
     problems: Sequence[str] = ()
-    moves_arm: bool = False
     parts: Mapping[str, Any] = field(default_factory=dict)
+    motion_problems: ClassVar[Sequence[str]] = ()
 
     @property
     def singular(self) -> str:
-        """The noun without its article."""
         return self.noun.rpartition(" ")[2]
 
+    @abstractmethod
+    def items(self, services: Services) -> ItemStore: ...
 
-def make_router(resource: Resource) -> APIRouter:
-    """The routes that every resource has; those that end something are added by its kind."""
-    plural, noun, singular = resource.plural, resource.noun, resource.singular
-    router = APIRouter(prefix=f"/{plural}", tags=[plural])
+    @abstractmethod
+    def find(self, services: Services, identifier: str) -> Any:
+        """The folder of an item. Raises NotFoundError if there is none."""
+
+    def follow(self, services: Services, identifier: str) -> EventSource:
+        """What has the events of an item. Raises NotFoundError if there is none."""
+        return self.find(services, identifier)
+
+    @abstractmethod
+    async def submit(self, request: Request, services: Services) -> str:
+        """Take a request; returns an identifier. Raises ProblemError or TauscopeError if it is not valid."""
+
+    @abstractmethod
+    def describe(self, services: Services, identifier: str, root: str) -> Any:
+        """The answer; one whose files are damaged says so. Raises NotFoundError. `root`: path of the interface."""
+
+    def router(self) -> APIRouter:
+        router = APIRouter(prefix=f"/{self.plural}", tags=[self.plural])
+        _add_submission(router, self)
+        _add_list(router, self)
+        _add_item(router, self)
+        add_events_route(router, self.noun, self.follow)
+        return router
+
+
+def _add_submission(router: APIRouter, resource: Resource) -> None:
     request_model, answer_model = resource.models
-    entries: Any = {plural: (list[answer_model], Field(description="the newest first"))}
-    list_model = create_model(
-        f"{singular.capitalize()}ListAnswer",
-        __base__=PageAnswer,
-        __doc__=f"{plural.capitalize()} that are kept.",
-        **entries,
-    )
 
     @router.post(
         "",
-        name=f"create_{singular}",
+        name=f"create_{resource.singular}",
         status_code=202,
         summary=resource.summary,
         description=resource.words,
         response_model=answer_model,
-        responses=problem_responses(*SUBMISSION, *(MOTION if resource.moves_arm else ()), *resource.problems),
+        responses=problem_responses(*SUBMISSION, *resource.motion_problems, *resource.problems),
         openapi_extra=request_body(request_model, resource.examples, resource.parts),
-        dependencies=[Depends(_lease_header)] if resource.moves_arm else [],
+        dependencies=[Depends(_lease_header)] if resource.motion_problems else [],
     )
     async def hand_in(request: Request, response: Response, services: ServicesDep) -> Any:
         identifier = await resource.submit(request, services)
-        answer: Any = await run_in_threadpool(resource.describe, services, identifier, collection(request, 1))
+        answer = await run_in_threadpool(resource.describe, services, identifier, collection(request, 1))
         response.headers["Location"] = answer.links.self_
         return answer
+
+
+def _add_list(router: APIRouter, resource: Resource) -> None:
+    plural, answer_model = resource.plural, resource.models[1]
+    entries: Any = {plural: (list[answer_model], Field(description="the newest first"))}
+    list_model = create_model(
+        f"{resource.singular.capitalize()}ListAnswer",
+        __base__=PageAnswer,
+        __doc__=f"{plural.capitalize()} that are kept.",
+        **entries,
+    )
 
     @router.get("", name=f"list_{plural}", summary=f"List {plural}", response_model=list_model)
     def list_items(request: Request, services: ServicesDep, limit: Limit = 100, after: After = None) -> BaseModel:
@@ -192,33 +183,32 @@ def make_router(resource: Resource) -> APIRouter:
                 page.append(resource.describe(services, each, root))
         return list_model(**{plural: page}, next=found[limit - 1] if len(found) > limit else None)
 
+
+def _add_item(router: APIRouter, resource: Resource) -> None:
     @router.get(
         "/{identifier}",
-        name=f"get_{singular}",
-        summary=f"Follow {noun}",
-        response_model=answer_model,
+        name=f"get_{resource.singular}",
+        summary=f"Follow {resource.noun}",
+        response_model=resource.models[1],
         responses=problem_responses("not-found"),
     )
-    def get_item(request: Request, identifier: Identifier, services: ServicesDep) -> BaseModel:
+    def get_item(request: Request, identifier: Identifier, services: ServicesDep) -> Any:
         """Its state, and where to go on from there."""
         return resource.describe(services, identifier, collection(request, 2))
 
     @router.get(
         "/{identifier}/robot",
-        name=f"get_robot_of_{singular}",
-        summary=f"Fetch the robot of {noun}",
+        name=f"get_robot_of_{resource.singular}",
+        summary=f"Fetch the robot of {resource.noun}",
         responses=problem_responses("not-found", "damaged", "robot-file", *READING),
     )
     async def get_robot(request: Request, identifier: Identifier, services: ServicesDep) -> JobRobotAnswer:
         """Its joints, limits and frames, and the files that were sent."""
-        workspace = await run_in_threadpool(resource.find, services, identifier)
-        folder, order = workspace.robot, await run_in_threadpool(workspace.read_order)
+        workspace: JobFolder[Any] = await run_in_threadpool(resource.find, services, identifier)
+        order = await run_in_threadpool(workspace.read_order)
         if order is None:
             raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it has no robot any more")
-        return await describe_robot(request, services, folder, order.robot_file)
-
-    add_events_route(router, noun, resource.followed)
-    return router
+        return await describe_robot(request, services, workspace.robot, order.robot_file)
 
 
 def add_cancelling(router: APIRouter, resource: Resource, kind: Callable[[Services], JobKind]) -> None:
@@ -231,7 +221,7 @@ def add_cancelling(router: APIRouter, resource: Resource, kind: Callable[[Servic
         response_model=resource.models[1],
         responses={204: {"description": "it had ended, and was removed"}, **problem_responses("not-found", "in-use")},
     )
-    def cancel_or_remove(request: Request, identifier: Identifier, services: ServicesDep) -> BaseModel | Response:
+    def cancel_or_remove(request: Request, identifier: Identifier, services: ServicesDep) -> Any:
         """One that waits or runs is cancelled; one that has ended is removed, unless it is a model in use."""
         if resource.find(services, identifier).has_ended():
             require_no_model(services, identifier)
@@ -240,58 +230,67 @@ def add_cancelling(router: APIRouter, resource: Resource, kind: Callable[[Servic
         return resource.describe(services, identifier, collection(request, 2))
 
 
-def add_stopping(
-    router: APIRouter,
-    resource: Resource,
-    answer: type[BaseModel],
-    stop: Callable[[Services, str], Any],
-    read_state: Callable[[Services, str], Any],
-    remove: Callable[[Services, str], bool],
-    words: tuple[str, str],
-) -> None:
-    """Give a resource that moves an arm the routes ``POST /{identifier}/stop`` and ``DELETE /{identifier}``.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MovingResource(Resource):
+    """One that moves an arm; `stop_words` and `remove_words` describe the routes that end it."""
 
-    `stop`: the state in which it was stopped; None where it does not go on.
-    `read_state`: the state in its folder; None where that is damaged.
-    `remove`: False where it goes on.
-    `words`: (str, str), what is said of either route.
-    """
+    stop_model: type[BaseModel]
+    stop_words: str
+    remove_words: str
+    motion_problems: ClassVar[Sequence[str]] = MOTION
 
-    @router.post(
-        "/{identifier}/stop",
-        name=f"stop_{resource.singular}",
-        status_code=202,
-        summary=f"Stop {resource.noun}",
-        description=words[0],
-        response_model=answer,
-        responses={**problem_responses("not-found"), 202: {"description": "it stops, or had ended already"}},
-        openapi_extra={"requestBody": {"required": False, "content": {}}},
-    )
-    async def stop_item(identifier: Identifier, services: ServicesDep) -> BaseModel:
-        # Neither a thread of the pool nor a lock nor a disk is needed for one that goes on, whatever is stuck.
-        state = stop(services, identifier) or read_state(services, identifier)
-        if state is None:
-            raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it does not go on")
-        return answer(id=identifier, state=state)
+    @abstractmethod
+    def manager(self, services: Services) -> Manager[Any]: ...
 
-    @router.delete(
-        "/{identifier}",
-        name=f"remove_{resource.singular}",
-        status_code=204,
-        summary=f"Remove {resource.noun}",
-        description=words[1],
-        responses=problem_responses("not-found", "not-finished"),
-    )
-    def remove_item(identifier: Identifier, services: ServicesDep) -> None:
-        if not remove(services, identifier):
-            raise ProblemError("not-finished", f"{identifier} goes on; stop it, and remove it when it has ended")
+    @abstractmethod
+    def read_state(self, services: Services, identifier: str) -> Any:
+        """The state in its folder; None where that is damaged."""
+
+    @override
+    def items(self, services: Services) -> ItemStore:
+        return self.manager(services).items
+
+    @override
+    def router(self) -> APIRouter:
+        router = super().router()
+        self._add_ending(router)
+        return router
+
+    def _add_ending(self, router: APIRouter) -> None:
+        @router.post(
+            "/{identifier}/stop",
+            name=f"stop_{self.singular}",
+            status_code=202,
+            summary=f"Stop {self.noun}",
+            description=self.stop_words,
+            response_model=self.stop_model,
+            responses={**problem_responses("not-found"), 202: {"description": "it stops, or had ended already"}},
+            openapi_extra=NO_BODY,
+        )
+        async def stop_item(identifier: Identifier, services: ServicesDep) -> BaseModel:
+            # Neither a thread of the pool nor a lock nor a disk is needed for one that goes on, whatever is stuck.
+            state = self.manager(services).stop(identifier) or self.read_state(services, identifier)
+            if state is None:
+                raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it does not go on")
+            return self.stop_model(id=identifier, state=state)
+
+        @router.delete(
+            "/{identifier}",
+            name=f"remove_{self.singular}",
+            status_code=204,
+            summary=f"Remove {self.noun}",
+            description=self.remove_words,
+            responses=problem_responses("not-found", "not-finished"),
+        )
+        def remove_item(identifier: Identifier, services: ServicesDep) -> None:
+            if not self.manager(services).remove(identifier):
+                raise ProblemError("not-finished", f"{identifier} goes on; stop it, and remove it when it has ended")
 
 
-def add_document_route(
-    router: APIRouter, finished: Callable[[Services, str], Any], document: JobDocument, problems: Sequence[str]
-) -> None:
-    """Give a resource the route of a document."""
+Finished = Callable[[Services, str], Any]  # the folder of a job that succeeded
 
+
+def add_document_route(router: APIRouter, finished: Finished, document: JobDocument, problems: Sequence[str]) -> None:
     @router.get(
         f"/{{identifier}}/{document.name}",
         name=f"get_{document.name.replace('-', '_')}_of_{router.prefix.strip('/')}",
@@ -312,7 +311,7 @@ def add_document_route(
 
 
 def add_export_route(
-    router: APIRouter, finished: Callable[[Services, str], Any], formats: Mapping[ExportFormat, ExportFile], words: str
+    router: APIRouter, finished: Finished, formats: Mapping[ExportFormat, ExportFile], words: str
 ) -> None:
     """Give a resource the route ``/{identifier}/exports/{format}``."""
     content = file_contents(*{file.media_type for file in formats.values()})
@@ -350,7 +349,6 @@ def add_export_route(
 
 
 async def describe_robot(request: Request, services: Services, folder: FilePath, robot_file: str) -> JobRobotAnswer:
-    """A robot at a glance, and its files."""
     report = await services.reading.call(request, check_received_robot, folder, robot_file)
     files = await run_in_threadpool(_read_files, folder)
     return JobRobotAnswer(report=RobotReportAnswer.of(report), robot_file=robot_file, files=files)

@@ -1,8 +1,7 @@
 """A request that hands a job in: JSON, or a form with the JSON as part `request` and files beside it."""
 
 import shutil
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from contextlib import asynccontextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, Self, TypeVar
@@ -10,7 +9,6 @@ from typing import Annotated, Any, Generic, Literal, Self, TypeVar
 from fastapi import Request
 from pydantic import AfterValidator, Field, FiniteFloat, model_validator
 from pydantic_core import PydanticCustomError
-from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import IdentificationError, RobotFileError, ScenarioError
 from tauscope.robot import Robot
@@ -28,12 +26,11 @@ from tauscope.server.http.bodies import (
     refuse_media_type,
     to_json_text,
 )
-from tauscope.server.http.openapi import Examples, binary_part, form_body, json_body, refer_to_model
+from tauscope.server.http.openapi import ROBOT_PARTS, Examples, form_body, json_body, refer_to_model
 from tauscope.server.http.robot_files import EXAMPLE_ROBOT, keep_inline_robot, robot_part_rules
 from tauscope.server.http.settings import Settings
 from tauscope.server.problems import ProblemError
-from tauscope.server.queue.task_job import SAVED_MODEL, Staged, TaskWorkspace
-from tauscope.server.store.data_folder import ItemStore
+from tauscope.server.queue.task_job import SAVED_MODEL, TaskWorkspace
 from tauscope.server.store.files import FILE_NAME_PATTERN, FILE_NAME_RULE, KeptFile, is_file_name
 from tauscope.server.store.robots import RobotStore
 from tauscope.strict_model import StrictModel
@@ -49,13 +46,7 @@ def keep_model(
     workspace: TaskWorkspace[Any],
     read: Callable[[str], bytes],
 ) -> str | None:
-    """Put a model into its place in a job's folder; returns its name there.
-
-    Raises ProblemError where it came twice. Raises IdentificationError where it holds what JSON cannot.
-
-    `model`: identifier or document, as the request has it; `file`: part of the form, which lies in its place; `read`:
-    the model of an identifier.
-    """
+    """Put a model, or that of an identifier, into its place; its name. Raises ProblemError, IdentificationError."""
     if file is not None and model is not None:
         raise ProblemError("invalid-request", "the model came twice, as part model and in part request; send it once")
     if file is not None or model is None:
@@ -64,10 +55,7 @@ def keep_model(
     if isinstance(model, str):
         path.write_bytes(read(model))
         return MODEL_FILE
-    text = to_json_text(model)
-    if text is None:
-        raise IdentificationError("model: holds NaN, infinity or text that is not Unicode; write plain numbers")
-    path.write_text(text, encoding="utf-8")
+    path.write_text(to_json_text(model, "model", IdentificationError), encoding="utf-8")
     return MODEL_FILE
 
 
@@ -107,28 +95,13 @@ RECORDINGS_EXAMPLE: tuple[str, Any] = (
     "Recordings that lie on the server",
     {"robot": EXAMPLE_ROBOT, "recordings": ["monday.csv", "tuesday.csv"], "held_out": ["wednesday.mcap"]},
 )
-
 Document = TypeVar("Document", bound=RobotRequest)
 
 
 @dataclass(frozen=True)
 class Received(Generic[Document]):
-    """A request as it arrived."""
-
     document: Document
     form: ReceivedForm
-
-
-@asynccontextmanager
-async def stage_request(items: ItemStore, kind: Callable[[Path], Staged]) -> AsyncIterator[Staged]:
-    """A new folder that is removed in the end, unless it was handed in meanwhile."""
-    staged = await run_in_threadpool(items.stage)
-    try:
-        workspace = kind(staged)
-        await run_in_threadpool(workspace.prepare)
-        yield workspace
-    finally:
-        await run_in_threadpool(items.discard, staged)
 
 
 async def receive_request(
@@ -138,10 +111,7 @@ async def receive_request(
     robot_folder: Path,
     further_parts: Mapping[str, PartRule] | None = None,
 ) -> Received[Document]:
-    """Read the body, whichever of the two media types it is.
-
-    Raises ProblemError if the request is not as documented. Raises LimitExceededError if something is too large.
-    """
+    """Read JSON or a form. Raises ProblemError or LimitExceededError."""
     if media_type(request) == JSON:
         return Received(await read_document(request, kind, settings.max_document_bytes), ReceivedForm())
     if media_type(request) != FORM:
@@ -156,11 +126,7 @@ async def receive_request(
 
 
 def keep_robot(received: Received[Any], folder: Path, robots: RobotStore) -> str:
-    """Name of the robot file in the job's folder, written there if it came as JSON or is a kept one.
-
-    Raises ProblemError if there is no robot, or two. Raises RobotFileError if its content is not plain data.
-    Raises NotFoundError if it names a version that is not kept.
-    """
+    """Name of the robot file. Raises ProblemError without one or with two, RobotFileError, NotFoundError."""
     file, inline = received.form.file("robot"), received.document.robot
     if file is not None and inline is not None:
         raise ProblemError("invalid-request", "the robot came twice, as part robot and in part request; send it once")
@@ -178,14 +144,9 @@ def keep_robot(received: Received[Any], folder: Path, robots: RobotStore) -> str
 def request_body(
     kind: type[RobotRequest], examples: Examples, further_parts: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
-    """The body of such a request, for the OpenAPI document.
-
-    `examples`: mapping of str to (str, plain data), summary and value by name.
-    """
     parts = {
         "request": refer_to_model(kind),
-        "robot": binary_part("the robot file (YAML)"),
-        "urdf": binary_part("the URDF that the robot file names, by its bare name"),
+        **ROBOT_PARTS,
         **(further_parts or {}),
     }
     form = form_body(parts, required=[])
@@ -200,12 +161,8 @@ class BackendRequest(StrictModel):
         default=None,
         description="of the simulated arm: as fast as it computes, or by the clock; null: the service's own",
     )
-    scenario: dict[str, Any] | None = Field(
-        default=None, description="what the simulated arm conceals: content of a scenario file; null: nothing"
-    )
-    keep_settings: bool = Field(
-        default=False, description="whether servos keep in EEPROM what a run changed; false: it is put back"
-    )
+    scenario: dict[str, Any] | None = Field(default=None, description="effects that the simulated arm conceals")
+    keep_settings: bool = Field(default=False, description="whether servos keep in EEPROM what a run changed")
     start: tuple[FiniteFloat, ...] | None = Field(
         default=None,
         max_length=100,
@@ -214,13 +171,9 @@ class BackendRequest(StrictModel):
 
 
 def choose_backend(settings: Settings, request: BackendRequest, robot: Robot) -> BackendChoice:
-    """The backend of a request.
-
-    Raises ScenarioError if the scenario is no plain data. Raises RobotFileError if a drive block names a file that the
-    driver would open: no path of the server is opened for a client; or if an arm without a model is to be simulated.
-    """
-    if request.scenario is not None and to_json_text(request.scenario) is None:
-        raise ScenarioError("scenario: holds NaN, infinity or text that is not Unicode; write plain numbers and text")
+    """Raises ScenarioError, or RobotFileError if a drive names a file or a simulated arm has no model."""
+    if request.scenario is not None:
+        to_json_text(request.scenario, "scenario", ScenarioError)
     name = request.name or settings.backend
     driver = find_driver(name)
     _refuse_files(robot, driver.file_keys)

@@ -2,8 +2,9 @@
 
 const ROOT = "/api/v1";
 const KEY = "tauscope-key";
+/** States in which nothing goes on any more, of jobs and of runs. */
+export const ENDS = ["succeeded", "failed", "cancelled", "finished", "degraded", "stopped", "interrupted", "damaged"];
 
-/** A failed request as the service describes it (RFC 9457). */
 export class Problem extends Error {
   constructor(status, detail, code) {
     super(detail);
@@ -72,7 +73,10 @@ export async function remove(path, options = {}) {
 
 /** Save a file that the service sends; a link alone could bring no key. */
 export async function download(path, name) {
-  const blob = await (await fetchRaw(path)).blob();
+  saveAs(await (await fetchRaw(path)).blob(), name);
+}
+
+export function saveAs(blob, name) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(blob);
   link.download = name;

@@ -157,7 +157,6 @@ export function armDrawing(report) {
   };
 }
 
-/** Joints and their limits as rows. */
 export function jointRows(report, number) {
   const unit = (joint) => (joint.type === "prismatic" ? "m" : "rad");
   return report.joints.map((joint) => [

@@ -1,6 +1,6 @@
 // Campaigns: begun from a robot file, followed step by step, and read.
 
-import { fetchRaw, follow, getJson, post } from "./api.js";
+import { ENDS, fetchRaw, follow, getJson, post } from "./api.js";
 import { cautions, explained, h, moment, render, section, state, title, verdict } from "./dom.js";
 import { HEADLINES, appendRobot } from "./diagnoses.js";
 import { DRIVERS } from "./drivers.js";
@@ -10,9 +10,8 @@ import { robotSheet } from "./robots.js";
 import { liveMonitor } from "./runs.js";
 
 const STEPS = { design: "Design motion", run: "Run motion", "held-out design": "Design held-out motion", "held-out run": "Run held-out motion", identify: "Identify", diagnose: "Diagnose" };
-const ENDS = ["succeeded", "failed", "cancelled", "interrupted", "damaged"];
+const isOver = (step) => step.state === "waiting" || ENDS.includes(step.state);
 const ROBOT_OF = /^(campaigns|runs|identifications|diagnoses)\/[\w-]+$/; // where the robot of a new campaign may be taken from
-const RUN_ENDS = ["finished", "degraded", "stopped", "failed", "interrupted", "damaged", "waiting"];
 
 export async function showCampaigns(root, { signal }) {
   const [{ campaigns }, verdicts] = await Promise.all([getJson("campaigns?limit=1000", signal), figuresOf("diagnosis", signal)]);
@@ -40,9 +39,9 @@ export async function showCampaign(root, { id, signal, show }) {
   let leaving = null;
   function update() {
     render(status, state(campaign.state), campaign.problem ? h("span", { role: "alert" }, " ", explained(campaign.problem)) : "");
-    render(steps, campaign.steps.map((step) => h("li", { "data-state": step.state, "data-live": !ENDS.includes(step.state) && !RUN_ENDS.includes(step.state) },
+    render(steps, campaign.steps.map((step) => h("li", { "data-state": step.state, "data-live": !isOver(step) },
       h("b", {}, step.link && !step.link.includes("/excitations/") ? h("a", { href: linked(step.link), text: STEPS[step.name] }) : STEPS[step.name]), state(step.state))));
-    const moving = campaign.steps.find((step) => step.link?.includes("/runs/") && !RUN_ENDS.includes(step.state));
+    const moving = campaign.steps.find((step) => step.link?.includes("/runs/") && !isOver(step));
     if ((moving?.link ?? null) !== watched) {
       watched = moving?.link ?? null;
       leaving?.abort();
@@ -68,7 +67,6 @@ export async function showCampaign(root, { id, signal, show }) {
 
 const linked = (path) => `#/${path.replace(/^\/api\/v1\//, "")}`;
 
-/** What a campaign has found, and where to read on. */
 function outcomeOf(campaign, { diagnosis }) {
   const id = (path) => path.split("/").pop();
   return [
@@ -84,7 +82,6 @@ function outcomeOf(campaign, { diagnosis }) {
   ];
 }
 
-/** What the simulated arm may conceal, for a first try: a scenario, its joint the last but one. */
 const CONCEALED = {
   nothing: () => null,
   spring: (joint) => ({ effect: "joint_spring", joint, stiffness: 2.0 }),
@@ -96,7 +93,6 @@ const CONCEALED_WORDS = {
   nothing: "nothing", spring: "a spring", load: "friction that grows with the load", bristles: "bristles: friction that rises over a distance",
 };
 
-/** How long the arm moves: what is asked of the design. */
 const LENGTHS = {
   usual: {},
   short: { excitation: { starts: 1, periods: 2, slow_postures: 1, closing_period: false }, held_out: { periods: 1 } },
@@ -107,7 +103,6 @@ const LENGTH_WORDS = { usual: "usual", short: "short", thorough: "thorough" };
 const BACKENDS = Object.fromEntries(Object.entries(DRIVERS).map(([name, { title: words }]) => [name, words]));
 const TIMES = { virtual: "as fast as it computes", real: "by the clock" };
 
-/** A choice among words, each with what it stands for. */
 const choice = (id, words) => h("select", { id }, Object.entries(words).map(([value, text]) => h("option", { value, text })));
 
 export async function showNewCampaign(root, { signal }) {

@@ -23,7 +23,6 @@ export const HEADLINES = {
 const AGAINST = { identified: "compared with the best model that the data allow", model: "compared with the robot file's model", simulation: "compared with the simulator's recordings" };
 const CONFIRMED = new Map([[true, "confirmed"], [false, "not confirmed"], [null, "no recording was held out"]]);
 
-/** Findings before a fold. */
 const MOST_FINDINGS = 5;
 
 export async function showDiagnosis(root, { id, signal, show }) {
@@ -123,14 +122,12 @@ function placed(name) {
 /** A sentence whose numbers stay with their units. */
 const unbroken = (text) => text?.replace(/(\d) (?=[A-Za-zµ°%])/g, "$1\u00a0");
 
-/** What to know of the robot file and the recordings before the findings are trusted. */
 function warningList(warnings) {
   if (!warnings.length) return null;
   const entries = warnings.map((each) => h("li", {}, each.joint ? `${each.joint}: ` : "", `${each.text}; ${each.remedy}.`));
   return h("details", { class: "cautions" }, h("summary", { text: entries.length === 1 ? "1 warning" : `${entries.length} warnings` }), h("ul", { class: "plain" }, entries));
 }
 
-/** What has changed since the diagnosis before the last experiment. */
 function changeList(before, result) {
   const place = (each) => (each.joint ? `${title(each.effect)} at ${each.joint}` : title(each.effect));
   const chances = (found) => new Map(found.findings.map((each) => [place(each), chance(each.probability)]));
@@ -154,7 +151,6 @@ export async function diagnoseAgain(id, recording) {
   return post("diagnoses", form);
 }
 
-/** What held-out motion confirms, and apart from it what is tentative. */
 function findingsSection(result) {
   const cards = (findings, kind) => findings.map((each, place) => findingCard(each, place, result.joints, kind));
   const confirmed = cards(result.findings, "");
@@ -168,7 +164,6 @@ function findingsSection(result) {
   ];
 }
 
-/** The first cards, and the rest behind a fold. */
 function folded(cards) {
   return [cards.slice(0, MOST_FINDINGS), cards.length > MOST_FINDINGS ? h("details", {}, h("summary", { text: `${cards.length - MOST_FINDINGS} more` }), cards.slice(MOST_FINDINGS)) : null];
 }
@@ -185,7 +180,6 @@ function findingCard(each, place, joints, kind) {
     h("div", { class: "chance" }, h("strong", { text: chance(each.probability) }), "probable", h("div", { class: "meter", "aria-hidden": "true" }, h("span", { "width%": 100 * each.probability }))));
 }
 
-/** Whether held-out motion confirms a finding, and the change at its joint, or where it is largest. */
 function heldOut(each, joints) {
   const change = each.held_out_change;
   if (!change) return CONFIRMED.get(each.confirmed);
@@ -208,7 +202,6 @@ function howMuchSection(result) {
     h("p", { class: "note", text: result.constancy.moved.length ? `Parameters do not all hold from one recording to the next: ${result.constancy.moved.map((each) => each.parameter).join(", ")} (p = ${number(p, 2)}).` : `The parameters hold from one recording to the next (p = ${number(p, 2)}).` }));
 }
 
-/** Standard errors as bars on a logarithmic axis to both sides. */
 function bars(entries) {
   const scale = (value) => Math.sign(value) * Math.log1p(Math.abs(value));
   const reach = Math.max(...entries.map(([, value]) => Math.abs(scale(value))), scale(4));
@@ -276,7 +269,6 @@ async function sameArm(job) {
   return { backend: { name: "sim" } };
 }
 
-/** A run of the planned motion with the robot that was diagnosed. */
 async function nextRun(job) {
   const [robot, trajectory, arm] = await Promise.all([getJson(`diagnoses/${job.id}/robot`), getJson(job.links.next_trajectory), sameArm(job)]);
   const form = new FormData();
@@ -285,7 +277,6 @@ async function nextRun(job) {
   return form;
 }
 
-/** The files of a robot as parts of a form. */
 export function appendRobot(form, robot) {
   for (const file of robot.files) form.append(file.name === robot.robot_file ? "robot" : "urdf", new File([file.content], file.name));
 }

@@ -17,7 +17,6 @@ function filled(element, properties, children) {
   return element;
 }
 
-/** An HTML element; children are elements or text. */
 export function h(tag, properties, ...children) {
   return filled(document.createElement(tag), properties, children);
 }
@@ -28,12 +27,10 @@ export function render(element, ...children) {
   filled(element, {}, children);
 }
 
-/** An SVG element. */
 export function s(tag, properties, ...children) {
   return filled(document.createElementNS(SVG, tag), properties, children);
 }
 
-/** A number to some significant digits, a dash where there is none. */
 export function number(value, digits = 4) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   if (value === 0) return "0";
@@ -43,7 +40,6 @@ export function number(value, digits = 4) {
   return value.toFixed(Math.min(decimals, 9)).replace("-", "−");
 }
 
-/** A unit behind its number; that of a ratio is not said. */
 export const unit = (name) => (name === "1" ? "" : ` ${name}`);
 
 const OF_ANY = { time: "s", temperature: "°C", motor_position: "rad" };
@@ -90,16 +86,13 @@ export function percent(share) {
 // English in the reader's own manner, as of Britain or of America.
 const LOCALE = navigator.languages.find((each) => each.startsWith("en")) ?? "en";
 
-/** A moment as people say it. */
 export function moment(text) {
   if (!text) return "–";
   return new Date(text).toLocaleString(LOCALE, { dateStyle: "medium", timeStyle: "short" });
 }
 
-/** An id of the service, such as load_dependent_friction, as words. */
 export const named = (id) => id.replaceAll("_", " ");
 
-/** An id such as load_dependent_friction as a heading. */
 export function title(id) {
   const words = named(id);
   return words.charAt(0).toUpperCase() + words.slice(1);
@@ -126,7 +119,6 @@ export function state(name) {
   return h("span", { class: `state ${kind}` }, h("span", { "aria-hidden": "true" }, marks[name] ?? "◐"), ` ${named(name)}`);
 }
 
-/** A verdict as a word with a mark of its own shape. */
 export function verdict(name) {
   const [mark, kind] = { consistent: ["●", "good"], explained: ["◆", "good"], partly_explained: ["◈", "live"], unexplained: ["✕", "bad"], inconclusive: ["?", "muted"], wrong_values: ["≠", "bad"] }[name] ?? ["–", "muted"];
   return h("span", { class: `state ${kind}` }, h("span", { "aria-hidden": "true" }, mark), ` ${named(`${name ?? "no verdict"}`)}`);
@@ -140,13 +132,11 @@ export function explained(problem) {
   return [h("span", { text: problem.detail ?? problem.message }), more ? [" · ", more] : null, other];
 }
 
-/** What the service doubts in a file; nothing where that is little. */
 export function cautions(findings) {
   const doubts = findings.filter((each) => each.severity !== "info");
   return doubts.length ? h("ul", { class: "cautions" }, doubts.map((each) => h("li", { text: `${each.where}: ${each.text}` }))) : null;
 }
 
-/** Large numbers at the top of a page. */
 export function figures(entries) {
   return h("dl", { class: "figures" }, entries.map(([name, value, remark]) =>
     h("div", {}, h("dt", { text: name }), h("dd", {}, value, remark ? h("small", { text: remark }) : null))));
@@ -156,7 +146,6 @@ export function section(id, heading, ...children) {
   return h("section", { id, "aria-labelledby": `${id}-title` }, h("h2", { id: `${id}-title`, text: heading }), children);
 }
 
-/** A choice of one among several, as buttons. */
 export function tabs(label, names, chosen, choose) {
   const buttons = names.map((name, place) => h("button", {
     type: "button", "aria-pressed": place === chosen ? "true" : "false",

@@ -6,7 +6,6 @@ const RECORDING = /\.(csv|tsv|txt|parquet|mcap|db3|bag|npz)$/i;
 const DESCRIPTION = /\.(urdf|xml|mjcf|xacro)$/i;
 const MAPPING = /\.(ya?ml|json)$/i;
 
-/** All files of a drop, those within folders too. */
 export async function droppedFiles(transfer) {
   const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
   return entries.length ? (await Promise.all(entries.map(filesOf))).flat() : [...transfer.files];
@@ -24,7 +23,6 @@ async function filesOf(entry) {
   return (await Promise.all(inside.map(filesOf))).flat();
 }
 
-/** The robot file, then the description that it names; the recordings; and the rest. */
 export async function sortFiles(files) {
   const shown = files.filter((file) => !file.name.startsWith("."));
   const recordings = shown.filter((file) => RECORDING.test(file.name)).sort((a, b) => a.name.localeCompare(b.name, "en", { numeric: true }));
@@ -41,5 +39,4 @@ export async function sortFiles(files) {
 
 const EXAMPLE = ["example-arm.yaml", "example-train.csv", "example-held-out.csv"];
 
-/** The example's files, as if they had been dropped. */
 export const exampleFiles = () => Promise.all(EXAMPLE.map(async (name) => new File([await (await fetchRaw(`/example/${name}`)).blob()], name)));

@@ -7,18 +7,8 @@ const HEIGHT = 420;
 const ROOM = { left: 78, right: 16, top: 40, bottom: 56 };
 const TEXT = 13;
 
-export function saveAs(content, type, name) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(content instanceof Blob ? content : new Blob([content], { type }));
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
-}
-
-/** A name for a file, of letters, digits and dashes. */
 export const fileName = (label) => label.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "") || "plot";
 
-/** Every sample between two instants, as CSV. */
 export function csvText(xLabel, series, x, columns, [from, to]) {
   const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
   const rows = [[xLabel, ...series.map((each) => each.label)].map(quoted).join(",")];
@@ -28,7 +18,6 @@ export function csvText(xLabel, series, x, columns, [from, to]) {
   return `${rows.join("\n")}\n`;
 }
 
-/** The canvas of a chart on paper of its own colour, below its title and its legend. */
 export function pngBlob(chart, spec, css) {
   const source = chart.ctx.canvas;
   const ratio = source.width / chart.width;
@@ -55,7 +44,6 @@ export function pngBlob(chart, spec, css) {
   return new Promise((done) => { canvas.toBlob(done, "image/png"); });
 }
 
-/** Marks of an axis at round numbers. */
 function ticks(low, high, most) {
   const rough = (high - low) / most || 1;
   const unit = 10 ** Math.floor(Math.log10(rough));
@@ -65,7 +53,6 @@ function ticks(low, high, most) {
   return found;
 }
 
-/** The chart as it is zoomed, drawn anew. */
 export function svgText(chart, spec, css) {
   const [x, ...columns] = chart.data;
   const range = (scale) => [chart.scales[scale].min, chart.scales[scale].max];
@@ -95,7 +82,6 @@ export function svgText(chart, spec, css) {
   return new XMLSerializer().serializeToString(svg);
 }
 
-/** A curve with its gaps, or its points. */
 function curve(each, x, values, across, up, css) {
   const places = Array.from(x, (value, k) => (values[k] === null || values[k] === undefined || !Number.isFinite(up(values[k])) ? null : [across(value), up(values[k])]));
   if (each.points) return places.filter(Boolean).map(([cx, cy]) => s("circle", { cx: cx.toFixed(2), cy: cy.toFixed(2), r: 2.5, fill: css(each.colour) }));

@@ -11,7 +11,6 @@ const GAP = 14;
 const WIDTH = 960;
 const TOP = 24;
 
-/** Level of a residual, given as a multiple of the noise. */
 export const level = (ratio) => LEVELS.filter((edge) => ratio > edge).length;
 
 /** The map; `choose(joint, variable, bin, words)` is told which cell was clicked, or reached with the arrow keys. */
@@ -65,7 +64,6 @@ export function heatMap(plots, joints, key, choose) {
     s("svg", { class: "heat", viewBox: `0 0 ${WIDTH} ${height}`, role: "img", "aria-label": label }, parts));
 }
 
-/** The cell that an arrow key leads to; nothing for other keys, and beyond the edge. */
 function neighbour(rows, from, key) {
   const [down, right] = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] }[key] ?? [0, 0];
   if (!down && !right) return null;

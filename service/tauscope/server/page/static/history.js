@@ -49,7 +49,6 @@ async function showRobot(place, robot, models, signal) {
   if (moved.length) draw();
 }
 
-/** A parameter in every model that was in use, and what the line through it says. */
 function trendOf({ name, points, line }, reference) {
   if (points.length < 2) return h("p", { class: "note", text: "Drawn from two models on." });
   const start = Date.parse(points[0].time);
@@ -63,7 +62,6 @@ function trendOf({ name, points, line }, reference) {
   ];
 }
 
-/** What the newest model says, beside the one that drift is counted from. */
 function changeOf(points, reference) {
   const from = points.find((each) => each.model === reference) ?? points[0];
   const to = points[points.length - 1];
@@ -74,7 +72,6 @@ function changeOf(points, reference) {
 
 const NOTHING_STARTED = ["skipped", "missed", "failed", "interrupted", "withdrawn"];
 
-/** All schedules as a section. */
 async function scheduleSection(signal) {
   const { schedules } = await getJson("schedules", signal);
   if (!schedules.length) return section("schedules", "Schedules", h("p", { class: "lead", text: "Nothing is done by itself." }));
@@ -85,7 +82,6 @@ async function scheduleSection(signal) {
       ([name, value]) => [h("dt", { text: name }), h("dd", {}, value)])))));
 }
 
-/** When a schedule is due, in the time zone that it says. */
 function whenDue({ cron, every_s: seconds, timezone, window }) {
   const due = cron ? `${cron} (${timezone})` : `every ${duration(seconds)}`;
   return window ? `${due}, from ${window.start} to ${window.end} only` : due;
@@ -96,7 +92,6 @@ function duration(seconds) {
   return seconds < 86_400 ? `${number(seconds / 3600, 3)} h` : `${number(seconds / 86_400, 3)} days`;
 }
 
-/** What became of a firing: the item that it started, or why it started none. */
 function outcome(firing) {
   if (!firing) return "not due yet";
   const when = moment(firing.due);

@@ -86,7 +86,6 @@ export async function showHome(root, { signal }) {
   redraw();
 }
 
-/** Forget everything that was dropped. */
 function clear() {
   Object.assign(dropped, { robot: [], report: null, recordings: [], unused: [], reading: {}, isGuessed: false });
 }
@@ -114,7 +113,6 @@ async function understand(file) {
   } catch (error) { return { mapping: null, report: null, problem: error.message }; }
 }
 
-/** Why a recording cannot be used; nothing where it can. */
 function fault(found) {
   if (!found) return null;
   const error = found.report?.findings.find((each) => each.severity === "error");
@@ -196,7 +194,6 @@ function startRow(all, isReady, said, earlier) {
     h("button", { type: "button", class: "quiet", text: "Clear", onclick: () => { clear(); window.dispatchEvent(new Event("hashchange")); } }));
 }
 
-/** Robots with the last verdict on each. */
 function recent(robots, items) {
   const newest = [...robots].sort((a, b) => b.last_seen.localeCompare(a.last_seen)).slice(0, MOST_ROBOTS);
   if (!newest.length) return h("p", { class: "note", text: "None yet." });
@@ -222,7 +219,6 @@ const SI = { rad: "m", Nm: "N" };
 
 const isPrismatic = (joint) => joint.type === "prismatic";
 
-/** A column's choices; `change(reading)` is told what a user chose. */
 function mappingForm(mapping, joints, reading, change) {
   const units = unitsOf(joints);
   const allSlide = units === PRISMATIC;

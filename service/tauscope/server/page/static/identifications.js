@@ -1,6 +1,6 @@
 // Identifications: how well the model explains the torque, its parameters, and its friction.
 
-import { download, follow, getJson, remove } from "./api.js";
+import { ENDS, download, follow, getJson, remove } from "./api.js";
 import { explained, figures, h, moment, number, parameterName, percent, render, s, section, state, table, tabs, unitsOf, withError } from "./dom.js";
 import { jobList } from "./lists.js";
 import { group, plot, zoomButtons } from "./plots.js";
@@ -8,10 +8,8 @@ import { group, plot, zoomButtons } from "./plots.js";
 export const showIdentifications = jobList("identifications", "identification", "Identifications", "Parameters and friction from recordings.",
   (each) => (each.recordings ?? []).map((entry) => entry.name).join(", "));
 
-const ENDS = ["failed", "cancelled", "interrupted", "damaged"];
 const CONDITION = [[30, "well excited"], [100, "acceptable"], [1000, "poor: some parameters lean on few samples"], [Infinity, "very poor: excite the joints more"]];
 
-/** Share of the torque's power that a model explains. */
 const power = (fit) => percent(1 - fit.relative_error ** 2);
 
 export async function showIdentification(root, { id, signal, show }) {
@@ -128,7 +126,6 @@ function interpolated(x, y, at) {
   return y[right - 1] + share * (y[right] - y[right - 1]);
 }
 
-/** A value with its 95 % interval on an axis that all rows share. */
 function interval(value, std, low, high) {
   const at = (each) => 4 + (192 * (each - low)) / (high - low || 1);
   const reach = 1.96 * (std ?? 0);
@@ -154,5 +151,4 @@ function parameterSection(result) {
       [parameterName(entry.name), withError(entry.value, entry.std ?? NaN), unit(entry), interval(entry.value, entry.std, ...ends[unit(entry)])])));
 }
 
-/** Number of the link of a parameter's leading term. */
 const linkOf = (entry) => Number(/\d+$/.exec(Object.keys(entry.terms)[0])?.[0] ?? 0);

@@ -1,10 +1,9 @@
 // The lease of an arm, where the service wants one: taken and armed by whoever begins a motion here, kept as long as this tab lives, given back at its end.
 
-import { getJson, post, remove } from "./api.js";
+import { ENDS, getJson, post, remove } from "./api.js";
 
 const STORE = "tauscope-leases";
 const TTL_S = 10;
-const ENDS = ["succeeded", "failed", "cancelled", "finished", "degraded", "stopped", "interrupted", "damaged"];
 
 let held = JSON.parse(sessionStorage.getItem(STORE) ?? "[]"); // a reload of the page does not stop the arm
 let worker = null;

@@ -1,9 +1,8 @@
 // Lists of what is kept, the newest first: each entry with its outcome, found by words and by kind of outcome.
 
-import { getJson, remove } from "./api.js";
+import { ENDS, getJson, remove } from "./api.js";
 import { explained, h, moment, named, percent, render, state, verdict } from "./dom.js";
 
-const REMOVABLE = ["succeeded", "finished", "degraded", "failed", "stopped", "cancelled", "interrupted", "damaged"]; // what goes on is cancelled or stopped
 const UNDO_MS = 6000;
 const FEW = 6; // entries that need no search
 
@@ -58,7 +57,6 @@ function takeAway(line, each, restore) {
   undo.focus();
 }
 
-/** The same with a search by words and a choice of outcomes. */
 export function searchable(entries, empty) {
   if (entries.length <= FEW) return items(entries, empty);
   const place = h("div", {});
@@ -84,18 +82,16 @@ export function searchable(entries, empty) {
     h("label", { class: "inline", for: "order" }, "Order", order), count), place);
 }
 
-/** Figures of the index by identifier, such as the verdicts of diagnoses. */
 export async function figuresOf(kind, signal) {
   const { items: found } = await getJson(`items?kind=${kind}&limit=1000`, signal);
   return new Map(found.filter((each) => each.is_here).map((each) => [each.id, each.figures]));
 }
 
-/** A view that is one list of jobs; `kind` is their kind in the index. */
 export function jobList(plural, kind, heading, lead, detail) {
   return async (root, { signal }) => {
     const [answer, figures] = await Promise.all([getJson(`${plural}?limit=1000`, signal), figuresOf(kind, signal)]);
     render(root, h("h1", { text: heading }), h("p", { class: "lead", text: lead }), searchable(answer[plural].map((each) => ({
-      href: `#/${plural}/${each.id}`, path: REMOVABLE.includes(each.state) ? `${plural}/${each.id}` : null, name: each.robot ?? each.id, detail: detail(each), outcome: outcome(each, figures.get(each.id)), created: each.created,
+      href: `#/${plural}/${each.id}`, path: ENDS.includes(each.state) ? `${plural}/${each.id}` : null, name: each.robot ?? each.id, detail: detail(each), outcome: outcome(each, figures.get(each.id)), created: each.created,
     })), "Nothing yet."));
   };
 }

@@ -1,6 +1,6 @@
 // The shell: which view is shown, whether the service can be reached, and the button that stops every arm.
 
-import { getJson, hasKey, useKey } from "./api.js";
+import { ENDS, getJson, hasKey, useKey } from "./api.js";
 import { explained, h, render } from "./dom.js";
 import { recolour } from "./plots.js";
 import { showCampaign, showCampaigns, showNewCampaign } from "./campaigns.js";
@@ -37,7 +37,6 @@ let panel = null;
 /** Whether a key is being asked for: until then, every request would only be refused. */
 const isAsked = () => panel !== null;
 
-/** Ask for a key; `go` is called as soon as there is one. */
 function askForKey(problem, go) {
   if (panel) return;
   const input = h("input", { type: "password", autocomplete: "off", required: true, autofocus: true, id: "key" });
@@ -53,7 +52,6 @@ function askForKey(problem, go) {
   panel.scrollIntoView({ block: "nearest" });
 }
 
-/** The button in the foot of the page by which another key is entered. */
 function keyButton(place, change) {
   const draw = () => render(place, hasKey() ? h("button", { type: "button", class: "link", text: "Use another key", onclick: change }) : null);
   window.addEventListener("tauscope:key", draw);
@@ -89,19 +87,15 @@ async function show() {
   }
 }
 
-/** Ask for a key; what could not be shown without it is shown then. */
 const needKey = (problem) => askForKey(problem, show);
 
-/** Whether the service answers, and what moves. */
 async function pulse() {
   const quick = AbortSignal.timeout(PULSE_MS * 1.5);
   if (isAsked()) { setTimeout(pulse, PULSE_MS); return; }
   try {
     const [runs, campaigns] = await Promise.all([getJson("runs?limit=8", quick), getJson("campaigns?limit=8", quick)]);
-    live = {
-      runs: runs.runs.filter((run) => !["finished", "degraded", "stopped", "failed", "interrupted", "damaged"].includes(run.state)),
-      campaigns: campaigns.campaigns.filter((each) => ["queued", "waiting", "running"].includes(each.state)),
-    };
+    const goesOn = (each) => !ENDS.includes(each.state);
+    live = { runs: runs.runs.filter(goesOn), campaigns: campaigns.campaigns.filter(goesOn) };
     connection(true);
   } catch (error) {
     if (error.status === 401) {
@@ -139,7 +133,6 @@ async function stopAll() {
   if (!refused) setTimeout(() => { if (reached) notice(""); }, 6000);
 }
 
-/** Which arms this tab has, and that they stop with it. */
 function tellLeases(arms, lost) {
   const shown = document.getElementById("lease");
   shown.textContent = arms.length ? `This tab has the lease of ${arms.join(" and ")}: where it is closed, or its connection is gone for ten seconds, the arm stops.` : "";

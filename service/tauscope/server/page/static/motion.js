@@ -96,7 +96,6 @@ export function motionSection(report, result, plots) {
 
 const sameType = (joints) => (joints.every((each) => each.type === joints[0].type) ? joints[0].type : undefined);
 
-/** Rms of a column over a window around each instant. */
 function rolling(time, column) {
   const sums = [0];
   for (const value of column) sums.push(sums[sums.length - 1] + (value ?? 0) ** 2);

@@ -1,13 +1,13 @@
 // Plots over uPlot: many samples thinned to what a screen shows, zoomed by mouse, keys or buttons, in step with each other.
 
 import { h, number } from "./dom.js";
-import { csvText, fileName, pngBlob, saveAs, svgText } from "./figure_files.js";
+import { saveAs } from "./api.js";
+import { csvText, fileName, pngBlob, svgText } from "./figure_files.js";
 import { nearest, thinned } from "./thinning.js";
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const alive = new Set();
 
-/** Draw all plots anew, in the colours that hold now. */
 export function recolour() {
   for (const plot of alive) plot.redraw(false, true);
 }
@@ -85,7 +85,6 @@ export function plot(spec) {
   const readings = spec.series.map(() => h("output", { class: "reading" }));
   const instant = h("span", { class: "key instant" });
 
-  /** Values at the cursor, of the samples themselves; nothing where it is away. */
   function read(u) {
     const isThere = u.cursor.left >= 0 && u.cursor.idx !== null;
     const row = isThere ? nearest(time, u.posToVal(u.cursor.left, "x")) : -1;
@@ -94,12 +93,11 @@ export function plot(spec) {
     instant.textContent = isThere ? `at ${number(time[row], 5)}` : "";
   }
 
-  /** The plot as a file. */
   function files() {
     const save = {
-      PNG: async () => saveAs(await pngBlob(chart, spec, css), "image/png", `${fileName(spec.label)}.png`),
-      SVG: () => saveAs(svgText(chart, spec, css), "image/svg+xml", `${fileName(spec.label)}.svg`),
-      CSV: () => saveAs(csvText(spec.xLabel, spec.series, time, columns, api.range()), "text/csv", `${fileName(spec.label)}.csv`),
+      PNG: async () => saveAs(await pngBlob(chart, spec, css), `${fileName(spec.label)}.png`),
+      SVG: () => saveAs(new Blob([svgText(chart, spec, css)], { type: "image/svg+xml" }), `${fileName(spec.label)}.svg`),
+      CSV: () => saveAs(new Blob([csvText(spec.xLabel, spec.series, time, columns, api.range())], { type: "text/csv" }), `${fileName(spec.label)}.csv`),
     };
     return h("span", { class: "files", role: "group", "aria-label": `Save ${spec.label}` },
       Object.entries(save).map(([name, write]) => h("button", { type: "button", class: "link", text: name, onclick: () => { if (chart) write(); } })));
@@ -179,7 +177,6 @@ export function plot(spec) {
   return api;
 }
 
-/** Buttons that zoom plots which are in step. */
 export function zoomButtons(group) {
   const any = () => [...group.members][0];
   const by = (factor) => () => {
@@ -196,7 +193,6 @@ export function zoomButtons(group) {
 
 let groups = 0;
 
-/** Plots that zoom and point together. */
 export function group() {
   groups += 1;
   return { key: `group-${groups}`, members: new Set() };
@@ -206,7 +202,6 @@ export function group() {
 const COLOURS = ["--c1", "--c2", "--c3", "--c4"];
 const DASHES = [undefined, [7, 4], [2, 3]];
 
-/** How the curve of a joint is drawn. */
 export function jointStyle(place) {
   return { colour: COLOURS[place % COLOURS.length], dash: DASHES[Math.floor(place / COLOURS.length) % DASHES.length] };
 }

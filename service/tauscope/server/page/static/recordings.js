@@ -41,7 +41,6 @@ export async function showRecording(root, { id, signal }) {
   const curves = h("div", {});
   let charts = [];
 
-  /** The curves; beside them those of another recording, or what is left without them. */
   function draw(other = null, isDifference = false) {
     const together = group();
     const make = (label, prefix, unit) => {
@@ -75,7 +74,6 @@ function missing(report) {
   return Object.entries(report.missed).filter(([name]) => /^(t|(q|tau|i|qref)\d+)$/.test(name)).reduce((sum, [, count]) => sum + count, 0);
 }
 
-/** The choice of another recording to lay over this one; nothing where there is no other. */
 function overlayForm(samples, names, draw, signal) {
   if (!names.length) return null;
   const said = h("span", { role: "alert" });

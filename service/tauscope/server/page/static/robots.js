@@ -1,12 +1,11 @@
 // Robots: each arm that something is kept about, what it does at this moment, and what is known of it.
 
 import { armDrawing, jointRows } from "./arm.js";
-import { getJson } from "./api.js";
+import { ENDS, getJson } from "./api.js";
 import { cautions, figures, h, moment, named, number, percent, render, section, table, title } from "./dom.js";
 import { items, outcome, searchable } from "./lists.js";
 
 const KINDS = { run: "runs", identification: "identifications", diagnosis: "diagnoses", campaign: "campaigns" };
-const STANDS_STILL = ["created", "finished", "degraded", "stopped", "failed", "interrupted", "damaged"];
 const DONE = ["succeeded", "finished"];
 const LATELY = 12;
 
@@ -25,7 +24,6 @@ export async function showRobots(root, { signal }) {
 
 const pageOf = (robot) => `#/robots/${encodeURIComponent(robot)}`;
 
-/** Who has the lease of an arm, in words; nothing where nobody has. */
 function holderOf(leases, robot) {
   const held = leases.filter(({ arm }) => arm.slice(0, arm.lastIndexOf(" on ")) === robot);
   return held.map(({ holder, armed }) => (armed ? `${holder} has its lease, and it may move` : `${holder} has its lease`)).join("; ");
@@ -35,7 +33,7 @@ export async function showRobot(root, { id: robot, signal }) {
   const of = `robot=${encodeURIComponent(robot)}`;
   const [{ items: all }, { models }, { leases }] = await Promise.all([getJson(`items?${of}&limit=200`, signal), getJson(`models?${of}&limit=200`, signal), getJson("leases", signal)]);
   const here = all.filter((each) => each.is_here && each.kind in KINDS);
-  const moving = here.find((each) => each.kind === "run" && !STANDS_STILL.includes(each.state));
+  const moving = here.find((each) => each.kind === "run" && each.state !== "created" && !ENDS.includes(each.state));
   const used = here.find((each) => each.kind === "run" && each.state !== "created");
   const model = models.find((each) => each.state === "active");
   const error = here.find((each) => each.kind === "identification" && each.id === model?.id)?.figures;
@@ -59,13 +57,11 @@ export async function showRobot(root, { id: robot, signal }) {
       href: `#/${KINDS[each.kind]}/${each.id}`, name: title(each.kind), outcome: outcome(each, each.figures), created: each.created })), "Nothing yet.")));
 }
 
-/** How well a model did where it was judged. */
 function explainedShare(error) {
   const relative = error?.held_out_error ?? error?.relative_error;
   return typeof relative === "number" ? `relative error ${percent(relative)}` : "passed every gate";
 }
 
-/** An arm as a drawing, and its joints with their limits. */
 export function robotSheet(report) {
   return h("div", { class: "split" }, armDrawing(report).element,
     table("Joints", ["", "joint", "type", "position", "velocity", "torque"], jointRows(report, number), 3));

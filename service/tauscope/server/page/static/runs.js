@@ -1,13 +1,12 @@
 // Runs: one as it goes on, with positions, torques, room to the limits and the loop's jitter.
 
 import { armDrawing } from "./arm.js";
-import { download, follow, getJson, post } from "./api.js";
+import { ENDS, download, follow, getJson, post } from "./api.js";
 import { explained, figures, h, moment, named, number, render, section, state, table, unitsOf } from "./dom.js";
 import { diagnoseAgain } from "./diagnoses.js";
 import { jobList } from "./lists.js";
 import { group, jointStyle, plot } from "./plots.js";
 
-const ENDS = ["finished", "degraded", "stopped", "failed", "interrupted", "damaged"];
 const KEPT = 1500;
 const KEPT_KEYS = ["position", "target", "effort"];
 const NEAR = 0.15;
@@ -61,7 +60,6 @@ function finished(run, arm) {
   ];
 }
 
-/** What a run says while it goes on; `take(event)` feeds it. */
 export function liveMonitor(id) {
   const bar = h("progress", { max: "100", value: "0", "aria-label": "Played" });
   const words = h("p", { class: "meta", text: "Waiting for the arm" });
@@ -115,7 +113,6 @@ export function liveMonitor(id) {
   return { element, take };
 }
 
-/** The joints of the arm that a run moves; none where its robot file cannot be read. */
 const jointsOf = (id) => getJson(`runs/${id}/robot`).then(({ report }) => report.joints, () => []);
 
 const nameOf = (arm, joint) => arm[joint]?.name ?? `joint ${joint + 1}`;

@@ -1,11 +1,10 @@
 // The button that stops every arm. It needs no lease, and any key will do, an expired one too; it is tried until the service has heard.
 
-import { getJson, post } from "./api.js";
+import { ENDS, getJson, post } from "./api.js";
 
 const ATTEMPTS = 60;
 const AGAIN_MS = 500;
 const PATIENCE_MS = 3000;
-const OVER = ["finished", "degraded", "stopped", "failed", "interrupted", "damaged", "succeeded", "cancelled"];
 
 /** Ask once; refusals are answers, a lost connection is none. */
 async function asked(path) {
@@ -22,7 +21,7 @@ async function stillGoing() {
   try {
     const fresh = AbortSignal.timeout(PATIENCE_MS);
     const [{ runs }, { campaigns }] = await Promise.all([getJson("runs?limit=20", fresh), getJson("campaigns?limit=20", fresh)]);
-    return [...campaigns, ...runs].filter((each) => !OVER.includes(each.state)).map((each) => each.links.stop);
+    return [...campaigns, ...runs].filter((each) => !ENDS.includes(each.state)).map((each) => each.links.stop);
   } catch (error) {
     if (error.status === undefined) throw error;
     return [];

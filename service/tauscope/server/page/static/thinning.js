@@ -12,7 +12,6 @@ export function lowerBound(column, value) {
   return low;
 }
 
-/** Index of the sample nearest in time. */
 export function nearest(time, value) {
   const right = Math.min(lowerBound(time, value), time.length - 1);
   return right > 0 && value - time[right - 1] < time[right] - value ? right - 1 : right;
@@ -63,11 +62,9 @@ function inner(first, last, turns, isEarly) {
   return isEarly ? [turns[0], between(turns[0], last, 1 / 2)] : [between(first, turns[0], 1 / 2), turns[0]];
 }
 
-/** A value on the line between two; the other where one of them is none. */
 function between(one, other, share) {
   if (!Number.isFinite(one)) return other;
   return Number.isFinite(other) ? one + share * (other - one) : one;
 }
 
-/** A gap in place of a value that is none. */
 const drawable = (value) => (Number.isFinite(value) ? value : null);

@@ -22,7 +22,6 @@ from tauscope.errors import StoreError
 from tauscope.robot.messages import one_line
 
 TIMEOUT_S = 5  # how long a write waits for another one, and a connection for its server [s]
-
 WRITES = "tauscope_writes"
 """Execution option of a connection that will write: SQLite then takes its lock at the beginning.
 
@@ -82,10 +81,7 @@ _ADVISORY_LOCK = 7_283_462_001
 
 
 def upgrade(engine: Engine, target: str = "head") -> None:
-    """Bring the tables to this program's form; nothing happens where they have it.
-
-    Raises StoreError if the tables have a form that this program does not know.
-    """
+    """Bring the tables to this program's form. Raises StoreError if they have a form that it does not know."""
     with engine.execution_options(**{WRITES: True}).begin() as connection:
         if connection.dialect.name == "postgresql":
             connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _ADVISORY_LOCK})
@@ -104,7 +100,6 @@ def present_revision(connection: Connection) -> str | None:
 
 @cache
 def revisions() -> tuple[str, ...]:
-    """All forms that this program knows, the oldest first."""
     scripts = ScriptDirectory.from_config(_configuration(None))
     return tuple(script.revision for script in scripts.walk_revisions())[::-1]
 
@@ -118,10 +113,7 @@ def _configuration(connection: Connection | None) -> Config:
 
 
 FILE_NAME = "tauscope.db"  # of the SQLite database in a data folder
-
-
 Entry = TypeVar("Entry")
-
 _SQLITE_MAGIC = b"SQLite format 3\0"
 _DAMAGE_HINT = "restore a backup, or move it away: the index is made anew, schedules and the choice of models are not"
 
@@ -137,62 +129,46 @@ class Database:
     """An open database. Every method may be called from any thread."""
 
     def __init__(self, address: Path | str) -> None:
-        """Open a database, and bring its tables to this program's form.
-
-        Raises StoreError if it cannot be reached, is damaged, or was written by a newer program.
-        """
-        self._engine = open_engine(address)
+        """Open and upgrade. Raises StoreError if it cannot be reached, is damaged, or of a newer program."""
+        self.engine = open_engine(address)
         try:
             if isinstance(address, Path) and address.parent.is_dir():
                 address.touch(0o600)  # SQLite gives its further files the same rights
             with self._own_words():
-                upgrade(self._engine)
-                if self._engine.url.get_backend_name() == "sqlite":
-                    _check_file(self._engine.url)
+                upgrade(self.engine)
+                if self.engine.url.get_backend_name() == "sqlite":
+                    _check_file(self.engine.url)
         except BaseException:
-            self._engine.dispose()
+            self.engine.dispose()
             raise
-
-    @property
-    def engine(self) -> Engine:
-        """Of SQLAlchemy, for tests and backups."""
-        return self._engine
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
         """A transaction that reads. Raises StoreError if the database does not answer."""
-        with self._own_words(), Session(self._engine) as session, session.begin():
+        with self._own_words(), Session(self.engine) as session, session.begin():
             yield session
 
     @contextmanager
     def writing(self) -> Iterator[Session]:
-        """A transaction that writes: all of it is kept, or nothing. Keep it short, others wait meanwhile.
-
-        Raises StoreError if the database does not answer, or somebody else writes for longer than we wait. Raises
-        IntegrityError if a row that may be there once is there already.
-        """
-        engine = self._engine.execution_options(**{WRITES: True})
+        """A short transaction that writes. Raises StoreError, or IntegrityError if a unique row is there already."""
+        engine = self.engine.execution_options(**{WRITES: True})
         with self._own_words(), Session(engine, expire_on_commit=False) as session, session.begin():
             session.connection()  # takes SQLite's lock now, not with the first statement
             yield session
 
     def check(self) -> None:
-        """Look whether it can be used now.
-
-        Raises StoreError if it does not answer, is damaged, or is another one than was opened.
-        """
+        """Raises StoreError if it does not answer, is damaged, or is another one than was opened."""
         with self._own_words():
-            if self._engine.url.get_backend_name() == "sqlite":
-                _check_file(self._engine.url)
-            with self._engine.connect() as connection:
+            if self.engine.url.get_backend_name() == "sqlite":
+                _check_file(self.engine.url)
+            with self.engine.connect() as connection:
                 present = present_revision(connection)
         if present != revisions()[-1]:
             hint = "restore it from a backup, and start the service again"
-            raise StoreError(f"{show_address(self._engine)}: its tables are gone or were changed; {hint}")
+            raise StoreError(f"{show_address(self.engine)}: its tables are gone or were changed; {hint}")
 
     def close(self) -> None:
-        """Close every connection."""
-        self._engine.dispose()
+        self.engine.dispose()
 
     @contextmanager
     def _own_words(self) -> Iterator[None]:
@@ -202,7 +178,7 @@ class Database:
         except IntegrityError:
             raise
         except (DBAPIError, PoolTimeoutError) as error:
-            raise StoreError(_describe_fault(show_address(self._engine), error)) from error
+            raise StoreError(_describe_fault(show_address(self.engine), error)) from error
 
 
 def _check_file(url: URL) -> None:

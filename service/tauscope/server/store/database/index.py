@@ -4,20 +4,19 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 
+from pydantic import Field
 from sqlalchemy import ColumnElement, delete, insert, select, update
 from sqlalchemy.orm import Session
 
 from tauscope.server.store.database.database import Database, read_row
-from tauscope.server.store.database.tables import ITEM_CLASSES, Artefact, Item, Recording, RecordingUse, Robot, Site
+from tauscope.server.store.database.tables import Artefact, Item, Recording, RecordingUse, Robot, Site
 from tauscope.server.store.recordings import StoredRecording
+from tauscope.strict_model import entry
 
 
 @dataclass(frozen=True)
 class FileMetadata:
-    """A file of an item.
-
-    `sha256`: of its bytes, in hexadecimal.
-    """
+    """`sha256`: of its bytes, in hexadecimal."""
 
     path: str
     size: int
@@ -26,8 +25,6 @@ class FileMetadata:
 
 @dataclass(frozen=True)
 class RecordingRole:
-    """A recording that an item works with."""
-
     role: str
     name: str
     origin: str
@@ -36,10 +33,7 @@ class RecordingRole:
 
 @dataclass(frozen=True)
 class ItemMetadata:
-    """An item as its folder shows it.
-
-    `problem`: (str, str), code and detail: why it has no result.
-    """
+    """`problem`: code and detail, why it has no result."""
 
     kind: str
     identifier: str
@@ -57,8 +51,6 @@ class ItemMetadata:
 
 @dataclass(frozen=True)
 class ItemEntry:
-    """An item as a search finds it."""
-
     kind: str
     identifier: str
     site: str
@@ -84,13 +76,11 @@ class ItemQuery:
     limit: int = 100
 
 
-@dataclass(frozen=True)
+@entry
 class RobotEntry:
-    """A robot that items are about."""
-
-    name: str
-    first_seen: datetime
-    last_seen: datetime
+    name: str = Field(description="as in its file")
+    first_seen: datetime = Field(description="when the first item about it was handed in, UTC")
+    last_seen: datetime = Field(description="when the last one was, UTC")
 
 
 FIGURES: Mapping[str, tuple[str, ...]] = {
@@ -105,8 +95,7 @@ class Index:
     """The part of the index that one data folder fills, and the search over all of it."""
 
     def __init__(self, database: Database, site: str) -> None:
-        self._database = database
-        self.site = site
+        self._database, self.site = database, site
 
     def register(self, label: str, now: datetime) -> None:
         """Make the site known, before anything of it is put into the index."""
@@ -114,10 +103,7 @@ class Index:
             session.merge(Site(identifier=self.site, label=label, last_seen=now))
 
     def stamps(self, kind: str) -> dict[str, tuple[str, bool]]:
-        """What is indexed of this site.
-
-        Returns dict of str to (str,), stamp of each item, and whether it is final, by identifier.
-        """
+        """Stamp of each item of this site, and whether it is final, by identifier."""
         query = select(Item.identifier, Item.stamp, Item.is_final).where(Item.site == self.site, Item.kind == kind)
         with self._database.reading() as session:
             return {identifier: (stamp, is_final) for identifier, stamp, is_final in session.execute(query)}
@@ -138,7 +124,7 @@ class Index:
             for each in facts:
                 row = rows.get(each.identifier)
                 if row is None:
-                    row = ITEM_CLASSES[kind](site=site, kind=kind, identifier=each.identifier)
+                    row = Item.__mapper__.polymorphic_map[kind].class_(site=site, kind=kind, identifier=each.identifier)
                     rows[each.identifier] = row
                     session.add(row)
                 _fill(row, each)
@@ -152,25 +138,21 @@ class Index:
                     session.execute(insert(table), values)
 
     def forget(self, kind: str, identifiers: Collection[str]) -> None:
-        """Take items out of the index whose folders are gone."""
         with self._database.writing() as session:
             for identifier in identifiers:
                 session.execute(delete(Item).where(*self._match(kind, identifier)))
 
     def damaged(self, kind: str) -> frozenset[str]:
-        """Identifiers of the damaged items of this site."""
         query = select(Item.identifier).where(Item.site == self.site, Item.kind == kind, Item.state == "damaged")
         with self._database.reading() as session:
             return frozenset(session.scalars(query))
 
     def mark_damaged(self, kind: str, identifier: str, detail: str) -> None:
-        """Say of an item that a file of it is not what it was."""
         values = {"state": "damaged", "problem_code": "damaged", "problem_detail": detail}
         with self._database.writing() as session:
             session.execute(update(Item).where(*self._match(kind, identifier)).values(**values))
 
     def artefacts(self, kind: str, identifier: str) -> tuple[FileMetadata, ...]:
-        """The files of an item as they were when it ended."""
         query = select(Artefact).join(Item).where(*self._match(kind, identifier))
         with self._database.reading() as session:
             rows = session.scalars(query.order_by(Artefact.path))
@@ -181,23 +163,20 @@ class Index:
 
     def put_recordings(self, entries: Iterable[StoredRecording]) -> None:
         """Index the recordings of this site; those that are not among them any more are forgotten."""
-        present = {entry.name: entry for entry in entries}
+        present = {each.name: each for each in entries}
         with self._database.writing() as session:
             known = {row.name: row for row in session.scalars(select(Recording).where(Recording.site == self.site))}
             for name in known.keys() - present.keys():
                 session.delete(known[name])
-            for name, entry in present.items():
+            for name, found in present.items():
                 row = known.get(name)
                 if row is None:
                     row = Recording(site=self.site, name=name)
                     session.add(row)
-                row.size, row.modified, row.sha256 = entry.size, entry.modified, entry.sha256
+                row.size, row.modified, row.sha256 = found.size, found.modified, found.sha256
 
     def list_used_recordings(self, except_by: Collection[tuple[str, str]] = ()) -> frozenset[str]:
-        """Names of the recordings on the server that items of this site were made from or judged by.
-
-        `except_by`: collection of (str, str), kind and identifier of items that do not count.
-        """
+        """Recordings on the server that items of this site use, `except_by` those of some kinds and identifiers."""
         query = select(Item.kind, Item.identifier, RecordingUse.name).join(RecordingUse)
         query = query.where(Item.site == self.site, RecordingUse.origin == "server")
         with self._database.reading() as session:
@@ -205,23 +184,16 @@ class Index:
             return frozenset(name for kind, identifier, name in uses if (kind, identifier) not in except_by)
 
     def list_users(self, recording: str) -> frozenset[str]:
-        """Identifiers of the items of this site that were made from or judged by a recording on the server."""
         query = select(Item.identifier).join(RecordingUse).where(Item.site == self.site)
         query = query.where(RecordingUse.origin == "server", RecordingUse.name == recording)
         with self._database.reading() as session:
             return frozenset(session.scalars(query))
 
     def search(self, query: ItemQuery) -> list[ItemEntry]:
-        """Items of all sites, the newest first."""
-        statement = select(Item).outerjoin(Robot)
-        for column, value in (
-            (Item.kind, query.kind),
-            (Item.state, query.state),
-            (Item.site, query.site),
-            (Robot.name, query.robot),
-        ):
-            if value is not None:
-                statement = statement.where(column == value)
+        columns = (Item.kind, Item.state, Item.site, Robot.name)
+        values = (query.kind, query.state, query.site, query.robot)
+        wanted = (column == value for column, value in zip(columns, values, strict=True) if value is not None)
+        statement = select(Item).outerjoin(Robot).where(*wanted)
         if query.before is not None:
             statement = statement.where(Item.created < query.before)
         if query.recording_sha256 is not None:
@@ -231,7 +203,6 @@ class Index:
             return [_entry(row) for row in session.scalars(statement)]
 
     def robots(self) -> list[RobotEntry]:
-        """Every robot that an item is or was about, by name."""
         with self._database.reading() as session:
             rows = session.scalars(select(Robot).order_by(Robot.name))
             return [read_row(RobotEntry, row) for row in rows]

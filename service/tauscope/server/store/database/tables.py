@@ -30,7 +30,6 @@ class Moment(TypeDecorator[datetime]):
         return moment.replace(tzinfo=None) if dialect.name == "sqlite" else moment
 
     def process_result_value(self, value: Any, dialect: Dialect) -> datetime | None:
-        """The moment as it is given out, in UTC."""
         if value is None:
             return None
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
@@ -53,10 +52,7 @@ class Base(DeclarativeBase):
 
 
 class Site(Base):
-    """A data folder; several services with a folder each may share one database.
-
-    `identifier` is kept with the folder, `label` is what people call it, `last_seen` when it was last opened.
-    """
+    """A data folder: its kept `identifier`, the `label` that people call it by, and when it was last opened."""
 
     __tablename__ = "sites"
 
@@ -66,11 +62,6 @@ class Site(Base):
 
 
 class Robot(Base):
-    """A robot, known by the `name` in its file; `first_seen` and `last_seen` are when items about it were handed in.
-
-    `id` is of this database alone.
-    """
-
     __tablename__ = "robots"
 
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -80,13 +71,7 @@ class Robot(Base):
 
 
 class Item(Base):
-    """Something that lies in a folder of its own: of which `site` and `kind`, and by which `identifier`.
-
-    `id` is of this database alone. `state` is where it stands, `is_final` whether it stays so by itself; `stamp` tells
-    whether the folder changed since it was indexed. `created` and `ended` are when it was handed in and when it ended;
-    `problem_code` and `problem_detail` say why it has no result. `robot_id` and `robot` are what it is about,
-    `artefacts` its files, `recordings` what it works with.
-    """
+    """`is_final`: whether its state stays; `stamp` changes with its folder; `artefacts` are its files."""
 
     __tablename__ = "items"
     __table_args__ = (
@@ -114,60 +99,35 @@ class Item(Base):
 
 
 class Excitation(Item):
-    """A designed motion."""
-
     __mapper_args__ = {"polymorphic_identity": "excitation"}  # noqa: RUF012
 
 
 class Run(Item):
-    """A motion of the arm, by a `backend`."""
-
     __mapper_args__ = {"polymorphic_identity": "run"}  # noqa: RUF012
     backend: Mapped[str | None] = mapped_column(nullable=True)
 
 
 class Identification(Item):
-    """An identification: `relative_error` of its fit, and `held_out_error` on recordings that it was not made from."""
-
     __mapper_args__ = {"polymorphic_identity": "identification"}  # noqa: RUF012
     relative_error: Mapped[float | None] = mapped_column(nullable=True)
     held_out_error: Mapped[float | None] = mapped_column(nullable=True)
 
 
 class Diagnosis(Item):
-    """A diagnosis, its `verdict`, and its `headline`: the most important result in one sentence."""
-
     __mapper_args__ = {"polymorphic_identity": "diagnosis"}  # noqa: RUF012
     verdict: Mapped[str | None] = mapped_column(nullable=True)
     headline: Mapped[str | None] = mapped_column(nullable=True)
 
 
 class Rollout(Item):
-    """A rollout."""
-
     __mapper_args__ = {"polymorphic_identity": "rollout"}  # noqa: RUF012
 
 
 class Campaign(Item):
-    """A campaign."""
-
     __mapper_args__ = {"polymorphic_identity": "campaign"}  # noqa: RUF012
 
 
-ITEM_CLASSES: dict[str, type[Item]] = {
-    "excitation": Excitation,
-    "run": Run,
-    "identification": Identification,
-    "diagnosis": Diagnosis,
-    "rollout": Rollout,
-    "campaign": Campaign,
-}
-"""The table class of each kind of item."""
-
-
 class Artefact(Base):
-    """A file of an item (`item_id`) that ended: its `path` below the item's folder, its `size` and `sha256` then."""
-
     __tablename__ = "artefacts"
 
     item_id: Mapped[int] = mapped_column(ForeignKey("items.id", ondelete="CASCADE"), primary_key=True)
@@ -177,11 +137,6 @@ class Artefact(Base):
 
 
 class RecordingUse(Base):
-    """A recording that an item (`item_id`) works with: in which `role`, by which `name` and of which `origin`.
-
-    `sha256` is of its bytes when the item was handed in.
-    """
-
     __tablename__ = "recording_uses"
 
     item_id: Mapped[int] = mapped_column(ForeignKey("items.id", ondelete="CASCADE"), primary_key=True)
@@ -192,11 +147,6 @@ class RecordingUse(Base):
 
 
 class Recording(Base):
-    """A recording that lies in the data folder of a `site`: its `name`, `size` [bytes], when it was `modified`.
-
-    `sha256` is of its bytes, where that was computed; `id` is of this database alone.
-    """
-
     __tablename__ = "recordings"
     __table_args__ = (UniqueConstraint("site", "name"),)
 
@@ -212,13 +162,7 @@ _ACTIVE, _REFERENCE, _OPEN = text("is_active"), text("is_reference"), text("clos
 
 
 class Model(Base):
-    """An identification that was judged: `identifier` of it, of which `site`, about which robot (`robot_id`, `robot`).
-
-    `id` is of this database alone. `created` is when the identification was handed in, `considered` when it was judged;
-    `source` says what was measured: ``arm``, ``simulated`` or ``uploaded``. `state` is ``active``, ``kept`` (it was
-    active), ``refused`` or ``unreadable``; `gates` are what it had to show. `is_active` marks the model in use,
-    `is_reference` the one that drift is counted from: one of each for a robot. `document` is the identification.
-    """
+    """A judged identification; `source`: arm, simulated or uploaded; one of a robot is active, one the reference."""
 
     __tablename__ = "models"
     __table_args__ = (
@@ -244,10 +188,7 @@ class Model(Base):
 
 
 class ModelChoice(Base):
-    """That a model (`model_id`) of a robot (`robot_id`) was made active or the reference: `role` says which.
-
-    `id` is of this database alone; `at` is when, `reason` why.
-    """
+    """That a model was made active or the reference (`role`), when and why."""
 
     __tablename__ = "model_choices"
 
@@ -260,11 +201,7 @@ class ModelChoice(Base):
 
 
 class ModelEvent(Base):
-    """Something about a robot (`robot_id`, `robot`) that people should know: `kind` of it and one line of `text`.
-
-    `id` numbers the events. A drift has a `parameter`, and `details` with its figures; `raised` is when it was seen
-    first, `last_seen` when last, `closed` when somebody took note and `note` what they wrote.
-    """
+    """What people should know of a robot, seen first (`raised`), last, and `closed` by somebody with a `note`."""
 
     __tablename__ = "model_events"
     __table_args__ = (
@@ -288,8 +225,6 @@ class ModelEvent(Base):
 
 
 class RobotPolicy(Base):
-    """The bounds that were set for a robot (`robot_id`): `document` of a model policy."""
-
     __tablename__ = "robot_policies"
 
     robot_id: Mapped[int] = mapped_column(ForeignKey("robots.id"), primary_key=True)
@@ -297,11 +232,7 @@ class RobotPolicy(Base):
 
 
 class Schedule(Base):
-    """Work that is repeated: its `name`, its `definition`, the `order` of each repetition and the robot's `files`.
-
-    `id` is of this database alone. `site` is the data folder whose service does it; whichever comes first where it is
-    null. `next_due` is when it is due next, null while it is not enabled. `created` is when it was set up first.
-    """
+    """Repeated work; `site`: whose service does it, null for any; `next_due`: null while not enabled."""
 
     __tablename__ = "schedules"
 
@@ -316,12 +247,7 @@ class Schedule(Base):
 
 
 class Firing(Base):
-    """One time that a schedule (`schedule_id`, `schedule`) was due: by the clock, or asked for (`is_asked`).
-
-    `id` numbers the firings. `due` is when, `claimed` when a service took it on, which `site` and which start of it
-    (`boot`). `state` is ``asked``, ``claimed``, ``started``, ``skipped``, ``missed``, ``failed``, ``interrupted`` or
-    ``withdrawn``, `reason` why nothing was started. `item_kind` and `item_identifier` are what was started.
-    """
+    """One time that a schedule was due or asked for; `claimed` by which start (`boot`) of which service."""
 
     __tablename__ = "firings"
     __table_args__ = (UniqueConstraint("schedule_id", "due", "is_asked"), Index(None, "state"))

@@ -8,6 +8,5 @@ down_revision = "0003"
 
 
 def upgrade() -> None:
-    """Take the step."""
     with op.batch_alter_table("items", schema=None) as batch_op:
         batch_op.add_column(sa.Column("headline", sa.String(), nullable=True))
