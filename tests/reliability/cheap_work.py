@@ -29,6 +29,6 @@ def cheap_identification(folder: Path, server_recordings: Path, fate: Callable[[
                 raise RecordingError(f"{entry.name}: was changed or removed after the job was handed in")
         begin_step(workspace, "write result and exports")
         content = {"schema": SCHEMA, "made_from": [entry.sha256 for entry in order.recordings]}
-        write_atomically(workspace.result, json.dumps(content, indent=1).encode())
+        write_atomically(workspace.folder / "result.json", json.dumps(content, indent=1).encode())
 
     return do_work(workspace, work, server_recordings)

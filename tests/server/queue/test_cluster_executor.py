@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, Future, wait
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -208,7 +208,7 @@ class TestASchedulerThatDies:
         failures: list[OSError] = []
         open_client = ClusterExecutor._open_client
 
-        def counted(executor: ClusterExecutor) -> "Client":
+        def counted(executor: ClusterExecutor) -> Any:
             try:
                 return open_client(executor)
             except OSError as error:
