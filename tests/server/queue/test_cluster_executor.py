@@ -30,7 +30,7 @@ from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.files import hash_file
 
 if TYPE_CHECKING:
-    from distributed import Client, LocalCluster
+    from distributed import LocalCluster
 
 CLUSTER = [pytest.mark.slow, pytest.mark.timeout(1200), pytest.mark.filterwarnings("ignore")]
 
