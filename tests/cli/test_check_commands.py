@@ -119,7 +119,7 @@ def test_the_files_of_drives_are_checked_without_a_bus(run: Run, tmp_path: Path)
     ended = run("robot", "check", write_arm(tmp_path, "eds: drive.eds"))
     assert (ended.status, ended.err) == (0, "")
     assert "ok: joint joint1: drive.eds has no Max torque (0x6072:00): Tauscope stops the arm" in ended.out
-    for section in ("6077", "1016", "1016sub0", "1016sub1"):
+    for section in ("6077", "1016", "1016sub0", "1016sub1", "100C", "100D"):
         del content[section]
     write_file(tmp_path, content)
     ended = run("robot", "check", tmp_path / "robot.yaml")

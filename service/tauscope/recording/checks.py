@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from tauscope.errors import RecordingError
 from tauscope.recording.examination import find_implausible, find_missing_effort, mend_recording
@@ -200,15 +199,15 @@ def _position_step(position: Array) -> float | None:
 
 def _find_clipped(recording: Recording, least: Array, greatest: Array) -> list[tuple[tuple[float, int], ...]]:
     """Levels, of the two extremes of each joint's effort, at which it stays for several samples time and again."""
+    from scipy.ndimage import binary_opening  # slow to import, and a control process reads no recordings
+
     levels = np.stack([least, greatest])
     counts = np.zeros(levels.shape, dtype=np.int64)
     for start in range(0, len(recording), _ROWS_AT_ONCE):
         effort = recording.samples(start, start + _ROWS_AT_ONCE).effort
         for side in range(2):
             # Every sample that a run of five covers counts once.
-            counts[side] += ndimage.binary_opening(effort == levels[side], np.ones((_CLIPPED_RUN, 1), dtype=int)).sum(
-                axis=0
-            )
+            counts[side] += binary_opening(effort == levels[side], np.ones((_CLIPPED_RUN, 1), dtype=int)).sum(axis=0)
     # The lower extreme of an effort that never changes sign is rest, not a limit.
     is_limit = (np.abs(levels) > np.abs(levels).max(axis=0) / 2) & (least < greatest)
     enough = (counts >= max(_CLIPPED_SAMPLES, _CLIPPED_SHARE * len(recording))) & is_limit
