@@ -8,8 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from diagnosis.evidence.test_linear_model import problem
+from diagnosis.nominal_arm import nominal_rows
 from tauscope.diagnosis.evidence.linear_model import LinearModel
+from tauscope.diagnosis.fitting.fit import stepped
+from tauscope.diagnosis.model.extended import with_terms
+from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.search import hypothesis
+from tauscope.effects.backlash import Backlash
 
 MODEL: Any = None
 SEEDS = st.integers(0, 10_000)
@@ -43,3 +48,16 @@ def test_what_stays_within_its_bounds_is_not_touched(seed: int) -> None:
     mean = case.model.posterior(case.scales).mean
     lower[:2], upper[1:3] = mean[:2] - 1.0, mean[1:3] + 1.0
     assert hold(case, lower, upper) is case.model
+
+
+def test_a_step_leads_no_gap_beyond_the_one_by_which_the_link_moves() -> None:
+    """What the link flies over and what it moves by are one gap, estimated twice."""
+    play = Backlash(0, lower=np.array([1e-5, 1.0]), upper=np.array([1.0, 50.0]))
+    model = with_terms(nominal_rows()[1], [Term(play, np.array([1e-3, 10.0]), np.array([1e-3]))])
+    (own,) = model.term_places()
+    step = np.zeros(model.size)
+    step[own] = [-0.6e-3, 0.5e-3]
+    (found,) = stepped(model, step).terms
+    assert found.coefficients == pytest.approx([0.4e-3])
+    assert found.shape[0] == pytest.approx(2.0 * 0.4e-3)
+    assert not play.is_consistent(found.coefficients, found.shape)
