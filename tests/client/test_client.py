@@ -63,7 +63,7 @@ def motion(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def mover(keys: dict[Scope, str], address: str) -> Client:
-    return Client(address, keys[Scope.MOVE])
+    return Client(address, keys[Scope.MOVE], timeout_s=120.0)  # the first request waits for a reader to start
 
 
 def test_an_arm_is_taken_moved_and_given_back(

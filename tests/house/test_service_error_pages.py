@@ -199,7 +199,7 @@ def a_heartbeat_too_late(bench: Bench) -> Response:
 
 
 def a_lease_not_armed(bench: Bench) -> Response:
-    lease = bench.client().post(LEASES, json=ARM).json()
+    lease = bench.client().post(LEASES, json={**ARM, "ttl_s": 30.0}).json()
     return bench.client().post(RUNS, json=MOTION, headers={"Lease-Token": lease["token"]})
 
 
