@@ -21,7 +21,6 @@ from server.queue.waiting import wait_until
 from tauscope.errors import StoreError
 from tauscope.server.queue.analyses import IdentificationOrder, IdentificationWorkspace, run_identification
 from tauscope.server.queue.cluster_executor import SCHEDULER, ClusterExecutor, ClusterUnavailableError, open_executor
-from tauscope.server.queue.fleet import LOST, FleetEntry, FleetResult, analyse_fleet
 from tauscope.server.queue.job_folder import JobState, Workspace
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.task_job import OrderedRecording
@@ -41,12 +40,6 @@ def die(_: int) -> None:
 
 def divide(number: int) -> float:
     return 1 / number
-
-
-def die_for_the_third(entry: FleetEntry, _: Path) -> FleetResult:
-    if entry.row == 2:
-        die(1)
-    return FleetResult(entry, {"verdict": str(entry.row)}, None)
 
 
 @pytest.fixture(scope="module")
@@ -97,12 +90,6 @@ class TestOnACluster:
         with pytest.raises(BrokenExecutor):
             executor.submit(die, 1).result(120)
         assert executor.submit(divide, 2).result(60) == 0.5
-
-    def test_a_fleet_loses_only_the_robots_that_kill_their_worker(self, executor: ClusterExecutor) -> None:
-        entries = (FleetEntry(row, f"arm{row}", Path("arm.yaml"), (Path("a.csv"),), ()) for row in range(8))
-        found = list(analyse_fleet(entries, die_for_the_third, Path(), executor, executor.width))
-        assert sorted(result.entry.row for result in found) == list(range(8))
-        assert {result.entry.row: result.error for result in found if result.error} == {2: LOST}
 
     def test_an_identification(self, executor: ClusterExecutor, tmp_path: Path) -> None:
         workspace = IdentificationWorkspace(tmp_path / "job")
