@@ -26,8 +26,11 @@ XACRO_TIMEOUT_S = 60.0
 KINEMATICS_OF_ROOT = {"robot": "urdf", "mujoco": "mjcf"}  # kinds of kinematics by the root element of a file
 
 
-def read_robot(path: Path | str) -> Robot:
+def read_robot(path: Path | str, *, expands_xacro: bool = True) -> Robot:
     """The robot that a robot file describes, or a URDF or MJCF by itself.
+
+    `expands_xacro`: whether the command ``xacro`` may read it, which evaluates Python and opens any file: never for a
+    file of strangers.
 
     Raises RobotFileError if the file or the one that it names cannot be read or is not valid; one line naming file,
     line, place and joint.
@@ -48,14 +51,14 @@ def read_robot(path: Path | str) -> Robot:
     try:
         robot = build_robot(document, origin, beside)
     except RobotFileError as error:
-        if EXPAND not in str(error) or which("xacro") is None:
+        if not expands_xacro or EXPAND not in str(error) or which("xacro") is None:
             raise
         robot = build_robot(document, origin, lambda kind, file: _expand(beside(kind, file)))
     return replace(robot, source=source)
 
 
 def _expand(file: SourceFile) -> SourceFile:
-    """A xacro as the installed command expands it: the user's own file, which may include others."""
+    """A xacro as the installed command expands it."""
     try:
         words = ["xacro", str(file.path and file.path.absolute())]
         done = run(words, capture_output=True, timeout=XACRO_TIMEOUT_S, check=True)  # noqa: S603 — a fixed program

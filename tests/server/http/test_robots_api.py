@@ -1,6 +1,7 @@
 """Robot files checked over HTTP."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from server.http.problem_check import assert_problem
+from tauscope.errors import RobotFileError
+from tauscope.server.http.robot_files import check_received_robot, read_received_robot
 
 CHECK = "/api/v1/robots/check"
 URDF = (
@@ -79,6 +82,23 @@ def test_an_mjcf_opens_no_file_of_the_server(client: TestClient, part: str) -> N
     ):
         problem = assert_problem(client.post(CHECK, files=files), "robot-file", 422)
         assert "was not sent" in problem["detail"]
+
+
+@pytest.mark.parametrize("read", [read_received_robot, check_received_robot])
+def test_no_program_of_the_server_reads_a_xacro(
+    read: Callable[[Path, str], object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It would evaluate the file's Python and open any file."""
+    program, ran = tmp_path / "xacro", tmp_path / "ran"
+    program.write_text(f"#!/bin/sh\ntouch {ran}\ncat $1\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    folder = tmp_path / "sent"
+    folder.mkdir()
+    (folder / "arm.urdf").write_bytes(URDF.replace(b'lower="-1"', b'lower="${-1}"'))
+    with pytest.raises(RobotFileError, match="is an expression of xacro; expand the file first"):
+        read(folder, "arm.urdf")
+    assert not ran.exists()
 
 
 def test_an_impossible_body_is_a_finding(client: TestClient, tmp_path: Path) -> None:

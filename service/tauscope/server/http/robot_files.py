@@ -125,7 +125,7 @@ def read_received_robot(folder: Path, file_name: str) -> Robot:
     """Raises RobotFileError if it is not valid, or names a file that was not sent with it."""
     try:
         _confine_files(folder, file_name)
-        return read_robot(folder / file_name)
+        return read_robot(folder / file_name, expands_xacro=False)
     except RobotFileError as error:
         raise type(error)(_word_for_user(str(error), folder)) from None
 
@@ -134,7 +134,7 @@ def check_received_robot(folder: Path, file_name: str) -> RobotReport:
     """Raises RobotFileError if it cannot be read at all, or names a file that was not sent with it."""
     try:
         _confine_files(folder, file_name)
-        report = check_robot(folder / file_name)
+        report = check_robot(folder / file_name, expands_xacro=False)
     except RobotFileError as error:
         raise type(error)(_word_for_user(str(error), folder)) from None
     findings = (replace(finding, where=_word_for_user(finding.where, folder)) for finding in report.findings)
