@@ -108,6 +108,7 @@ class Effect(ABC):
     One that `is_variant` is a form of the effect of the same id and stands in no catalogue itself.
     Every geared joint may have one that `is_expected`: it counts towards no limit, and nothing is doubted beside it.
     One that `has_constant` of its own shows it as the nominal model's offset.
+    One that `bends` the torque has a `slope` that changes with it.
     """
 
     id: ClassVar[str]
@@ -131,6 +132,7 @@ class Effect(ABC):
     of_motion_and_step: ClassVar[bool] = False
     screened: ClassVar[bool] = True
     arguments: ClassVar[frozenset[str] | None] = None
+    bends: ClassVar[bool] = False
 
     joint: int | None
     grid: Array = field(default_factory=lambda: NO_SHAPE)

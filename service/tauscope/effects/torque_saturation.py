@@ -27,6 +27,7 @@ class Saturation(Effect):
     meaning = "the recorded torque is compressed or clipped at high load"
     remedy = "record within the sensor's or the drive's linear range"
     no_code = "it changes the recorded torque, not the arm's"
+    bends = True
     revealing_motion = "the same motion slower and without payload, well below the level"
     shapes = (Shape("c", "{tau}", logarithmic=True),)
 

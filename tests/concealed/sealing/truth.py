@@ -122,10 +122,10 @@ def truth_of(trial: Trial, case: Case | None = None) -> Truth:
     hidden = [_hidden(drawn, entry, names) for drawn, entry in zip(trial.truth, entries, strict=False)]
     told = {} if case is None else case.as_dict()
     noise = [float(each) for each in trial.noise.torque_std]
-    return Truth(told, hidden, float(trial.strength), noise, _unstated(trial))
+    return Truth(told, hidden, float(trial.strength), noise, _list_unstated(trial))
 
 
-def _unstated(trial: Trial) -> list[str]:
+def _list_unstated(trial: Trial) -> list[str]:
     """Joints whose friction falls with speed, by a constant that no robot file states: τ_sc atan(δ q̇) with τ_sc < 0."""
     friction = arm_named(trial.arm).model.friction
     assert friction is not None

@@ -55,7 +55,7 @@ class Asking(Search):
         assert place == 0
         return holding("found")
 
-    def _log_odds_of(self, lost: Any, *_: Any) -> float:
+    def _weigh_lost(self, lost: Any, *_: Any) -> float:
         assert [each.id for each in lost] == ["time_delay"]
         assert self.lost is not None
         return self.lost

@@ -12,8 +12,8 @@ from tauscope.diagnosis.noise.floor import with_pure_error
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory, Prior
 from tauscope.diagnosis.search.proposals import Proposer
-from tauscope.diagnosis.search.scoring import SIZES, Scorer
-from tauscope.effects import possible_effects
+from tauscope.diagnosis.search.scoring import SIZES, Scored, Scorer
+from tauscope.effects import Effect, possible_effects
 from tauscope.identification import identify
 from tauscope.recording.conditioning import Conditioner
 
@@ -71,3 +71,26 @@ def test_an_arm_that_lacks_nothing_has_no_likely_effect(beside: tuple[Proposer, 
     proposer, at = beside
     places = len({(each.id, each.joint) for each in proposer.effects})
     assert all(each.log_factor < np.log(places) for each in proposer.propose(at, lambda effect: True))
+
+
+@pytest.mark.parametrize(("explained", "looked_at"), [(60.0, True), (40.0, False)])
+def test_a_rival_explains_at_least_half_as_much(
+    beside: tuple[Proposer, Hypothesis], monkeypatch: pytest.MonkeyPatch, explained: float, looked_at: bool
+) -> None:
+    proposer, at = beside
+    own, rival = (next(each for each in proposer.effects if each.id == name) for name in ("cogging", "joint_spring"))
+    looked: list[Effect] = []
+
+    def score(effect: Effect, *_: object) -> tuple[Scored, Scored]:
+        factor = np.array([100.0 if effect is own else explained if effect is rival else 0.0])
+        found = Scored(effect, effect.grid[:1], factor, np.zeros((1, 1)), np.ones((1, 1)))
+        return found, found
+
+    monkeypatch.setattr(proposer, "_on_grid", score)
+    monkeypatch.setattr(proposer, "_look_at", lambda scored, *_: looked.append(scored[0].effect))
+    proposer.propose(at, lambda _: True, instead=(own.id, own.joint))
+    assert own in looked
+    assert (rival in looked) is looked_at
+    looked.clear()
+    proposer.propose(at, lambda _: True)
+    assert rival in looked

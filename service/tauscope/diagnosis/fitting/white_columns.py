@@ -16,7 +16,6 @@ from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.effects import Effect, Signals
 from tauscope.effects.computation import THREADS, LastFew
-from tauscope.effects.torque_saturation import Saturation
 from tauscope.recording.recording import Array
 
 FRICTION_KEPT = 2 * THREADS
@@ -91,7 +90,7 @@ class WhiteColumns:
 
     def _scale(self, model: ExtendedModel, joint: int) -> Array | float:
         """∂τ_recorded/∂τ of every row, (R,), or of all; whitening mixes neighbours, for which it is nearly the same."""
-        if not any(isinstance(term.effect, Saturation) for term in model.terms if term.effect.joint == joint):
+        if not any(term.effect.bends for term in model.terms if term.effect.joint == joint):
             return model.factor(joint)
         observations = self._observations
         order = observations.noise[joint].order if observations.noise else 0

@@ -22,7 +22,7 @@ LOOKED_AT = 5
 WORTH_A_LOOK = 2.0
 """Log Bayes factor on the grid below which nothing comes of a closer look."""
 
-A_RIVAL = 0.5
+RIVALS = 0.5
 """…relative to that of the effect in whose place it may be."""
 
 MOST_SHAPES = 600
@@ -83,7 +83,7 @@ class Proposer:
         for kind in (0, 1):
             seen = set[Place]()
             own = (each[kind].log_evidence for each in scored if _place(each) == instead)
-            least = max(A_RIVAL * max(own, default=0.0), WORTH_A_LOOK)
+            least = max(RIVALS * max(own, default=0.0), WORTH_A_LOOK)
             for place in sorted(range(len(scored)), key=lambda place: -scored[place][kind].log_evidence):
                 if scored[place][kind].log_evidence < least:
                     break

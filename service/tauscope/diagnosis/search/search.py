@@ -222,26 +222,21 @@ class Search:
 
     def _best(self, at: Hypothesis, proposals: list[Proposal]) -> tuple[list[Step], Hypothesis | None]:
         """The most probable proposal that held-out motion does not contradict, after those that it does."""
-        refusals, beyond = list[Step](), set[Place]()
+        refusals, untried = list[Step](), list(self.farther)
         for proposal in self._rank(at, [each for each in proposals if self._log_odds(each) > 0.0]):
             step, found = self._try(at, proposal, proposals)
-            is_enough = step.is_confirmed or _stands(found.model)
-            forms = [] if is_enough else [each for each in self._forms_beyond(at, proposal) if each.place not in beyond]
-            beyond |= {each.place for each in forms}
-            for form in forms:  # where its own law cannot be
-                step, found = self._try(at, form, proposals)
-                if step.is_confirmed:
-                    break
+            name, joint = proposal.place
+            forms = [each for each in untried if name in each.refines and each.joint == joint]
+            if forms and not step.is_confirmed and not _stands(found.model):  # its own law cannot be
+                untried = [each for each in untried if each not in forms]
+                for form in Proposer(self.laboratory, forms).propose(at, lambda _: True):
+                    step, found = self._try(at, form, proposals)
+                    if step.is_confirmed:
+                        break
             if step.is_confirmed:
                 return [*refusals, step], found
             refusals.append(step)
         return refusals, None
-
-    def _forms_beyond(self, at: Hypothesis, proposal: Proposal) -> list[Proposal]:
-        """Farther forms that refine an effect."""
-        name, joint = proposal.place
-        forms = [each for each in self.farther if name in each.refines and each.joint == joint]
-        return Proposer(self.laboratory, forms).propose(at, lambda _: True) if forms else []
 
     def _rank(self, at: Hypothesis, proposals: Sequence[Proposal]) -> list[Proposal]:
         """Proposals after all motion, the most probable first."""
@@ -264,7 +259,7 @@ class Search:
         """A proposal in the model, and what held-out motion says of it."""
         touched = proposal.term.effect.touched(len(at.scales))
         found, lost = self._drop_impossible(self._settle(self._add(at, proposal), touched))
-        trained = self._log_odds(proposal) - (self._log_odds_of(lost, at, found, proposal) if lost else 0.0)
+        trained = self._log_odds(proposal) - (self._weigh_lost(lost, at, found, proposal) if lost else 0.0)
         change = None if self.held_out is None else self.held_out.change(at, found)
         rivals = tuple(each for each in proposals if each is not proposal)
         passes = isinstance(proposal.term.effect, TimeLocalEffect)
@@ -287,7 +282,7 @@ class Search:
             at = self._settle_without(at, broken[0])
         return at, lost
 
-    def _log_odds_of(self, lost: Sequence[Effect], at: Hypothesis, found: Hypothesis, proposal: Proposal) -> float:
+    def _weigh_lost(self, lost: Sequence[Effect], at: Hypothesis, found: Hypothesis, proposal: Proposal) -> float:
         """Log odds that are lost with effects that a proposal makes impossible."""
         gained = self.laboratory.under(found, at.dependence, range(len(at.scales))).log_evidence - at.log_evidence
         return proposal.log_factor - gained + sum(self._prior_odds(effect, 0.0) for effect in lost)

@@ -58,7 +58,7 @@ def guess_parts(
     effort = next((role for role in order if _choose(families, role, count)), "tau")
     groups = {"q": q, "i" if effort == "i" else "tau": _choose(families, effort, count)}
     groups |= {group: _choose(families, group, count) for group in _OPTIONAL if group != effort}
-    columns: dict[str, Source] = {} if time is None else {"t": _with_nanoseconds(header, time)}
+    columns: dict[str, Source] = {} if time is None else {"t": _add_nanoseconds(header, time)}
     columns |= {group: _source(family, count) for group, family in groups.items() if family is not None}
     torque = groups.get("i") or groups.get("tau")
     units = {
@@ -128,7 +128,7 @@ def _find_time(header: Sequence[str], known: Sequence[str] | None) -> str | None
     return min(ranked)[2] if ranked else None
 
 
-def _with_nanoseconds(header: Sequence[str], time: str) -> Source:
+def _add_nanoseconds(header: Sequence[str], time: str) -> Source:
     """The column of the time, with that of its nanoseconds where it counts whole seconds."""
     match = _WHOLE_SECONDS.fullmatch(time)
     names = [f"{match[1]}{name}" for name in ("nanosec", "nsec", "nsecs")] if match else []
