@@ -41,6 +41,14 @@ def test_errors_of_neighbours_that_are_alike_count_as_few() -> None:
     assert tied == pytest.approx(5.0 * free, rel=0.2)
 
 
+def test_a_change_that_one_stretch_makes_is_one_standard_error_of_itself() -> None:
+    before = np.append(1.0, np.full(STRETCHES - 1, 1e-9))[None]
+    after = before * np.append(0.25, np.ones(STRETCHES - 1))
+    change = HeldOutChange.between(before, after)
+    assert change.relative[0] == pytest.approx(-0.5)
+    assert np.abs(change.standard[0]) < 1.0
+
+
 def test_nothing_is_told_of_motion_that_is_too_short_or_of_no_error_at_all() -> None:
     short = np.ones((1, 10))
     assert sum_stretches(short).shape == (1, 1)

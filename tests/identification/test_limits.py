@@ -55,6 +55,11 @@ def test_half_a_second_at_rest_is_a_stop(rows: int, stops: int) -> None:
     assert len(piece(staying(rows)).stops(0)) == stops
 
 
+@pytest.mark.parametrize("part", [slice(110, None), slice(0, 130)])
+def test_a_rest_that_the_edge_of_a_motion_cuts_short_is_a_stop(part: slice) -> None:
+    assert len(piece(staying(40)[part]).stops(0)) == 1
+
+
 @pytest.mark.parametrize(("share", "moves"), [(0.09, True), (0.11, False)])
 def test_a_row_tells_of_motion_where_less_than_a_tenth_of_it_rests(share: float, moves: bool) -> None:
     prepared = piece(staying(0))

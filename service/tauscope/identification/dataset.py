@@ -60,16 +60,18 @@ class PreparedMotion:
         white = rows * (self.used[joint] * self.row_weight)
         if self.rest_variance[joint] > 0.0:
             for stop in self.stops(joint):
-                kept = 1.0 / np.sqrt(1.0 + self.rest_variance[joint] * (stop.stop - stop.start))
-                white[:, stop] -= (1.0 - kept) * white[:, stop].mean(axis=1, keepdims=True)
+                held = np.flatnonzero(self.used[joint, stop]) + stop.start
+                kept = 1.0 / np.sqrt(1.0 + self.rest_variance[joint] * len(held))
+                white[:, held] -= (1.0 - kept) * white[:, held].mean(axis=1, keepdims=True)
         return white
 
     def stops(self, joint: int) -> list[slice]:
-        """Consecutive rows of every stop of a joint that is longer than a turning point."""
-        resting = self.used[joint] & (self.at_rest[joint] >= MOSTLY)
+        """Consecutive rows of every stop of a joint: longer than a turning point, or cut short by the motion's edge."""
+        resting = self.at_rest[joint] >= MOSTLY
         edges = np.flatnonzero(np.diff(resting, prepend=False, append=False)).reshape(-1, 2)
         least = STOP_S * self.motion.band.rate_hz
-        return [slice(int(begin), int(end)) for begin, end in edges if end - begin >= least]
+        long = [slice(*each) for each in edges.tolist() if np.diff(each) >= least or {0, len(resting)} & set(each)]
+        return [stop for stop in long if self.used[joint, stop].any()]
 
     @property
     def moving(self) -> Mask:

@@ -67,9 +67,9 @@ def _doubt_friction_at_rest(motions: Dataset, structure: ModelStructure) -> None
         left = prepared.reduced_torque - prepared.predicted_rows(structure, posterior.mean)
         for joint, row in enumerate(left):
             for stop in prepared.stops(joint):
-                count = stop.stop - stop.start
-                held[joint] += count * row[stop].mean() ** 2 - posterior.noise_std[joint] ** 2
-                rows[joint] += count
+                own = row[stop][prepared.used[joint, stop]]
+                held[joint] += len(own) * own.mean() ** 2 - posterior.noise_std[joint] ** 2
+                rows[joint] += len(own)
     motions.rest_variance = np.clip(held / rows, 0.0, stiction**2) / posterior.noise_std**2
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from diagnosis.nominal_arm import nominal_rows, stopping
 from tauscope.diagnosis.evidence.rows import AROUND_STOP, EvidenceRows, find_rest
+from tauscope.diagnosis.evidence.scales import Scales
 from tauscope.recording.recording import Array
 
 JOINT = 1
@@ -14,10 +15,11 @@ STOPS = slice(40, 90), slice(200, 230)
 """Both are longer than a turning point."""
 
 
-def certainties(*stops: slice) -> Array:
-    """Weight of every row of the joint, in order of time, (R,)."""
+def certainties(*stops: slice, noise: float = 1.0) -> Array:
+    """Weight of every row of the joint beside noise that a model finds, in order of time, (R,)."""
     observations, model = nominal_rows()
-    rows = EvidenceRows.prepare(stopping(observations, JOINT, *stops), model)
+    scales = [Scales.start(1.0).without_discrepancy(noise)] * observations.robot.joint_count
+    rows = EvidenceRows.prepare(stopping(observations, JOINT, *stops), model).under(model, scales)
     found = np.empty_like(rows.certain[JOINT])
     found[rows.order[JOINT]] = rows.certain[JOINT]
     return found
@@ -37,13 +39,14 @@ def test_no_row_belongs_to_a_stop_where_a_joint_never_stops() -> None:
     assert not stops.any()
 
 
-def test_all_rows_of_a_stop_count_as_one_whose_variance_is_that_of_breakaway() -> None:
+@pytest.mark.parametrize("found", [0.3, 1.0])
+def test_all_rows_of_a_stop_count_as_one_whose_variance_is_that_of_breakaway(found: float) -> None:
     observations, model = nominal_rows()
-    moving, stopped = certainties(), certainties(*STOPS)
+    moving, stopped = certainties(noise=found), certainties(*STOPS, noise=found)
     _, stops = find_rest(stopping(observations, JOINT, *STOPS), model, JOINT)
     place = model.structure.coefficient(JOINT, "stiction")
     assert place is not None
-    noise = observations.noise[JOINT].model.variance
+    noise = observations.noise[JOINT].model.variance * found**2
     power = 1.0 + model.parameters[place] ** 2 / noise
     for number in range(1, stops.max() + 1):
         share = (stopped[stops == number] / moving[stops == number]) ** 2

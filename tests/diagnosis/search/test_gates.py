@@ -116,3 +116,15 @@ UNASKED = Trial(training=2.0, held_out=20.0)
 )
 def test_an_effect_is_named_where_training_asks_and_held_out_motion_shows_it(trial: Trial, named: bool) -> None:
     assert is_named(trial) is named
+
+
+@pytest.mark.parametrize(
+    ("training", "held_out", "tried"), [(0.5, 0.0, True), (-1.0, 20.0, True), (-1.0, 16.0, False), (-1.0, 0.0, False)]
+)
+def test_an_effect_is_tried_where_training_asks_for_it_or_held_out_motion_alone(
+    training: float, held_out: float, tried: bool
+) -> None:
+    laboratory: Any = SimpleNamespace(approach=lambda found: found)
+    judge: Any = SimpleNamespace(change=lambda before, after: change(held_out))
+    proposal: Any = SimpleNamespace(term=NOTHING, log_factor=training)
+    assert Asking(NOTHING, laboratory, NOTHING, judge)._rank(holding("at"), [proposal]) == [proposal] * tried

@@ -155,7 +155,7 @@ class LinearModel:
         low, high = np.array(limits).T
         starts = [start.values]
         if anew:
-            starts.append(start.without_discrepancy(float(np.exp(start.values[0]))).values)
+            starts.append(start.without_discrepancy(start.noise).values)
         ends = [
             minimize(
                 objective,

@@ -5,7 +5,7 @@ their own (`Scales`). All rows of a stop count as one, whose friction is unknown
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tauscope.diagnosis.evidence.dependence import Succession
 from tauscope.diagnosis.evidence.discrepancy import GROUP, Reach, beyond, smooth_features
 from tauscope.diagnosis.evidence.moments import JointMoments
-from tauscope.diagnosis.evidence.scales import REST_BOUNDS, REST_SHARES
+from tauscope.diagnosis.evidence.scales import REST_BOUNDS, REST_SHARES, Scales
 from tauscope.diagnosis.fitting.projection import JointColumns
 from tauscope.diagnosis.fitting.regressor_noise import certainty, shared_errors
 from tauscope.diagnosis.fitting.white_columns import WhiteColumns, white_columns
@@ -84,6 +84,11 @@ class EvidenceRows:
             groups,
             tuple(successions),
         )
+
+    def under(self, model: ExtendedModel, scales: Sequence[Scales]) -> "EvidenceRows":
+        """The same rows, their uncertainty beside the noise of some scales."""
+        weights = (weigh_rows(self.observations, model, joint, own.noise) for joint, own in enumerate(scales))
+        return replace(self, certain=tuple(own[order] for own, order in zip(weights, self.order, strict=True)))
 
     def take(self, joint: int, rows: Array, dependence: float) -> Array:
         """The rows of a joint that count, as much as they tell, in order of their class, (…, R_j).
@@ -170,20 +175,24 @@ def find_rest(observations: Observations, model: ExtendedModel, joint: int) -> t
     return near[kept], np.concatenate(stops)[kept]
 
 
-def weigh_rows(observations: Observations, model: ExtendedModel, joint: int) -> Array:
+def weigh_rows(observations: Observations, model: ExtendedModel, joint: int, noise: float = 1.0) -> Array:
     """How much every white row of a joint tells beside friction's step and at stops, (R,).
 
     `joint`: joint index, from 0.
+    `noise`: σ of the rows, relative to white noise.
     """
     _, stops = find_rest(observations, model, joint)
-    return certainty(observations, model, joint, OPEN) * _weigh_stops(observations, model, joint, stops)
+    certain = certainty(observations, model, joint, OPEN / noise**2)
+    return certain * _weigh_stops(observations, model, joint, stops, noise)
 
 
-def _weigh_stops(observations: Observations, model: ExtendedModel, joint: int, stops: NDArray[np.intp]) -> Array:
+def _weigh_stops(
+    observations: Observations, model: ExtendedModel, joint: int, stops: NDArray[np.intp], noise: float
+) -> Array:
     """Weight of each row, (R,): all rows of a stop count as one, whose friction is anything up to breakaway."""
     column = model.structure.coefficient(joint, "stiction")
     breakaway = 0.0 if column is None else float(model.parameters[column])
-    power = 1.0 + breakaway**2 / observations.noise[joint].model.variance
+    power = 1.0 + breakaway**2 / (observations.noise[joint].model.variance * noise**2)
     rows = np.bincount(stops)[stops]
     return np.where(stops > 0, 1.0 / np.sqrt(rows * power), 1.0)
 

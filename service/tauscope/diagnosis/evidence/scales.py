@@ -62,9 +62,14 @@ class Scales:
         least = float(np.log(LEAST * self.level))
         return [(-LIMIT, LIMIT), *[(least, least + LIMIT)] * GROUPS, (-LIMIT, LIMIT)]
 
+    @property
+    def noise(self) -> float:
+        """σ, relative to white noise."""
+        return float(np.exp(self.values[0]))
+
     def weights(self) -> Array:
         """1 / (σ² (1 + r² c²)) of each class, (K,)."""
-        return np.exp(-2.0 * self.values[0]) / (1.0 + np.exp(2.0 * self.values[-1]) * REST_SHARES**2)
+        return self.noise**-2.0 / (1.0 + np.exp(2.0 * self.values[-1]) * REST_SHARES**2)
 
     def amplitudes(self, groups: NDArray[np.intp]) -> Array:
         """Amplitude of each feature; 1 for an error of known size, group -1.
@@ -83,7 +88,7 @@ class Scales:
         `groups`: (b,), group of each feature.
         """
         rest = np.exp(2.0 * self.values[-1]) * REST_SHARES**2
-        variance = np.exp(2.0 * self.values[0])
+        variance = self.noise**2
         of_noise = float(by_class @ (2.0 * variance * (1.0 + rest)))
         of_rest = float(by_class @ (2.0 * variance * rest))
         return np.array([of_noise, *(by_feature[groups == group].sum() for group in range(GROUPS)), of_rest])

@@ -1,9 +1,11 @@
 """How much better one model predicts held-out motion than another, joint by joint.
 
 Errors of neighbouring samples are alike, so a standard error comes from sums over stretches of motion. With a_s and b_s
-the squared errors after and before, summed over stretch s of S, and ρ = Σ a_s / Σ b_s,
+the squared errors after and before, summed over stretch s of S, ρ = Σ a_s / Σ b_s, and ρ_s the same without stretch s,
 
-    change of the rms = √ρ - 1,        σ(ρ) = √S std(a_s - ρ b_s) / Σ b_s.
+    change of the rms = √ρ - 1,        σ(ρ)² = (S - 1)/S Σ (ρ_s - mean ρ_s)²,
+
+the jackknife: a change that a single stretch makes is one standard error of itself.
 """
 
 from collections.abc import Sequence
@@ -63,17 +65,15 @@ class HeldOutChange:
 
         `before`, `after`, `difference`: (n, S), summed over the same stretches.
         """
-        stretches = before.shape[1]
-        whole = before.sum(axis=1)
-        whole = np.where(whole > 0.0, whole, 1.0)
-        ratio = np.where(before.any(axis=1), after.sum(axis=1) / whole, 1.0)
-        if stretches == 1:
+        count, whole = before.shape[1], before.sum(axis=1)
+        ratio = _divide(after.sum(axis=1), whole)
+        if count == 1:
             return HeldOutChange(np.sqrt(ratio) - 1.0, np.full(len(before), np.inf), np.zeros(len(before)))
-        spread = (after - ratio[:, None] * before).std(axis=1, ddof=1)
+        without = _divide(after.sum(axis=1)[:, None] - after, whole[:, None] - before)
         slope = 2.0 * np.sqrt(np.maximum(ratio, np.finfo(float).tiny))
-        error, expected = np.sqrt(stretches) * spread / whole, None
+        error, expected = np.sqrt(count - 1.0) * without.std(axis=1), None
         if difference is not None:
-            size = difference.sum(axis=1) / whole
+            size = difference.sum(axis=1) / np.where(whole > 0.0, whole, 1.0)
             expected = np.divide(size, error, out=np.zeros_like(size), where=error > 0.0)
         return HeldOutChange(np.sqrt(ratio) - 1.0, error / slope, expected)
 
@@ -109,3 +109,8 @@ class HeldOutChange:
         size = np.abs(self.standard) if self.expected is None else np.minimum(np.abs(self.standard), self.expected)
         own = -2.0 * self.standard * size
         return float(np.sum(own if joints is None else own[list(joints)]))
+
+
+def _divide(after: Array, before: Array) -> Array:
+    """Ratios of errors; one where there were none."""
+    return np.divide(after, before, out=np.ones_like(after), where=before > 0.0)

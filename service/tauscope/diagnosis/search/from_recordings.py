@@ -72,6 +72,8 @@ def search(
     rows = EvidenceRows.prepare(white, model)
     progress("compare effects")
     laboratory = Laboratory(rows, Prior.of(identification, model), repeated is not None)
+    start = laboratory.start(model)
+    laboratory = replace(laboratory, rows=rows.under(start.model, start.scales))
     known = [*_rotors(identification, effects), *(each.term for each in direct_terms(deflections, setting))]
     nominal = _add_known(laboratory.start(model), laboratory, known)
     unseen = None

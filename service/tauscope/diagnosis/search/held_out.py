@@ -60,7 +60,7 @@ class HeldOut:
         """How much each row of a joint counts, (R,): as little as in training near rest and beside friction's step."""
         near, _ = find_rest(self.observations, at.model, joint)
         weights = at.scales[joint].weights()[np.digitize(near, REST_BOUNDS)]
-        return weights * weigh_rows(self.observations, at.model, joint) ** 2
+        return weights * weigh_rows(self.observations, at.model, joint, at.scales[joint].noise) ** 2
 
     def _errors(self, at: Hypothesis) -> list[Array]:
         """Measured less predicted torque of every joint, (R,)."""

@@ -1,7 +1,5 @@
 """What a hypothesis leaves, under the noise that it finds."""
 
-import numpy as np
-
 from tauscope.diagnosis.evidence.rows import weigh_rows
 from tauscope.diagnosis.fitting.fit import Fit, Fitter
 from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit, lack_of_fit
@@ -27,7 +25,7 @@ def rows_under(at: Hypothesis, rows: Observations, *, pure_error: bool) -> Obser
     if pure_error:
         return weigh(rows, at)
     pairs = zip(rows.noise, at.scales, strict=True)
-    return weigh(rows.with_noise([own.times(float(np.exp(scales.values[0]))) for own, scales in pairs]), at)
+    return weigh(rows.with_noise([own.times(scales.noise) for own, scales in pairs]), at)
 
 
 def weigh(rows: Observations, at: Hypothesis) -> Observations:

@@ -223,7 +223,7 @@ class Search:
     def _best(self, at: Hypothesis, proposals: list[Proposal]) -> tuple[list[Step], Hypothesis | None]:
         """The most probable proposal that held-out motion does not contradict, after those that it does."""
         refusals, untried = list[Step](), list(self.farther)
-        for proposal in self._rank(at, [each for each in proposals if self._log_odds(each) > 0.0]):
+        for proposal in self._rank(at, proposals):
             step, found = self._try(at, proposal, proposals)
             name, joint = proposal.place
             forms = [each for each in untried if name in each.refines and each.joint == joint]
@@ -239,18 +239,22 @@ class Search:
         return refusals, None
 
     def _rank(self, at: Hypothesis, proposals: Sequence[Proposal]) -> list[Proposal]:
-        """Proposals after all motion, the most probable first."""
-        if self.held_out is None or len(proposals) < 2:
-            return list(proposals)
+        """Proposals that training asks for, or held-out motion alone, the most probable after all motion first."""
+        asked = [each for each in proposals if self._log_odds(each) > 0.0]
+        if self.held_out is None:
+            return asked
         held_out = self.held_out
         nearer = {id(each): self.laboratory.approach(self._add(at, each)) for each in proposals}
+        for each in proposals:
+            if each not in asked and held_out.change(at, nearer[id(each)]).log_odds() > UNASKED:
+                asked.append(each)
 
         def compare(one: Proposal, other: Proposal) -> float:
             """Log odds of the other. What both predict alike says nothing: they are compared with each other."""
             found = held_out.change(nearer[id(one)], nearer[id(other)]).log_odds()
             return found + self._log_odds(other) - self._log_odds(one)
 
-        return sorted(proposals, key=cmp_to_key(lambda one, other: int(np.sign(compare(one, other)))))
+        return sorted(asked, key=cmp_to_key(lambda one, other: int(np.sign(compare(one, other)))))
 
     def _add(self, at: Hypothesis, proposal: Proposal) -> Hypothesis:
         return self.laboratory.with_term(self.laboratory.paint(at, proposal.found), proposal.term, proposal.size)
