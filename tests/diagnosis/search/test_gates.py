@@ -111,6 +111,8 @@ UNASKED = Trial(training=2.0, held_out=20.0)
         (replace(ASKED, lost=5.0), False),  # but what is lost with that counts
         (UNASKED, True),
         (replace(UNASKED, held_out=16.0), False),  # three standard errors
+        (replace(ASKED, held_out=20.0, harm=0.006), True),  # at a small cost beside its gain
+        (replace(UNASKED, harm=0.006), False),  # which nothing is worth that training does not ask for
         (replace(UNASKED, training=-20.0), False),  # what training is sure is not there
     ],
 )

@@ -271,10 +271,11 @@ class Search:
             trained = min(trained, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
         log_odds = trained + (0.0 if change is None else change.log_odds())
         confirmed = log_odds > (UNASKED if passes else NAMED) and _stands(found.model)
-        least = SHOWN if trained > NAMED else UNASKED
-        if self.held_out is not None:
-            confirmed &= self.held_out.trained_change(at, found).harm <= 0.0
-        confirmed = confirmed and self._agrees(at, found, [len(found.model.terms) - 1], least)
+        asked = trained > NAMED
+        if self.held_out is not None:  # what training does not ask for may cost no joint anything
+            told = self.held_out.trained_change(at, found)
+            confirmed &= told.harm <= 0.0 if asked else not told.losing
+        confirmed = confirmed and self._agrees(at, found, [len(found.model.terms) - 1], SHOWN if asked else UNASKED)
         covariance = found.posterior.covariance
         return Step(proposal, log_odds, rivals, change, confirmed, at.model, found.model, covariance, trained), found
 
