@@ -32,11 +32,21 @@ def test_the_density_of_white_noise_is_found(rate: float, seconds: float, std: f
 
 @pytest.mark.parametrize("length", [256, 101])
 def test_the_mean_of_segment_spectra_is_welchs(length: int) -> None:
-    values = np.random.default_rng(4).normal(1.0, 2.0, (1500, 3))
+    values = np.random.default_rng(4).normal(1.0, 2.0, (length + 10 * (length - length // 2), 3))
     spectra = segment_spectra(values, 200.0, length)
     frequency, expected = signal.welch(values, 200.0, nperseg=length, axis=0)
     assert spectra.shape[1:] == (len(frequency), 3)
     np.testing.assert_allclose(spectra.mean(axis=0), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("pieces", [[], [1050]])
+def test_a_joint_that_moves_at_the_end_alone_sets_a_band(pieces: list[int]) -> None:
+    time = np.arange(1400) / 100.0
+    moved = np.where(time > 11.0, 0.3 * np.sin(4.0 * np.pi * np.maximum(time - 11.0, 0.0)), 0.0)
+    noisy = moved[:, None] + np.random.default_rng(8).normal(0.0, 1e-5, (1400, 1))
+    found = position_noise([stretch_of(piece, 100.0) for piece in np.split(noisy, pieces)])
+    whole = position_noise(stretch_of(noisy[1100:], 100.0))
+    assert found.joint_limits_hz[0] == pytest.approx(whole.joint_limits_hz[0], rel=0.3)
 
 
 @pytest.mark.parametrize("counts", [4096, 65536])

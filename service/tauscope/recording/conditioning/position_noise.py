@@ -121,10 +121,11 @@ def acceleration_spectrum(
     """
     accelerations = [np.diff(values, n=order, axis=0) * rate_hz**order for values in signals]
     length = min(SEGMENT, max(len(values) for values in accelerations))
-    spectra = [segment_spectra(values, rate_hz, length) for values in accelerations if len(values) >= length]
-    segments = sum(len(each) for each in spectra)
+    spectra = [segment_spectra(values, rate_hz, length) for values in accelerations]
+    shares = [min(len(values) / length, 1.0) for values in accelerations]  # a joint may move in a short piece alone
+    segments = sum(share * len(each) for share, each in zip(shares, spectra, strict=True))
     frequency = np.arange(length // 2 + 1, dtype=np.float64) * (rate_hz / length)
-    power = np.sum([each.sum(axis=0) for each in spectra], axis=0) / segments
+    power = np.sum([share * each.sum(axis=0) for share, each in zip(shares, spectra, strict=True)], axis=0) / segments
     gain = _gain(frequency, rate_hz, order)
     density = np.maximum(_plateau_density(accelerations, rate_hz, order), floor)
     return AccelerationSpectrum(frequency, power, gain, density)
@@ -155,15 +156,18 @@ def _gain(frequency: Array, rate_hz: float, order: int) -> Array:
 
 
 def segment_spectra(values: Array, rate_hz: float, length: int) -> Array:
-    """One-sided spectral densities of half-overlapping segments under a Hann window: Welch's, before their mean.
+    """One-sided spectral densities of segments under a Hann window: Welch's, before their mean.
+
+    Segments overlap by half or a little more, so that no sample is left out; what is shorter is one segment.
 
     `values`: (N, n), signals, a column each; `rate_hz`: sampling rate [Hz]. Returns (S, F, n), of every segment, its
     mean removed; half the time of `scipy.signal.welch`, which goes from segment to segment.
     """
-    step = length - length // 2
-    segments = np.lib.stride_tricks.sliding_window_view(np.ascontiguousarray(values.T), length, axis=1)[:, ::step]
-    window = signal.get_window("hann", length)
-    spectrum = np.fft.rfft((segments - segments.mean(axis=2, keepdims=True)) * window)
+    whole, last = min(length, len(values)), max(len(values) - length, 0)
+    begins = np.linspace(0, last, int(np.ceil(last / (length - length // 2))) + 1).astype(int)
+    segments = np.lib.stride_tricks.sliding_window_view(np.ascontiguousarray(values.T), whole, axis=1)[:, begins]
+    window = signal.get_window("hann", whole)
+    spectrum = np.fft.rfft((segments - segments.mean(axis=2, keepdims=True)) * window, length)
     density = (spectrum.real**2 + spectrum.imag**2) / (rate_hz * np.sum(window**2))
     density[..., 1 : (length + 1) // 2] *= 2.0  # the negative frequencies; zero and Nyquist's have none
     return np.moveaxis(density, 0, -1)
