@@ -66,6 +66,13 @@ def bunch_stamps(channels: Channels, rng: np.random.Generator) -> None:
         channels.time[row] = channels.time[row + 1] - 1e-7
 
 
+def queue_samples(channels: Channels, rng: np.random.Generator) -> None:
+    stamps = channels.time
+    for last in np.flatnonzero(rng.random(len(stamps)) < 0.015):
+        first = max(last - 3, 0)
+        stamps[first:last] = stamps[last] - 1e-5 * np.arange(last - first, 0, -1)
+
+
 def drop_efforts(channels: Channels, rng: np.random.Generator) -> None:
     channels.effort[rng.choice(len(channels.time), 40, replace=False)] = 0.0
 
@@ -127,6 +134,7 @@ DAMAGES: dict[Callable[[Channels, np.random.Generator], None], str] = {
     repeat_stamps: "time-stamps",
     swap_rows: "time-stamps",
     bunch_stamps: "time-stamps",
+    queue_samples: "time-stamps",
     drop_efforts: "effort-dropouts",
     drop_long: "effort-dropouts",
     spike_efforts: "spikes",

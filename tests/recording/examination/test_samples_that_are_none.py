@@ -18,6 +18,7 @@ from recording.examination.damages import (
     freeze_positions,
     hold_all,
     hold_efforts,
+    queue_samples,
     reset_encoder,
     spike_efforts,
     spike_positions,
@@ -81,6 +82,17 @@ def test_a_damage_is_named_and_costs_little(damage: Damage) -> None:
     assert DAMAGES[damage] in {warning.code for warning in recording.warnings}
     sound = measure_error_at_rate(SLOW.get(damage, 1))
     assert measure_held_out_error(recording) < 1.2 * sound
+
+
+@given(seed=st.integers(0, 2**31))
+def test_no_row_keeps_a_stamp_that_is_not_its_own(seed: int) -> None:
+    channels = Channels.of(BASE)
+    own = channels.time.copy()
+    queue_samples(channels, np.random.default_rng(seed))
+    samples = read_text(channels.csv()).samples()
+    kept = np.isfinite(samples.position).all(axis=1)
+    assert np.abs(samples.time - own)[kept].max() < 0.5 * (own[1] - own[0])
+    assert kept.mean() > 0.9
 
 
 @settings(max_examples=100, deadline=None)

@@ -39,7 +39,7 @@ def scan_position(
     `rows`: (N,) int64, row of each value within the recording.
     `time`: (N,), stamps [s].
     `position`: (N,), q [rad or m], finite.
-    `interval`: longest usual time from row to row [s].
+    `interval`: usual time from row to row [s].
     `core`: (int, int), rows that this block answers for; the others are neighbours.
     """
     if len(position) < 8:

@@ -37,16 +37,15 @@ class Sketch:
         return np.concatenate([np.diff(window.time) for window in self.windows])
 
     @cached_property
-    def longest_interval(self) -> float:
-        """Longest usual time from row to row [s]: their 99th percentile."""
-        return float(np.percentile(self._steps, 99.0))
-
-    @cached_property
     def interval(self) -> float:
         """Usual time from row to row [s]: the median, or where rows come in bursts the mean without gaps."""
-        median = float(np.median(self._steps))
-        mean = float(np.mean(self._steps[self._steps <= self.longest_interval]))
+        median, longest = np.percentile(self._steps, [50.0, 99.0]).tolist()
+        mean = float(np.mean(self._steps[self._steps <= longest]))
         return mean if median < BURST * mean else median
+
+    def share_within(self, part: float) -> float:
+        """Share of rows that follow another within a part of the usual time."""
+        return float(np.mean(self._steps < part * self.interval))
 
     @cached_property
     def position(self) -> Array:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, Numbers, Rows, join_ranges, row_numbers
 from tauscope.recording.examination.effort_defects import ZeroRuns, find_all_stuck, find_spikes, find_stuck
@@ -24,6 +25,8 @@ from tauscope.robot.robot import JointType
 
 SPARE_ROWS = 512  # rows read beyond a block on either side: a run of one value that is longer is taken to end there
 BUNCHED = 0.1  # share of the usual interval below which two stamps belong to one instant: a buffer was emptied
+ON_A_LINE = 31  # rows of which most have the stamp that their number foretells
+OFF_THE_LINE = 0.5  # share of the usual interval by which the stamp of one that waited is off
 # Share of bunched stamps above which the source always sends in bursts: the conditioning counts its rows.
 MOST_BUNCHED = 0.1
 REST_HOLDS = 4  # holds of one value after which it is a rest, and no update that was lost
@@ -113,7 +116,7 @@ class _Scan:
     def add(self, samples: Samples, first: int, core: tuple[int, int]) -> None:
         """Take a block, of which the rows of `core` are its own and the others neighbours."""
         rows = np.arange(first, first + len(samples.time))
-        close = _find_bunched(samples.time, self.sketch.interval)
+        close = _find_bunched(samples.time, self.sketch.interval) & (self.sketch.share_within(BUNCHED) <= MOST_BUNCHED)
         self._keep(0, "bunched", rows[close], core)
         stuck = find_all_stuck(rows, samples.effort, samples.position, self.efforts)
         for joint, (place, scale) in enumerate(zip(self.defects.joints, self.positions, strict=True)):
@@ -122,7 +125,7 @@ class _Scan:
             known = np.isfinite(position) & ~close
             if place.hold > 1:
                 known[known] = is_new(position[known])
-            interval = self.sketch.longest_interval * place.hold
+            interval = self.sketch.interval * place.hold
             for kind, row, height in scan_position(
                 rows[known], samples.time[known], position[known], scale, interval, core
             ):
@@ -150,8 +153,6 @@ class _Scan:
                 defects.bunched = rows
             else:
                 defects.joints[joint].rows[name] = rows
-        if len(defects.bunched) > MOST_BUNCHED * len(recording):
-            defects.bunched = NO_NUMBERS
         for joint, ranges in zip(defects.joints, self.zeros.find_dropouts(recording), strict=True):
             joint.rows["zeros"] = np.unique(row_numbers(ranges))
         return defects
@@ -175,14 +176,19 @@ def _sum_jumps(jumps: list[tuple[int, float]], where: Numbers, count: int) -> Ar
 
 
 def _find_bunched(time: Array, interval: float) -> NDArray[np.bool_]:
-    """Rows of which the stamp is that of a neighbour; of two the one that leaves the more even intervals."""
-    steps = np.diff(time)
-    close = np.zeros(len(time), dtype=bool)
-    for k in np.flatnonzero(steps < BUNCHED * interval):
-        before = float(steps[k - 1]) if k > 0 else 0.0
-        after = float(steps[k + 1]) if k + 1 < len(steps) else 0.0
-        close[k if before > after else k + 1] = True
-    return close
+    """Rows whose stamp is no instant of theirs: off the line of their neighbours where several came together.
+
+    They waited for the last one. Of two that are still at one instant, the second is one too many.
+    """
+    is_close = np.diff(time, prepend=-np.inf) < BUNCHED * interval
+    if not is_close.any():
+        return is_close
+    offset = time - interval * np.arange(len(time))
+    off = np.abs(offset - ndimage.median_filter(offset, ON_A_LINE)) > OFF_THE_LINE * interval
+    waited = off & ndimage.maximum_filter1d(is_close, ON_A_LINE)
+    kept = np.flatnonzero(~waited)
+    waited[kept] = np.diff(time[kept], prepend=-np.inf) < BUNCHED * interval
+    return waited
 
 
 def _find_repeated(same: NDArray[np.bool_], hold: int) -> NDArray[np.bool_]:
