@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 
 from server.http.problem_check import assert_problem
 from tauscope.errors import RobotFileError
-from tauscope.server.http.robot_files import check_received_robot, read_received_robot
+from tauscope.server.queue.received_robot import check_received_robot, read_received_robot
 
 CHECK = "/api/v1/robots/check"
 URDF = (
