@@ -73,6 +73,7 @@ def test_xl330_at_gains_that_training_had_not(tmp_path: Path) -> None:
     assert by_horizon[0.1] < by_horizon[1.0] < 1.1 * by_horizon[None]
 
 
+@pytest.mark.slow
 def test_a_refinement_on_xl330_wins_at_gains_that_training_had_not(tmp_path: Path) -> None:
     """62.9 mrad with the best form of its makers, refitted by rollouts; 50 are wanted."""
     folder = SHARED_DATA / "bam-xl330"

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 import tauscope
 from cli.simulated_files import SimulatedFiles, write_files
+from diagnosis.diagnosed_arm import only_effects
 from tauscope.errors import MissingExtraError, RecordingMismatchError
 from tauscope.library import RecordingSource
 from tauscope.results import DiagnosisResult, ExcitationResult, IdentificationResult, SimulationResult
@@ -99,7 +100,8 @@ def test_a_motion_is_the_designs(motion: ExcitationResult) -> None:
 def test_a_diagnosis_names_the_spring(simulation: SimulationResult) -> None:
     from tauscope_sim.examples import example_robot
 
-    result = tauscope.diagnose(example_robot("paper_arm"), simulation, against="model")
+    with only_effects(["joint_spring", "cable_force", "cogging"]):
+        result = tauscope.diagnose(example_robot("paper_arm"), simulation, against="model")
     assert result.to_dict()["schema"] == "tauscope.diagnosis/1"
     assert result.document.against == "model"
     assert list(result.to_frame().columns) == [

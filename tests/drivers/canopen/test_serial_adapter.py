@@ -66,7 +66,7 @@ def test_a_frame_that_lacks_a_character_is_lost_and_the_next_is_not(adapter, los
         b"".join
     )
 )
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_no_text_crashes_the_reader(adapter, noise: bytes) -> None:
     assert all(identifier <= 0x1FFFFFFF for identifier, _ in received(adapter, noise))
 
