@@ -123,7 +123,7 @@ def test_without_held_out_recordings_it_says_so(case: Case, undrawn_figures: Non
     assert "Torque on a held-out recording" not in text
 
 
-def test_broken_unicode_of_a_file_name_is_spelled_out(case: Case) -> None:
+def test_broken_unicode_of_a_file_name_is_spelled_out(case: Case, undrawn_figures: None) -> None:
     (train,) = case.recordings
     page = replace(case, recordings=(replace(train, name="bad\udcff\x00.csv"),)).page()
     page.encode()
