@@ -51,6 +51,7 @@ NEEDED: dict[str, tuple[str, ...]] = {
         "tests/tasks",
         "tests/examples",
         "tests/cli",
+        "tests/house/test_installation.py",
         "tests/server",
         "tests/hardware_emulated/test_canopen_campaign.py",
     ),

@@ -13,6 +13,7 @@ import typer
 from cli.conftest import Ended
 from cli.simulated_files import NOISE_STD, SimulatedFiles
 from diagnosis.diagnosed_arm import only_effects
+from figures import leave_figures_undrawn
 from tauscope.cli.arguments import parse_cutoff
 from tauscope.robot import read_robot
 
@@ -197,7 +198,10 @@ def test_the_report_is_written(run: Run, files: SimulatedFiles, tmp_path: Path) 
     assert f"tauscope identify {files.robot} {files.train[0]} --held-out {files.held_out[0]}" in text
 
 
-def test_a_link_that_no_body_can_be_stands_first(run: Run, files: SimulatedFiles, tmp_path: Path) -> None:
+def test_a_link_that_no_body_can_be_stands_first(
+    run: Run, files: SimulatedFiles, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    leave_figures_undrawn(monkeypatch)
     link = "{mass: MASS, first_moment: [0.1, 0, 0], inertia: {xx: 0.1, yy: 0.2, zz: 0.2, xy: 0, xz: 0, yz: 0}}"
     links = ", ".join(link.replace("MASS", mass) for mass in ("1", "-1.4", "1"))
     robot = tmp_path / "robot.yaml"

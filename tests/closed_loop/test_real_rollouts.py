@@ -59,6 +59,7 @@ def _commands(folder: Path, robot: Robot, kind: str) -> list[Recording]:
     return recordings
 
 
+@pytest.mark.slow
 def test_xl330_at_gains_that_training_had_not(tmp_path: Path) -> None:
     """Trained at register gains 100 and 400, judged at 200 and 800; 101 mrad with the makers' parameters."""
     folder = SHARED_DATA / "bam-xl330"

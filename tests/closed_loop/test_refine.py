@@ -82,6 +82,7 @@ def test_friction_by_load_is_found_and_wins() -> None:
         assert p_value < 1e-3
 
 
+@pytest.mark.slow
 def test_friction_by_load_that_is_not_there_is_left_out() -> None:
     robot = _robot()
     refined = refine_model(_model(robot, 0.2, 0.2), _loops(robot), [_record(_model(robot), None, 6.0, 1)])

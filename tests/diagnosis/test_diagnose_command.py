@@ -13,12 +13,14 @@ from typer.testing import CliRunner
 import tauscope.tasks.diagnose
 from diagnosis.diagnosed_arm import only_effects, recordings
 from diagnosis.test_diagnosis_of_simulated_arms import spring
+from figures import leave_figures_undrawn
 from tauscope.cli.diagnose_command import diagnose
 from tauscope.cli.verbs import SeveralValuesCommand, add_verb
 from tauscope.diagnosis import Diagnosis, DiagnosisDocument
 from tauscope.errors import ExcitationError
 from tauscope.excitation import require_within_limits
 from tauscope.export.model_file import read_extended_model
+from tauscope.headroom.learners import LEARNERS
 from tauscope.recording import Recording
 from tauscope.robot import read_robot
 from tauscope.trajectory import motion_limits, read_trajectory
@@ -76,7 +78,9 @@ def written_once(files: list[str], tmp_path_factory: pytest.TempPathFactory) -> 
     monkeypatch = pytest.MonkeyPatch()
     diagnose = tauscope.tasks.diagnose.diagnose
     monkeypatch.setattr("tauscope.tasks.diagnose.diagnose", lambda *of: found.append(diagnose(*of)) or found[0])
-    monkeypatch.setattr("tauscope.headroom.learners.TREES", (2, 5))  # how much they learn is not asked here
+    monkeypatch.setattr("tauscope.headroom.joint_headroom.LEARNERS", LEARNERS[:1])  # how much it learns is not asked
+    monkeypatch.setattr("tauscope.headroom.learners.TREES", (2, 5))
+    leave_figures_undrawn(monkeypatch)
     status, shown = run(
         files[0],
         *("--held-out", files[1], "--headroom", "--json", str(out["out.json"])),
@@ -97,6 +101,13 @@ def test_the_document_is_written(written_once: Written) -> None:
     assert [each.joint for each in found.headroom or ()] == ["joint1", "joint2", "joint3"]
 
 
+@pytest.fixture
+def found_before(written_once: Written, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the same recording said once: a diagnosis takes seconds."""
+    monkeypatch.setattr("tauscope.tasks.diagnose.diagnose", lambda *_: written_once.found)
+
+
+@pytest.mark.usefixtures("found_before")
 def test_a_terminal_shows_verdict_and_statement(files: list[str]) -> None:
     status, shown = run(files[0])
     assert status == 0
@@ -107,6 +118,7 @@ def test_a_terminal_shows_verdict_and_statement(files: list[str]) -> None:
     assert "Noise: from differences between repeated periods" in shown
 
 
+@pytest.mark.usefixtures("found_before")
 def test_everything_that_can_be_written_is_written_and_read_again(written_once: Written, files: list[str]) -> None:
     out = written_once.out
     arm = read_robot(example_robot("paper_arm"))
@@ -127,14 +139,14 @@ def test_everything_that_can_be_written_is_written_and_read_again(written_once: 
     assert "consistent" in shown
 
 
+@pytest.mark.usefixtures("found_before")
 def test_limits_that_allow_no_next_experiment_cost_nobody_the_diagnosis(
-    files: list[str], written_once: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    files: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refused(*_: object, **__: object) -> None:
         raise ExcitationError("joint1: no room; relax its limits")
 
     monkeypatch.setattr("tauscope.tasks.diagnose.planned_experiment", refused)
-    monkeypatch.setattr("tauscope.tasks.diagnose.diagnose", lambda *_: written_once.found)
     out, motion = tmp_path / "out.json", tmp_path / "next.json"
     status, shown = run(files[0], "--json", str(out), "--next-trajectory", str(motion))
     assert status == 1

@@ -103,7 +103,7 @@ def test_links_whose_angle_wraps_are_measured_as_any_other() -> None:
         assert other.compliance == pytest.approx(one.compliance, abs=0.01 * one.compliance_std)
 
 
-SEARCHED = pytest.mark.parametrize("effects", few_or_all("joint_spring", "time_delay", "load_dependent_friction"))
+SEARCHED = pytest.mark.parametrize("effects", few_or_all("joint_spring"))
 
 
 def diagnosed(effects: Sequence[str] | None, **deflection: tuple[float, ...]) -> Diagnosis:

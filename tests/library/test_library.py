@@ -37,7 +37,7 @@ def identification(files: SimulatedFiles) -> IdentificationResult:
 def motion() -> ExcitationResult:
     from tauscope_sim.examples import example_robot
 
-    options = {"slow_reversals": False, "closing_period": False}
+    options = {"slow_reversals": False, "closing_period": False, "starts": 1}
     return tauscope.design_excitation(example_robot("paper_arm"), period_s=5.0, harmonics=3, periods=2, **options)
 
 

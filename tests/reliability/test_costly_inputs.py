@@ -127,6 +127,7 @@ def test_no_small_file_is_costly(pool: WorkerPool, tmp_path: Path) -> None:
     assert not found, "\n".join(found)
 
 
+@pytest.mark.slow
 def test_the_measure_sees_memory(pool: WorkerPool) -> None:
     used = pool.submit(hold, 50 * 2**20).result(60.0)
     assert used >= 50 * 2**20

@@ -17,7 +17,7 @@ OWN = 0o077
 SERVE = [sys.executable, "-m", "tauscope.cli", "serve", "--port", "0", "--data"]
 
 
-@pytest.mark.parametrize("damage", ["header", "middle"])
+@pytest.mark.parametrize("damage", [pytest.param("header", marks=pytest.mark.slow), "middle"])
 def test_a_damaged_database_is_one_line(tmp_path: Path, damage: str) -> None:
     path = tmp_path / FILE_NAME
     Database(path).close()
