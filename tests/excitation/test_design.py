@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from arms import random_link, ur5_like
-from excitation.excited_arms import assert_within_limits, limited_paper_arm, modelled_arm, with_limits
+from excitation.excited_arms import assert_within_limits, limited_paper_arm, modelled_arm, short_search, with_limits
 from tauscope.dynamics import base_parameters
 from tauscope.errors import ExcitationError
 from tauscope.excitation import (
@@ -23,7 +23,6 @@ from tauscope.excitation import (
     OptimiserProgress,
     Workspace,
     design_excitation,
-    optimiser,
 )
 from tauscope.excitation.information import ExcitationRegressor
 from tauscope.excitation.workspace import WorkspaceUsage
@@ -36,10 +35,7 @@ QUICK = ExcitationOptions(starts=1, slow_postures=1)
 
 @pytest.fixture(scope="module", autouse=True)
 def _short_search() -> Iterator[None]:
-    """A few iterations are enough to see whether limits are kept."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name, value in (("CANDIDATES", 24), ("SHORT_ROUND", 12), ("LONG_ROUND", 12)):
-            patch.setattr(optimiser, name, value)
+    with short_search():
         yield
 
 
@@ -55,7 +51,7 @@ LIMITS = {
 }
 
 
-@settings(max_examples=5, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=3, suppress_health_check=[HealthCheck.too_slow])
 @given(**LIMITS)
 def test_random_limits_hold_at_every_instant(**drawn: Any) -> None:
     check_random_limits(**drawn)

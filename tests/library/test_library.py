@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 import tauscope
 from cli.simulated_files import SimulatedFiles, write_files
 from diagnosis.diagnosed_arm import only_effects
+from excitation.excited_arms import short_search
 from tauscope.errors import MissingExtraError, RecordingMismatchError
 from tauscope.library import RecordingSource
 from tauscope.results import DiagnosisResult, ExcitationResult, IdentificationResult, SimulationResult
@@ -37,8 +38,9 @@ def identification(files: SimulatedFiles) -> IdentificationResult:
 def motion() -> ExcitationResult:
     from tauscope_sim.examples import example_robot
 
-    options = {"slow_reversals": False, "closing_period": False, "starts": 1}
-    return tauscope.design_excitation(example_robot("paper_arm"), period_s=5.0, harmonics=3, periods=2, **options)
+    options = {"slow_reversals": False, "closing_period": False}
+    with short_search():
+        return tauscope.design_excitation(example_robot("paper_arm"), period_s=5.0, harmonics=3, periods=2, **options)
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ import pytest
 
 from diagnosis.diagnosed_arm import only_effects, recordings
 from diagnosis.test_diagnosis_of_simulated_arms import spring
+from excitation.excited_arms import short_search
 from report.conftest import HOSTILE, JOINTS
 from report.test_identification_report import LOADING, Reading
 from shared_data import SHARED_DATA, needs_shared_data
@@ -43,7 +44,8 @@ def found() -> Diagnosis:
 
 @pytest.fixture(scope="module")
 def planned(found: Diagnosis) -> PlannedExperiment:
-    return plan_experiment(found)
+    with short_search():
+        return plan_experiment(found)
 
 
 @pytest.fixture(scope="module")

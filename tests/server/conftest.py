@@ -11,6 +11,7 @@ from starlette.routing import BaseRoute
 from starlette.testclient import TestClient
 
 from databases import address, database, postgres
+from excitation.excited_arms import short_search
 from figures import leave_figures_undrawn
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.paper_files import PAPER_ROBOT, write_recording
@@ -64,6 +65,13 @@ def inline_readers(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPat
     """Files are read in this process, unless a test asks for `reader_processes`: to start them takes a second."""
     if "reader_processes" not in request.fixturenames:
         monkeypatch.setattr("tauscope.server.http.services.open_readers", lambda _: InlineExecutor())
+
+
+@pytest.fixture(autouse=True, scope="module")
+def quick_designs() -> Iterator[None]:
+    """Motions are designed within a few iterations."""
+    with short_search():
+        yield
 
 
 @pytest.fixture
