@@ -43,8 +43,8 @@ def request_of(name: str, *, is_gone: bool = False) -> Request:
     return Request({"type": "http", "headers": [], CALLER: caller}, receive)
 
 
-def test_a_process_that_reads_robots_begins_without_the_rest_of_the_service() -> None:
-    loaded = packages_of("tauscope.server.queue.received_robot")
+def test_a_process_that_reads_files_begins_without_the_rest_of_the_service() -> None:
+    loaded = packages_of("tauscope.server.queue.received_robot, tauscope.server.queue.received_recording")
     assert not {"fastapi", "starlette", "sqlalchemy", "scipy"} & loaded
 
 

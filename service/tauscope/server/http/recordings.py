@@ -19,7 +19,7 @@ from tauscope.server.http.reading import READING
 from tauscope.server.http.robot_files import FindingAnswer, robot_part_rules
 from tauscope.server.http.services import ServicesDep, require_no_evidence
 from tauscope.server.problems import ProblemError, problem_responses
-from tauscope.server.queue.analyses import check_kept_recording, read_kept_samples, understand_recording
+from tauscope.server.queue.received_recording import check_kept_recording, read_kept_samples, understand_recording
 from tauscope.server.queue.received_robot import read_received_robot
 from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import StoredRecording

@@ -48,7 +48,8 @@ from tauscope.server.http.tasks.submission import (
     receive_request,
 )
 from tauscope.server.problems import Problem, ProblemError, make_problem
-from tauscope.server.queue.analyses import ExcitationOrder, ExcitationWorkspace, check_trajectory
+from tauscope.server.queue.analyses import ExcitationOrder, ExcitationWorkspace
+from tauscope.server.queue.received_recording import check_trajectory
 from tauscope.server.queue.received_robot import read_received_robot
 from tauscope.server.queue.task_job import stage_workspace, submit_job
 from tauscope.server.store.event_log import EventLog
