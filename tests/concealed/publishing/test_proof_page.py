@@ -76,7 +76,7 @@ def trial(series: str, seed: int, score: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def outcomes() -> list[dict[str, Any]]:
     told = [trial("sound", seed, QUIET) for seed in range(98)] + [trial("sound", seed, WRONG) for seed in (98, 99)]
     told += [trial("moderate", seed, RIGHT) for seed in range(19)] + [trial("moderate", 19, WRONG)]

@@ -20,6 +20,14 @@ PATIENCE_S = 10.0
 CHARACTERS = [b"t", b"T", b"r", b"d", b"x", b"1", b"8", b"F", b"\r", b"\a", b"\xff"]
 
 
+@pytest.fixture(scope="module", autouse=True)
+def adapters_that_never_tell_their_version() -> Iterator[None]:
+    """Nobody waits for long until they do."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tauscope_drivers.canopen.interfaces.RESTART_S", 0.1)
+        yield
+
+
 @pytest.fixture(scope="module")
 def adapter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[PseudoTerminal, SerialAdapterBus]]:
     path = str(tmp_path_factory.mktemp("adapter") / "port")
