@@ -53,6 +53,7 @@ def test_a_recording_in_every_format(suffix: str, run: Run, short: Path, tmp_pat
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["short.json", out.name])
 
 
+@pytest.mark.slow
 def test_a_link_that_no_body_can_be_is_simulated_as_the_nearest_body(run: Run, short: Path, tmp_path: Path) -> None:
     robot = tmp_path / "robot.yaml"
     text = Path(PAPER_ROBOT).read_text(encoding="utf-8")
@@ -138,7 +139,7 @@ def test_ctrl_c_stops_the_arm_and_keeps_what_was_recorded(tmp_path: Path) -> Non
             records = list(tmp_path.glob(".tauscope-run-*/run/run.json"))
             if not records or json.loads(records[0].read_bytes())["state"] != "running":
                 return False
-            return records[0].with_name("journal.mcap").stat().st_size > 20_000
+            return records[0].with_name("journal.mcap").stat().st_size > 200_000
 
         wait_until(is_running)
         os.kill(process.pid, signal.SIGINT)

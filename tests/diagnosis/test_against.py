@@ -33,7 +33,7 @@ def real() -> Diagnosis:
     """Of recordings of the arm with 0.3 kg at its tool."""
     rng = np.random.default_rng(8)
     made = [noisy(exact_motion(seed, SEEDS), torque_of_load(seed, MASS, PLACE), seed, rng) for seed in SEEDS]
-    with only_effects(["payload", "joint_spring"]):
+    with only_effects(["payload"]):
         return diagnose(mistaken(), made)
 
 

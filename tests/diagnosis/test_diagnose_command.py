@@ -43,7 +43,7 @@ def written(folder: Path, name: str, recording: Recording) -> Path:
 
 @pytest.fixture(scope="module", autouse=True)
 def few_effects() -> Iterator[None]:
-    with only_effects(["joint_spring", "cogging", "cable_force"]):
+    with only_effects(["joint_spring"]):
         yield
 
 

@@ -19,7 +19,7 @@ def found() -> Diagnosis:
     """The paper's arm with a spring at its first joint, one motion held out."""
     robot = replace(read_robot(example_robot("paper_arm")), model=Model())
     train, held_out = recordings((1, 2), spring, np.random.default_rng(5))
-    with only_effects(["joint_spring", "cogging", "cable_force"]):
+    with only_effects(["joint_spring"]):
         return diagnose(robot, [train], [held_out])
 
 

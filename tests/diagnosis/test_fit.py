@@ -27,7 +27,7 @@ def stribeck(arm: SimulatedArm, rigid: Array) -> Array:
 def diagnosis() -> Diagnosis:
     rng = np.random.default_rng(3)
     with only_effects(["stribeck_friction"]):
-        return diagnose(paper_robot(), recordings((1, 2), stribeck, rng), recordings((11,), stribeck, rng))
+        return diagnose(paper_robot(), recordings((1,), stribeck, rng), recordings((11,), stribeck, rng))
 
 
 def curve(diagnosis: Diagnosis) -> Term:

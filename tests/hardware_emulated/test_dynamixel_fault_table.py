@@ -70,7 +70,7 @@ def test_every_fault_in_every_phase(site: Site) -> None:
 
 QUICK = [
     (FaultKind.OVERLOAD, "run", "overload"),
-    (FaultKind.SILENT, "stop", "silent"),
+    pytest.param(FaultKind.SILENT, "stop", "silent", marks=pytest.mark.slow),
     pytest.param(FaultKind.LOSE, "run", "", marks=pytest.mark.slow),
 ]
 

@@ -102,7 +102,7 @@ def test_a_motion_is_the_designs(motion: ExcitationResult) -> None:
 def test_a_diagnosis_names_the_spring(simulation: SimulationResult) -> None:
     from tauscope_sim.examples import example_robot
 
-    with only_effects(["joint_spring", "cable_force", "cogging"]):
+    with only_effects(["joint_spring"]):
         result = tauscope.diagnose(example_robot("paper_arm"), simulation, against="model")
     assert result.to_dict()["schema"] == "tauscope.diagnosis/1"
     assert result.document.against == "model"

@@ -38,7 +38,7 @@ def found() -> Diagnosis:
     joints = tuple(replace(joint, name=name) for joint, name in zip(arm.joints, JOINTS, strict=True))
     robot = replace(arm, name=HOSTILE, joints=joints, model=Model())
     train, held_out = recordings((1, 2), spring, np.random.default_rng(5))
-    with only_effects(["joint_spring", "cogging", "cable_force"]):
+    with only_effects(["joint_spring"]):
         return diagnose(robot, [replace(train, name=f"{HOSTILE}.csv")], [held_out])
 
 

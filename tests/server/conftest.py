@@ -15,12 +15,11 @@ from excitation.excited_arms import short_search
 from figures import leave_figures_undrawn
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.paper_files import PAPER_ROBOT, write_recording
-from tauscope.report import diagnosis_report, identification_report
 from tauscope.server.http import Settings, create_app
 from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.database.database import FILE_NAME, Database
 
-__all__ = ["address", "database", "diagnosis_report", "identification_report", "postgres"]
+__all__ = ["address", "database", "postgres"]
 
 HOST = "http://127.0.0.1:8000"
 IDENTIFICATIONS = "/api/v1/identifications"
