@@ -123,6 +123,7 @@ def test_what_is_refused(
     assert [path.name for path in tmp_path.iterdir()] == ["short.json"]
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_the_arm_and_keeps_what_was_recorded(tmp_path: Path) -> None:
     long = motion(tmp_path / "long.json", 600.0)
     out = tmp_path / "out.csv"
