@@ -16,7 +16,12 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 EMULATORS = ("tests/drivers", "tests/hardware_emulated", "tests/sim_backend")
 KILLS = ("tests/runtime", "tests/hardware_emulated")
 SERVICE = ("tests/server", "tests/reliability", "tests/browser", "tests/client")
-QUICK_PROOF = ("tests/concealed/test_proof.py", "tests/concealed/test_reduced_bench.py", "tests/concealed/real")
+QUICK_PROOF = (
+    "tests/docs/test_readme.py",
+    "tests/concealed/test_proof.py",
+    "tests/concealed/test_reduced_bench.py",
+    "tests/concealed/real",
+)
 
 NEEDED: dict[str, tuple[str, ...]] = {
     # moving the arm
@@ -46,6 +51,7 @@ NEEDED: dict[str, tuple[str, ...]] = {
         "tests/tasks",
         "tests/examples",
         "tests/cli",
+        "tests/house/test_installation.py",
         "tests/server",
         "tests/hardware_emulated/test_canopen_campaign.py",
     ),
@@ -60,7 +66,7 @@ NEEDED: dict[str, tuple[str, ...]] = {
     "docs/": ("tests/server/http/test_handbook.py",),
     "docs/examples/": ("tests/examples",),
     "typings/": (),
-    "README.md": (),
+    "README.md": ("tests/docs/test_readme.py",),
     "CHANGELOG.md": (),
     "CONTRIBUTING.md": (),
     "LICENSE": (),

@@ -158,7 +158,7 @@ def test_interruption_is_130(files: SimulatedFiles, monkeypatch: pytest.MonkeyPa
 def test_the_process_ends_as_main_says(files: SimulatedFiles, tmp_path: Path) -> None:
     empty = tmp_path / "empty.csv"
     empty.touch()
-    for words, status in ((["--version"], 0), (["robot", "check", empty], 1), (["robot", "check"], 2)):
+    for words, status in ((["--version"], 0), (["robot", "check", empty], 1), (["identfy"], 2)):
         ended = subprocess.run([*PROGRAM, *map(str, words)], check=False, capture_output=True, text=True, timeout=60)
         assert ended.returncode == status
         assert "Traceback" not in ended.stderr

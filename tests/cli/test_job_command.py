@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import Ended
+from figures import leave_figures_undrawn
 from server.conftest import connected
 from server.queue.executors import InlineExecutor
 from snapshots import SNAPSHOTS, unpacked
@@ -36,6 +37,7 @@ def done_here(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("open_readers", "open_executor"):
         monkeypatch.setattr(f"tauscope.server.http.services.{name}", lambda *_, **__: InlineExecutor())
     monkeypatch.setattr("tauscope.cli.job_command.POLL_S", 0.02)
+    leave_figures_undrawn(monkeypatch)
 
 
 @pytest.mark.usefixtures("done_here")

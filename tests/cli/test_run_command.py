@@ -53,6 +53,7 @@ def test_a_recording_in_every_format(suffix: str, run: Run, short: Path, tmp_pat
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["short.json", out.name])
 
 
+@pytest.mark.slow
 def test_a_link_that_no_body_can_be_is_simulated_as_the_nearest_body(run: Run, short: Path, tmp_path: Path) -> None:
     robot = tmp_path / "robot.yaml"
     text = Path(PAPER_ROBOT).read_text(encoding="utf-8")
@@ -64,14 +65,16 @@ def test_a_link_that_no_body_can_be_is_simulated_as_the_nearest_body(run: Run, s
     assert "the nearest body is used" in warning
 
 
-def test_the_scenario_and_the_posture_count_and_a_name_is_made_of_the_moment(
+def test_scenario_posture_and_limits_of_lost_samples_count_and_a_name_is_made_of_the_moment(
     run: Run, short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scenario.yaml").write_text("torque_noise_std: 2.0\n", encoding="utf-8")
-    options = ["--scenario", "scenario.yaml", "--start", "0.2,0.6,0.6"]
+    lenient = ["--stale-ms", "5", "--missed", "10", "--lost-s", "0.2", "--least-kept", "0.5"]
+    options = ["--scenario", "scenario.yaml", "--start", "0.2,0.6,0.6", *lenient]
     ended = run("run", PAPER_ROBOT, "--trajectory", short, "--rate", "200", *options)
     assert ended.status == 0
+    assert "samples kept" in ended.out
     (made,) = tmp_path.glob("run-*Z.csv")
     assert f"wrote {made.name}\n" in ended.out
     # Differences of white noise have √2 times its deviation; without noise the torque of this motion has less than 0.1.
@@ -120,6 +123,7 @@ def test_what_is_refused(
     assert [path.name for path in tmp_path.iterdir()] == ["short.json"]
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_the_arm_and_keeps_what_was_recorded(tmp_path: Path) -> None:
     long = motion(tmp_path / "long.json", 600.0)
     out = tmp_path / "out.csv"
@@ -148,14 +152,6 @@ def test_ctrl_c_stops_the_arm_and_keeps_what_was_recorded(tmp_path: Path) -> Non
     assert f"wrote {out}\n" in printed
     assert len(read_recording(out)) > 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["long.json", "out.csv"]
-
-
-def test_the_limits_of_lost_samples_are_options(run: Run, short: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out.csv"
-    lenient = ["--stale-ms", "5", "--missed", "10", "--lost-s", "0.2", "--least-kept", "0.5"]
-    ended = run("run", PAPER_ROBOT, "--trajectory", short, "--out", out, "--rate", "200", START, *lenient)
-    assert (ended.status, ended.err) == (0, "")
-    assert "samples kept" in ended.out
 
 
 @pytest.mark.parametrize(

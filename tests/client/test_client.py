@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from server.auth.keyed import make_keys
+from server.conftest import inline_readers
 from server.http.contract.running import running
 from server.http.motions import ROBOT, ROBOT_FILE, move_document
 from server.queue.controls import HandControls
@@ -19,6 +20,8 @@ from tauscope.runtime.states import RunState
 from tauscope.server.auth.keys import Scope
 from tauscope.server.http import Settings, create_app
 from tauscope.server.queue.job_folder import JobState
+
+__all__ = ["inline_readers"]
 
 
 @pytest.fixture
@@ -63,7 +66,7 @@ def motion(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def mover(keys: dict[Scope, str], address: str) -> Client:
-    return Client(address, keys[Scope.MOVE], timeout_s=120.0)  # the first request waits for a reader to start
+    return Client(address, keys[Scope.MOVE])
 
 
 def test_an_arm_is_taken_moved_and_given_back(

@@ -59,6 +59,7 @@ def _commands(folder: Path, robot: Robot, kind: str) -> list[Recording]:
     return recordings
 
 
+@pytest.mark.slow
 def test_xl330_at_gains_that_training_had_not(tmp_path: Path) -> None:
     """Trained at register gains 100 and 400, judged at 200 and 800; 101 mrad with the makers' parameters."""
     folder = SHARED_DATA / "bam-xl330"
@@ -73,6 +74,7 @@ def test_xl330_at_gains_that_training_had_not(tmp_path: Path) -> None:
     assert by_horizon[0.1] < by_horizon[1.0] < 1.1 * by_horizon[None]
 
 
+@pytest.mark.slow
 def test_a_refinement_on_xl330_wins_at_gains_that_training_had_not(tmp_path: Path) -> None:
     """62.9 mrad with the best form of its makers, refitted by rollouts; 50 are wanted."""
     folder = SHARED_DATA / "bam-xl330"

@@ -66,7 +66,7 @@ def _record(model: ExportModel, by_load: LoadFriction | None, seconds: float, se
 def test_friction_by_load_is_found_and_wins() -> None:
     robot = _robot()
     by_load = LoadFriction(np.array([DRIVING]), np.array([BRAKING]))
-    train, judge = (_record(_model(robot), by_load, 12.0, seed) for seed in (1, 2))
+    train, judge = (_record(_model(robot), by_load, 6.0, seed) for seed in (1, 2))
     document = roll_out(robot, [judge], [_model(robot, stiction=0.25, viscous=0.2)], training=[train]).document
     assert [entry.model for entry in document.summary] == ["stated", "identified", "refined"]
     assert document.summary[-1].rms[0] < 0.2 * document.summary[-2].rms[0]
@@ -82,9 +82,10 @@ def test_friction_by_load_is_found_and_wins() -> None:
         assert p_value < 1e-3
 
 
+@pytest.mark.slow
 def test_friction_by_load_that_is_not_there_is_left_out() -> None:
     robot = _robot()
-    refined = refine_model(_model(robot, 0.2, 0.2), _loops(robot), [_record(_model(robot), None, 12.0, 1)])
+    refined = refine_model(_model(robot, 0.2, 0.2), _loops(robot), [_record(_model(robot), None, 6.0, 1)])
     assert set(refined.left_out) == {"driving friction joint1", "braking friction joint1"}
     assert refined.model.friction[0].stiction == pytest.approx(0.08, rel=0.15)
     assert refined.model.friction[0].viscous == pytest.approx(0.1, rel=0.15)

@@ -140,7 +140,7 @@ def test_recorded_torque_drives_where_no_loop_is_stated() -> None:
 
 def test_a_delay_that_nothing_states_is_estimated() -> None:
     robot = _robot()
-    real = _record(_model(robot), 12.0)
+    real = _record(_model(robot), 4.0)
     samples = real.samples()
     late = Recording.from_arrays(
         "late",

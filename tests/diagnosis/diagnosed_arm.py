@@ -1,11 +1,16 @@
 """Recordings of the paper's arm with an effect written out here, never taken from the catalogue."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 
 import numpy as np
+import pytest
+from _pytest.mark import ParameterSet
 
 from identification.simulated import PAPER_NOISE, Array, SimulatedArm, paper_robot, simulate
+from tauscope.diagnosis import Diagnosis, diagnose
+from tauscope.effects import possible_effects
 from tauscope.recording import Recording
 from tauscope.robot import FrictionCoefficients
 
@@ -35,6 +40,33 @@ def recordings(seeds: tuple[int, ...], effect: EffectTorque | None, rng: np.rand
         noise = POSITION_NOISE * rng.standard_normal(rigid.shape)
         made.append(arm.recording(arm.white(PAPER_NOISE, rng), noise, extra_torque=extra, name=f"motion-{seed}"))
     return made
+
+
+def few_or_all(*ids: str) -> list[ParameterSet]:
+    """What `only_effects` takes: a few effects in a quick test, and all in a slow one."""
+    return [pytest.param(ids, id="few effects"), pytest.param(None, id="whole catalogue", marks=pytest.mark.slow)]
+
+
+@contextmanager
+def only_effects(ids: Sequence[str] | None) -> Iterator[None]:
+    """Diagnoses that look for these effects alone: to compare the whole catalogue takes most of a diagnosis' time."""
+    if ids is None:
+        yield
+        return
+    module = "tauscope.diagnosis.search.from_recordings"
+    with pytest.MonkeyPatch.context() as patch:
+        forms = [f"{module}.possible_effects", f"{module}.farther_effects"]
+        patch.setattr(forms[0], lambda context: [each for each in possible_effects(context) if each.id in ids])
+        patch.setattr(forms[1], lambda _: [])
+        yield
+
+
+@cache
+def sound_arm() -> Diagnosis:
+    """Of an arm that lacks nothing, with held-out motion."""
+    rng = np.random.default_rng(0)
+    with only_effects(["joint_spring"]):
+        return diagnose(paper_robot(), recordings((1,), None, rng), recordings((11,), None, rng))
 
 
 def at_joint(joint: int, torque: Array) -> Array:

@@ -1,6 +1,7 @@
 """``tauscope diagnose`` from the files to its document; the parser is the program's own."""
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,14 +11,16 @@ import typer
 from typer.testing import CliRunner
 
 import tauscope.tasks.diagnose
-from diagnosis.diagnosed_arm import recordings
+from diagnosis.diagnosed_arm import only_effects, recordings
 from diagnosis.test_diagnosis_of_simulated_arms import spring
+from figures import leave_figures_undrawn
 from tauscope.cli.diagnose_command import diagnose
 from tauscope.cli.verbs import SeveralValuesCommand, add_verb
 from tauscope.diagnosis import Diagnosis, DiagnosisDocument
 from tauscope.errors import ExcitationError
 from tauscope.excitation import require_within_limits
 from tauscope.export.model_file import read_extended_model
+from tauscope.headroom.learners import LEARNERS
 from tauscope.recording import Recording
 from tauscope.robot import read_robot
 from tauscope.trajectory import motion_limits, read_trajectory
@@ -36,6 +39,12 @@ def written(folder: Path, name: str, recording: Recording) -> Path:
     path = folder / f"{name}.csv"
     np.savetxt(path, np.hstack(columns), delimiter=",", header=header, comments="", fmt="%.9g")
     return path
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_effects() -> Iterator[None]:
+    with only_effects(["joint_spring"]):
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +78,9 @@ def written_once(files: list[str], tmp_path_factory: pytest.TempPathFactory) -> 
     monkeypatch = pytest.MonkeyPatch()
     diagnose = tauscope.tasks.diagnose.diagnose
     monkeypatch.setattr("tauscope.tasks.diagnose.diagnose", lambda *of: found.append(diagnose(*of)) or found[0])
-    monkeypatch.setattr("tauscope.headroom.learners.TREES", (5, 20))  # how much they learn is not asked here
+    monkeypatch.setattr("tauscope.headroom.joint_headroom.LEARNERS", LEARNERS[:1])  # how much it learns is not asked
+    monkeypatch.setattr("tauscope.headroom.learners.TREES", (2, 5))
+    leave_figures_undrawn(monkeypatch)
     status, shown = run(
         files[0],
         *("--held-out", files[1], "--headroom", "--json", str(out["out.json"])),
@@ -90,6 +101,13 @@ def test_the_document_is_written(written_once: Written) -> None:
     assert [each.joint for each in found.headroom or ()] == ["joint1", "joint2", "joint3"]
 
 
+@pytest.fixture
+def found_before(written_once: Written, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the same recording said once: a diagnosis takes seconds."""
+    monkeypatch.setattr("tauscope.tasks.diagnose.diagnose", lambda *_: written_once.found)
+
+
+@pytest.mark.usefixtures("found_before")
 def test_a_terminal_shows_verdict_and_statement(files: list[str]) -> None:
     status, shown = run(files[0])
     assert status == 0
@@ -100,6 +118,7 @@ def test_a_terminal_shows_verdict_and_statement(files: list[str]) -> None:
     assert "Noise: from differences between repeated periods" in shown
 
 
+@pytest.mark.usefixtures("found_before")
 def test_everything_that_can_be_written_is_written_and_read_again(written_once: Written, files: list[str]) -> None:
     out = written_once.out
     arm = read_robot(example_robot("paper_arm"))
@@ -115,19 +134,19 @@ def test_everything_that_can_be_written_is_written_and_read_again(written_once: 
     assert "explained" in page
     assert "http://" not in page.replace("http://www.w3.org", "")
     compile(out["code.py"].read_text(), "code.py", "exec")
-    status, shown = run(*files, "--against", str(out["model.json"]))
+    status, shown = run(files[0], "--against", str(out["model.json"]))
     assert status == 0
     assert "consistent" in shown
 
 
+@pytest.mark.usefixtures("found_before")
 def test_limits_that_allow_no_next_experiment_cost_nobody_the_diagnosis(
-    files: list[str], written_once: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    files: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refused(*_: object, **__: object) -> None:
         raise ExcitationError("joint1: no room; relax its limits")
 
     monkeypatch.setattr("tauscope.tasks.diagnose.planned_experiment", refused)
-    monkeypatch.setattr("tauscope.tasks.diagnose.diagnose", lambda *_: written_once.found)
     out, motion = tmp_path / "out.json", tmp_path / "next.json"
     status, shown = run(files[0], "--json", str(out), "--next-trajectory", str(motion))
     assert status == 1
@@ -151,7 +170,7 @@ def test_against_the_model_wrong_values_and_missing_structure_are_told_apart(fil
         text.replace("{stiction: 1.0, stribeck: -0.2, viscous: 0.277}", "{stiction: 1.0, stribeck: -0.2, viscous: 0.1}")
     )
     out = tmp_path / "out.json"
-    result = CliRunner().invoke(app, [str(robot), *files, "--against", "model", "--json", str(out)])
+    result = CliRunner().invoke(app, [str(robot), files[0], "--against", "model", "--json", str(out)])
     assert result.exit_code == 0
     found = DiagnosisDocument.model_validate_json(out.read_text())
     assert found.against == "model"

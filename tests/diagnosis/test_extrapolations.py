@@ -1,9 +1,12 @@
 """Held-out motion beyond training: which joints, and by what."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from diagnosis.diagnosed_arm import few_or_all, only_effects
 from identification.simulated import Array, SimulatedArm, paper_robot, simulate
 from tauscope.diagnosis import diagnose, document
 from tauscope.identification import Identification, identify
@@ -47,12 +50,14 @@ def test_motion_of_the_same_kind_is_no_extrapolation_however_loud_the_noise() ->
     assert extrapolations(found) == {}
 
 
-def test_a_cable_that_only_held_out_motion_reaches_is_inconclusive() -> None:
+@pytest.mark.parametrize("effects", few_or_all("cable_force", "joint_spring"))
+def test_a_cable_that_only_held_out_motion_reaches_is_inconclusive(effects: Sequence[str] | None) -> None:
     """Training cannot name it, and its error may as well be that of parameters which training leaves open."""
     wide = motion(2)
     pull = np.zeros_like(wide.exact.torque_exact)
     pull[:, 0] = -60.0 * np.maximum(np.abs(wide.exact.exact.position[:, 0]) - 1.0, 0.0)
-    found = diagnose(paper_robot(), [recorded(motion(1, 0.3), 1)], [recorded(wide, 2, extra=pull)])
+    with only_effects(effects):
+        found = diagnose(paper_robot(), [recorded(motion(1, 0.3), 1)], [recorded(wide, 2, extra=pull)])
     told = document(found)
     assert told.verdict == "inconclusive"
     assert "extrapolation" in {each.code for each in told.warnings}

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.diagnosed_arm import at_joint, recordings
+from diagnosis.diagnosed_arm import at_joint, only_effects, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
 from tauscope.diagnosis import diagnose
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
@@ -26,7 +26,8 @@ def stribeck(arm: SimulatedArm, rigid: Array) -> Array:
 @pytest.fixture(scope="module")
 def diagnosis() -> Diagnosis:
     rng = np.random.default_rng(3)
-    return diagnose(paper_robot(), recordings((1, 2), stribeck, rng), recordings((11,), stribeck, rng))
+    with only_effects(["stribeck_friction"]):
+        return diagnose(paper_robot(), recordings((1,), stribeck, rng), recordings((11,), stribeck, rng))
 
 
 def curve(diagnosis: Diagnosis) -> Term:

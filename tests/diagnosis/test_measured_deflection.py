@@ -1,8 +1,11 @@
 """Compliance and play from an encoder on the link: their size, what mounting adds, and a joint that is rigid."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
+from diagnosis.diagnosed_arm import few_or_all, only_effects
 from diagnosis.linked_arm import linked_recordings
 from identification.simulated import Array, paper_robot
 from tauscope.diagnosis import Diagnosis, diagnose, document
@@ -100,14 +103,19 @@ def test_links_whose_angle_wraps_are_measured_as_any_other() -> None:
         assert other.compliance == pytest.approx(one.compliance, abs=0.01 * one.compliance_std)
 
 
-def diagnosed(**deflection: tuple[float, ...]) -> Diagnosis:
+SEARCHED = pytest.mark.parametrize("effects", few_or_all("joint_spring"))
+
+
+def diagnosed(effects: Sequence[str] | None, **deflection: tuple[float, ...]) -> Diagnosis:
     rng = np.random.default_rng(7)
     train, held_out = (linked_recordings(seeds, rng, **deflection) for seeds in (SEEDS, (11,)))  # type: ignore[arg-type]
-    return diagnose(paper_robot(), train, held_out)
+    with only_effects(effects):
+        return diagnose(paper_robot(), train, held_out)
 
 
-def test_a_diagnosis_names_what_the_encoders_show() -> None:
-    diagnosis = diagnosed(compliance=(0.0, 3e-4, 0.0), play=PLAY)
+@SEARCHED
+def test_a_diagnosis_names_what_the_encoders_show(effects: Sequence[str] | None) -> None:
+    diagnosis = diagnosed(effects, compliance=(0.0, 3e-4, 0.0), play=PLAY)
     found = document(diagnosis)
     named = {(each.effect, each.joint): each for each in found.findings}
     assert {("backlash", "joint1"), ("joint_elasticity", "joint2")} <= set(named)
@@ -122,8 +130,9 @@ def test_a_diagnosis_names_what_the_encoders_show() -> None:
     assert [type(term.effect) for term in again] == [type(term.effect) for term in terms]
 
 
-def test_a_rigid_joint_is_never_called_elastic() -> None:
+@SEARCHED
+def test_a_rigid_joint_is_never_called_elastic(effects: Sequence[str] | None) -> None:
     """The torque of a spring that the motors do not show is none of a transmission."""
-    found = diagnosed()
+    found = diagnosed(effects)
     assert not [each for each in possible_effects(found.setting) if each.id in ("joint_elasticity", "backlash")]
     assert document(found).verdict == "consistent"

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.diagnosed_arm import sound_arm
 from diagnosis.made_up_findings import finding, form
-from diagnosis.test_diagnosis_of_simulated_arms import diagnosed
 from identification.simulated import paper_robot
 from tauscope.diagnosis import Diagnosis
 from tauscope.diagnosis.findings.plain import _without, states_friction, undeclared_offsets, with_plain_terms
@@ -18,7 +18,7 @@ JOINT = 1
 
 def of_size(term: str, value: float, joint: int = JOINT) -> Diagnosis:
     """The sound arm as if one nominal parameter had come out otherwise."""
-    sound = diagnosed(None)
+    sound = sound_arm()
     fit, place = sound.selection.fit, place_of(sound, term, joint)
     parameters = fit.model.parameters.copy()
     parameters[place] = value
@@ -34,7 +34,7 @@ def place_of(diagnosis: Diagnosis, term: str, joint: int = JOINT) -> int:
 
 @pytest.mark.parametrize(("term", "effect"), [("stiction", "coulomb_friction"), ("viscous", "viscous_friction")])
 def test_friction_that_the_model_lacks_is_a_finding_of_its_size(term: str, effect: str) -> None:
-    sound = diagnosed(None)
+    sound = sound_arm()
     (found,) = with_plain_terms(sound, [(JOINT, term)]).findings
     place = place_of(sound, term)
     value = sound.selection.fit.model.parameters[place]
@@ -50,7 +50,7 @@ def test_friction_that_the_model_lacks_is_a_finding_of_its_size(term: str, effec
 
 
 def test_what_may_as_well_be_zero_is_none() -> None:
-    sound = diagnosed(None)
+    sound = sound_arm()
     place = place_of(sound, "viscous")
     error = float(np.sqrt(sound.selection.fit.covariance[place, place]))
     assert not with_plain_terms(of_size("viscous", 0.0), [(JOINT, "viscous")]).findings
@@ -58,14 +58,14 @@ def test_what_may_as_well_be_zero_is_none() -> None:
 
 
 def test_what_held_out_motion_shows_with_the_other_sign_is_tentative() -> None:
-    truth = diagnosed(None).selection.fit.model.parameters[place_of(diagnosed(None), "viscous")]
+    truth = sound_arm().selection.fit.model.parameters[place_of(sound_arm(), "viscous")]
     found = with_plain_terms(of_size("viscous", -truth), [(JOINT, "viscous")])
     assert not found.findings
     assert [each.place for each in found.tentative] == [("viscous_friction", JOINT)]
 
 
 def test_without_held_out_motion_nothing_confirms_it() -> None:
-    alone = replace(diagnosed(None), held_out=None)
+    alone = replace(sound_arm(), held_out=None)
     (found,) = with_plain_terms(alone, [(JOINT, "viscous")]).findings
     assert found.confirmed is None
 
@@ -85,7 +85,7 @@ def test_only_a_file_that_states_friction_lacks_constants() -> None:
     stating = replace(silent, model=replace(silent.model, friction=(FrictionCoefficients(),) * 3))
     assert not states_friction(silent)
     assert states_friction(stating)
-    sound = diagnosed(None)
+    sound = sound_arm()
     for robot, expected in ((silent, []), (stating, [(joint, "offset") for joint in range(3)])):
         own = replace(sound, identification=replace(sound.identification, robot=robot))
         assert list(undeclared_offsets(own)) == expected
@@ -93,7 +93,7 @@ def test_only_a_file_that_states_friction_lacks_constants() -> None:
 
 def test_without_a_term_the_rows_are_worse_by_its_share_and_the_others_move() -> None:
     """In least squares the energy grows by c² over the variance of c; nothing else is held."""
-    sound = diagnosed(None)
+    sound = sound_arm()
     fit, place = sound.fitter.fit(sound.selection.fit.model), place_of(sound, "viscous")
     without = _without(fit, place)
     assert without.parameters[place] == 0.0

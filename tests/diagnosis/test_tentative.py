@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.test_diagnosis_of_simulated_arms import diagnosed
+from diagnosis.diagnosed_arm import sound_arm
 from tauscope.diagnosis.findings.conclude import _tentative
 from tauscope.diagnosis.findings.finding import Finding
 from tauscope.diagnosis.model.extended import with_terms
@@ -15,7 +15,7 @@ from tauscope.effects.joint_spring import JointSpring
 
 def step(joint: int, stiffness: float, *, trained: float = 9.0, is_confirmed: bool = False) -> Step:
     """A spring that was tried beside the sound arm's model."""
-    nominal = diagnosed(None).selection.fit.model
+    nominal = sound_arm().selection.fit.model
     term = Term(JointSpring(joint), np.zeros(0), np.array([stiffness]))
     proposal: Any = term
     after = with_terms(nominal, [*nominal.terms, term])
@@ -23,7 +23,7 @@ def step(joint: int, stiffness: float, *, trained: float = 9.0, is_confirmed: bo
 
 
 def tentative(*steps: Step, found: frozenset[Place] = frozenset()) -> list[Finding]:
-    sound = diagnosed(None)
+    sound = sound_arm()
     return list(_tentative(steps, set(found), sound.fitter, sound.held_out))
 
 
@@ -33,7 +33,7 @@ def test_what_was_refuted_is_told_with_even_odds_at_most() -> None:
     assert found.confirmed is False
     assert found.probability < 0.5
     assert found.before.held_out is not None
-    assert found.before.train.tolist() == diagnosed(None).after.train.tolist()
+    assert found.before.train.tolist() == sound_arm().after.train.tolist()
 
 
 def test_of_one_place_the_last_trial_counts() -> None:

@@ -1,10 +1,12 @@
 """Friction that follows a recorded temperature: named with it, and predicted at a temperature that nobody trained."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from diagnosis.diagnosed_arm import few_or_all, only_effects
 from diagnosis.warm_arm import COLD_C, PER_KELVIN, VISCOUS, warm_recordings
 from effects.piece_of_motion import SIGNALS, context
 from identification.simulated import paper_robot
@@ -53,9 +55,17 @@ def test_whole_degrees_are_smoothed() -> None:
     assert np.abs(np.diff(found[0, 0])).max() < 0.01
 
 
-def test_viscous_friction_that_falls_as_a_joint_warms_up_is_named_with_its_temperature() -> None:
+SEARCHED = pytest.mark.parametrize("effects", few_or_all("friction_drift", "joint_spring"))
+
+
+@SEARCHED
+def test_viscous_friction_that_falls_as_a_joint_warms_up_is_named_with_its_temperature(
+    effects: Sequence[str] | None,
+) -> None:
     rng = np.random.default_rng(7)
-    diagnosis = diagnose(paper_robot(), warm_recordings(TRAIN, COURSES, rng), warm_recordings(HELD_OUT, WARMER, rng))
+    train, held_out = warm_recordings(TRAIN, COURSES, rng), warm_recordings(HELD_OUT, WARMER, rng)
+    with only_effects(effects):
+        diagnosis = diagnose(paper_robot(), train, held_out)
     found = document(diagnosis)
     assert [(each.effect, each.joint, each.confirmed) for each in found.findings] == [
         ("friction_drift", "joint1", True)
@@ -76,7 +86,9 @@ def test_viscous_friction_that_falls_as_a_joint_warms_up_is_named_with_its_tempe
     assert term.effect.reference_c == values["T_0"].value
 
 
-def test_a_temperature_that_friction_does_not_follow_is_no_finding() -> None:
+@SEARCHED
+def test_a_temperature_that_friction_does_not_follow_is_no_finding(effects: Sequence[str] | None) -> None:
     rng = np.random.default_rng(7)
     train, held_out = (warm_recordings(*each, rng, per_kelvin=0.0) for each in ((TRAIN, COURSES), (HELD_OUT, WARMER)))
-    assert document(diagnose(paper_robot(), train, held_out)).findings == []
+    with only_effects(effects):
+        assert document(diagnose(paper_robot(), train, held_out)).findings == []

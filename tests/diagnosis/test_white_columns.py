@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.diagnosed_arm import recordings
+from diagnosis.diagnosed_arm import only_effects, recordings
 from identification.simulated import Array, paper_robot
 from tauscope.diagnosis import diagnose
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
@@ -21,7 +21,8 @@ IDS = ("stribeck_friction", "load_dependent_friction", "torque_gain_error", "tim
 @pytest.fixture(scope="module")
 def diagnosis() -> Diagnosis:
     rng = np.random.default_rng(3)
-    return diagnose(paper_robot(), recordings((1, 2), None, rng))
+    with only_effects([]):
+        return diagnose(paper_robot(), recordings((1, 2), None, rng))
 
 
 def any_term(effect: Effect, rng: np.random.Generator) -> Term:

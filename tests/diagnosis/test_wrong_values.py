@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.diagnosed_arm import recordings
+from diagnosis.diagnosed_arm import only_effects, recordings
 from diagnosis.loaded_arm import carrying
 from identification.simulated import Array, paper_robot, simulate
 from robot.robot_texts import write_robot
@@ -23,7 +23,8 @@ SEEDS = (1, 2, 3)
 @cache
 def sound() -> Diagnosis:
     """Of an arm that lacks nothing."""
-    return diagnose(paper_robot(), recordings(SEEDS, None, np.random.default_rng(8)))
+    with only_effects(["payload"]):
+        return diagnose(paper_robot(), recordings(SEEDS, None, np.random.default_rng(8)))
 
 
 def compared(robot: Robot) -> DiagnosisDocument:
@@ -201,7 +202,8 @@ def arm_of_urdf() -> Diagnosis:
     rng = np.random.default_rng(4)
     made = [simulate(robot, seed=seed, periods=2) for seed in SEEDS[:2]]
     noise = np.array([0.2, 0.2, 0.1])
-    return diagnose(robot, [arm.recording(arm.white(noise, rng), arm.white(2e-5, rng)) for arm in made])
+    with only_effects(["payload"]):
+        return diagnose(robot, [arm.recording(arm.white(noise, rng), arm.white(2e-5, rng)) for arm in made])
 
 
 def robot_of(urdf: str) -> Robot:

@@ -39,6 +39,7 @@ def printed(command: str, folder: Path) -> list[str]:
     return [line.rstrip() for line in done.stdout.splitlines()]
 
 
+@pytest.mark.slow
 def test_the_example_is_what_the_program_prints(tmp_path: Path) -> None:
     (tmp_path / "sim_backend").symlink_to(REPOSITORY / "sim_backend")
     for command in blocks(section("Example"), "sh")[0].splitlines():

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from arms import (
@@ -46,7 +46,6 @@ TABLE_2 = {
 
 EXPECTED_COUNTS = {"kuka-lwr4": 43, "franka-panda": 43, "staubli-tx40": 36, "double-pendulum": 6, "emps": 1}
 ARMS = given(seed=st.integers(0, 2**32 - 1), joint_count=st.integers(1, 7))
-quick = settings(max_examples=25, deadline=None)
 
 
 def fresh_regressor(robot: Robot, samples: int = 40) -> np.ndarray:
@@ -106,7 +105,6 @@ def test_the_papers_independent_and_unidentifiable_parameters() -> None:
     assert base.unidentifiable == tuple(f"{name}1" for name in STANDARD_PARAMETERS if name != "Iyy")
 
 
-@quick
 @ARMS
 def test_the_rank_is_that_of_the_singular_values(seed: int, joint_count: int) -> None:
     robot = random_arm(np.random.default_rng(seed), joint_count)
@@ -121,7 +119,6 @@ def test_base_parameters_of_known_arms_give_the_same_torques(robot: Robot) -> No
     assert_same_torques(robot, 1e-12)
 
 
-@quick
 @ARMS
 def test_base_parameters_of_random_arms_give_the_same_torques(seed: int, joint_count: int) -> None:
     robot = random_arm(np.random.default_rng(seed), joint_count)
@@ -131,7 +128,6 @@ def test_base_parameters_of_random_arms_give_the_same_torques(seed: int, joint_c
     assert_same_torques(robot, max(3e-8, 1e-14 * condition))
 
 
-@quick
 @ARMS
 def test_every_column_is_sorted_into_one_of_three_kinds(seed: int, joint_count: int) -> None:
     base = base_parameters(random_arm(np.random.default_rng(seed), joint_count))

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio  # pyright: ignore[reportMissingImports]
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from arms import emps_like, panda_like, paper_arm, random_arm, random_parameters, random_states, ur5_like
@@ -25,7 +25,6 @@ def assert_same(actual: np.ndarray, expected: np.ndarray) -> None:
     np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 
-@settings(max_examples=40, deadline=None)
 @given(seed=SEEDS, joint_count=st.integers(1, 7))
 def test_every_column_is_pinocchios_on_random_chains(seed: int, joint_count: int) -> None:
     rng = np.random.default_rng(seed)
@@ -75,7 +74,6 @@ def test_a_link_loads_only_the_joints_that_carry_it() -> None:
         assert not phi[:, link + 1 :, 10 * link : 10 * link + 10].any()
 
 
-@settings(max_examples=25, deadline=None)
 @given(seed=SEEDS, joint_count=st.integers(1, 6), data=st.data())
 def test_some_columns_are_those_of_the_whole(seed: int, joint_count: int, data: st.DataObject) -> None:
     chosen = data.draw(st.sets(st.integers(0, 10 * joint_count - 1)))

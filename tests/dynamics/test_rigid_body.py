@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio  # pyright: ignore[reportMissingImports]
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from arms import random_arm, random_parameters, random_states
@@ -17,7 +17,6 @@ from tauscope.robot.robot import LinkInertia, Robot
 
 SAMPLES = 6
 ARMS = given(seed=st.integers(0, 2**32 - 1), joint_count=st.integers(1, 7))
-quick = settings(max_examples=25, deadline=None)
 
 
 def some_arm(seed: int, joint_count: int) -> tuple[Robot, np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
@@ -53,7 +52,6 @@ def derivative(function: Callable[[float], np.ndarray], h: float) -> np.ndarray:
     return np.sum([weight * (function(k * h) - function(-k * h)) for k, weight in weights], axis=0) / h
 
 
-@quick
 @ARMS
 def test_pinocchio_agrees(seed: int, joint_count: int) -> None:
     robot, parameters, (q, qd, qdd) = some_arm(seed, joint_count)
@@ -77,7 +75,6 @@ def test_pinocchio_agrees(seed: int, joint_count: int) -> None:
     )
 
 
-@quick
 @ARMS
 def test_mass_matrix_is_symmetric_and_positive_definite(seed: int, joint_count: int) -> None:
     robot, parameters, (q, _, _) = some_arm(seed, joint_count)
@@ -86,7 +83,6 @@ def test_mass_matrix_is_symmetric_and_positive_definite(seed: int, joint_count: 
     assert (np.linalg.eigvalsh(mass) > 0).all()
 
 
-@quick
 @ARMS
 def test_mass_matrix_is_what_accelerations_cost(seed: int, joint_count: int) -> None:
     robot, parameters, (q, qd, qdd) = some_arm(seed, joint_count)
@@ -96,7 +92,6 @@ def test_mass_matrix_is_what_accelerations_cost(seed: int, joint_count: int) -> 
     close(cost, np.einsum("nik,nk->ni", mass_matrix(robot, parameters, q), qdd))
 
 
-@quick
 @ARMS
 def test_power_is_the_rate_of_energy(seed: int, joint_count: int) -> None:
     robot, parameters, (q, qd, qdd) = some_arm(seed, joint_count)
@@ -109,7 +104,6 @@ def test_power_is_the_rate_of_energy(seed: int, joint_count: int) -> None:
     close(derivative(energy, 1e-3), power, 1e-7)
 
 
-@quick
 @ARMS
 def test_gravity_torque_is_the_slope_of_potential_energy(seed: int, joint_count: int) -> None:
     robot, parameters, (q, _, _) = some_arm(seed, joint_count)
@@ -120,7 +114,6 @@ def test_gravity_torque_is_the_slope_of_potential_energy(seed: int, joint_count:
     close(gravity_torque(robot, parameters, q), np.stack(slopes, axis=1), 1e-8)
 
 
-@quick
 @ARMS
 def test_coriolis_torque_leaves_mass_rate_minus_twice_coriolis_skew(seed: int, joint_count: int) -> None:
     """H' - 2 C is skew: q̇ᵀ(H' q̇ - 2 C q̇) = 0 with C q̇ = h, the velocity-dependent torque."""

@@ -1,14 +1,16 @@
 """Arms with limits and models, and motions for them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from arms import panda_like, paper_arm, paper_parameters, random_arm, random_link, ur5_like
 from tauscope.dynamics import inverse_dynamics
-from tauscope.excitation import ExcitationDesign, ExcitationOptions
+from tauscope.excitation import ExcitationDesign, ExcitationOptions, optimiser
 from tauscope.robot import FrictionCoefficients, FrictionShape, Joint, JointLimits, LinkInertia, Model, Robot
 from tauscope.trajectory import FourierSeries, motion_limits
 
@@ -16,6 +18,15 @@ Array = NDArray[np.float64]
 
 
 PAPER_SHAPE = FrictionShape(500.0, 10.0)
+
+
+@contextmanager
+def short_search() -> Iterator[None]:
+    """Designs that are nowhere near the best: a few iterations show whether limits are kept."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in (("CANDIDATES", 24), ("SHORT_ROUND", 12), ("LONG_ROUND", 12)):
+            patch.setattr(optimiser, name, value)
+        yield
 
 
 def with_limits(robot: Robot, limits: JointLimits, shape: FrictionShape = PAPER_SHAPE) -> Robot:

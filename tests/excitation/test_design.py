@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -10,18 +11,18 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from arms import random_link, ur5_like
-from excitation.excited_arms import assert_within_limits, limited_paper_arm, modelled_arm, with_limits
+from excitation.excited_arms import assert_within_limits, limited_paper_arm, modelled_arm, short_search, with_limits
 from tauscope.dynamics import base_parameters
 from tauscope.errors import ExcitationError
 from tauscope.excitation import (
     Box,
     ColumnScaling,
     Criterion,
+    ExcitationDesign,
     ExcitationOptions,
     OptimiserProgress,
     Workspace,
     design_excitation,
-    optimiser,
 )
 from tauscope.excitation.information import ExcitationRegressor
 from tauscope.excitation.workspace import WorkspaceUsage
@@ -34,10 +35,7 @@ QUICK = ExcitationOptions(starts=1, slow_postures=1)
 
 @pytest.fixture(scope="module", autouse=True)
 def _short_search() -> Iterator[None]:
-    """A few iterations are enough to see whether limits are kept."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name, value in (("CANDIDATES", 24), ("SHORT_ROUND", 12), ("LONG_ROUND", 12)):
-            patch.setattr(optimiser, name, value)
+    with short_search():
         yield
 
 
@@ -53,14 +51,14 @@ LIMITS = {
 }
 
 
-@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=3, suppress_health_check=[HealthCheck.too_slow])
 @given(**LIMITS)
 def test_random_limits_hold_at_every_instant(**drawn: Any) -> None:
     check_random_limits(**drawn)
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 @given(**LIMITS)
 def test_many_random_limits_hold_at_every_instant(**drawn: Any) -> None:
     check_random_limits(**drawn)
@@ -83,9 +81,13 @@ def check_random_limits(
     assert min(part.min() for part in (margins.position, margins.velocity, margins.acceleration)) >= -1e-9
 
 
+@cache
+def plain() -> ExcitationDesign:
+    return design_excitation(limited_paper_arm(), QUICK)
+
+
 def test_the_same_seed_gives_the_same_motion() -> None:
-    options = replace(QUICK, seed=3)
-    first, second = (design_excitation(limited_paper_arm(), options) for _ in range(2))
+    first, second = plain(), design_excitation(limited_paper_arm(), QUICK)
     assert trajectory_json(first.trajectory) == trajectory_json(second.trajectory)
     other = design_excitation(limited_paper_arm(), replace(QUICK, seed=4))
     assert trajectory_json(first.trajectory) != trajectory_json(other.trajectory)
@@ -103,7 +105,11 @@ def test_progress_grows_to_its_end() -> None:
 
 @pytest.mark.parametrize("criterion", list(Criterion))
 def test_every_criterion_gets_better_where_it_is_asked_for(criterion: Criterion) -> None:
-    design = design_excitation(limited_paper_arm(), replace(QUICK, criterion=criterion))
+    design = (
+        plain()
+        if criterion is QUICK.criterion
+        else design_excitation(limited_paper_arm(), replace(QUICK, criterion=criterion))
+    )
     assert design.value < design.random_value
     robot = limited_paper_arm()
     matrix = ExcitationRegressor(robot, base_parameters(robot), capacity=2000).stacked(
@@ -120,11 +126,10 @@ def test_every_criterion_gets_better_where_it_is_asked_for(criterion: Criterion)
 
 def test_noise_and_scaling_change_the_motion() -> None:
     robot = limited_paper_arm()
-    plain = design_excitation(robot, QUICK)
     weighted = design_excitation(robot, replace(QUICK, noise_std=np.array([0.05, 5.0, 0.5])))
     scaled = design_excitation(robot, replace(QUICK, scaling=ColumnScaling.TYPICAL))
-    assert weighted.value != pytest.approx(plain.value, rel=1e-3)
-    assert scaled.value < 0.1 * plain.value  # columns of one size are far better conditioned
+    assert weighted.value != pytest.approx(plain().value, rel=1e-3)
+    assert scaled.value < 0.1 * plain().value  # columns of one size are far better conditioned
     with pytest.raises(ExcitationError, match="noise_std needs 3 positive numbers"):
         design_excitation(robot, replace(QUICK, noise_std=np.array([1.0, 0.0, 1.0])))
 

@@ -1,11 +1,13 @@
 """``tauscope excite``: what it writes, what it shows, how it ends."""
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from excitation.excited_arms import short_search
 from tauscope.cli.program import main
 from tauscope.robot import read_robot
 from tauscope.trajectory import read_trajectory, trajectory_json
@@ -14,6 +16,12 @@ from tauscope_sim.examples import example_robot
 
 ROBOT = str(example_robot("paper_arm"))
 QUICK = ["--periods", "2", "--harmonics", "3", "--duration", "6", "--no-slow-reversals"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _short_search() -> Iterator[None]:
+    with short_search():
+        yield
 
 
 def test_design_and_samples_are_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

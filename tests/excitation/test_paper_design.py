@@ -31,6 +31,7 @@ def condition_number(robot: Robot, motion: MotionSamples) -> float:
     return float(np.linalg.cond(ExcitationRegressor(robot, base_parameters(robot), capacity=4096).stacked(motion)))
 
 
+@pytest.mark.slow
 def test_the_paper_s_arm(paper_design: ExcitationDesign) -> None:
     robot = limited_paper_arm()
     assert_within_limits(robot, paper_design, ExcitationOptions())

@@ -1,8 +1,11 @@
 """The closing period carries the next index: conditioning averages the repeated periods and takes it for what it is."""
 
-import numpy as np
+from collections.abc import Iterator
 
-from excitation.excited_arms import Array, limited_paper_arm
+import numpy as np
+import pytest
+
+from excitation.excited_arms import Array, limited_paper_arm, short_search
 from tauscope.dynamics import friction_torque, inverse_dynamics
 from tauscope.excitation import ExcitationOptions, design_excitation
 from tauscope.recording.conditioning import Conditioner
@@ -10,6 +13,12 @@ from tauscope.recording.recording import Recording
 
 RATE_HZ = 100.0
 NOISE_STD = np.array([0.5, 0.3, 0.7])
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _short_search() -> Iterator[None]:
+    with short_search():
+        yield
 
 
 def simulated(options: ExcitationOptions) -> tuple[Recording, Recording, Array]:

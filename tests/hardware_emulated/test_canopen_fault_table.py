@@ -67,8 +67,8 @@ def test_every_fault_in_every_phase(site: Site) -> None:
 
 QUICK = [
     (FaultKind.OVERLOAD, "run", "overload"),
-    (FaultKind.LOSE, "run", ""),
-    (FaultKind.BUS_OFF, "run", "stale-state"),
+    pytest.param(FaultKind.LOSE, "run", "", marks=pytest.mark.slow),
+    pytest.param(FaultKind.BUS_OFF, "run", "stale-state", marks=pytest.mark.slow),
 ]
 
 

@@ -205,6 +205,7 @@ def test_rate_beyond_the_bus_is_refused_with_its_reason(three: Bench) -> None:
     assert "latency timer" in str(error) or "the wire" in str(error)
 
 
+@pytest.mark.slow
 def test_the_delay_of_an_adapter_is_learnt_and_no_answer_is_late_for_it(tmp_path: Path) -> None:
     delay_s = 0.006
     with bench(tmp_path, latency_s=delay_s) as one:

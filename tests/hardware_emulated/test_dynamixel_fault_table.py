@@ -68,7 +68,11 @@ def test_every_fault_in_every_phase(site: Site) -> None:
     TABLE.require_documented(site)
 
 
-QUICK = [(FaultKind.OVERLOAD, "run", "overload"), (FaultKind.SILENT, "stop", "silent"), (FaultKind.LOSE, "run", "")]
+QUICK = [
+    (FaultKind.OVERLOAD, "run", "overload"),
+    pytest.param(FaultKind.SILENT, "stop", "silent", marks=pytest.mark.slow),
+    pytest.param(FaultKind.LOSE, "run", "", marks=pytest.mark.slow),
+]
 
 
 @pytest.mark.parametrize(("kind", "phase", "reason"), QUICK)

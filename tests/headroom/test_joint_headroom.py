@@ -45,9 +45,8 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(learners, "LANDMARKS", 60)
 
 
-@pytest.mark.parametrize(
-    "law", [load_friction, *(pytest.param(each, marks=pytest.mark.slow) for each in (spring, cogging, coupling))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("law", [load_friction, spring, cogging, coupling])
 def test_a_hidden_law_is_predicted_near_its_true_share(law: Law) -> None:
     training, held_out = recordings(law, NOISE, seed=1)
     truth = float(np.sum(law(held_out[0]) ** 2))

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from tauscope.identification import Identification
@@ -134,6 +135,11 @@ def z_scores(result: Identification, robot: Robot, rotors: Sequence[float] | Non
     """(estimate - truth) / standard error of the free estimate, (p,); NaN for what the recordings say nothing about."""
     errors = np.where(result.undetermined, np.nan, standard_errors(result))
     return (result.free_parameters - true_parameters(result, robot, rotors)) / errors
+
+
+def runs(few: int, many: int) -> pytest.MarkDecorator:
+    """The number of runs that differ by their noise: few in a quick test, many in a slow one."""
+    return pytest.mark.parametrize("runs", [few, pytest.param(many, marks=pytest.mark.slow)])
 
 
 def rms(values: Array) -> float:

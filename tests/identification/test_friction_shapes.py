@@ -12,6 +12,7 @@ from identification.simulated import (
     SimulatedArm,
     paper_robot,
     rms,
+    runs,
     simulate,
     standard_errors,
     with_shapes,
@@ -61,7 +62,7 @@ def rms_speed(arm: SimulatedArm) -> Array:
 @pytest.mark.parametrize(
     ("k_v", "delta", "period_s", "seed"), [(500.0, 10.0, 10.0, 2), (500.0, 10.0, 10.0, 3), (200.0, 8.0, 10.0, 2)]
 )
-@pytest.mark.parametrize("runs", [6, pytest.param(60, marks=pytest.mark.slow)])
+@runs(3, 60)
 def test_constants_that_the_motion_shows_are_found_within_their_errors(
     k_v: float, delta: float, period_s: float, seed: int, runs: int
 ) -> None:
@@ -81,9 +82,10 @@ def test_constants_that_the_motion_shows_are_found_within_their_errors(
 
 
 @pytest.mark.parametrize("seed", [2, 3])
-def test_constants_at_a_very_high_signal_to_noise_ratio(seed: int) -> None:
+@runs(2, 4)
+def test_constants_at_a_very_high_signal_to_noise_ratio(seed: int, runs: int) -> None:
     arm = simulate(paper_robot(), seed=seed)
-    for run in range(4):
+    for run in range(runs):
         result = identified(arm, 0.001 * PAPER_NOISE, run)
         assert all(shape.k_v_identifiable and shape.delta_identifiable for shape in result.shapes)
         assert [shape.k_v for shape in result.shapes] == pytest.approx([500.0] * 3, rel=1e-3)
@@ -114,11 +116,12 @@ def test_constants_that_the_file_states_are_kept() -> None:
     assert (0, "k_v") not in shape_parameters(result.shapes)
 
 
-def test_a_stribeck_term_is_found_with_delta_unknown() -> None:
+@runs(3, 8)
+def test_a_stribeck_term_is_found_with_delta_unknown(runs: int) -> None:
     """The paper's truth, K_v stated, δ not: the term is there in every run, and its size is right."""
     arm = simulate(paper_robot(), seed=2)
     robot = with_shapes(arm.robot, 500.0, None)
-    for seed in range(8):
+    for seed in range(runs):
         noise = arm.white(0.2 * PAPER_NOISE, np.random.default_rng(seed))
         result = identify(robot, [arm.recording(noise)])
         assert all(shape.delta is not None for shape in result.shapes)
@@ -126,7 +129,7 @@ def test_a_stribeck_term_is_found_with_delta_unknown() -> None:
 
 
 @pytest.mark.parametrize("k_v", [60.0, 500.0, 5000.0])
-@pytest.mark.parametrize("runs", [12, pytest.param(100, marks=pytest.mark.slow)])
+@runs(12, 100)
 def test_no_stribeck_term_is_invented(k_v: float, runs: int) -> None:
     arm = simulate(with_shapes(paper_robot(), k_v, 1.0), seed=2, friction=WITHOUT_STRIBECK)
     results = [identified(arm, PAPER_NOISE, seed) for seed in range(runs)]
@@ -140,9 +143,10 @@ def test_no_stribeck_term_is_invented(k_v: float, runs: int) -> None:
 
 
 @pytest.mark.parametrize("noise", [1e-3, 1e-5])
-def test_a_k_v_between_grid_points_is_not_taken_for_stribeck(noise: float) -> None:
+@runs(3, 10)
+def test_a_k_v_between_grid_points_is_not_taken_for_stribeck(noise: float, runs: int) -> None:
     """At a very high signal-to-noise ratio even the error of a fine grid would be significant."""
-    for seed, k_v in enumerate(np.geomspace(25.0, 4000.0, 10)):
+    for seed, k_v in enumerate(np.geomspace(25.0, 4000.0, runs)):
         arm = simulate(with_shapes(paper_robot(), float(k_v), 1.0), seed=2 + seed % 2, friction=WITHOUT_STRIBECK)
         result = identified(arm, noise, seed)
         assert all(shape.delta is None for shape in result.shapes), k_v
@@ -151,9 +155,10 @@ def test_a_k_v_between_grid_points_is_not_taken_for_stribeck(noise: float) -> No
         assert np.abs(z_scores(result, arm.robot)).max() < 4.5
 
 
-def test_noise_that_hides_the_reversals_leaves_the_constants_open() -> None:
+@runs(2, 6)
+def test_noise_that_hides_the_reversals_leaves_the_constants_open(runs: int) -> None:
     arm = simulate(paper_robot(), seed=2)
-    for seed in range(6):
+    for seed in range(runs):
         result = identified(arm, 20.0, seed)
         for shape, speed in zip(result.shapes, rms_speed(arm), strict=True):
             assert not shape.k_v_identifiable
@@ -166,12 +171,13 @@ def test_noise_that_hides_the_reversals_leaves_the_constants_open() -> None:
 
 
 @pytest.mark.parametrize("noise", [10.0, 1.0, 1e-2, 1e-4], ids=lambda factor: f"noise x {factor:g}")
-def test_an_ideal_step_does_not_let_the_slope_run_away(noise: float) -> None:
+@runs(2, 4)
+def test_an_ideal_step_does_not_let_the_slope_run_away(noise: float, runs: int) -> None:
     still = [FrictionCoefficients(0.0, 0.0, 0.5)] * 3
     arm = simulate(paper_robot(), seed=2, friction=still)
     level = np.array([2.0, 1.0, 2.0])
     step = level * np.sign(arm.exact.exact.velocity)
-    for seed in range(4):
+    for seed in range(runs):
         result = identified(arm, noise * PAPER_NOISE, seed, step)
         for joint, (shape, speed) in enumerate(zip(result.shapes, rms_speed(arm), strict=True)):
             assert ORDINARY[0] <= shape.k_v * speed <= STEEPEST
@@ -203,18 +209,20 @@ def test_viscous_friction_that_bends_is_not_taken_for_a_gentle_step(level: float
             assert ORDINARY[0] <= shape.k_v * own <= STEEPEST
 
 
-def test_a_gentle_step_is_known_by_the_passage_through_zero() -> None:
+@runs(2, 4)
+def test_a_gentle_step_is_known_by_the_passage_through_zero(runs: int) -> None:
     """Beside it friction may bend as it likes: the slope of a step that is gentle indeed stays known."""
     arm = simulate(with_shapes(paper_robot(), 25.0, 1.0), seed=2, friction=WITHOUT_STRIBECK)
-    for seed in range(4):
+    for seed in range(runs):
         result = identified(arm, 0.1 * PAPER_NOISE, seed)
         assert all(shape.k_v_identifiable for shape in result.shapes)
         assert [shape.k_v for shape in result.shapes] == pytest.approx([25.0] * 3, rel=0.2)
 
 
-def test_a_joint_without_friction_has_none() -> None:
+@runs(3, 8)
+def test_a_joint_without_friction_has_none(runs: int) -> None:
     arm = simulate(paper_robot(), seed=2, friction=[FrictionCoefficients()] * 3)
-    for seed in range(8):
+    for seed in range(runs):
         result = identified(arm, PAPER_NOISE, seed)
         assert all(shape.delta is None and not shape.k_v_identifiable for shape in result.shapes)
         assert np.abs(z_scores(result, arm.robot)).max() < 4.5
@@ -228,11 +236,12 @@ def test_a_joint_without_friction_has_none() -> None:
         (500.0, 10.0, 10.0, 2, 0.001),
     ],
 )
+@runs(1, 3)
 def test_both_slopes_are_right_at_a_high_signal_to_noise_ratio(
-    k_v: float, delta: float, period_s: float, seed: int, noise: float
+    k_v: float, delta: float, period_s: float, seed: int, noise: float, runs: int
 ) -> None:
     arm = simulate(with_shapes(paper_robot(), k_v, delta), seed=seed, period_s=period_s)
-    for run in range(3):
+    for run in range(runs):
         result = identified(arm, noise * PAPER_NOISE, run)
         assert [shape.k_v for shape in result.shapes] == pytest.approx([k_v] * 3, rel=0.1)
         assert [shape.delta for shape in result.shapes] == pytest.approx([delta] * 3, rel=0.2)

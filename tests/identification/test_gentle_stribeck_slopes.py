@@ -51,6 +51,7 @@ def test_a_slope_gentler_than_every_candidate_is_found(steepness: float, coeffic
         assert all(0.4 < (shape.delta or 0.0) * own < 1.5 for shape, own in zip(result.shapes, speed, strict=True))
 
 
+@pytest.mark.slow
 @needs_shared_data
 def test_no_friction_that_would_drive_the_joint_is_found_in_the_lwr4() -> None:
     """Freely fitted, joint 5's friction falls from 2.3 to -1.9 Nm: a proxy, and held-out torque is worse with it."""

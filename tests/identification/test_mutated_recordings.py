@@ -93,7 +93,6 @@ def check(folder: Path, steps: list[tuple[Callable[[Rows, int, int], Rows], int,
     assert path.read_text() == text
 
 
-@settings(max_examples=60)
 @given(steps=STEPS)
 def test_a_mutated_recording(tmp_path_factory: pytest.TempPathFactory, steps: list) -> None:
     check(tmp_path_factory.getbasetemp(), steps)

@@ -6,10 +6,12 @@ what it did with irregular stamps and with the filter's edges: here signals are 
 1.5 periods of the cut-off are left out at both ends.
 """
 
+from collections.abc import Iterable
 from functools import cache
 
 import numpy as np
 import pytest
+from _pytest.mark import ParameterSet
 from numpy.typing import NDArray
 from scipy import signal
 
@@ -42,6 +44,12 @@ LESS_LEFT_OUT = "the recipe leaves out less of the edges than our conditioning, 
 STANDARD = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "m", "msx", "msy", "msz")
 
 ALL_SETS = (*HELD_OUT_BOUNDS, "odrive-cogging")
+LARGE_SETS = ("kuka-lwr4", "franka-panda", "staubli-tx40")
+"""Arms of six and seven joints: seconds each, and small ones show the same."""
+
+
+def each_of(names: Iterable[str]) -> list[ParameterSet]:
+    return [pytest.param(name, marks=pytest.mark.slow if name in LARGE_SETS else ()) for name in names]
 
 
 @cache
@@ -121,7 +129,7 @@ def links_of(found: IdentificationDocument) -> list[LinkInertia]:
     return links
 
 
-@pytest.mark.parametrize("name", HELD_OUT_BOUNDS)
+@pytest.mark.parametrize("name", each_of(HELD_OUT_BOUNDS))
 def test_held_out_error_is_no_worse_than_the_readmes(name: str) -> None:
     cutoff, bound = HELD_OUT_BOUNDS[name]
     result = identified(name, cutoff)
@@ -133,12 +141,12 @@ def test_held_out_error_is_no_worse_than_the_readmes(name: str) -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        "emps",
-        "kuka-lwr4",
-        "franka-panda",
-        "double-pendulum",
+        *each_of(("emps", "kuka-lwr4", "franka-panda", "double-pendulum")),
         pytest.param("bam-xl330", marks=pytest.mark.xfail(reason=f"30.1 %: {LESS_LEFT_OUT}", strict=True)),
-        pytest.param("staubli-tx40", marks=pytest.mark.xfail(reason=f"21.2 %: {LESS_LEFT_OUT}", strict=True)),
+        pytest.param(
+            "staubli-tx40",
+            marks=[pytest.mark.slow, pytest.mark.xfail(reason=f"21.2 %: {LESS_LEFT_OUT}", strict=True)],
+        ),
     ],
 )
 def test_held_out_error_by_the_readmes_own_recipe(name: str) -> None:
@@ -147,7 +155,7 @@ def test_held_out_error_by_the_readmes_own_recipe(name: str) -> None:
     assert relative_error_by_recipe(result, result.parameters, real_set(name)[2]) <= bound
 
 
-@pytest.mark.parametrize("name", HELD_OUT_BOUNDS)
+@pytest.mark.parametrize("name", each_of(HELD_OUT_BOUNDS))
 def test_links_are_possible_and_nearly_as_good(name: str) -> None:
     result = identified(name, HELD_OUT_BOUNDS[name][0])
     found = document(result)
@@ -162,7 +170,7 @@ def test_links_are_possible_and_nearly_as_good(name: str) -> None:
     assert 100.0 * result.held_out.relative_error <= free + 1.0
 
 
-@pytest.mark.parametrize("name", HELD_OUT_BOUNDS)
+@pytest.mark.parametrize("name", each_of(HELD_OUT_BOUNDS))
 def test_the_stated_links_are_the_model_that_was_judged(name: str) -> None:
     result = identified(name, HELD_OUT_BOUNDS[name][0])
     found = document(result)
@@ -173,7 +181,7 @@ def test_the_stated_links_are_the_model_that_was_judged(name: str) -> None:
     np.testing.assert_allclose(base, result.consistent_parameters[: len(base)], rtol=0, atol=1e-9 * np.abs(base).max())
 
 
-@pytest.mark.parametrize("name", HELD_OUT_BOUNDS)
+@pytest.mark.parametrize("name", each_of(HELD_OUT_BOUNDS))
 def test_the_stated_fit_is_the_recipes(name: str) -> None:
     result = identified(name, HELD_OUT_BOUNDS[name][0])
     assert result.held_out is not None
@@ -206,7 +214,7 @@ def test_the_double_pendulum_has_its_published_moments() -> None:
     assert first.first_moment[0] + 0.3 * (first.mass + second.mass) == pytest.approx(0.3491, rel=0.05)
 
 
-@pytest.mark.parametrize("name", ALL_SETS)
+@pytest.mark.parametrize("name", each_of(ALL_SETS))
 def test_the_automatic_band_suits_the_data(name: str) -> None:
     robot, train, _ = real_set(name)
     result = identified(name)
@@ -222,5 +230,6 @@ def test_the_automatic_band_suits_the_data(name: str) -> None:
     assert robot.joint_count == len(result.shapes)
 
 
+@pytest.mark.slow
 def test_the_residual_that_a_result_predicts_is_the_one_that_shows() -> None:
     assert within(np.concatenate([ratios(document(identified(name))) for name in ALL_SETS])) >= 0.95

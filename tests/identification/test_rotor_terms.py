@@ -12,6 +12,7 @@ from identification.simulated import (
     Array,
     SimulatedArm,
     paper_robot,
+    runs,
     simulate,
     with_limits,
     with_model,
@@ -59,15 +60,16 @@ def imitated(robot: Robot, joint: int) -> bool:
     return bool(np.linalg.norm(flat - basis @ (basis.T @ flat)) < 1e-6 * np.linalg.norm(flat))
 
 
-@pytest.mark.parametrize("runs", [20, pytest.param(100, marks=pytest.mark.slow)])
+@runs(8, 100)
 def test_no_rotor_is_invented(arm: SimulatedArm, runs: int) -> None:
     found = [rotors_of(with_rotors(arm, [0.0, 0.0, 0.0], seed)) for seed in range(runs)]
     assert not np.any(found)
 
 
-def test_the_last_joints_rotor_is_found(arm: SimulatedArm) -> None:
+@runs(4, 10)
+def test_the_last_joints_rotor_is_found(arm: SimulatedArm, runs: int) -> None:
     rotors = [0.0, 0.0, 0.15]
-    for seed in range(10):
+    for seed in range(runs):
         result = with_rotors(arm, rotors, seed)
         assert rotors_of(result) == [False, False, True]
         assert np.abs(z_scores(result, arm.robot, rotors)).max() < 4.5
@@ -155,10 +157,11 @@ def test_no_rotor_on_a_vertical_axis_where_mass_and_offset_imitate_it() -> None:
     assert np.abs(z_scores(result, arm.robot, [0.0, 0.0, 0.3])).max() < 4.5
 
 
-def test_a_stated_gear_ratio_lowers_the_bar_but_invents_nothing(arm: SimulatedArm) -> None:
+@runs(6, 20)
+def test_a_stated_gear_ratio_lowers_the_bar_but_invents_nothing(arm: SimulatedArm, runs: int) -> None:
     """The gear says that there is a rotor; where none shows, an estimate of two standard errors is rare and honest."""
     robot = replace(arm.robot, joints=tuple(replace(joint, gear_ratio=100.0) for joint in arm.robot.joints))
-    for seed in range(20):
+    for seed in range(runs):
         result = identify(robot, [arm.recording(arm.white(PAPER_NOISE, np.random.default_rng(seed)))])
         assert rotors_of(result)[:2] == [False, False]
         assert np.abs(z_scores(result, arm.robot)).max() < 4.5

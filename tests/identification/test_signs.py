@@ -69,6 +69,7 @@ def test_torque_far_from_the_stated_masses_is_named(tmp_path: Path) -> None:
         assert not np.isnan(found.parameters).any()
 
 
+@pytest.mark.slow
 @needs_shared_cases
 def test_two_joints_of_a_file_as_people_bring_it() -> None:
     robot = read_robot(SHARED_CASES / "ur5" / "ur5.yaml")

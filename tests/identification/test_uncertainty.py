@@ -12,6 +12,7 @@ from identification.simulated import (
     SimulatedArm,
     paper_robot,
     rms,
+    runs,
     simulate,
     standard_errors,
     true_parameters,
@@ -80,7 +81,7 @@ def naive_scores(recording: Recording, result: Identification, arm: SimulatedArm
     return (result.free_parameters - true_parameters(result, arm.robot)) / naive
 
 
-@pytest.mark.parametrize("runs", [12, pytest.param(100, marks=pytest.mark.slow)])
+@runs(6, 100)
 def test_autocorrelated_noise_widens_the_standard_errors(slow_arm: SimulatedArm, runs: int) -> None:
     recordings = []
 
@@ -96,7 +97,7 @@ def test_autocorrelated_noise_widens_the_standard_errors(slow_arm: SimulatedArm,
     assert_unbiased(results, slow_arm)
 
 
-@pytest.mark.parametrize("runs", [12, pytest.param(40, marks=pytest.mark.slow)])
+@runs(6, 40)
 def test_autocorrelated_noise_with_samples_missed(slow_arm: SimulatedArm, runs: int) -> None:
     """A sample in twenty: pairs of neighbours are fewer, not less alike."""
 
@@ -109,7 +110,7 @@ def test_autocorrelated_noise_with_samples_missed(slow_arm: SimulatedArm, runs: 
 
 
 @pytest.mark.parametrize("seed", [3, 4])
-@pytest.mark.parametrize("runs", [12, pytest.param(100, marks=pytest.mark.slow)])
+@runs(6, 100)
 def test_autocorrelated_noise_in_averaged_periods(seed: int, runs: int) -> None:
     """Six periods averaged into one: of their noise the single periods tell more than the few rows of the mean."""
     arm = simulate(paper_robot(), seed=seed, periods=6)
@@ -119,7 +120,7 @@ def test_autocorrelated_noise_in_averaged_periods(seed: int, runs: int) -> None:
 
 
 @pytest.mark.parametrize("coefficient", [-0.5, 0.5])
-@pytest.mark.parametrize("runs", [12, pytest.param(30, marks=pytest.mark.slow)])
+@runs(6, 30)
 def test_other_colours_of_noise(slow_arm: SimulatedArm, coefficient: float, runs: int) -> None:
     def draw(rng: np.random.Generator) -> Recording:
         return slow_arm.recording(autoregressive(slow_arm, PAPER_NOISE, coefficient, rng))
@@ -127,9 +128,10 @@ def test_other_colours_of_noise(slow_arm: SimulatedArm, coefficient: float, runs
     assert 0.85 <= rms(scores(runs_of(slow_arm, runs, draw), slow_arm)) <= 1.15
 
 
-def test_joints_of_very_different_noise(slow_arm: SimulatedArm) -> None:
+@runs(8, 30)
+def test_joints_of_very_different_noise(slow_arm: SimulatedArm, runs: int) -> None:
     std = np.array([2.0, 0.02, 0.2])
-    results = runs_of(slow_arm, 30, lambda rng: slow_arm.recording(slow_arm.white(std, rng)))
+    results = runs_of(slow_arm, runs, lambda rng: slow_arm.recording(slow_arm.white(std, rng)))
     assert 0.9 <= rms(scores(results, slow_arm)) <= 1.1
     noise = np.array([result.residuals.noise_std for result in results])
     np.testing.assert_allclose(noise.mean(axis=0), std, rtol=0.01)
@@ -179,7 +181,7 @@ def test_periods_tell_the_noise_where_the_model_is_wrong(fast_arm: SimulatedArm)
 
 
 @pytest.mark.parametrize("periods", [True, False], ids=["averaged", "one motion"])
-@pytest.mark.parametrize("runs", [6, pytest.param(80, marks=pytest.mark.slow)])
+@runs(4, 80)
 def test_encoder_noise_neither_biases_nor_fools(fast_arm: SimulatedArm, periods: bool, runs: int) -> None:
     def draw(rng: np.random.Generator) -> Recording:
         torque, position = fast_arm.white(PAPER_NOISE, rng), fast_arm.white(2e-5, rng)
@@ -195,7 +197,7 @@ def test_encoder_noise_neither_biases_nor_fools(fast_arm: SimulatedArm, periods:
 
 
 @pytest.mark.parametrize("seed", [3, 4])
-@pytest.mark.parametrize("runs", [6, pytest.param(60, marks=pytest.mark.slow)])
+@runs(4, 60)
 def test_encoder_noise_does_not_bias_where_torque_noise_is_small(seed: int, runs: int) -> None:
     """The band has to end where the noise of q̈ makes less torque than the torque's own noise, not less than q̈."""
     arm = simulate(paper_robot(), seed=seed, rate_hz=200.0, periods=5)

@@ -170,7 +170,6 @@ def is_plain(data: bytes) -> bool:
     return sorted(header.strip("\r").split(",")) == sorted(COLUMNS) and b"\0" not in data
 
 
-@settings(max_examples=100)
 @given(mutated_csv())
 def test_mutated_csv(data):
     csv_is_read_right_or_refused(data)
@@ -217,13 +216,11 @@ def recovery_keeps_a_prefix(data: bytes) -> None:
             assert [file.name for file in Path(folder).iterdir()] == ["file.mcap"]
 
 
-@settings(max_examples=100)
 @given(mutated_bytes(MCAP))
 def test_mutated_mcap(data):
     mcap_is_read_right_or_refused(data)
 
 
-@settings(max_examples=60)
 @given(mutated_bytes(MCAP))
 def test_recovery_of_mutated_mcap(data):
     recovery_keeps_a_prefix(data)
@@ -241,7 +238,6 @@ CDR = encoded_messages(messages(12))
 JSON = [(time, json.dumps(message).encode()) for time, message in messages(12)]
 
 
-@settings(max_examples=100)
 @given(st.integers(0, 11), st.sampled_from(["cdr", "json"]), st.data())
 def test_mutated_messages_behind_sound_checksums(index, encoding, data):
     """The container cannot know that a message is broken; the decoder must."""
@@ -261,7 +257,6 @@ def sound_parquet() -> bytes:
         return path.read_bytes()
 
 
-@settings(max_examples=100)
 @given(st.data())
 def test_mutated_parquet(data):
     read_in_a_folder("file.parquet", data.draw(mutated_bytes(sound_parquet())))
@@ -274,7 +269,6 @@ def test_many_mutated_parquet(data):
     read_in_a_folder("file.parquet", data.draw(mutated_bytes(sound_parquet())))
 
 
-@settings(max_examples=100)
 @given(st.binary(max_size=300), st.sampled_from(["file.csv", "file.mcap", "file.parquet", "file.db3", "file"]))
 def test_any_bytes_at_all(data, name):
     assert read_in_a_folder(name, data).rows is None
@@ -283,7 +277,6 @@ def test_any_bytes_at_all(data, name):
 DATABASE = file_of(lambda path: write_database(path, messages(14)))
 
 
-@settings(max_examples=100)
 @given(mutated_bytes(DATABASE))
 def test_mutated_database(data):
     read_in_a_folder("file.db3", data)

@@ -27,8 +27,8 @@ from reliability.costly_inputs import (
 from server.queue.paper_files import PAPER_ROBOT
 from tauscope.errors import TauscopeError
 from tauscope.robot import check_robot, read_robot
-from tauscope.server.http.robot_files import check_received_robot
-from tauscope.server.queue.analyses import check_kept_recording
+from tauscope.server.queue.received_recording import check_kept_recording
+from tauscope.server.queue.received_robot import check_received_robot
 from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.trajectory import read_trajectory
 
@@ -127,6 +127,7 @@ def test_no_small_file_is_costly(pool: WorkerPool, tmp_path: Path) -> None:
     assert not found, "\n".join(found)
 
 
+@pytest.mark.slow
 def test_the_measure_sees_memory(pool: WorkerPool) -> None:
     used = pool.submit(hold, 50 * 2**20).result(60.0)
     assert used >= 50 * 2**20

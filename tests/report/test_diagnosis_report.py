@@ -7,8 +7,9 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from diagnosis.diagnosed_arm import recordings
+from diagnosis.diagnosed_arm import only_effects, recordings
 from diagnosis.test_diagnosis_of_simulated_arms import spring
+from excitation.excited_arms import short_search
 from report.conftest import HOSTILE, JOINTS
 from report.test_identification_report import LOADING, Reading
 from shared_data import SHARED_DATA, needs_shared_data
@@ -37,12 +38,14 @@ def found() -> Diagnosis:
     joints = tuple(replace(joint, name=name) for joint, name in zip(arm.joints, JOINTS, strict=True))
     robot = replace(arm, name=HOSTILE, joints=joints, model=Model())
     train, held_out = recordings((1, 2), spring, np.random.default_rng(5))
-    return diagnose(robot, [replace(train, name=f"{HOSTILE}.csv")], [held_out])
+    with only_effects(["joint_spring"]):
+        return diagnose(robot, [replace(train, name=f"{HOSTILE}.csv")], [held_out])
 
 
 @pytest.fixture(scope="module")
 def planned(found: Diagnosis) -> PlannedExperiment:
-    return plan_experiment(found)
+    with short_search():
+        return plan_experiment(found)
 
 
 @pytest.fixture(scope="module")

@@ -147,7 +147,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("mutations")
 
 
-QUICK = settings(max_examples=100, suppress_health_check=[HealthCheck.too_slow])
+QUICK = settings(suppress_health_check=[HealthCheck.too_slow])
 THOROUGH = settings(max_examples=2000, suppress_health_check=[HealthCheck.too_slow])
 
 

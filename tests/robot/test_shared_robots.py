@@ -1,11 +1,13 @@
 """Robot descriptions as people bring them: every row robots/ of the cases' README."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tauscope
+from diagnosis.diagnosed_arm import few_or_all, only_effects
 from shared_data import SHARED_CASES, needs_shared_cases
 from tauscope.robot import Coupling, Robot, find_defect, read_robot
 
@@ -70,7 +72,9 @@ def test_motion_is_designed(name: str) -> None:
     assert design.design.trajectory.joints
 
 
-def test_exact_model_with_a_gripper_is_consistent() -> None:
+@pytest.mark.parametrize("effects", few_or_all("joint_spring", "payload"))
+def test_exact_model_with_a_gripper_is_consistent(effects: Sequence[str] | None) -> None:
     folder = ROBOTS / "63-gripper-beside"
-    found = tauscope.diagnose(folder / "arm.yaml", folder / "run.csv", folder / "held.csv", against="model")
+    with only_effects(effects):
+        found = tauscope.diagnose(folder / "arm.yaml", folder / "run.csv", folder / "held.csv", against="model")
     assert (found.document.verdict, found.document.findings) == ("consistent", [])

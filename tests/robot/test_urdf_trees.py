@@ -143,7 +143,6 @@ def pinocchio_torque(case: Case, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray)
     return total
 
 
-@settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), steps=st.integers(1, 8))
 def test_torque_of_a_tree_is_pinocchios(seed: int, steps: int) -> None:
     case = make_case(seed, steps)
@@ -164,7 +163,7 @@ def test_torque_of_a_tree_is_pinocchios(seed: int, steps: int) -> None:
     np.testing.assert_array_equal(inverse_dynamics(again, parameters, q, qd, qdd), torque)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_gradient_of_a_coupled_regressor_is_that_of_differences(seed: int) -> None:
     robot, rng = make_case(seed, 6).robot, np.random.default_rng(seed)

@@ -76,7 +76,7 @@ def test_a_scenario_is_carried_out(tmp_path: Path, robot: Robot) -> None:
         settings = {"start": motion(robot).start.tolist(), **concealed}
         run_trajectory(
             robot,
-            motion(robot, repeats=2),
+            motion(robot),
             lambda settings=settings: make_backend("sim", robot, settings),
             tmp_path / name,
             RunOptions(rate_hz=200.0),

@@ -11,15 +11,15 @@ from starlette.routing import BaseRoute
 from starlette.testclient import TestClient
 
 from databases import address, database, postgres
+from excitation.excited_arms import short_search
 from figures import leave_figures_undrawn
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.paper_files import PAPER_ROBOT, write_recording
-from tauscope.report import diagnosis_report, identification_report
 from tauscope.server.http import Settings, create_app
 from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.database.database import FILE_NAME, Database
 
-__all__ = ["address", "database", "diagnosis_report", "identification_report", "postgres"]
+__all__ = ["address", "database", "postgres"]
 
 HOST = "http://127.0.0.1:8000"
 IDENTIFICATIONS = "/api/v1/identifications"
@@ -64,6 +64,13 @@ def inline_readers(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPat
     """Files are read in this process, unless a test asks for `reader_processes`: to start them takes a second."""
     if "reader_processes" not in request.fixturenames:
         monkeypatch.setattr("tauscope.server.http.services.open_readers", lambda _: InlineExecutor())
+
+
+@pytest.fixture(autouse=True, scope="module")
+def quick_designs() -> Iterator[None]:
+    """Motions are designed within a few iterations."""
+    with short_search():
+        yield
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tauscope.errors import RecordingError, RobotFileError
@@ -22,7 +22,6 @@ def motion_of(seed: int, period_s: float = 10.0, harmonics: int = 5, limit_fract
     return random_fourier_motion(JOINTS, rng, period_s=period_s, harmonics=harmonics, limit_fraction=limit_fraction)
 
 
-@settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 2**32), period_s=st.floats(0.5, 60.0), harmonics=st.integers(2, 12))
 def test_limits_hold_and_one_of_them_is_used(seed: int, period_s: float, harmonics: int) -> None:
     motion = motion_of(seed, period_s, harmonics, limit_fraction=1.0)
@@ -42,7 +41,6 @@ def test_limits_hold_and_one_of_them_is_used(seed: int, period_s: float, harmoni
         assert 0.99 < max(used) <= 1.0 + 1e-12
 
 
-@settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 2**32), period_s=st.floats(0.5, 60.0), harmonics=st.integers(2, 12))
 def test_motion_rests_at_both_ends_and_repeats(seed: int, period_s: float, harmonics: int) -> None:
     ends = motion_of(seed, period_s, harmonics).evaluate(np.array([0.0, period_s]))

@@ -5,7 +5,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tauscope.dynamics import inverse_dynamics
@@ -141,7 +141,6 @@ def random_mjcf(seed: int) -> tuple[str, str, list[str]]:
     return f"<mujoco><worldbody>{inner}</worldbody></mujoco>", f"main{last}", names
 
 
-@settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_random_tree_has_mujocos_torque(tmp_path_factory: pytest.TempPathFactory, seed: int) -> None:
     text, tip, names = random_mjcf(seed)

@@ -249,7 +249,7 @@ VALUES = st.one_of(
 )
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_mutated_entries_are_read_or_refused_in_one_line(data: Any, arm: Robot) -> None:
     """Any value for any key: a scenario that can be simulated, or a ScenarioError; never a traceback."""
@@ -273,7 +273,7 @@ def test_mutated_entries_are_read_or_refused_in_one_line(data: Any, arm: Robot) 
     assert "\n" not in refusal_of(simulate)
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(cuts=st.lists(st.tuples(st.integers(0, 900), st.integers(0, 40), st.binary(max_size=6)), min_size=1, max_size=4))
 def test_mutated_bytes_are_read_or_refused_in_one_line(cuts: list[tuple[int, int, bytes]], arm: Robot) -> None:
     lines = "".join(f"  - {{effect: {name}, {keys}}}\n" for name, keys in list(ENTRIES.items())[5:12])

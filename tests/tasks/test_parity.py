@@ -19,6 +19,7 @@ from tauscope.server.http.runs import RunRequest
 from tauscope.server.http.settings import Settings
 from tauscope.server.http.tasks.submission import BackendRequest
 from tauscope.tasks import campaign, design_excitation, diagnose, identify, run
+from tauscope.tasks.task import Outputs
 
 FILES = {"robot", "recordings", "held_out", "simulated", "model"}
 """Fields of a request that name files: arguments, options or parts of a form."""
@@ -158,3 +159,13 @@ def test_a_field_of_rest_belongs_to_the_task(verb: str) -> None:
 def test_an_output_of_the_command_line_has_a_route(verb: str, task: Any) -> None:
     routes = {document.name for document in task.documents} | {"exports"}
     assert set(OUTPUTS[verb].values()) <= routes
+
+
+def test_an_output_is_made_when_it_is_asked_for_and_once() -> None:
+    made: list[str] = []
+    outputs = Outputs({"a": lambda: made.append("a") or "text", "b": lambda: made.append("b") or "text"})
+    assert "a" in outputs
+    assert "c" not in outputs
+    assert made == []
+    assert outputs["a"] == b"text"
+    assert made == ["a"]

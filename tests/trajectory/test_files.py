@@ -222,7 +222,7 @@ def test_faults_of_an_excitation_are_named(tmp_path: Path, changes: dict[str, ob
     assert str(raised.value) == f"{path}: {message}"
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_mutated_files_never_make_a_traceback(data: st.DataObject) -> None:
     is_json = data.draw(st.booleans())

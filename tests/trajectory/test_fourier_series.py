@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from excitation.excited_arms import rest_error, resting_series
@@ -49,7 +49,6 @@ def test_rest_at_the_ends_of_every_period() -> None:
     assert rest_error(moving)[0] == pytest.approx(1.0)
 
 
-@settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), harmonics=st.integers(2, 9), per_harmonic=st.integers(3, 40))
 def test_nothing_between_samples_exceeds_the_bound(seed: int, harmonics: int, per_harmonic: int) -> None:
     series = resting_series(np.random.default_rng(seed), 1, harmonics)

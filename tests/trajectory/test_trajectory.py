@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from excitation.excited_arms import limited_paper_arm, resting_series
@@ -107,7 +107,6 @@ def test_a_path_visits_the_series_postures_at_its_own_pace() -> None:
 posture = st.lists(st.floats(-2.9, 2.9), min_size=3, max_size=3).map(np.array)
 
 
-@settings(max_examples=60, deadline=None)
 @given(start=posture, end=posture, speed=st.floats(0.05, 5.0), acceleration=st.floats(0.1, 30.0))
 def test_ramps_keep_half_the_limits_and_stay_between_their_ends(
     start: np.ndarray, end: np.ndarray, speed: float, acceleration: float

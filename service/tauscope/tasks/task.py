@@ -188,6 +188,10 @@ class Outputs(Mapping[str, bytes]):
         made = self._make[name]()
         return made.encode() if isinstance(made, str) else made
 
+    def __contains__(self, name: object) -> bool:
+        """Whether there is such an output: asked of `Mapping`, it would be made for the answer."""
+        return name in self._make
+
     def __iter__(self) -> Iterator[str]:
         """Names of all outputs."""
         return iter(self._make)

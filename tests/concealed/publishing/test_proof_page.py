@@ -76,7 +76,7 @@ def trial(series: str, seed: int, score: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def outcomes() -> list[dict[str, Any]]:
     told = [trial("sound", seed, QUIET) for seed in range(98)] + [trial("sound", seed, WRONG) for seed in (98, 99)]
     told += [trial("moderate", seed, RIGHT) for seed in range(19)] + [trial("moderate", 19, WRONG)]
@@ -225,5 +225,5 @@ def test_a_set_that_is_not_done_says_so(outcomes: list[dict[str, Any]], tmp_path
 
 
 def test_the_same_outcomes_give_the_same_bytes(outcomes: list[dict[str, Any]], tmp_path: Path) -> None:
-    first, second = (write_page(outcomes, tmp_path / name / "proof.md", "x") for name in ("a", "b"))
+    first, second = (write_page(outcomes[-3:], tmp_path / name / "proof.md", "x") for name in ("a", "b"))
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]

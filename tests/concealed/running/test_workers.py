@@ -32,7 +32,8 @@ def test_without_a_number_they_are_as_many_as_there_are_cores_to_use(monkeypatch
         assert executor._max_workers == 3  # type: ignore[attr-defined]
 
 
-def test_a_scheduler_that_does_not_answer_is_named() -> None:
+def test_a_scheduler_that_does_not_answer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tauscope.server.queue.cluster_executor.TIMEOUT_S", 0.2)
     with pytest.raises(TauscopeError, match=r"tcp://127\.0\.0\.1:9"), workers(scheduler="tcp://127.0.0.1:9"):
         pass
 

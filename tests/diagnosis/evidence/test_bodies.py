@@ -52,7 +52,6 @@ def test_what_base_parameters_say_of_bodies_makes_these_base_parameters(seed: in
     np.testing.assert_allclose(own.base @ about.links(asked), asked, rtol=1e-6, atol=1e-6)
 
 
-@settings(max_examples=25)
 @given(SEEDS, st.floats(0.1, 1e3))
 def test_no_step_leaves_the_bodies(seed: int, size: float) -> None:
     own, _, bodies = prior(seed)

@@ -39,7 +39,6 @@ def test_rows_of_white_noise_count_as_one_each(seed: int) -> None:
     assert 1.0 <= unbroken(ROWS).dependence(coloured(0.0, seed)) < 1.1
 
 
-@settings(max_examples=25)
 @given(st.integers(0, 10_000), st.floats(-0.95, 0.95), st.floats(1e-6, 1e6))
 def test_the_unit_of_the_rows_does_not_matter(seed: int, correlation: float, unit: float) -> None:
     rows = coloured(correlation, seed, 500)

@@ -1,13 +1,12 @@
 """Torque without a name: nothing that the model can say itself."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tauscope.diagnosis.evidence.discrepancy import beyond
 
 
-@settings(max_examples=25)
 @given(st.integers(0, 10_000), st.floats(1e-6, 1e6))
 def test_features_hold_nothing_of_the_columns_whatever_their_unit(seed: int, unit: float) -> None:
     draws = np.random.default_rng(seed)

@@ -27,7 +27,6 @@ def hold(case: Any, lower: np.ndarray, upper: np.ndarray) -> LinearModel:
         return hypothesis._hold_impossible(case.model, MODEL, case.scales)
 
 
-@settings(max_examples=60)
 @given(SEEDS, PLACES, st.floats(0.0, 2.0), st.floats(0.0, 2.0))
 def test_no_coefficient_passes_a_bound(seed: int, places: list[int], below: float, above: float) -> None:
     case = problem(seed)

@@ -37,7 +37,7 @@ def with_offset(model: ExtendedModel, offset: float) -> ExtendedModel:
     return replace(model, parameters=parameters)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.floats(0.5, 5.0))
 def test_a_torque_that_is_not_there_is_refuted_at_its_joint_alone(offset: float) -> None:
     observations, model = nominal_rows()

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -53,7 +53,6 @@ def window(first: int, count: int) -> Inside:
     return (np.arange(ROWS) >= first) & (np.arange(ROWS) < first + count)
 
 
-@settings(max_examples=25)
 @given(st.integers(0, 10_000), st.floats(2.0, 10.0), st.integers(STRETCHES * SHORTEST, 300))
 def test_a_shift_all_over_the_window_is_found(seed: int, shift: float, count: int) -> None:
     inside = window(100, count)
@@ -76,7 +75,6 @@ def test_a_burst_in_a_small_part_of_the_window_is_not() -> None:
     assert log_odds(residual, inside, residual[inside].mean() * inside) < np.log(ROWS)
 
 
-@settings(max_examples=25)
 @given(st.integers(0, 10_000), st.integers(1, SHORTEST * FEWEST - 1))
 def test_fewer_rows_than_stretches_need_say_nothing(seed: int, count: int) -> None:
     inside = window(100, count)

@@ -40,7 +40,7 @@ def messages() -> st.SearchStrategy[can.Message]:
 
 
 @given(noise=st.lists(messages(), max_size=20))
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_no_frame_crashes_the_driver(buses: tuple[can.BusABC, CanBus], noise: list[can.Message]) -> None:
     peer, bus = buses
     node = DriveNode.on_bus(bus, NodeConfiguration(NODE, 65_536.0, 1.0), 1)

@@ -4,7 +4,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from recording.conditioning.synthetic import Harmonics, harmonics, own_samples, record, robot, torque_of
@@ -273,7 +273,6 @@ def test_the_stretch_of_residuals_is_made_as_callers_make_it() -> None:
     joints=st.integers(1, 3),
     seed=st.integers(0, 2**16),
 )
-@settings(max_examples=80)
 def test_whatever_is_sent_comes_out_finite_counted_and_in_order(
     rate: float,
     count: int,

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from recording.conditioning.synthetic import harmonics, record, robot, torque_of
@@ -214,7 +214,6 @@ def test_optional_columns_reach_the_grid_and_lasting_losses_take_a_joint_out() -
     origin_s=st.sampled_from([0.0, 1.7e9]),
     seed=st.integers(0, 2**16),
 )
-@settings(max_examples=60)
 def test_whatever_is_missing_nothing_is_invented(
     rate_hz: float,
     jitter: float,

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from recording.examination.sound_arms import record_sound_arm, with_limits
@@ -24,7 +24,6 @@ def change(samples: Samples, **changes) -> Recording:
     return Recording.from_arrays("file.csv", **{**channels, "velocity": velocity})
 
 
-@settings(max_examples=200, deadline=None)
 @given(seed=st.integers(0, 2**31), limited=st.booleans())
 def test_sound_recordings_are_not_refused(seed: int, limited: bool) -> None:
     sound = record_sound_arm(seed, rows=1500)
@@ -33,7 +32,6 @@ def test_sound_recordings_are_not_refused(seed: int, limited: bool) -> None:
     assert find_implausible(sound.recording) is None
 
 
-@settings(max_examples=100, deadline=None)
 @given(seed=st.integers(0, 2**31), unit=st.sampled_from(["t=us", "t=ns"]))
 def test_microseconds_and_nanoseconds_are_refused(seed: int, unit: str) -> None:
     sound = record_sound_arm(seed)

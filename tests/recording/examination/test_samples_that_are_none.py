@@ -95,7 +95,6 @@ def test_no_row_keeps_a_stamp_that_is_not_its_own(seed: int) -> None:
     assert kept.mean() > 0.9
 
 
-@settings(max_examples=100, deadline=None)
 @given(damage=st.sampled_from(list(DAMAGES)), seed=st.integers(0, 2**31))
 def test_a_damage_is_named_wherever_it_is(damage: Damage, seed: int) -> None:
     codes = {warning.code for warning in read_text(write_damaged(damage, seed, 1200)).warnings}
@@ -126,7 +125,6 @@ def test_damages_end_in_a_line_or_in_a_result_as_good(damages: list[Damage], see
     assert result < 1.2 * max(measure_error_at_rate(slowest), measure_error_at_rate(1))
 
 
-@settings(max_examples=150, deadline=None)
 @given(seed=st.integers(0, 2**31))
 @example(seed=7943)  # an effort in coarse steps rests while it turns
 def test_a_sound_recording_is_left_alone(seed: int) -> None:

@@ -87,7 +87,7 @@ def columns_of(style: Sequence[str]) -> list[str]:
     return [time, *names]
 
 
-@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     style=st.sampled_from(sorted(STYLES)),
     order=st.permutations(range(10)),

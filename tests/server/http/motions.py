@@ -35,6 +35,15 @@ ROBOT: dict[str, Any] = {
     },
 }
 ROBOT_FILE = json.dumps(ROBOT).encode()
+QUICK_DESIGN = {
+    "duration_s": 4.0,
+    "harmonics": 2,
+    "periods": 2,
+    "starts": 1,
+    "slow_postures": 0,
+    "closing_period": False,
+}
+"""Options of an excitation that is designed within a tenth of a second."""
 
 
 def move_document() -> dict[str, Any]:

@@ -7,7 +7,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from server.http.event_stream import read_events
-from server.http.motions import ROBOT, ROBOT_FILE, move_document
+from server.http.motions import QUICK_DESIGN, ROBOT, ROBOT_FILE, move_document
 from server.http.problem_check import assert_problem
 from server.queue.executors import ManualExecutor
 from tauscope.robot import read_robot
@@ -16,11 +16,10 @@ from tauscope.server.queue.analyses import ExcitationWorkspace
 from tauscope.trajectory import parse_trajectory_json
 
 EXCITATIONS = "/api/v1/excitations"
-QUICK = {"duration_s": 4.0, "harmonics": 2, "periods": 2, "starts": 1, "slow_postures": 0, "closing_period": False}
 
 
 def test_a_design_all_the_way(client: TestClient, settings: Settings) -> None:
-    accepted = client.post(EXCITATIONS, json={"robot": ROBOT, "options": {**QUICK, "floor_m": -0.4, "seed": 5}})
+    accepted = client.post(EXCITATIONS, json={"robot": ROBOT, "options": {**QUICK_DESIGN, "floor_m": -0.4, "seed": 5}})
     assert accepted.status_code == 202, accepted.text
     here = accepted.headers["location"]
     status = client.get(here).json()
@@ -54,7 +53,7 @@ def test_a_design_all_the_way(client: TestClient, settings: Settings) -> None:
 
 
 def test_limits_that_leave_no_motion(client: TestClient) -> None:
-    status = client.post(EXCITATIONS, json={"robot": ROBOT, "options": {**QUICK, "floor_m": 5.0}}).json()
+    status = client.post(EXCITATIONS, json={"robot": ROBOT, "options": {**QUICK_DESIGN, "floor_m": 5.0}}).json()
     status = client.get(status["links"]["self"]).json()
     assert (status["state"], status["problem"]["code"]) == ("failed", "excitation")
     assert_problem(client.get(f"{status['links']['self']}/result"), "excitation", 422)
@@ -63,7 +62,7 @@ def test_limits_that_leave_no_motion(client: TestClient) -> None:
 
 def test_a_box_that_is_none(client: TestClient) -> None:
     box = {"low": [1.0, 0.0, 0.0], "high": [0.0, 1.0, 1.0]}
-    status = client.post(EXCITATIONS, json={"robot": ROBOT, "options": {**QUICK, "boxes": [box]}}).json()
+    status = client.post(EXCITATIONS, json={"robot": ROBOT, "options": {**QUICK_DESIGN, "boxes": [box]}}).json()
     problem = client.get(status["links"]["self"]).json()["problem"]
     assert problem["code"] == "excitation"
     assert "box" in problem["detail"]

@@ -44,7 +44,7 @@ NAMES = st.text(st.characters(exclude_categories=["Cs"], exclude_characters='"\r
 @given(
     pieces=st.lists(FRAGMENTS, max_size=25), path=st.sampled_from([RECORDINGS, IDENTIFICATIONS, "/api/v1/robots/check"])
 )
-@examples(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_form_is_answered(pieces: list[bytes], path: str, form_client: TestClient, folder: Path) -> None:
     headers = {"content-type": "multipart/form-data; boundary=b"}
     answer = form_client.post(path, content=b"".join(pieces), headers=headers)
@@ -57,7 +57,7 @@ def test_any_form_is_answered(pieces: list[bytes], path: str, form_client: TestC
 
 
 @given(name=NAMES, content=st.binary(max_size=50))
-@examples(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_file_is_kept_under_its_own_name_or_not_at_all(
     name: str, content: bytes, form_client: TestClient, folder: Path
 ) -> None:

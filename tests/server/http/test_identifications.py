@@ -53,7 +53,6 @@ def test_columns_of_another_tool(client: TestClient, files: Files) -> None:
         assert_problem(refused, "invalid-request", 422)
 
 
-@pytest.mark.usefixtures("drawn_figures")
 def test_uploaded_files_all_the_way(client: TestClient, files: Files, paper_recordings: tuple[bytes, bytes]) -> None:
     files.append(("held_out", ("test.csv", paper_recordings[1])))
     accepted = client.post(IDENTIFICATIONS, files=files, data=form(QUICK))

@@ -11,6 +11,7 @@ import pytest
 from starlette.requests import ClientDisconnect, Request
 from starlette.testclient import TestClient
 
+from runtime.test_control_process import packages_of
 from server.conftest import RECORDINGS, connected
 from server.http.problem_check import assert_problem
 from server.queue.executors import InlineExecutor
@@ -40,6 +41,11 @@ def request_of(name: str, *, is_gone: bool = False) -> Request:
 
     caller = Caller(name=name, scope=Scope.READ, key=name)
     return Request({"type": "http", "headers": [], CALLER: caller}, receive)
+
+
+def test_a_process_that_reads_files_begins_without_the_rest_of_the_service() -> None:
+    loaded = packages_of("tauscope.server.queue.received_robot, tauscope.server.queue.received_recording")
+    assert not {"fastapi", "starlette", "sqlalchemy", "scipy"} & loaded
 
 
 def test_work_of_a_client_that_has_gone_is_ended(pool: WorkerPool) -> None:

@@ -20,6 +20,8 @@ from server.queue.waiting import wait_until
 from tauscope.recording import read_recording
 from tauscope.trajectory import MoveSegment, Trajectory, trajectory_json
 
+pytestmark = pytest.mark.slow
+
 RUNS = "/api/v1/runs"
 LONG_S = 600.0
 START = [0.0, 0.6, 0.6]

@@ -18,6 +18,8 @@ from server.queue.waiting import wait_until
 from tauscope.errors import TauscopeError
 from tauscope.server.http import Settings, serve
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def data_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -8,9 +8,10 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from server.http.motions import QUICK_DESIGN
 from server.http.problem_check import assert_problem
 from tauscope.errors import RobotFileError
-from tauscope.server.http.robot_files import check_received_robot, read_received_robot
+from tauscope.server.queue.received_robot import check_received_robot, read_received_robot
 
 CHECK = "/api/v1/robots/check"
 URDF = (
@@ -174,7 +175,7 @@ def test_the_same_content_is_one_version(client: TestClient, paper_robot: bytes)
 def test_a_kept_robot_with_its_urdf_is_used_by_its_version(client: TestClient) -> None:
     files = {"robot": ("robot.yaml", URDF_ROBOT), "urdf": ("arm.urdf", URDF)}
     kept = client.post(ROBOTS, files=files).json()
-    job = client.post("/api/v1/excitations", json={"robot": {"version": kept["version"]}})
+    job = client.post("/api/v1/excitations", json={"robot": {"version": kept["version"]}, "options": QUICK_DESIGN})
     assert job.status_code == 202, job.text
     # The job has a copy of its own.
     assert client.delete(kept["link"]).status_code == 204

@@ -48,7 +48,6 @@ def identification(client: TestClient, robot: Files, paper_recordings: tuple[byt
     return status
 
 
-@pytest.mark.usefixtures("drawn_figures")
 def test_the_model_of_an_identification_is_rolled_out(
     client: TestClient, robot: Files, judge: Files, identification: dict[str, Any]
 ) -> None:

@@ -18,7 +18,7 @@ from server.queue.waiting import wait_until
 from tauscope.runtime.record import RunProblem
 from tauscope.runtime.states import RunState
 from tauscope.server.control.run import RunWorkspace
-from tauscope.server.http import Settings, create_app
+from tauscope.server.http import Settings, create_app, protection
 from tauscope.server.http.tasks import event_feeds
 from tauscope.server.queue.analyses import ExcitationWorkspace
 from tauscope.server.store.files import KeptFile
@@ -150,12 +150,14 @@ def test_stop_works_while_everything_else_is_stuck(
 ) -> None:
     """The jobs hang, every thread that routes run in is taken, the disk takes nothing, and all locks are held."""
     executor, stuck, let_go = ManualExecutor(), threading.Semaphore(0), threading.Event()
+    slot = protection._Slot
     freed: list[bool] = []
 
     def hang(*_: object, **__: object) -> None:
         stuck.release()
         freed.append(let_go.wait(60.0))
 
+    monkeypatch.setattr(protection, "_Slot", lambda slots, _: slot(slots, 0.02))  # the readers that hang lose theirs
     app = create_app(settings, executor, controls)
     with connected(app) as client:
         answer = begin(client)

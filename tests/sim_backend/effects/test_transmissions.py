@@ -74,7 +74,11 @@ CASES: dict[str, tuple[list[Any], Callable[..., Any]]] = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+QUICK = ("friction behind a rotor", "friction and ripple")
+EVERY_CASE = [pytest.param(each, marks=() if each in QUICK else pytest.mark.slow) for each in CASES]
+
+
+@pytest.mark.parametrize("name", EVERY_CASE)
 def test_what_the_load_costs(name: str, planar: Any, planar_trial: Any, agrees: Agree) -> None:
     effects, rates = CASES[name]
     agrees(planar.robot, effects, planar_trial, rates(planar), 2 * TOLERANCE)

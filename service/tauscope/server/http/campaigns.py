@@ -31,7 +31,7 @@ from tauscope.server.http.diagnoses import DIAGNOSES
 from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.identifications import IDENTIFICATIONS
 from tauscope.server.http.leases import permit_of
-from tauscope.server.http.robot_files import EXAMPLE_ROBOT, read_received_robot
+from tauscope.server.http.robot_files import EXAMPLE_ROBOT
 from tauscope.server.http.runs import RUNS
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.router import MovingResource
@@ -44,6 +44,7 @@ from tauscope.server.http.tasks.submission import (
 )
 from tauscope.server.problems import problem_responses
 from tauscope.server.queue.job_folder import JobState
+from tauscope.server.queue.received_robot import read_received_robot
 from tauscope.server.queue.task_job import stage_workspace
 from tauscope.tasks.campaign import CampaignOptions
 from tauscope.tasks.run import BackendChoice

@@ -16,10 +16,11 @@ from tauscope.server.http.answers import After, AnswerModel, Measured, PageAnswe
 from tauscope.server.http.bodies import PartRule, ReceivedForm, file_answer, parse_document, receive_form
 from tauscope.server.http.openapi import ROBOT_PARTS, binary_part, file_responses, form_body, refer_to_model
 from tauscope.server.http.reading import READING
-from tauscope.server.http.robot_files import FindingAnswer, read_received_robot, robot_part_rules
+from tauscope.server.http.robot_files import FindingAnswer, robot_part_rules
 from tauscope.server.http.services import ServicesDep, require_no_evidence
 from tauscope.server.problems import ProblemError, problem_responses
-from tauscope.server.queue.analyses import check_kept_recording, read_kept_samples, understand_recording
+from tauscope.server.queue.received_recording import check_kept_recording, read_kept_samples, understand_recording
+from tauscope.server.queue.received_robot import read_received_robot
 from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import StoredRecording
 from tauscope.tasks.task import ReadingOptions

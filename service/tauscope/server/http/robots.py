@@ -16,14 +16,13 @@ from tauscope.server.http.robot_files import (
     RobotCheckRequest,
     RobotReportAnswer,
     RobotVersionAnswer,
-    check_received_robot,
     keep_inline_robot,
-    read_received_robot,
     robot_part_rules,
 )
 from tauscope.server.http.services import ServicesDep, require_no_identification
 from tauscope.server.http.tasks.router import JobRobotAnswer, describe_robot
 from tauscope.server.problems import ProblemError, problem_responses
+from tauscope.server.queue.received_robot import check_received_robot, read_received_robot
 from tauscope.server.store.robots import VERSION_PATTERN
 
 router = APIRouter(prefix="/robots", tags=["robots"])

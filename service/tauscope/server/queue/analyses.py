@@ -1,30 +1,22 @@
-"""Jobs of the queue: what each kind of order and folder holds, the work, and recordings as a worker reads them."""
+"""Jobs of the queue: what each kind of order and folder holds, and the work."""
 
-import json
 from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from tauscope.errors import LimitExceededError, NotFoundError, RecordingError
+from tauscope.errors import LimitExceededError, NotFoundError
 from tauscope.export.formats import CODE_FILES, EXPORT_FILES
-from tauscope.recording import ColumnMapping, Reading, RecordingReport, check_recording, find_mapping, read_recording
-from tauscope.recording.recording import Array
-from tauscope.report.series import envelope_indices
-from tauscope.robot import Robot, read_robot
-from tauscope.server.queue.job_folder import JobProblem, hide_folders, without_folders
+from tauscope.robot import read_robot
+from tauscope.server.queue.job_folder import JobProblem
 from tauscope.server.queue.task_job import TRAJECTORY, OrderedRecording, TaskOrder, TaskWorkspace, perform_job
 from tauscope.tasks import design_excitation, diagnose, identify, rollout
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.diagnose import DiagnosisOptions
 from tauscope.tasks.identify import IdentificationOptions
 from tauscope.tasks.task import ReadingOptions
-from tauscope.trajectory import parse_trajectory_json, read_trajectory
+from tauscope.trajectory import parse_trajectory_json
 from tauscope.trajectory.csv_format import write_trajectory_rows
 
 
@@ -143,68 +135,3 @@ def write_trajectory_piece(workspace: TaskWorkspace[Any], rate_hz: float, start:
         raise LimitExceededError(f"{rows:.3g} rows are more than the {MOST_ROWS} that are made here; {hint}")
     is_over = start >= trajectory.count_samples(rate_hz)
     return b"" if is_over else write_trajectory_rows(trajectory, rate_hz, start).encode()
-
-
-def check_trajectory(folder: Path, robot_file: Path) -> None:
-    """Read a trajectory as a worker does. Raises ExcitationError if it is not valid, or not for this arm."""
-    (path,) = folder.iterdir()
-    with hide_folders(folder, robot_file.parent):
-        read_trajectory(path, read_robot(robot_file))
-
-
-def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport:
-    """Report on a recording. Raises RecordingError, whose message calls the file by its name alone."""
-    with hide_folders(path.parent):
-        return replace(check_recording(path, joint_count), name=path.name)
-
-
-@dataclass(frozen=True)
-class Understanding:
-    """`mapping`: None for a log, which names its joints; `problem`: why the file is refused, without `report`."""
-
-    mapping: ColumnMapping | None
-    report: RecordingReport | None
-    problem: str | None
-
-
-def understand_recording(path: Path, robot: Robot | None, reading: Reading) -> Understanding:
-    """Find columns and units, guessed ones too, and report what a file holds when it is read so."""
-    mapping = None
-    with suppress(RecordingError):  # a log, or a file that the check refuses, too
-        mapping = find_mapping(path, robot, reading)
-    if mapping is not None and mapping.is_guessed and reading.columns is None:
-        reading = replace(reading, columns=mapping.columns, units={**mapping.units, **reading.units})
-    try:
-        report = check_recording(path, None, robot, reading)
-    except RecordingError as error:
-        return Understanding(mapping, None, without_folders(str(error), path.parent))
-    return Understanding(mapping, replace(report, name=path.name), None)
-
-
-def read_kept_samples(path: Path, most: int) -> bytes:
-    """Samples of a plot, thinned to extremes: header length (4 bytes), JSON header, columns of 32-bit floats."""
-    with hide_folders(path.parent):
-        recording = read_recording(path)
-    samples = recording.samples()
-    effort = recording.effort_kind.value
-    values = np.hstack([samples.position, samples.effort])
-    kept = _choose_rows(values, most)
-    joints = range(1, recording.joint_count + 1)
-    header = {
-        "columns": ["t", *(f"q{j}" for j in joints), *(f"{effort}{j}" for j in joints)],
-        "joint_count": recording.joint_count,
-        "effort": effort,
-        "samples": len(samples.time),
-        "shown": len(kept),
-    }
-    text = json.dumps(header).encode()
-    text += b" " * (-len(text) % 4)
-    columns = np.vstack([samples.time[kept] - samples.time[0], values[kept].T]).astype("<f4")
-    return len(text).to_bytes(4, "little") + text + columns.tobytes()
-
-
-def _choose_rows(values: Array, most: int) -> NDArray[np.intp]:
-    if len(values) <= most:
-        return np.arange(len(values))
-    share = max(most // values.shape[1], 2)
-    return np.unique(np.concatenate([envelope_indices(column, share) for column in values.T]))

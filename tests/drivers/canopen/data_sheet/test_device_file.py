@@ -363,7 +363,7 @@ def damages(line: str, other: str, scrap: str) -> list[list[str]]:
 
 
 @given(data=st.data())
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_no_damage_to_a_file_crashes_the_driver(tmp_path: Path, data: st.DataObject) -> None:
     lines = WHOLE.splitlines()
     for _ in range(data.draw(st.integers(1, 4))):
@@ -376,7 +376,7 @@ def test_no_damage_to_a_file_crashes_the_driver(tmp_path: Path, data: st.DataObj
 
 
 @given(content=st.binary(max_size=200) | st.text(max_size=200).map(str.encode))
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_no_other_file_crashes_the_driver(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "any.eds"
     path.write_bytes(b"[607A]\n" + content)

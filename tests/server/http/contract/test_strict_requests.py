@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
-from server.http.motions import ROBOT
+from server.http.motions import QUICK_DESIGN, ROBOT
 from server.http.problem_check import assert_problem
 
 DOCUMENT = json.loads((Path(__file__).parents[1] / "openapi.json").read_text(encoding="utf-8"))
@@ -50,7 +50,7 @@ def test_the_document_is_short() -> None:
 def test_lists_are_read_page_by_page(client: TestClient) -> None:
     for number in range(5):
         client.post("/api/v1/recordings", files={"file": (f"{number}.csv", b"t\n%d\n" % number)})
-        client.post("/api/v1/excitations", json={"robot": ROBOT})
+        client.post("/api/v1/excitations", json={"robot": ROBOT, "options": QUICK_DESIGN})
     for plural, key in (("recordings", "name"), ("excitations", "id")):
         whole = [each[key] for each in client.get(f"/api/v1/{plural}").json()[plural]]
         assert len(whole) == 5

@@ -13,7 +13,6 @@ from tauscope.errors import LimitExceededError
 from tauscope.server.auth.gate import find_caller
 from tauscope.server.http.answers import describe_damaged, describe_job, require_success
 from tauscope.server.http.bodies import PartRule
-from tauscope.server.http.robot_files import read_received_robot
 from tauscope.server.http.services import Services
 from tauscope.server.http.tasks.router import (
     JobDocument,
@@ -26,6 +25,7 @@ from tauscope.server.http.tasks.submission import Received, keep_robot, receive_
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.job_folder import JobState
 from tauscope.server.queue.queue import JobKind
+from tauscope.server.queue.received_robot import read_received_robot
 from tauscope.server.queue.task_job import OrderedRecording, TaskWorkspace, stage_workspace
 from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.files import KeptFile

@@ -33,7 +33,7 @@ from tauscope.server.http.answers import (
 from tauscope.server.http.leases import NO_BODY, LeaseToken
 from tauscope.server.http.openapi import Examples, file_contents
 from tauscope.server.http.reading import READING
-from tauscope.server.http.robot_files import RobotReportAnswer, check_received_robot
+from tauscope.server.http.robot_files import RobotReportAnswer
 from tauscope.server.http.services import Services, ServicesDep, require_no_model
 from tauscope.server.http.tasks.event_feeds import EventSource
 from tauscope.server.http.tasks.events import add_events_route
@@ -41,6 +41,7 @@ from tauscope.server.http.tasks.submission import RobotRequest, request_body
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.job_folder import JobFolder
 from tauscope.server.queue.queue import JobKind
+from tauscope.server.queue.received_robot import check_received_robot
 from tauscope.server.store.data_folder import ItemStore
 
 HTML = "text/html"

@@ -17,7 +17,7 @@ from httpx2 import Response
 from starlette.testclient import TestClient
 
 from server.auth.keyed import client_with
-from server.conftest import HOST, RECORDINGS
+from server.conftest import RECORDINGS, connected, make_data_folder
 from server.http.motions import ROBOT, move_document
 from server.http.problem_check import assert_problem
 from server.queue.controls import HandControls
@@ -91,10 +91,10 @@ class Bench:
 
 
 @pytest.fixture
-def bench(tmp_path: Path) -> Iterator[Bench]:
-    settings = Settings(data_folder=tmp_path / "data", max_upload_bytes=2**20, max_waiting=2)
-    bench = Bench(settings)
-    with TestClient(bench.app, base_url=HOST, raise_server_exceptions=False):
+def bench(tmp_path: Path, new_database: Path) -> Iterator[Bench]:
+    data = make_data_folder(tmp_path / "data", new_database)
+    bench = Bench(Settings(data_folder=data, max_upload_bytes=2**20, max_waiting=2))
+    with connected(bench.app):
         try:
             yield bench
         finally:
@@ -234,12 +234,12 @@ def a_job_that_was_cancelled(bench: Bench) -> Response:
 def a_job_that_kills_the_service(bench: Bench) -> Response:
     settings = bench.settings.model_copy(update={"data_folder": bench.settings.data_folder / "another"})
     first, second = Bench(settings), Bench(settings)
-    with TestClient(first.app, base_url=HOST):
+    with connected(first.app):
         job = first.identify()
     state = settings.data_folder / "identifications" / job["id"] / "state.json"
     record = json.loads(state.read_text(encoding="utf-8"))
     state.write_text(json.dumps({**record, "attempts": MOST_ATTEMPTS}), encoding="utf-8")
-    with TestClient(second.app, base_url=HOST):
+    with connected(second.app):
         return second.result(job)
 
 
