@@ -104,13 +104,7 @@ def effect_entries(model: ExportModel) -> list[dict[str, Any]]:
             "effect": found.effect.id,
             "joint": None if found.effect.joint is None else names[found.effect.joint],
             "equation": found.effect.equation,
-            "parameters": {
-                each.name: float(value)
-                for each, value in (
-                    *zip(found.effect.coefficients, found.coefficients, strict=True),
-                    *zip(found.effect.shapes, found.shape, strict=True),
-                )
-            },
+            "parameters": found.values,
         }
         for found in model.effects
     ]

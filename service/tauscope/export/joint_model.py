@@ -43,6 +43,16 @@ class CentredInertia:
     centre: NDArray[np.float64]
     inertia: NDArray[np.float64]
 
+    @property
+    def full(self) -> NDArray[np.float64]:
+        """The six entries of the inertia as an MJCF lists them: xx, yy, zz, xy, xz, yz [kg m²]."""
+        return LinkInertia(self.mass, self.mass * self.centre, self.inertia).to_vector()[:6]
+
+
+def numbers(*values: float | np.float64) -> str:
+    """Numbers that read back as the same float64; no negative zero."""
+    return " ".join(repr(float(value) + 0.0) for value in values)
+
 
 def joint_models(
     robot: Robot,

@@ -57,7 +57,7 @@ def model_file(document: ModelDocument, robot: Robot, origin: Origin, plain: Mod
     arm = ArmEntry(
         robot=robot_to_dict(robot),
         segments=list(robot.segment_names),
-        branches=[[float(value) for value in link.to_vector()] for link in robot.branches],
+        branches=[link.to_vector().tolist() for link in robot.branches],
         urdf=None if origin.urdf is None else origin.urdf.decode("latin-1"),
         is_mjcf=origin.is_mjcf,
         effort=origin.effort_kind.value,
@@ -79,7 +79,7 @@ def identified_document(result: Identification) -> ModelDocument:
         robot=result.robot.name,
         joints=names,
         base_parameters=[NamedValue(name=name, value=values[name]) for name in structure.base.expressions],
-        links=[[float(value) for value in link.to_vector()] for link in result.consistent.links],
+        links=[link.to_vector().tolist() for link in result.consistent.links],
         friction=list_friction(structure, values),
         effects=[
             EffectEntry(

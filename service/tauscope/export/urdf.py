@@ -4,8 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from tauscope.errors import ExportError
 from tauscope.export.compensation.model import JointFriction
 from tauscope.export.compensation.source_code import comment_text
@@ -15,6 +13,7 @@ from tauscope.export.joint_model import (
     centred,
     dry_friction_and_damping,
     friction_notes,
+    numbers,
     without_branch,
 )
 from tauscope.export.xml_spans import Element, XmlText
@@ -123,9 +122,9 @@ def _joint(element: Element) -> _Joint:
 
 def _write_inertial(text: XmlText, link: Element, inertia: CentredInertia) -> None:
     values = {
-        "origin": {"xyz": _numbers(*inertia.centre), "rpy": "0 0 0"},
-        "mass": {"value": _numbers(inertia.mass)},
-        "inertia": {key: _numbers(inertia.inertia[row, column]) for key, row, column in _INERTIA},
+        "origin": {"xyz": numbers(*inertia.centre), "rpy": "0 0 0"},
+        "mass": {"value": numbers(inertia.mass)},
+        "inertia": {key: numbers(inertia.inertia[row, column]) for key, row, column in _INERTIA},
     }
     tags = {kind: _tag(f"{link.prefix}{kind}", attributes) for kind, attributes in values.items()}
     inertials = list(link.named("inertial"))
@@ -184,7 +183,7 @@ def _zero_inertial(text: XmlText, element: Element, name: str, joint: str, carri
 
 def _write_dynamics(text: XmlText, element: Element, name: str, friction: JointFriction) -> list[str]:
     dry, damping = dry_friction_and_damping(name, friction)
-    values = {"damping": _numbers(damping), "friction": _numbers(dry)}
+    values = {"damping": numbers(damping), "friction": numbers(dry)}
     existing = list(element.named("dynamics"))
     for dynamics in existing:
         text.set_attributes(dynamics, values)
@@ -195,8 +194,3 @@ def _write_dynamics(text: XmlText, element: Element, name: str, friction: JointF
 
 def _tag(name: str, attributes: Mapping[str, str]) -> str:
     return f"<{name} " + " ".join(f'{key}="{value}"' for key, value in attributes.items()) + "/>"
-
-
-def _numbers(*values: float | np.float64) -> str:
-    """Numbers that read back as the same float64; no negative zero."""
-    return " ".join(repr(float(value) + 0.0) for value in values)
