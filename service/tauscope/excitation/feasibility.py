@@ -102,7 +102,7 @@ class Feasibility:
         `x`: (n, columns), centre and coefficients.
         """
         largest = 0.0
-        for part in self.states.usages(self.grid.motion(x)) if self.states.count else ():
+        for part in self.states.usages(self.grid.motion(x)) if self.states.parts else ():
             # Between samples a smooth function exceeds them by an eighth of its second difference.
             bend = np.abs(np.roll(part, -1, axis=0) - 2.0 * part + np.roll(part, 1, axis=0))
             largest = max(largest, float((part + bend / 8.0).max()))

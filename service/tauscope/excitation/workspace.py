@@ -111,11 +111,11 @@ class WorkspaceUsage:
             columns.append(_beyond(box, points).max(axis=-1))
         return np.concatenate(columns, axis=1) if columns else np.empty((len(position), 0))
 
-    def usage(self, motion: MotionSamples) -> Array:
+    def usage(self, motion: MotionSamples, _base: Array | None = None) -> Array:
         """1 - clearance / `REFERENCE_M`, not below 0, (N, obstacles × points)."""
         return np.maximum(1.0 - self.clearance(motion.position) / REFERENCE_M, 0.0)
 
-    def pull_back(self, motion: MotionSamples, weight: Array) -> MotionGradient:
+    def pull_back(self, motion: MotionSamples, _base: Array, weight: Array) -> MotionGradient:
         """Derivatives by the motion of Σ weight · usage. `weight`: (N, obstacles × points), derivative by `usage`."""
         chain = self._frames(motion.position)
         points = self._places(chain)

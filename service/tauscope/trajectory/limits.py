@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.robot import JointType, Robot
+from tauscope.trajectory.fourier_series import MotionSamples
 
 Array = NDArray[np.float64]
 
@@ -56,6 +57,16 @@ class MotionLimits:
             fraction * self.torque,
             self.assumed,
         )
+
+    def usage(self, motion: MotionSamples) -> tuple[Array, Array, Array]:
+        """Position, velocity and acceleration as parts of their limits, -1 to 1 within; (N, n) each."""
+        place = (motion.position - self.middle) / self.half_range
+        return place, motion.velocity / self.velocity, motion.acceleration / self.acceleration
+
+    def random_states(self, count: int, rng: np.random.Generator) -> MotionSamples:
+        """States anywhere within the limits."""
+        place, speed, change = (rng.uniform(-1.0, 1.0, (count, len(self.velocity))) for _ in range(3))
+        return MotionSamples(self.middle + self.half_range * place, self.velocity * speed, self.acceleration * change)
 
 
 def motion_limits(robot: Robot) -> MotionLimits:
