@@ -102,7 +102,9 @@ class ExportModel:
 def of_identification(identification: Identification, origin: Origin) -> ExportModel:
     """The model that an identification delivers; simulators get the friction that fits its bodies."""
     robot, structure, parameters = identification.robot, identification.structure, identification.consistent_parameters
-    rotors = [_coefficient(structure, parameters, joint, "rotor_inertia") for joint in range(robot.joint_count)]
+    rotors: list[float | None] = [None] * robot.joint_count
+    for joint, column in structure.coefficients("rotor_inertia").items():
+        rotors[joint] = float(parameters[column])
     return ExportModel(
         robot=robot,
         links=tuple(identification.consistent.links),
@@ -144,13 +146,8 @@ def _frictions(
 ) -> tuple[JointFriction, ...]:
     frictions = []
     for joint, shape in enumerate(shapes):
-        names = ("stiction", "stribeck", "viscous", "offset")
-        values = {name: _coefficient(structure, parameters, joint, name) or 0.0 for name in names}
+        places = {name: structure.coefficient(joint, name) for name in ("stiction", "stribeck", "viscous", "offset")}
+        values = {name: 0.0 if at is None else float(parameters[at]) for name, at in places.items()}
         delta = None if shape.delta is None else float(shape.delta)
         frictions.append(JointFriction(**values, k_v=float(shape.k_v), delta=delta))
     return tuple(frictions)
-
-
-def _coefficient(structure: ModelStructure, parameters: NDArray[np.float64], joint: int, name: str) -> float | None:
-    column = structure.coefficient(joint, name)
-    return None if column is None else float(parameters[column])
