@@ -46,6 +46,16 @@ WORDING: Mapping[str, Callable[[ErrorDetails], str]] = {
 }
 
 
+def first_fault(error: ValidationError) -> tuple[Place, str]:
+    """Where the first of a document's errors is, and what it is in our words."""
+    details = error.errors(include_url=False)
+    place: Place = tuple(details[0]["loc"])
+    key = details[0].get("ctx", {}).get("key")
+    word = WORDING.get(details[0]["type"], lambda e: e["msg"])
+    more = f" (the first of {len(details)} errors)" if len(details) > 1 else ""
+    return place if key is None else (*place, key), word(details[0]) + more
+
+
 @dataclass(frozen=True)
 class DocumentOrigin:
     """The label of a document (its path), its data as read, and the line of every entry where it has lines."""
@@ -74,18 +84,8 @@ class DocumentOrigin:
         try:
             return kind.model_validate(self.data)
         except ValidationError as error:
-            details = error.errors(include_url=False)
-        place, text = self._word(details[0])
-        more = f" (the first of {len(details)} errors)" if len(details) > 1 else ""
-        raise self.error(place, text + more)
-
-    def _word(self, detail: ErrorDetails) -> tuple[Place, str]:
-        place: Place = tuple(detail["loc"])
-        key = detail.get("ctx", {}).get("key")
-        if key is not None:
-            place = (*place, key)
-        word = WORDING.get(detail["type"])
-        return place, word(detail) if word else detail["msg"]
+            place, text = first_fault(error)
+        raise self.error(place, text)
 
     def _line(self, place: Place) -> int | None:
         """Line of an entry, or of the nearest mapping that should hold it."""

@@ -63,6 +63,14 @@ def rotation_of_z_to(axis: Array) -> Array:
     )
 
 
+def joint_displacement(kind: JointType, axis: Array, position: float) -> Placement:
+    """A turn about an axis through the origin, or a slide along it. `axis`: (3,), unit vector."""
+    if kind is JointType.PRISMATIC:
+        return Placement(translation=position * axis)
+    align = rotation_of_z_to(axis)
+    return Placement(align @ rotation_about_z(position) @ align.T)
+
+
 @dataclass(frozen=True)
 class DenavitHartenbergRow:
     """One row of Denavit-Hartenberg parameters.
