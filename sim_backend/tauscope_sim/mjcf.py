@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tauscope.errors import RobotFileError
+from tauscope.errors import RobotFileError, one_line
 from tauscope.robot.actuator import Actuator
 from tauscope.robot.chain import Chain, ChainMotion, Master, ResultWarning, default_ends_note, rigid_branch_note
 from tauscope.robot.document import MOST_JOINTS
 from tauscope.robot.kinematics import compose, joint_displacement, rotation_of_z_to
-from tauscope.robot.messages import Finding, Severity, nearest, one_line, shown
+from tauscope.robot.messages import Finding, Severity, nearest, shown
 from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
 from tauscope.robot.urdf_inertia import inertia_about_frame
 from tauscope_sim.mjcf_compiler import compile_model
@@ -92,8 +92,7 @@ class _Reader:
         self._by_name = {joint.name: joint for joint in self._joints}
         for name in locked:
             if name not in self._by_name:
-                text = f"locked: joint {shown(name)} is not in the file; {nearest(name, self._by_name)}"
-                raise self._error(text)
+                raise self._error(f"locked: joint {shown(name)} is not in the file; {nearest(name, self._by_name)}")
 
     def chain(self, base: str | None, tip: str | None) -> Chain:
         """Read the chain between two bodies."""
@@ -103,8 +102,7 @@ class _Reader:
         free = [joint for joint in path if joint.name not in self._locked]
         for joint in free:
             if not joint.moves:
-                text = f"joint {shown(joint.name)} is a ball or free joint; name the body beyond it as base"
-                raise self._error(text)
+                raise self._error(f"joint {shown(joint.name)} is a ball or free joint; name the body beyond it as base")
         motion = ChainMotion({joint.name: joint.master for joint in free})
         moving = [joint for joint in free if joint.name in motion.moving]
         if not moving:
@@ -142,7 +140,7 @@ class _Reader:
         )
 
     def _error(self, text: str) -> RobotFileError:
-        return RobotFileError(one_line(f"{self._label}: {text}"))
+        return RobotFileError(f"{self._label}: {text}")
 
     def _remark(self, severity: Severity, joint: _Joint, text: str) -> None:
         self._findings.append(Finding(severity, one_line(f"{self._label}: joint {shown(joint.name)}"), text))

@@ -10,7 +10,6 @@ from pathlib import Path
 import mujoco
 
 from tauscope.errors import RobotFileError
-from tauscope.robot.messages import one_line
 
 
 def compile_model(data: bytes, label: str, path: Path | None) -> mujoco.MjModel:
@@ -31,7 +30,7 @@ def compile_model(data: bytes, label: str, path: Path | None) -> mujoco.MjModel:
         remedy = "correct it"
         if "opening file" in reason:
             remedy = "put that file there" + ("" if "include" in reason else ", or state <inertial> of every body")
-        raise RobotFileError(one_line(f"{label}: MuJoCo refuses the file ({reason}); {remedy}")) from None
+        raise RobotFileError(f"{label}: MuJoCo refuses the file ({reason}); {remedy}") from None
 
 
 def _parse(data: bytes, path: Path | None) -> mujoco.MjSpec:

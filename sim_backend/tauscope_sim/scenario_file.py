@@ -25,7 +25,7 @@ from tauscope.errors import RobotFileError, ScenarioError
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.document import DocumentOrigin, first_fault
 from tauscope.robot.document_fields import Document
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import nearest, shown
 from tauscope.robot.robot import Robot
 from tauscope.robot.yaml_text import Place, read_yaml
 from tauscope_sim.effects import EFFECTS, Effect, ScenarioEntry, SensorEffect
@@ -140,4 +140,4 @@ class _Reader:
         if effect:  # it stands behind its number
             before, entry, key = where.rpartition(f"effects[{place[1]}]")
             where = f"{before}{entry} ({effect}){key}"
-        return ScenarioError(one_line(f"{where}: {text}"))
+        return ScenarioError(f"{where}: {text}")

@@ -17,11 +17,10 @@ from tauscope.cli.device_command import show_frames
 from tauscope.cli.output_files import keep_file, require_new
 from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
-from tauscope.errors import AcquisitionError
+from tauscope.errors import AcquisitionError, one_line
 from tauscope.number_text import ABSENT, counted, significant
 from tauscope.report.tables import Table
 from tauscope.robot import JointType, Robot
-from tauscope.robot.messages import one_line
 from tauscope.runtime.drivers import DEFAULT_BACKEND, BackendName, driver_names, find_driver
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.record import RunRecord

@@ -13,7 +13,6 @@ from tauscope.export.mjcf import to_mjcf
 from tauscope.export.mjcf_findings import effects_in
 from tauscope.export.model import ExportModel
 from tauscope.export.urdf import patch_urdf
-from tauscope.robot.messages import one_line
 
 
 class ExportFormat(StrEnum):
@@ -89,7 +88,7 @@ def make_export(export_format: ExportFormat, model: ExportModel, choice: Actuato
         case ExportFormat.URDF:
             if model.origin.urdf is None:
                 text = "its chain does not come from a URDF; export an MJCF (.xml) instead"
-                raise ExportError(one_line(f"robot {model.robot.name}: {text}"))
+                raise ExportError(f"robot {model.robot.name}: {text}")
             notes = effects_in(model, (), "a URDF has no such element")
             return patch_urdf(model.origin.urdf, model.joint_models, notes).data
         case ExportFormat.MJCF:

@@ -12,7 +12,7 @@ from tauscope.export.mjcf_findings import NEWER, Additions, JointExtras, MjcfSeg
 from tauscope.export.model import ExportModel
 from tauscope.robot import JointType, Robot, Segment
 from tauscope.robot.kinematics import compose
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 
 MOTORS = ActuatorChoice()  # torque motors, which need no gains
 
@@ -112,7 +112,7 @@ def _body(motion: Segment, segment: MjcfSegment) -> list[str]:
 
     label, link = segment.label, segment.model.link
     if link is None:
-        raise ExportError(one_line(f"joint {shown(label)} has no link to write; give the link of every joint"))
+        raise ExportError(f"joint {shown(label)} has no link to write; give the link of every joint")
     inertia = centred(label, link)
     centre, mass, full = numbers(*inertia.centre), numbers(inertia.mass), numbers(*inertia.full)
     # At q = 0 the link frame is before · after; the joint's axis is the z axis between the two.
@@ -146,7 +146,7 @@ def _armature(label: str, model: JointModel) -> float:
     armature = 0.0 if model.rotor_inertia is None else float(model.rotor_inertia)
     if not (np.isfinite(armature) and armature >= 0.0):
         text = f"joint {shown(label)}: rotor inertia {armature:g} must be 0 or more; export the consistent model"
-        raise ExportError(one_line(text))
+        raise ExportError(text)
     return armature
 
 

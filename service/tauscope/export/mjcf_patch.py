@@ -13,7 +13,7 @@ from tauscope.export.mjcf import passive_elements, tendon_elements
 from tauscope.export.mjcf_findings import MjcfSegment, add_findings
 from tauscope.export.model import ExportModel
 from tauscope.export.xml_spans import Element, XmlText
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import nearest, shown
 
 _MARKER = "Model identified by Tauscope."
 
@@ -27,13 +27,13 @@ def patch_mjcf(path: Path, model: ExportModel) -> bytes:
     """
     if not model.origin.is_mjcf:
         text = "the model comes from another file than an MJCF; give this MJCF as ROBOT to identify or diagnose"
-        raise ExportError(one_line(f"{path}: {text}"))
+        raise ExportError(f"{path}: {text}")
     try:
         text = XmlText(path.read_bytes(), str(path))
     except OSError as error:
-        raise ExportError(one_line(f"{path}: cannot be read: {error.strerror}; check the path")) from None
+        raise ExportError(f"{path}: cannot be read: {error.strerror}; check the path") from None
     if text.root.name != "mujoco":
-        raise ExportError(one_line(f"{path}: the outermost element is <{text.root.name}>, not <mujoco>; give an MJCF"))
+        raise ExportError(f"{path}: the outermost element is <{text.root.name}>, not <mujoco>; give an MJCF")
     added = add_findings(model, without=("base_tilt", "kinematic_error"))
     places = {joint.attributes.get("name", ""): (body, joint) for body, joint in _joints(text.root)}
     notes = list(added.notes)
@@ -41,7 +41,7 @@ def patch_mjcf(path: Path, model: ExportModel) -> bytes:
         label, link = segment.label, segment.model.link
         if label not in places:
             hint = nearest(label, places)
-            raise ExportError(one_line(f"{path}: joint {shown(label)} is not in the file itself; {hint}"))
+            raise ExportError(f"{path}: joint {shown(label)} is not in the file itself; {hint}")
         body, joint = places[label]
         if link is not None and np.any(link.to_vector()):  # of several joints of one body, only the last has it
             own, remarks = without_branch(label, segment.model)
@@ -53,7 +53,7 @@ def patch_mjcf(path: Path, model: ExportModel) -> bytes:
     passive = [line for joint, extras in enumerate(added.joints) for line in passive_elements(joint, extras, names)]
     tendons = tendon_elements(added, names)
     if (passive or tendons) and _MARKER.encode() in text.data:
-        raise ExportError(one_line(f"{path}: holds findings of an earlier export; give the file as it was before"))
+        raise ExportError(f"{path}: holds findings of an earlier export; give the file as it was before")
     _append(text, "actuator", passive)
     _append(text, "tendon", tendons)
     text.set_comment(text.root, _MARKER, "".join(f"\n       {comment_text(note)}" for note in notes))

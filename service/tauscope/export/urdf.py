@@ -17,7 +17,7 @@ from tauscope.export.joint_model import (
     without_branch,
 )
 from tauscope.export.xml_spans import Element, XmlText
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import nearest, shown
 
 _MARKER = "Model identified by Tauscope."
 _INERTIA = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2), ("izz", 2, 2))
@@ -46,7 +46,7 @@ def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel], remarks: 
     data, label = _read(source)
     text = XmlText(data, label)
     if text.root.name.rpartition(":")[2] != "robot":
-        raise ExportError(one_line(f"{label}: the outermost element is <{text.root.name}>, not <robot>; give a URDF"))
+        raise ExportError(f"{label}: the outermost element is <{text.root.name}>, not <robot>; give a URDF")
     tree = _Tree(text.root, label)
     notes: list[str] = []
     for name, model in models.items():
@@ -87,7 +87,7 @@ class _Tree:
     def link(self, name: str) -> Element:
         """The link element of a name."""
         if name not in self._links:
-            raise ExportError(one_line(f"{self.label}: link {shown(name)} is not in the file; add it"))
+            raise ExportError(f"{self.label}: link {shown(name)} is not in the file; add it")
         return self._links[name]
 
     def moving_joint(self, name: str) -> _Joint:
@@ -95,10 +95,10 @@ class _Tree:
         joint = self._joints.get(name)
         if joint is None:
             hint = nearest(name, self._joints)
-            raise ExportError(one_line(f"{self.label}: joint {shown(name)} is not in the file; {hint}"))
+            raise ExportError(f"{self.label}: joint {shown(name)} is not in the file; {hint}")
         if joint.type == "fixed":
             text = f"joint {shown(name)} is fixed; name the moving joint that carries its link"
-            raise ExportError(one_line(f"{self.label}: {text}"))
+            raise ExportError(f"{self.label}: {text}")
         return joint
 
     def below(self, link: str) -> list[tuple[str, _Joint]]:
@@ -110,9 +110,9 @@ def _read(source: bytes | Path) -> tuple[bytes, str]:
     if isinstance(source, bytes):
         return source, "URDF"
     try:
-        return source.read_bytes(), one_line(str(source))
+        return source.read_bytes(), str(source)
     except OSError as error:
-        raise ExportError(one_line(f"{source}: cannot be read: {error.strerror}; check the path")) from None
+        raise ExportError(f"{source}: cannot be read: {error.strerror}; check the path") from None
 
 
 def _joint(element: Element) -> _Joint:

@@ -322,8 +322,7 @@ class _Scan:
         elif opcode == Opcode.STATISTICS:
             (stated,) = struct.unpack_from("<Q", self._read(length))
             if stated != self._messages:  # a record whose kind was damaged was passed over as an unknown one
-                text = f"it states {stated} messages and holds {self._messages}"
-                raise DamageError(f"the file is damaged: {text}")
+                raise DamageError(f"the file is damaged: it states {stated} messages and holds {self._messages}")
         else:  # of any size, in small memory; the checksum wants its bytes
             while length > 0:
                 length -= len(self._read(min(length, _COPY_BYTES)))

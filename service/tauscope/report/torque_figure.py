@@ -123,7 +123,7 @@ def worst_part(residual: Array, share: float) -> slice:
 
 
 def plot_envelope(axis: Axes, time: Array, values: Array, most: int, **style: Any) -> None:
-    """Draw a curve over the whole width of an axis by as many points as keep its look."""
+    """Draw a curve over the whole width of an axis by as many points as keep its look. `time`, `values`: (N,)."""
     kept = envelope_indices(values, most)
     axis.plot(time[kept], values[kept], **style)
     axis.margins(x=0.0)

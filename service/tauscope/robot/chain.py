@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tauscope.errors import one_line
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.actuator import Actuator
-from tauscope.robot.messages import Finding, one_line, shown
+from tauscope.robot.messages import Finding, shown
 from tauscope.robot.robot import (
     Coupling,
     FrictionCoefficients,

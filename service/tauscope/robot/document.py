@@ -28,7 +28,7 @@ from tauscope.robot.document_fields import (
     choice,
     refusal,
 )
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 from tauscope.robot.recording_layout import RecordingLayout, Source, find_column_fault, find_fault, find_separator_fault
 from tauscope.robot.robot import JointType
 from tauscope.robot.yaml_text import Place
@@ -75,7 +75,7 @@ class DocumentOrigin:
 
     def error(self, place: Place, text: str) -> RobotFileError:
         """The error of an entry."""
-        return RobotFileError(one_line(f"{self.where(place)}: {text}"))
+        return RobotFileError(f"{self.where(place)}: {text}")
 
     def validate(self, kind: type[DocumentType]) -> DocumentType:
         """The data as a validated document. Raises RobotFileError naming the first entry that is not valid."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from tauscope.errors import RobotFileError
 from tauscope.robot.document import DocumentOrigin, PlainRobotDocument
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import nearest, shown
 from tauscope.robot.robot import Joint, LinkInertia, Model, Placement, Robot, Segment
 from tauscope.robot.robot_building import FileSource, SourceFile, build_robot
 from tauscope.robot.robot_file import parse_robot_file
@@ -62,7 +62,7 @@ def _find_given(origin: DocumentOrigin, files: Mapping[str, bytes]) -> FileSourc
         data = files[file]
         if not 0 < len(data) <= LARGEST_XML:
             limit = LARGEST_XML // 1024
-            raise RobotFileError(one_line(f"{file}: must hold 1 byte to {limit} KiB, but holds {len(data)} bytes"))
+            raise RobotFileError(f"{file}: must hold 1 byte to {limit} KiB, but holds {len(data)} bytes")
         return SourceFile(data, file)
 
     return look_up

@@ -21,7 +21,7 @@ from tauscope.robot.chain import Chain, ChainMotion, Master, default_ends_note, 
 from tauscope.robot.document import MOST_JOINTS
 from tauscope.robot.document_fields import LARGEST_NUMBER
 from tauscope.robot.kinematics import compose, joint_displacement, rotation_of_z_to
-from tauscope.robot.messages import Finding, Severity, nearest, one_line, shown
+from tauscope.robot.messages import Finding, Severity, nearest, shown
 from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
 from tauscope.robot.urdf_element import Element, number, only_child, origin, urdf_error, vector, where
 from tauscope.robot.urdf_inertia import lumped_inertia, stated_mass
@@ -42,7 +42,7 @@ class JointMotions:
         for name in locked:
             if name not in self._joints:
                 hint = nearest(name, self._joints)
-                raise RobotFileError(one_line(f"{tree.label}: locked: joint {shown(name)} is not in the file; {hint}"))
+                raise RobotFileError(f"{tree.label}: locked: joint {shown(name)} is not in the file; {hint}")
         free = [joint for joint in path if joint.type in MOVING and joint.name not in locked]
         self.chain = ChainMotion({joint.name: self.master(joint) for joint in free})
         self.independent = tuple(self._joints[name] for name in self.chain.independent)
@@ -70,7 +70,7 @@ class JointMotions:
             mimic = only_child(self._tree.label, joint.element, "mimic", findings)
             if mimic is not None and (name := mimic.get("joint") or "") not in self._joints:
                 text = f"mimics joint {shown(name)}, which is not in the file, and counts as free; "
-                place = one_line(where(self._tree.label, joint.element))
+                place = where(self._tree.label, joint.element)
                 findings.append(Finding(Severity.WARNING, place, text + nearest(name, self._joints)))
 
     def is_locked(self, joint: UrdfJoint) -> bool:
@@ -103,7 +103,7 @@ def joint_axis(tree: UrdfTree, joint: UrdfJoint, findings: list[Finding]) -> np.
         raise urdf_error(tree.label, joint.element, "its axis is zero; give the direction, as xyz='0 0 1'")
     if abs(length - 1.0) > 1e-3:
         text = f"its axis has length {length:g}; its direction is used"
-        findings.append(Finding(Severity.INFO, one_line(where(tree.label, joint.element)), text))
+        findings.append(Finding(Severity.INFO, where(tree.label, joint.element), text))
     return axis / length
 
 
@@ -138,7 +138,7 @@ def read_urdf_chain(
             raise urdf_error(label, joint.element, text)
     if not motions.independent:
         text = f"no moving joint lies between base {shown(base)} and tip {shown(tip)}; name the last link as tip"
-        raise RobotFileError(one_line(f"{label}: {text}"))
+        raise RobotFileError(f"{label}: {text}")
     moving = [joint for joint in path if joint.name in motions.chain.moving]
     branches: list[UrdfJoint] = []
     bodies = [_bodies(tree, joint, path, motions, branches, findings) for joint in moving]
@@ -150,13 +150,13 @@ def read_urdf_chain(
     _remark_on_base(tree, base, findings)
     for joint, link in zip(moving, links, strict=True):
         if link is None and any(links):
-            place = one_line(where(label, tree.links[joint.child]))
+            place = where(label, tree.links[joint.child])
             findings.append(Finding(Severity.WARNING, place, "has no <inertial>; the model takes it as massless"))
     names = [joint.name for joint in motions.independent]
     for joint in moving:
         if (master := motions.master(joint)) is not None:
             text = f"follows {shown(master.joint)}: {master.multiplier:g} times its position, plus {master.offset:g}"
-            findings.append(Finding(Severity.INFO, one_line(where(label, joint.element)), text))
+            findings.append(Finding(Severity.INFO, where(label, joint.element), text))
     notes = [default_ends_note(label, "urdf", base, tip, names)] if is_default else []
     return Chain(
         base=base,
@@ -183,14 +183,14 @@ def _ends(tree: UrdfTree, base: str | None, tip: str | None, locked: Mapping[str
     for role, link in (("base", base), ("tip", tip)):
         if link is not None and link not in tree.links:
             hint = nearest(link, tree.links)
-            raise RobotFileError(one_line(f"{tree.label}: the {role} link {shown(link)} is not in the file; {hint}"))
+            raise RobotFileError(f"{tree.label}: the {role} link {shown(link)} is not in the file; {hint}")
     if tip is None:
         leaves = [link for link in tree.links if link not in tree.child_joints]
         paths = {leaf: _up(tree, leaf, base) for leaf in leaves}
         reached = {leaf: path for leaf, path in paths.items() if path is not None}
         if not reached:
             text = "holds no links" if base is None else f"the base {shown(base)} carries no other link; name another"
-            raise RobotFileError(one_line(f"{tree.label}: {text}"))
+            raise RobotFileError(f"{tree.label}: {text}")
 
         def depth(leaf: str) -> tuple[int, int]:
             moving = [joint for joint in reached[leaf] if joint.type in MOVING and joint.name not in locked]
@@ -225,11 +225,11 @@ def _path(tree: UrdfTree, base: str, tip: str) -> list[UrdfJoint]:
             text = (
                 f"the tip {shown(tip)} hangs on {shown(link)}, not on the base {shown(base)}; name links of one chain"
             )
-            raise RobotFileError(one_line(f"{tree.label}: {text}"))
+            raise RobotFileError(f"{tree.label}: {text}")
         path.append(joint)
         link = joint.parent
     if len(path) > MOST_JOINTS:
-        raise RobotFileError(one_line(f"{tree.label}: the chain has {len(path)} joints, more than {MOST_JOINTS}"))
+        raise RobotFileError(f"{tree.label}: the chain has {len(path)} joints, more than {MOST_JOINTS}")
     return path[::-1]
 
 
@@ -238,7 +238,7 @@ def _remark_on_base(tree: UrdfTree, base: str, findings: list[Finding]) -> None:
     while (joint := tree.parent_joint.get(link)) is not None:
         if joint.type != "fixed":
             text = f"moves the base {shown(base)}; it is taken to stand still"
-            findings.append(Finding(Severity.INFO, one_line(where(tree.label, joint.element)), text))
+            findings.append(Finding(Severity.INFO, where(tree.label, joint.element), text))
         link = joint.parent
 
 
@@ -316,7 +316,7 @@ def _limits(tree: UrdfTree, joint: UrdfJoint, findings: list[Finding]) -> JointL
     lower, upper = (_limit(tree, element, key) for key in ("lower", "upper"))
     if lower > upper and joint.type != "continuous":
         text = f"limits reversed: lower {lower:g} is above upper {upper:g}; they count as not stated, correct them"
-        findings.append(Finding(Severity.WARNING, one_line(where(tree.label, joint.element)), text))
+        findings.append(Finding(Severity.WARNING, where(tree.label, joint.element), text))
     stated = joint.type != "continuous" and lower < upper and max(-lower, upper) <= LARGEST_NUMBER
     return JointLimits(
         position=(lower, upper) if stated else None,

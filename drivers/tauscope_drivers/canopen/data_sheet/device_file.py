@@ -196,13 +196,21 @@ def read_device_file(path: Path, node_id: int) -> DeviceFile:
     sections = read_sections(_content(path))
     entries = {(entry.index, entry.subindex): entry for entry in _describe_all(sections, node_id)}
     device = sections.get("DeviceInfo", {})
-    identity: list[int | None] = []
-    for subindex, key in enumerate(("VendorNumber", "ProductNumber", "RevisionNumber"), start=1):
-        entry = entries.get((objects.VENDOR.index, subindex))
-        # Zero is how makers leave it open.
-        identity.append(int(device.get(key, "0")) or (None if entry is None else entry.default or None))
+
+    def identity(entry: DriveObject, key: str) -> int | None:
+        """By the device's section, or by the default of the object; zero is how makers leave it open."""
+        described = entries.get((entry.index, entry.subindex))
+        return int(device.get(key, "0")) or (described.default if described else None) or None
+
     made_for = sections.get("DeviceComissioning", {}).get("NodeID")
-    return DeviceFile(_printable(path.name), entries, *identity, None if made_for is None else int(made_for))
+    return DeviceFile(
+        name=_printable(path.name),
+        objects=entries,
+        vendor=identity(objects.VENDOR, "VendorNumber"),
+        product=identity(objects.PRODUCT, "ProductNumber"),
+        revision=identity(objects.REVISION, "RevisionNumber"),
+        node_id=None if made_for is None else int(made_for),
+    )
 
 
 def _content(path: Path) -> str:

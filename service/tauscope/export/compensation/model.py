@@ -17,7 +17,7 @@ from ruamel.yaml.representer import SafeRepresenter
 from tauscope.errors import ExportError
 from tauscope.recording import EffortKind
 from tauscope.robot import Joint, JointType
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 
 _RATED_TORQUE = "rated_torque_nm"
 
@@ -57,7 +57,7 @@ def _milliampere(joint: Joint, effort_kind: EffortKind) -> tuple[float | None, s
     constant = joint.torque_constant
     if not math.isfinite(constant) or constant == 0.0:
         text = f"joint {shown(joint.name)}: torque_constant = {constant:g} must be finite and not zero"
-        raise ExportError(one_line(f"{text}; correct the robot file"))
+        raise ExportError(f"{text}; correct the robot file")
     force = "N" if joint.type is JointType.PRISMATIC else "Nm"
     remark = f"mA: torque_constant {constant!r} {force}/A, sign {joint.sign:+d}"
     if constant == 1.0:
@@ -83,7 +83,7 @@ def _permille(joint: Joint) -> tuple[float | None, str]:
 def _positive(joint: Joint, name: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value <= 0.0:
         text = f"joint {shown(joint.name)}: {name} = {shown(value)} must be a positive number; correct the robot file"
-        raise ExportError(one_line(text))
+        raise ExportError(text)
     return float(value)
 
 
@@ -156,17 +156,15 @@ def check_friction(joint: str, friction: JointFriction) -> None:
     """
     for name in ("stiction", "stribeck", "viscous", "offset", "k_v"):
         if not math.isfinite(getattr(friction, name)):
-            raise ExportError(one_line(f"joint {shown(joint)}: {name} is not finite; identify it from other data"))
+            raise ExportError(f"joint {shown(joint)}: {name} is not finite; identify it from other data")
     if friction.k_v <= 0.0:
-        raise ExportError(
-            one_line(f"joint {shown(joint)}: k_v = {friction.k_v:g} is not positive; give a positive k_v")
-        )
+        raise ExportError(f"joint {shown(joint)}: k_v = {friction.k_v:g} is not positive; give a positive k_v")
     if friction.delta is None:
         if friction.stribeck != 0.0:
-            raise ExportError(one_line(f"joint {shown(joint)}: has a Stribeck term but no delta; give its delta"))
+            raise ExportError(f"joint {shown(joint)}: has a Stribeck term but no delta; give its delta")
     elif not (math.isfinite(friction.delta) and friction.delta > 0.0):
         text = f"joint {shown(joint)}: delta = {friction.delta:g} is not positive and finite; give a positive delta"
-        raise ExportError(one_line(text))
+        raise ExportError(text)
 
 
 def friction_torque(friction: JointFriction, velocity: NDArray[np.float64] | float) -> NDArray[np.float64]:
