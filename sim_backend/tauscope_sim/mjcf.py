@@ -17,7 +17,6 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tauscope.errors import RobotFileError, one_line
@@ -26,10 +25,8 @@ from tauscope.robot.chain import Chain, ChainMotion, Master, ResultWarning, defa
 from tauscope.robot.document import MOST_JOINTS
 from tauscope.robot.kinematics import compose, joint_displacement, rotation_of_z_to
 from tauscope.robot.messages import Finding, Severity, nearest, shown
-from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
+from tauscope.robot.robot import Array, FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
 from tauscope.robot.urdf_inertia import inertia_about_frame
-
-Array = NDArray[np.float64]
 
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 CHOSEN_STD = 0.2  # relative standard error of an MJCF's gains: most are chosen so that the arm looks right

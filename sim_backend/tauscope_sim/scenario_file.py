@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
 from tauscope.errors import RobotFileError, ScenarioError
@@ -26,13 +25,11 @@ from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.document import DocumentOrigin, first_fault
 from tauscope.robot.document_fields import Document
 from tauscope.robot.messages import nearest, shown
-from tauscope.robot.robot import Robot
+from tauscope.robot.robot import Array, Robot
 from tauscope.robot.yaml_text import Place, read_yaml
 from tauscope_sim.effects import EFFECTS, Effect, ScenarioEntry, SensorEffect
 from tauscope_sim.effects.effect import NotNegative, NotNegativeNumbers, Seed, single_zero
 from tauscope_sim.scenario import Scenario
-
-Array = NDArray[np.float64]
 
 LARGEST_SCENARIO_FILE = 256 * 1024
 MOST_EFFECTS = 200

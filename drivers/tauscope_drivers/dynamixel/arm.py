@@ -4,7 +4,6 @@ import contextlib
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope_drivers.backend import Capabilities, ControlMode, DriveLimits, StopPolicy
 from tauscope_drivers.clock import Clock
@@ -22,9 +21,7 @@ from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.limits import RunawayWatch
 from tauscope_drivers.serial_servos.arm import SerialServoArm
 from tauscope_drivers.serial_servos.bus import PATIENCE_S, BusTiming, CycleTraffic, largest_part, largest_rate_hz
-from tauscope_drivers.state import ArmState, Setpoint
-
-Array = NDArray[np.float64]
+from tauscope_drivers.state import ArmState, Array, Setpoint
 
 # what the servos do by themselves when their watchdog fires
 _POLICIES = {ControlMode.POSITION: frozenset([StopPolicy.HOLD]), ControlMode.TORQUE: frozenset([StopPolicy.TORQUE_OFF])}

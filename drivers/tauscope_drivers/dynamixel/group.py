@@ -4,15 +4,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope_drivers.dynamixel.bus import ServoBus
 from tauscope_drivers.dynamixel.control_table import BYTES_BEFORE_STATE, STATE_ITEMS, Block, Item
 from tauscope_drivers.dynamixel.packets import Status
 from tauscope_drivers.dynamixel.servo import JointServo
 from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers
-
-Array = NDArray[np.float64]
+from tauscope_drivers.state import Array
 
 PROBES = 3  # how often Fast Sync Read is tried before the firmware counts as not knowing it
 PLAIN_CYCLES = 50  # for how many cycles each servo answers for itself, after a common packet broke off at a silent one

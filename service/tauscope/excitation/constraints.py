@@ -9,16 +9,14 @@ what it is off at the present motion: (⟨u^p⟩)^{1/p} · (max u / (⟨u^p⟩)^
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.excitation.information import MotionGradient
 from tauscope.excitation.series_space import SeriesSpace
 from tauscope.excitation.torque_prediction import TorquePrediction
 from tauscope.excitation.workspace import WorkspaceUsage
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples, between_samples
 from tauscope.trajectory.limits import MotionLimits
-
-Array = NDArray[np.float64]
 
 POWER = 30.0  # p of the p-norm over time: the largest usages decide, yet several peaks at once have a say
 # Instants a period of the highest harmonic at which kinematic limits are held: 0.3 % is left for what lies between.

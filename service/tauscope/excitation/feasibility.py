@@ -3,16 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import ExcitationError
 from tauscope.excitation.constraints import KinematicUsage, StateUsage
 from tauscope.excitation.series_space import SeriesGrid, SeriesSpace
 from tauscope.robot import JointType, Robot
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
 from tauscope.trajectory.limits import MotionLimits
-
-Array = NDArray[np.float64]
 
 POSTURES = 2048  # random postures at which is asked whether the arm can stand there at all
 LEAST_HALF_RANGE = 1e-3  # half range below which a joint has no room to move [rad or m]

@@ -22,9 +22,9 @@ from tauscope.dynamics.friction import smooth_sign
 from tauscope.dynamics.regressor import TorqueRegressor
 from tauscope.dynamics.regressor_gradient import RegressorGradient
 from tauscope.robot import STANDARD_PARAMETERS, Robot
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
 
-Array = NDArray[np.float64]
 Columns = NDArray[np.intp]
 
 # K_v where the robot file states none [s/rad or s/m]: its sign function turns within a hundredth of usual speeds.

@@ -4,17 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import ExcitationError
 from tauscope.excitation.constraints import StateUsage
 from tauscope.robot import JointType, Robot
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples, between_samples
 from tauscope.trajectory.limits import MotionLimits
 from tauscope.trajectory.segments import FourierSegment, Segment
 from tauscope.trajectory.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 CHECK_RATE_HZ = 500.0  # rate at which segments are looked at that are no Fourier series [Hz]
 SAMPLES_PER_HARMONIC = 400  # instants a period of the highest harmonic at which a Fourier series is looked at

@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.excitation.constraints import KinematicUsage, StateUsage
 from tauscope.excitation.information import Criterion, CriterionValue, ExcitationRegressor, criterion_value
 from tauscope.excitation.series_space import SeriesGrid, SeriesSpace
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.dynamics import BaseParameters, base_parameters
 from tauscope.errors import ExcitationError
@@ -23,10 +22,9 @@ from tauscope.excitation.series_space import SeriesSpace
 from tauscope.excitation.torque_prediction import TorquePrediction
 from tauscope.excitation.workspace import Workspace, WorkspaceUsage
 from tauscope.robot import Robot
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import FourierSeries, MotionSamples
 from tauscope.trajectory.limits import MotionLimits, motion_limits
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

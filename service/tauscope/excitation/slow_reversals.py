@@ -13,16 +13,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.excitation.constraints import StateUsage
 from tauscope.robot import JointType, Robot
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import FourierSeries
 from tauscope.trajectory.limits import MotionLimits
 from tauscope.trajectory.segments import FourierSegment, MoveSegment, PathSegment, Segment
 from tauscope.trajectory.trajectory import ramp, whole_steps
-
-Array = NDArray[np.float64]
 
 SPEED_SHARE = 0.05  # peak speed as part of the speed limit
 # Peak speed however fast the joint may move [rad/s or m/s].

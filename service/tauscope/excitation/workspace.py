@@ -3,15 +3,13 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import ExcitationError
 from tauscope.excitation.information import MotionGradient
 from tauscope.robot import JointType, Robot
 from tauscope.robot.kinematics import homogeneous, link_placements
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
-
-Array = NDArray[np.float64]
 
 REFERENCE_M = 0.1  # clearance from which nothing is said to be used of it; at zero clearance all of it is [m]
 STILL_M = 1e-9  # a point that moves less than this is fixed to the base: where it stands is nobody's choice [m]

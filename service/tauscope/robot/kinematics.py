@@ -4,12 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import RecordingMismatchError
-from tauscope.robot.robot import JointType, Placement, Robot, Segment, segment_couplings
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array, JointType, Placement, Robot, Segment, segment_couplings
 
 
 def compose(first: Placement, second: Placement) -> Placement:

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import AcquisitionError
 from tauscope.robot import JointType, Robot
+from tauscope.robot.robot import Array
 from tauscope.trajectory.limits import motion_limits
 from tauscope_drivers import ArmState, DriveLimits, Setpoint
 
@@ -49,7 +49,6 @@ class GuardViolationError(AcquisitionError):
         self.violation = violation
 
 
-Array = NDArray[np.float64]
 DEFAULT_FOLLOWING = {JointType.REVOLUTE: 0.2, JointType.PRISMATIC: 0.05}
 """Following error that is allowed where nothing is stated [rad or m]."""
 DEFAULT_MARGIN = {JointType.REVOLUTE: 0.05, JointType.PRISMATIC: 0.01}

@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.robot import JointType, Robot
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
-
-Array = NDArray[np.float64]
 
 DEFAULT_RANGE = {JointType.REVOLUTE: np.pi, JointType.PRISMATIC: 0.25}
 """Positions from minus to plus this where no range is stated [rad or m]."""

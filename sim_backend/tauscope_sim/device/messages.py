@@ -10,7 +10,6 @@ from functools import cache
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from tauscope_drivers import ArmState, ControlMode, DriveLimits, DriverError, Fault, Setpoint, StopPolicy
@@ -85,8 +84,6 @@ class FrameBuffer:
             del self._bytes[:end]
         return frames
 
-
-Array = NDArray[np.float64]
 
 _INSTANT = struct.Struct("<q")
 _STATE_HEAD = struct.Struct("<qH")

@@ -6,10 +6,9 @@ from math import atan, pi
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import ScenarioError
-from tauscope.robot.robot import FrictionCoefficients, FrictionShape, Robot
+from tauscope.robot.robot import Array, FrictionCoefficients, FrictionShape, Robot
 from tauscope_sim.friction import shape_constants
 from tauscope_sim.plant.rigid_bodies import RigidBodies
 from tauscope_sim.plant.term import (
@@ -22,8 +21,6 @@ from tauscope_sim.plant.term import (
     Transmission,
     loaded_accelerations,
 )
-
-Array = NDArray[np.float64]
 
 
 def compliant_transmissions(effects: Sequence[PhysicalEffect], rotor_inertia: Array) -> dict[int, Transmission]:

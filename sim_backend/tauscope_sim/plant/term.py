@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dgesv
 
 from tauscope.errors import ScenarioError
-from tauscope.robot.robot import Robot
+from tauscope.robot.robot import Array, Robot
 from tauscope_sim.plant.rigid_bodies import RigidBodies
 
 
@@ -48,8 +47,6 @@ class Coordinates:
         """Places of all motors, one a joint."""
         return [self.motor(joint) for joint in range(self.joint_count)]
 
-
-Array = NDArray[np.float64]
 
 AMBIENT = 25.0  # temperature of joints that no effect heats [°C]
 
