@@ -7,7 +7,7 @@ import numpy as np
 from tauscope.errors import ExcitationError
 from tauscope.excitation.constraints import KinematicUsage, StateUsage
 from tauscope.excitation.series_space import SeriesGrid, SeriesSpace
-from tauscope.robot import JointType, Robot
+from tauscope.robot import Robot
 from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
 from tauscope.trajectory.limits import MotionLimits
@@ -115,7 +115,7 @@ class Feasibility:
             if least.max() > SETTLED:
                 j = int(np.argmax(least))
                 joint = self.robot.joints[j]
-                unit = "Nm" if joint.type is JointType.REVOLUTE else "N"
+                unit = joint.type.torque_unit
                 needed = least[j] * torque.available[j]
                 raise ExcitationError(
                     f"{joint.name}: torque limit: at rest the prior model needs {needed:.4g} {unit} or more in every "
@@ -144,7 +144,7 @@ class Feasibility:
 def require_room(robot: Robot, limits: MotionLimits) -> None:
     """Refuse limits of a joint that leave no motion. Raises ExcitationError naming the joint and the limit."""
     for j, joint in enumerate(robot.joints):
-        unit = "rad" if joint.type is JointType.REVOLUTE else "m"
+        unit = joint.type.unit
         low, high = limits.position_low[j], limits.position_high[j]
         if not 0.5 * (high - low) >= LEAST_HALF_RANGE:
             raise ExcitationError(

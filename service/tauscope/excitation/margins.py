@@ -7,7 +7,7 @@ import numpy as np
 
 from tauscope.errors import ExcitationError
 from tauscope.excitation.constraints import StateUsage
-from tauscope.robot import JointType, Robot
+from tauscope.robot import Robot
 from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples, between_samples
 from tauscope.trajectory.limits import MotionLimits
@@ -90,7 +90,7 @@ def require_within_limits(trajectory: Trajectory, robot: Robot, limits: MotionLi
             instant = begin + at * segment.duration_s / max(len(values) - 1, 1)
             worst = max(worst, (abs(values[at] - centre), instant, float(values[at])))
             begin += segment.duration_s
-        length = "rad" if robot.joints[j].type is JointType.REVOLUTE else "m"
+        length = robot.joints[j].type.unit
         unit, bound = {
             "position": (length, f"{limits.position_low[j]:.6g} to {limits.position_high[j]:.6g}"),
             "velocity": (f"{length}/s", f"{limits.velocity[j]:.6g}"),

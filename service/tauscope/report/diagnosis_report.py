@@ -33,7 +33,6 @@ from tauscope.report.words import (
     noise_words,
     place_title,
     summary_sentences,
-    torque_unit,
 )
 from tauscope.robot import JointType
 
@@ -43,7 +42,7 @@ def diagnosis_report(
 ) -> str:
     """A self-contained HTML page on a diagnosis."""
     plots = diagnosis_plots(diagnosis)
-    units = [torque_unit(joint.type) for joint in diagnosis.robot.joints]
+    units = [joint.type.torque_unit for joint in diagnosis.robot.joints]
     sections = [
         _where(plots, document, [joint.type for joint in diagnosis.robot.joints]),
         _what(document),

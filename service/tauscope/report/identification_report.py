@@ -27,8 +27,6 @@ from tauscope.report.words import (
     masked_samples,
     noise_ratio,
     noise_words,
-    torque_unit,
-    velocity_unit,
 )
 
 _FRICTION_EQUATION = "τ_f(q̇) = τ_s A(K_v q̇) + τ_sc A(δ q̇) + τ_v q̇ + offset,  A(x) = (2/π) arctan x"
@@ -107,7 +105,7 @@ def _torque_section(
 ) -> Section:
     parts = []
     for joint, name in enumerate(result.joints):
-        unit = torque_unit(identification.robot.joints[joint].type)
+        unit = identification.robot.joints[joint].type.torque_unit
         svg = torque_figure(f"{kind}-{joint + 1}", series, joint, result.noise_std[joint], unit)
         label = f"Torque of {name}, measured and predicted, and their difference"
         caption = f"{name}: torque at the recorded rate above, what the model leaves below; right, the shaded tenth."
@@ -127,7 +125,7 @@ def _friction_section(
 ) -> Section:
     types = [joint.type for joint in identification.robot.joints]
     curves = [friction_curve(identification, series, joint) for joint in range(len(types))]
-    units = [(velocity_unit(kind), torque_unit(kind)) for kind in types]
+    units = [(f"{kind.unit}/s", kind.torque_unit) for kind in types]
     figure = Drawing(
         friction_figure("friction", curves, result.joints, units),
         "Friction of every joint over its velocity",

@@ -26,6 +26,16 @@ class JointType(StrEnum):
     REVOLUTE = "revolute"
     PRISMATIC = "prismatic"
 
+    @property
+    def unit(self) -> str:
+        """Unit of its position."""
+        return "m" if self is JointType.PRISMATIC else "rad"
+
+    @property
+    def torque_unit(self) -> str:
+        """Unit of what drives it."""
+        return "N" if self is JointType.PRISMATIC else "Nm"
+
 
 @dataclass(frozen=True)
 class JointLimits:

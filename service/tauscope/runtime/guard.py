@@ -109,7 +109,7 @@ def guard_limits(
     room = np.array([DEFAULT_MARGIN[joint.type] for joint in joints])
     return GuardLimits(
         joints=tuple(joint.name for joint in joints),
-        units=tuple("rad" if joint.type is JointType.REVOLUTE else "m" for joint in joints),
+        units=tuple(joint.type.unit for joint in joints),
         position_low=np.where(has_range, limits.position_low, np.minimum(limits.position_low, low - room)),
         position_high=np.where(has_range, limits.position_high, np.maximum(limits.position_high, high + room)),
         velocity=np.where(has_speed, limits.velocity, np.maximum(limits.velocity, _ROOM * speed)),

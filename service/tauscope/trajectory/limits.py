@@ -72,8 +72,7 @@ def motion_limits(robot: Robot) -> MotionLimits:
     assumed: list[str] = []
     low, high, velocity, acceleration, torque = (np.empty(robot.joint_count) for _ in range(5))
     for j, joint in enumerate(robot.joints):
-        unit = "rad" if joint.type is JointType.REVOLUTE else "m"
-        limits = joint.limits
+        unit, limits = joint.type.unit, joint.limits
         reach = DEFAULT_RANGE[joint.type]
         low[j], high[j] = limits.position or (-reach, reach)
         velocity[j] = DEFAULT_SPEED[joint.type] if limits.velocity is None else limits.velocity

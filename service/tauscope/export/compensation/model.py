@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from datetime import date
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from ruamel.yaml import YAML
 from ruamel.yaml.nodes import ScalarNode
 from ruamel.yaml.representer import SafeRepresenter
@@ -58,7 +56,7 @@ def _milliampere(joint: Joint, effort_kind: EffortKind) -> tuple[float | None, s
     if not math.isfinite(constant) or constant == 0.0:
         text = f"joint {shown(joint.name)}: torque_constant = {constant:g} must be finite and not zero"
         raise ExportError(f"{text}; correct the robot file")
-    force = "N" if joint.type is JointType.PRISMATIC else "Nm"
+    force = joint.type.torque_unit
     remark = f"mA: torque_constant {constant!r} {force}/A, sign {joint.sign:+d}"
     if constant == 1.0:
         remark += f"; if the robot file gives no torque_constant, all torques here are in A, not in {force}"
@@ -167,19 +165,6 @@ def check_friction(joint: str, friction: JointFriction) -> None:
         raise ExportError(text)
 
 
-def friction_torque(friction: JointFriction, velocity: NDArray[np.float64] | float) -> NDArray[np.float64]:
-    """Friction torque τ_s S(K_v v) + τ_sc S(δ v) + τ_v v + offset, S(x) = (2/π) atan x, (N,).
-
-    Seed paper, equations (7) and (8).
-
-    `velocity`: v [rad/s or m/s]. Returns array of: torque of the shape of `velocity` [Nm or N].
-    """
-    v = np.asarray(velocity, dtype=np.float64)
-    step = np.arctan(friction.k_v * v) * (2.0 / np.pi)
-    stribeck = np.arctan((friction.delta or 0.0) * v) * (2.0 / np.pi)
-    return friction.stiction * step + friction.stribeck * stribeck + friction.viscous * v + friction.offset
-
-
 SCHEMA = "tauscope.compensation/1"
 
 
@@ -252,7 +237,6 @@ def _quote_text(value: Any) -> Any:
 
 
 def _joint(number: int, joint: JointCompensation) -> dict[str, Any]:
-    prismatic = joint.type is JointType.PRISMATIC
     units = joint.units
     return {
         "number": number,
@@ -260,8 +244,8 @@ def _joint(number: int, joint: JointCompensation) -> dict[str, Any]:
         "type": joint.type.value,
         "k_v": joint.friction.k_v,
         "delta": joint.friction.delta,
-        "velocity_unit": "m/s" if prismatic else "rad/s",
-        "torque": _coefficients(joint, 1.0, "N" if prismatic else "Nm"),
+        "velocity_unit": f"{joint.type.unit}/s",
+        "torque": _coefficients(joint, 1.0, joint.type.torque_unit),
         "current": _coefficients(joint, units.torque_per_milliampere, "mA"),
         "rated_torque": _coefficients(joint, units.torque_per_permille, "per mille of rated torque"),
         "remarks": list(units.remarks),
