@@ -15,13 +15,7 @@ from tauscope.effects.carried_body import unit_body
 from tauscope.effects.friction_coupling import FrictionCoupling
 from tauscope.effects.kinematic_error import displaced
 from tauscope.export.compensation.model import JointFriction
-from tauscope.export.joint_model import (
-    JointModel,
-    dry_friction_and_damping,
-    friction_notes,
-    joint_models,
-    numbers,
-)
+from tauscope.export.joint_model import JointModel, dry_friction_and_damping, friction_notes, joint_models, numbers
 from tauscope.export.model import ExportModel, FoundEffect
 from tauscope.robot import Joint, LinkInertia, Robot
 

@@ -20,14 +20,7 @@ from tauscope.report.tables import (
     rotor_table,
 )
 from tauscope.report.torque_figure import torque_columns, torque_figure
-from tauscope.report.words import (
-    band_words,
-    cautions,
-    fit_sentences,
-    masked_samples,
-    noise_ratio,
-    noise_words,
-)
+from tauscope.report.words import band_words, cautions, fit_sentences, masked_samples, noise_ratio, noise_words
 
 _FRICTION_EQUATION = "τ_f(q̇) = τ_s A(K_v q̇) + τ_sc A(δ q̇) + τ_v q̇ + offset,  A(x) = (2/π) arctan x"
 

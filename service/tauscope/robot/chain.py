@@ -11,15 +11,7 @@ from tauscope.errors import one_line
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.actuator import Actuator
 from tauscope.robot.messages import Finding, shown
-from tauscope.robot.robot import (
-    Coupling,
-    FrictionCoefficients,
-    JointLimits,
-    JointType,
-    LinkInertia,
-    Repair,
-    Segment,
-)
+from tauscope.robot.robot import Coupling, FrictionCoefficients, JointLimits, JointType, LinkInertia, Repair, Segment
 
 MOST_NAMES = 4  # names that a note lists
 
