@@ -147,10 +147,14 @@ class EmulatedBus:
         deliveries: list[Delivery] = []
         for instruction in instructions:
             end_s = max(now_s, self._free_s) + self._wire_s(instruction.length)
-            answers = self._handlers.get(instruction.code, self._refuse)(instruction, end_s)
+            answers = self._obey(instruction, end_s)
             self._free_s = max([end_s, *(due for due, _ in answers)])
             deliveries += answers
         return deliveries
+
+    def _obey(self, instruction: Instruction, end_s: float) -> list[Delivery]:
+        """Answers to an instruction; servos of another protocol on the same line have their own."""
+        return self._handlers.get(instruction.code, self._refuse)(instruction, end_s)
 
     def carry_out(self, fault: InjectedFault, now_s: float) -> None:
         """Let a fault happen now."""
