@@ -12,13 +12,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tauscope_drivers.clock import Clock
-from tauscope_drivers.state import ArmState, Setpoint
-
-Array = NDArray[np.float64]
+from tauscope_drivers.state import ArmState, Array, Setpoint
 
 
 class ControlMode(StrEnum):

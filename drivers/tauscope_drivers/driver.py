@@ -139,8 +139,7 @@ class BusDriver(Driver):
         patience_s = settings.get(PATIENCE.name, PATIENCE.default)
         is_number = isinstance(patience_s, int | float) and not isinstance(patience_s, bool)
         if not (is_number and 0.0 < patience_s <= _LONGEST_PATIENCE_S):
-            text = f"backend {self.name}: patience_s is {patience_s!r:.60}; give seconds up to 1"
-            raise DriverError.refusal(text)
+            raise DriverError.refusal(f"backend {self.name}: patience_s is {patience_s!r:.60}; give seconds up to 1")
         return float(patience_s)
 
 

@@ -70,10 +70,5 @@ def failure(place: str, message: str, device: str = "") -> Finding:
     """A failure by a driver's message, without the place at its beginning: that stands before it."""
     for name in filter(None, (place, device)):
         message = message.removeprefix(f"{name}: ").removeprefix(f"{name} ")
-    return Finding(Severity.FAILURE, place, *split_remedy(message))
-
-
-def split_remedy(message: str) -> tuple[str, str]:
-    """Detail and remedy of a driver's message: what follows the last semicolon is what to do."""
-    detail, _, remedy = message.rpartition("; ")
-    return (detail, remedy) if detail else (message, "see the message")
+    detail, _, remedy = message.rpartition("; ")  # what follows the last semicolon is what to do
+    return Finding(Severity.FAILURE, place, detail or message, remedy if detail else "see the message")

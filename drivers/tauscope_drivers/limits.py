@@ -3,14 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope_drivers.backend import DriveLimits
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError, Fault
-from tauscope_drivers.state import Setpoint
-
-Array = NDArray[np.float64]
+from tauscope_drivers.state import Array, Setpoint
 
 # how far outside its range a joint may stand when it is enabled: as far as a stop can carry it [rad or m]
 ENABLE_MARGIN = 0.05

@@ -38,6 +38,12 @@ class ArmState:
     late_ns: int = 0
     voltage: Array | None = None
 
+    @staticmethod
+    def unknown(time_ns: int, joint_count: int, faults: tuple[Fault, ...] = ()) -> "ArmState":
+        """The state of an arm that nobody is connected to."""
+        nothing = np.full(joint_count, np.nan)
+        return ArmState(time_ns, nothing, nothing, nothing, nothing, np.zeros(joint_count, dtype=np.bool_), faults)
+
     @property
     def fresh(self) -> NDArray[np.bool_]:
         """Whether each joint's position was received in this cycle, shape (n,)."""

@@ -21,11 +21,24 @@ row or joint, and what to do next.
 
 from typing import ClassVar
 
+LONGEST_MESSAGE = 2000
+
+
+def one_line(text: str) -> str:
+    """A message as one printable line: white space folded, control characters escaped, cut where it is endless."""
+    folded = " ".join(text.split())
+    printable = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in folded)
+    return printable if len(printable) <= LONGEST_MESSAGE else printable[: LONGEST_MESSAGE - 1] + "…"
+
 
 class TauscopeError(Exception):
     """Any failure that Tauscope foresees; its message is written for the user."""
 
     code: ClassVar[str] = "error"
+
+    def __init__(self, message: str = "") -> None:
+        """Take the message, whatever a file's content put into it, as one printable line."""
+        super().__init__(one_line(message))
 
 
 class RobotFileError(TauscopeError, ValueError):

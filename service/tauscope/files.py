@@ -2,8 +2,28 @@
 
 import errno
 import os
-import tempfile
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
+
+
+@contextmanager
+def open_atomically(path: Path, mode: int = 0o666) -> Iterator[BinaryIO]:
+    """A new file that takes its name, in place of an older one, once it is complete and its bytes are on the disk.
+
+    `mode`: its permissions, before the account's mask.
+    """
+    partial = path.with_name(f".{path.name[:64]}.{secrets.token_hex(6)}.partial")
+    try:
+        with open(partial, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def write_atomically(path: Path, content: bytes) -> None:
@@ -11,16 +31,8 @@ def write_atomically(path: Path, content: bytes) -> None:
 
     The bytes reach the disk before the name does, and the name before this function returns.
     """
-    descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=".part-")
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    with open_atomically(path, 0o600) as file:
+        file.write(content)
     sync_folder(path.parent)
 
 

@@ -4,12 +4,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import RobotFileError
-from tauscope.robot.robot import FrictionCoefficients, FrictionShape
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array, FrictionCoefficients, FrictionShape
 
 
 def static_friction_torque(

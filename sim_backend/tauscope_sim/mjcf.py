@@ -9,31 +9,31 @@ Bodies without a joint, and bodies on joints that rest, belong to the link that 
 # pyright: reportAttributeAccessIssue=false
 # (MuJoCo's extension modules come without type stubs)
 
+import warnings
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tauscope.errors import RobotFileError
+from tauscope.errors import RobotFileError, one_line
 from tauscope.robot.actuator import Actuator
-from tauscope.robot.chain import Chain, ResultWarning, default_ends_note, rigid_branch_note
+from tauscope.robot.chain import Chain, ChainMotion, Master, ResultWarning, default_ends_note, rigid_branch_note
 from tauscope.robot.document import MOST_JOINTS
-from tauscope.robot.kinematics import compose, rotation_of_z_to
-from tauscope.robot.messages import Finding, Severity, nearest, one_line, shown
-from tauscope.robot.robot import Coupling, FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
+from tauscope.robot.kinematics import compose, joint_displacement, rotation_of_z_to
+from tauscope.robot.messages import Finding, Severity, nearest, shown
+from tauscope.robot.robot import Array, FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
 from tauscope.robot.urdf_inertia import inertia_about_frame
-from tauscope_sim.mjcf_compiler import compile_model
-
-Array = NDArray[np.float64]
 
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 CHOSEN_STD = 0.2  # relative standard error of an MJCF's gains: most are chosen so that the arm looks right
 
 OF_JOINT = int(mujoco.mjtTrn.mjTRN_JOINT)
+MOTOR, LOOP = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE)  # what actuators add by themselves
+_ALONG_Z = np.array([0.0, 0.0, 1.0])
 
 
 def read_chain(
@@ -45,18 +45,32 @@ def read_chain(
     `path`: where the file lies, for the files that it names; None for text without files beside it; `locked`: position
     of joints that do not move [rad or m].
     """
-    return _Reader(compile_model(data, label, path), label, locked).chain(base, tip)
+    return _Reader(_compile(data, label, path), label, locked).chain(base, tip)
 
 
 @dataclass(frozen=True)
 class _Joint:
-    """A joint of the compiled model by its index, and what it follows: (index, multiplier, offset) or nothing."""
+    """A joint of the compiled model by its index, and what it follows.
+
+    `rest`: its position as the file states the arm [rad or m].
+    """
 
     index: int
     name: str
     kind: int
     body: int
-    master: tuple[int, float, float] | None
+    rest: float
+    master: Master | None
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is a hinge or a slide."""
+        return self.kind in (HINGE, SLIDE)
+
+    @property
+    def type(self) -> JointType:
+        """How it moves."""
+        return JointType.PRISMATIC if self.kind == SLIDE else JointType.REVOLUTE
 
 
 class _Reader:
@@ -66,66 +80,56 @@ class _Reader:
         mujoco.mj_forward(model, self._data)
         self._findings: list[Finding] = []
         self._body_names = [model.body(index).name or f"body {index}" for index in range(model.nbody)]
-        masters = dict(self._masters())
-        self._joints = [
-            _Joint(
-                index,
-                model.joint(index).name or f"{self._body_names[model.jnt_bodyid[index]]}_joint",
-                int(model.jnt_type[index]),
-                int(model.jnt_bodyid[index]),
-                masters.get(index),
-            )
-            for index in range(model.njnt)
-        ]
+        self._joints: list[_Joint] = []
+        for index, body in enumerate(map(int, model.jnt_bodyid)):
+            number = index - int(model.body_jntadr[body])
+            name = model.joint(index).name or f"{self._body_names[body]}_joint{number + 1 if number else ''}"
+            rest = float(model.qpos0[model.jnt_qposadr[index]])
+            self._joints.append(_Joint(index, name, int(model.jnt_type[index]), body, rest, None))
+        self._find_masters()
         self._by_name = {joint.name: joint for joint in self._joints}
         for name in locked:
             if name not in self._by_name:
-                text = f"locked: joint {shown(name)} is not in the file; {nearest(name, self._by_name)}"
-                raise self._error(text)
+                raise self._error(f"locked: joint {shown(name)} is not in the file; {nearest(name, self._by_name)}")
 
     def chain(self, base: str | None, tip: str | None) -> Chain:
         """Read the chain between two bodies."""
-        model = self._model
         first, last = self._ends(base, tip)
         bodies = self._path(first, last)
         path = [joint for body in bodies for joint in self._joints_of(body)]
         free = [joint for joint in path if joint.name not in self._locked]
         for joint in free:
-            if joint.kind not in (HINGE, SLIDE):
-                text = f"joint {shown(joint.name)} is a ball or free joint; name the body beyond it as base"
-                raise self._error(text)
-        indices = {joint.index for joint in free if joint.master is None}
-        moving = [joint for joint in free if (joint.master or (joint.index,))[0] in indices]
+            if not joint.moves:
+                raise self._error(f"joint {shown(joint.name)} is a ball or free joint; name the body beyond it as base")
+        motion = ChainMotion({joint.name: joint.master for joint in free})
+        moving = [joint for joint in free if joint.name in motion.moving]
         if not moving:
             names = f"base {shown(self._body_names[first])} and tip {shown(self._body_names[last])}"
-            has_none = not any(joint.kind in (HINGE, SLIDE) for joint in self._joints)
+            has_none = not any(joint.moves for joint in self._joints)
             remedy = "give the file of the whole arm" if has_none else "name the last body as tip"
             raise self._error(f"no hinge or slide lies between {names}; {remedy}")
-        own = list(dict.fromkeys((joint.master or (joint.index,))[0] for joint in moving))
-        independent = [self._joints[index] for index in own]
-        segments, members = self._segments(bodies, moving, own)
-        links = tuple(self._link(body, placed) for body, placed in members)
-        names = tuple(joint.name for joint in independent)
+        names, independent = motion.independent, [self._by_name[name] for name in motion.independent]
+        segments, members = self._segments(bodies, moving, motion)
+        links = tuple(self._link(placed) for _, placed in members)
         notes = [self._branches(members, moving)]
         if base is None or tip is None:
             ends = self._body_names[first], self._body_names[last]
             notes.insert(0, default_ends_note(self._label, "mjcf", *ends, names))
         self._remark_on_the_rest()
-        dofs = [int(model.jnt_dofadr[joint.index]) for joint in independent]
-        rotors = np.array([model.dof_armature[dof] for dof in dofs]) + self._motor_armature(own)
+        rotors = [self._rotor_inertia(joint) for joint in independent]
         return Chain(
             base=self._body_names[first],
             tip=self._body_names[last],
             joint_names=names,
             segment_names=tuple(joint.name for joint in moving),
-            joint_types=tuple(_joint_type(joint) for joint in independent),
+            joint_types=tuple(joint.type for joint in independent),
             segments=segments,
             limits=tuple(self._limits(joint) for joint in independent),
             links=links if any(link.mass for link in links) else None,
-            friction=self._friction(moving, own),
-            rotor_inertia=tuple(float(value) for value in rotors) if rotors.any() else None,
+            friction=self._friction(moving, motion),
+            rotor_inertia=tuple(rotors) if any(rotors) else None,
             link_names=tuple(tuple(self._body_names[each] for each, _, _ in placed) for _, placed in members),
-            branches=tuple(self._link(body, [each for each in placed if each[0] != body]) for body, placed in members),
+            branches=tuple(self._link([each for each in placed if each[0] != body]) for body, placed in members),
             actuators=tuple(self._actuator(joint) for joint in independent),
             findings=tuple(self._findings),
             repairs=(),
@@ -134,7 +138,7 @@ class _Reader:
         )
 
     def _error(self, text: str) -> RobotFileError:
-        return RobotFileError(one_line(f"{self._label}: {text}"))
+        return RobotFileError(f"{self._label}: {text}")
 
     def _remark(self, severity: Severity, joint: _Joint, text: str) -> None:
         self._findings.append(Finding(severity, one_line(f"{self._label}: joint {shown(joint.name)}"), text))
@@ -155,7 +159,7 @@ class _Reader:
             left.append("gravity compensation (gravcomp)")
         self._findings += [Finding(Severity.WARNING, self._label, f"the model leaves out {each}") for each in left]
 
-    def _masters(self) -> Iterable[tuple[int, tuple[int, float, float]]]:
+    def _find_masters(self) -> None:
         """Joints tied to another by an equality that is linear: q₁ - q₁⁰ = c₀ + c₁ (q₂ - q₂⁰)."""
         model = self._model
         for index in np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)):
@@ -163,8 +167,9 @@ class _Reader:
             offset, ratio, *higher = (float(value) for value in model.eq_data[index][:5])
             if second < 0 or any(higher) or not ratio or not model.eq_active0[index]:
                 continue
-            rest = [float(model.qpos0[model.jnt_qposadr[joint]]) for joint in (first, second)]
-            yield first, (second, ratio, rest[0] + offset - ratio * rest[1])
+            own, other = self._joints[first], self._joints[second]
+            master = Master(other.name, ratio, own.rest + offset - ratio * other.rest)
+            self._joints[first] = replace(own, master=master)
 
     def _ends(self, base: str | None, tip: str | None) -> tuple[int, int]:
         """Bodies of base and tip: the world, or the first one below a free joint, and the body with most joints."""
@@ -182,7 +187,7 @@ class _Reader:
                 above = self._above(body, found.get("base"))
                 joints = [joint for each in above for joint in self._joints_of(each)]
                 own = [joint for joint in joints if joint.master is None and joint.name not in self._locked]
-                return len([joint for joint in own if joint.kind in (HINGE, SLIDE)]), len(above)
+                return len([joint for joint in own if joint.moves]), len(above)
 
             parents = set(map(int, self._model.body_parentid[1:]))
             found["tip"] = max((body for body in range(self._model.nbody) if body not in parents), key=depth, default=0)
@@ -190,7 +195,7 @@ class _Reader:
             above = self._above(found["tip"], None)
             found["base"] = int(self._model.body_parentid[above[0]]) if above else found["tip"]
             first = above[0] if above else 0
-            if any(joint.kind not in (HINGE, SLIDE) for joint in self._joints_of(first)):
+            if not all(joint.moves for joint in self._joints_of(first)):
                 found["base"] = first
         return found["base"], found["tip"]
 
@@ -199,7 +204,7 @@ class _Reader:
         chain: list[int] = []
         while body and body != base:
             chain.append(body)
-            if base is None and any(joint.kind not in (HINGE, SLIDE) for joint in self._joints_of(body)):
+            if base is None and not all(joint.moves for joint in self._joints_of(body)):
                 break
             body = int(self._model.body_parentid[body])
         return chain[::-1] if base is None or body == base else []
@@ -221,12 +226,12 @@ class _Reader:
         return self._joints[first : first + count] if count else []
 
     def _segments(
-        self, path: list[int], moving: list[_Joint], own: list[int]
+        self, path: list[int], moving: list[_Joint], motion: ChainMotion
     ) -> tuple[tuple[Segment, ...], list[tuple[int, list[tuple[int, Placement, bool]]]]]:
         """Segments, and for each the body whose frame its link has, with the bodies that belong to it."""
         segments: list[Segment] = []
         members: list[tuple[int, list[tuple[int, Placement, bool]]]] = []
-        pending, met = Placement(), set[int]()
+        pending = Placement()
         for body in path:
             pending = compose(pending, self._placement(body))
             joints = self._joints_of(body)
@@ -236,15 +241,10 @@ class _Reader:
                     continue
                 anchor = Placement(translation=np.array(self._model.jnt_pos[joint.index]))
                 align = Placement(rotation_of_z_to(np.array(self._model.jnt_axis[joint.index])))
-                rest = float(self._model.qpos0[self._model.jnt_qposadr[joint.index]])
-                turned = _motion(joint.kind, -rest)
+                turned = joint_displacement(joint.type, _ALONG_Z, -joint.rest)
                 before = compose(compose(pending, anchor), compose(align, turned))
                 after = compose(Placement(align.rotation.T), Placement(translation=-anchor.translation))
-                master, ratio, offset = joint.master or (joint.index, 1.0, 0.0)
-                is_next = master not in met and (ratio, offset) == (1.0, 0.0)
-                coupling = None if is_next else Coupling(own.index(master), ratio, offset)
-                met.add(master)
-                segments.append(Segment(_joint_type(joint), before, after, coupling))
+                segments.append(Segment(joint.type, before, after, motion.couplings[joint.name]))
                 members.append((body, []))
                 pending = Placement()
             if members and members[-1][0] == body:
@@ -272,25 +272,20 @@ class _Reader:
 
     def _rigid_position(self, joint: _Joint) -> float:
         """Position of a joint that rests: locked, following a joint that rests, or at its reference [rad or m]."""
-        rest = float(self._model.qpos0[self._model.jnt_qposadr[joint.index]])
         if joint.name in self._locked:
             return self._locked[joint.name]
-        if joint.master is None or self._joints[joint.master[0]].name not in self._locked:
-            return rest
-        master, ratio, offset = joint.master
-        return ratio * self._locked[self._joints[master].name] + offset
+        if joint.master is None or joint.master.joint not in self._locked:
+            return joint.rest
+        return joint.master.multiplier * self._locked[joint.master.joint] + joint.master.offset
 
     def _rigid_motion(self, joint: _Joint) -> Placement:
-        if joint.kind not in (HINGE, SLIDE):
+        if not joint.moves:
             return Placement()
-        rest = float(self._model.qpos0[self._model.jnt_qposadr[joint.index]])
-        anchor = np.array(self._model.jnt_pos[joint.index])
-        align = rotation_of_z_to(np.array(self._model.jnt_axis[joint.index]))
-        motion = _motion(joint.kind, self._rigid_position(joint) - rest)
-        turned = compose(compose(Placement(align, anchor), motion), Placement(align.T))
-        return compose(turned, Placement(translation=-anchor))
+        anchor, axis = (np.array(of[joint.index]) for of in (self._model.jnt_pos, self._model.jnt_axis))
+        moved = joint_displacement(joint.type, axis, self._rigid_position(joint) - joint.rest)
+        return compose(Placement(translation=anchor), compose(moved, Placement(translation=-anchor)))
 
-    def _link(self, body: int, members: Iterable[tuple[int, Placement, bool]]) -> LinkInertia:
+    def _link(self, members: Iterable[tuple[int, Placement, bool]]) -> LinkInertia:
         model, total = self._model, np.zeros(10)
         for each, placement, _ in members:
             centre = Placement(_rotation(model.body_iquat[each]), np.array(model.body_ipos[each]))
@@ -303,15 +298,15 @@ class _Reader:
         self, members: list[tuple[int, list[tuple[int, Placement, bool]]]], moving: list[_Joint]
     ) -> ResultWarning | None:
         names, following, mass = [], [], 0.0
-        chain = {joint.index for joint in moving}
-        for _, placed in members:
-            for body, _, on_joint in placed:
-                joints = [] if not on_joint else [each for each in self._joints_of(body) if each not in moving]
-                masters = {joint.name: joint.master and self._joints[joint.master[0]].name for joint in joints}
-                free = [name for name, master in masters.items() if not {name, master} & set(self._locked)]
-                names += free
-                following += [name for name in free if (own := self._by_name[name].master) and own[0] in chain]
-                mass += float(self._model.body_mass[body]) if on_joint else 0.0
+        chain = {joint.name for joint in moving}
+        carried = [body for _, placed in members for body, _, on_joint in placed if on_joint]
+        for body in carried:
+            joints = [each for each in self._joints_of(body) if each.name not in chain]
+            masters = {each.name: each.master and each.master.joint for each in joints}
+            free = [name for name, master in masters.items() if not {name, master} & set(self._locked)]
+            names += free
+            following += [name for name in free if masters[name] in chain]
+            mass += float(self._model.body_mass[body])
         return rigid_branch_note(self._label, names, mass, following) if names and mass > 0.0 else None
 
     def _limits(self, joint: _Joint) -> JointLimits:
@@ -322,38 +317,34 @@ class _Reader:
             gear = abs(float(model.actuator_gear[actuator, 0]))
             if model.actuator_forcelimited[actuator]:
                 torques.append(gear * float(np.max(np.abs(model.actuator_forcerange[actuator]))))
-            elif self._is_motor(actuator) and model.actuator_ctrllimited[actuator]:
+            elif model.actuator_biastype[actuator] == MOTOR and model.actuator_ctrllimited[actuator]:
                 gain = abs(float(model.actuator_gainprm[actuator, 0]))
                 torques.append(gear * gain * float(np.max(np.abs(model.actuator_ctrlrange[actuator]))))
         torque = min((value for value in torques if 0.0 < value < np.inf), default=None)
         stated = bool(model.jnt_limited[index]) and low < high
         return JointLimits(position=(low, high) if stated else None, torque=torque)
 
-    def _friction(self, moving: list[_Joint], own: list[int]) -> tuple[FrictionCoefficients, ...] | None:
-        """Stiction from frictionloss, viscous from damping; a joint that follows with ratio m adds |m| and m² times."""
-        model, total = self._model, {index: np.zeros(2) for index in own}
+    def _friction(self, moving: list[_Joint], motion: ChainMotion) -> tuple[FrictionCoefficients, ...] | None:
+        """Stiction from frictionloss, viscous from damping."""
+        model, stated = self._model, {}
         for joint in moving:
             dof = int(model.jnt_dofadr[joint.index])
-            index, ratio, _ = joint.master or (joint.index, 1.0, 0.0)
             damping = float(model.dof_damping[dof])
             for actuator in self._actuators_of(joint):
                 damping += float(model.actuator_damping[actuator]) * float(model.actuator_gear[actuator, 0]) ** 2
-            total[index] += abs(ratio) * float(model.dof_frictionloss[dof]), ratio**2 * damping
+            stated[joint.name] = (float(model.dof_frictionloss[dof]), damping)
             if model.jnt_stiffness[joint.index]:
                 text = f"has stiffness {float(model.jnt_stiffness[joint.index]):g}, which the model leaves out"
                 self._remark(Severity.WARNING, joint, text)
             if np.any(model.dof_dampingpoly[dof]):
                 self._remark(Severity.WARNING, joint, "has polynomial damping; the model takes its linear part")
-        if not any(values.any() for values in total.values()):
-            return None
-        return tuple(FrictionCoefficients(stiction=float(d), viscous=float(v)) for d, v in total.values())
+        return motion.friction(stated) if any(map(any, stated.values())) else None
 
-    def _motor_armature(self, own: list[int]) -> Array:
-        """Inertia that the actuators add to their joints, n gear² [kg m² or kg]."""
-        model, total = self._model, np.zeros(len(own))
-        for place, index in enumerate(own):
-            for actuator in self._actuators_of(self._joints[index]):
-                total[place] += float(model.actuator_armature[actuator]) * float(model.actuator_gear[actuator, 0]) ** 2
+    def _rotor_inertia(self, joint: _Joint) -> float:
+        """Armature of a joint, and of its actuators times gear² [kg m² or kg]."""
+        model, total = self._model, float(self._model.dof_armature[self._model.jnt_dofadr[joint.index]])
+        for actuator in self._actuators_of(joint):
+            total += float(model.actuator_armature[actuator]) * float(model.actuator_gear[actuator, 0]) ** 2
         return total
 
     def _actuators_of(self, joint: _Joint) -> list[int]:
@@ -364,16 +355,12 @@ class _Reader:
             if model.actuator_trntype[index] == OF_JOINT and model.actuator_trnid[index, 0] == joint.index
         ]
 
-    def _is_motor(self, actuator: int) -> bool:
-        return self._model.actuator_biastype[actuator] == int(mujoco.mjtBias.mjBIAS_NONE)
-
     def _actuator(self, joint: _Joint) -> Actuator | None:
         """Gains of a joint's actuator in joint units; of several the first that holds the position."""
         model, found = self._model, None
         for index in self._actuators_of(joint):
             gear = float(model.actuator_gear[index, 0])
-            affine = model.actuator_biastype[index] == int(mujoco.mjtBias.mjBIAS_AFFINE)
-            if not affine:
+            if model.actuator_biastype[index] != LOOP:
                 found = found or Actuator("torque")
                 continue
             kp, kv = -float(model.actuator_biasprm[index, 1]), -float(model.actuator_biasprm[index, 2])
@@ -389,15 +376,59 @@ class _Reader:
         return found
 
 
-def _joint_type(joint: _Joint) -> JointType:
-    return JointType.PRISMATIC if joint.kind == SLIDE else JointType.REVOLUTE
-
-
 def _rotation(quaternion: Array) -> Array:
     return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
 
 
-def _motion(kind: int, position: float) -> Placement:
-    if kind == SLIDE:
-        return Placement(translation=np.array([0.0, 0.0, position]))
-    return Placement(_rotation(np.array([np.cos(position / 2), 0.0, 0.0, np.sin(position / 2)])))
+def _compile(data: bytes, label: str, path: Path | None) -> mujoco.MjModel:
+    """The compiled model; where files of shapes or textures are missing, without the shapes that carry no mass.
+
+    Raises RobotFileError if MuJoCo refuses the file.
+    `path`: where the file lies, for the files that it names; None for text without files beside it.
+    """
+    try:
+        with warnings.catch_warnings(action="ignore"):  # attributes that MuJoCo will remove one day
+            with suppress(ValueError):
+                return _parse(data, path).compile()
+            spec = _parse(data, path)
+            _drop_shapes(spec)
+            return spec.compile()
+    except ValueError as error:
+        reason = " ".join(str(error).split()).removeprefix("Error: ")
+        remedy = "correct it"
+        if "opening file" in reason:
+            remedy = "put that file there" + ("" if "include" in reason else ", or state <inertial> of every body")
+        raise RobotFileError(f"{label}: MuJoCo refuses the file ({reason}); {remedy}") from None
+
+
+def _parse(data: bytes, path: Path | None) -> mujoco.MjSpec:
+    """The editable model; of a file, so that what it names is found beside it."""
+    return mujoco.MjSpec.from_string(data.decode()) if path is None else mujoco.MjSpec.from_file(str(path))
+
+
+def _drop_shapes(spec: mujoco.MjSpec) -> None:
+    """Delete meshes, height fields and textures, and the shapes that need them, where none of these gives a mass."""
+    if spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
+        return
+    for body in spec.bodies:
+        weighs = any(geom.meshname and geom.mass != 0.0 for geom in body.geoms)
+        if weighs and not body.explicitinertial and _moves(body):
+            return
+    for geom in list(spec.geoms):
+        if geom.meshname or geom.hfieldname:
+            spec.delete(geom)
+    for geom in spec.geoms:
+        geom.material = ""
+    for site in spec.sites:
+        site.material = ""
+    for kind in (spec.skins, spec.meshes, spec.hfields, spec.materials, spec.textures):
+        for element in list(kind):
+            spec.delete(element)
+
+
+def _moves(body: mujoco.MjsBody) -> bool:
+    while body is not None:
+        if body.joints:
+            return True
+        body = body.parent
+    return False

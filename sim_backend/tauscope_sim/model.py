@@ -9,14 +9,11 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tauscope.errors import RobotFileError, TauscopeError
 from tauscope.robot.physical import about_centre, nearest_body
-from tauscope.robot.robot import JointType, LinkInertia, Robot, Segment
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array, JointType, LinkInertia, Robot, Segment
 
 # added to each principal moment of inertia [kg m²]: a slender rod has a zero one, MuJoCo refuses less than 1e-15
 LEAST_INERTIA = 1e-12

@@ -4,13 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import RecordingError, RobotFileError
-from tauscope.robot.robot import Joint
-
-Array = NDArray[np.float64]
-
+from tauscope.robot.robot import Array, Joint
 
 LEAST_HARMONICS = 2  # one harmonic alone cannot be at rest, with zero acceleration, at the ends of its period
 

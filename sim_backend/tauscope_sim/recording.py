@@ -13,12 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauscope.errors import RecordingError
-from tauscope.robot.robot import FrictionCoefficients, FrictionShape, Joint, Robot
+from tauscope.robot.robot import Array, FrictionCoefficients, FrictionShape, Joint, Robot
 from tauscope_sim.friction import static_friction_torque
 from tauscope_sim.model import build_model
 from tauscope_sim.motion import FourierMotion, MotionSamples
-
-Array = NDArray[np.float64]
 
 
 def rigid_body_torque(model: mujoco.MjModel, position: Array, velocity: Array, acceleration: Array) -> Array:

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array
 
 JOINT_EQUALITY = int(mujoco.mjtEq.mjEQ_JOINT)
 

@@ -3,14 +3,11 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tauscope.robot.robot import Robot
+from tauscope.robot.robot import Array, Robot
 from tauscope_sim.effects import Effect, SensorEffect
 from tauscope_sim.plant import Plant
 from tauscope_sim.plant.plant import STEP
-
-Array = NDArray[np.float64]
 
 
 def _zero() -> Array:

@@ -18,21 +18,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
 from tauscope.errors import RobotFileError, ScenarioError
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
-from tauscope.robot.document import WORDING
+from tauscope.robot.document import DocumentOrigin, first_fault
 from tauscope.robot.document_fields import Document
-from tauscope.robot.messages import nearest, one_line, shown
-from tauscope.robot.robot import Robot
+from tauscope.robot.messages import nearest, shown
+from tauscope.robot.robot import Array, Robot
 from tauscope.robot.yaml_text import Place, read_yaml
 from tauscope_sim.effects import EFFECTS, Effect, ScenarioEntry, SensorEffect
 from tauscope_sim.effects.effect import NotNegative, NotNegativeNumbers, Seed, single_zero
 from tauscope_sim.scenario import Scenario
-
-Array = NDArray[np.float64]
 
 LARGEST_SCENARIO_FILE = 256 * 1024
 MOST_EFFECTS = 200
@@ -71,15 +68,15 @@ def scenario_from_yaml(data: bytes, label: str, robot: Robot) -> Scenario:
         content = read_yaml(decode_utf8(data, label), label)
     except RobotFileError as error:
         raise ScenarioError(str(error).replace("this is no robot file", "this is no scenario file")) from error
-    return _Reader(label, content.lines, robot).scenario(content.data)
+    return _Reader(DocumentOrigin(label, content.data, content.lines), robot).scenario()
 
 
 class _Reader:
-    def __init__(self, label: str, lines: Mapping[Place, int], robot: Robot) -> None:
-        self._label, self._lines, self._robot = label, lines, robot
+    def __init__(self, origin: DocumentOrigin, robot: Robot) -> None:
+        self._origin, self._robot = origin, robot
 
-    def scenario(self, data: Any) -> Scenario:
-        document = self._validate(ScenarioDocument, data, (), "")
+    def scenario(self) -> Scenario:
+        document = self._validate(ScenarioDocument, self._origin.data, ())
         entries = [self._entry(value, number) for number, value in enumerate(document.effects)]
         scenario = Scenario(
             effects=tuple(entry for entry in entries if isinstance(entry, Effect)),
@@ -90,25 +87,28 @@ class _Reader:
             command_latency_s=document.command_latency,
             seed=document.seed,
         )
-        self._try_out(scenario)
+        try:
+            scenario.plant(self._robot)
+        except ScenarioError as error:
+            raise self._error(("effects",), str(error)) from error
         return scenario
 
     def _entry(self, value: Any, number: int) -> ScenarioEntry:
         place: Place = ("effects", number)
         if not isinstance(value, Mapping):
-            raise self._error(place, "", f"must be a mapping with the key effect, but is {shown(value)}")
+            raise self._error(place, f"must be a mapping with the key effect, but is {shown(value)}")
         if "effect" not in value:
-            raise self._error(place, "", f"the key 'effect' is missing; add it ({nearest('', EFFECTS)})")
+            raise self._error(place, f"the key 'effect' is missing; add it ({nearest('', EFFECTS)})")
         name = value["effect"]
         if not isinstance(name, str) or name not in EFFECTS:
             hint = nearest(name, EFFECTS) if isinstance(name, str) else "write an effect id"
-            raise self._error((*place, "effect"), "", f"unknown effect {shown(name)}; {hint}")
+            raise self._error((*place, "effect"), f"unknown effect {shown(name)}; {hint}")
         keys = {key: self._joint_number(key, part) for key, part in value.items() if key != "effect"}
         entry = self._validate(EFFECTS[name], keys, place, name)
         try:
             entry.check(self._robot)
         except ScenarioError as error:
-            raise self._error(place, "", str(error)) from error
+            raise self._error(place, str(error)) from error
         return entry
 
     def _joint_number(self, key: str, value: Any) -> Any:
@@ -120,37 +120,21 @@ class _Reader:
     def _per_joint(self, document: ScenarioDocument, key: str) -> Array:
         values, count = getattr(document, key), self._robot.joint_count
         if len(values) not in (1, count):
-            raise self._error((key,), "", f"holds {len(values)} numbers; give one, or one for each of {count} joints")
+            raise self._error((key,), f"holds {len(values)} numbers; give one, or one for each of {count} joints")
         return np.broadcast_to(np.array(values), (count,)).copy()
 
-    def _try_out(self, scenario: Scenario) -> None:
-        try:
-            scenario.plant(self._robot)
-        except ScenarioError as error:
-            raise self._error(("effects",), "", str(error)) from error
-
-    def _validate(self, kind: type, data: Any, place: Place, name: str) -> Any:
+    def _validate(self, kind: type, data: Any, place: Place, effect: str = "") -> Any:
         if not isinstance(data, Mapping):
-            raise self._error(place, name, f"must be a mapping, but is {shown(data)}")
+            raise self._error(place, f"must be a mapping, but is {shown(data)}")
         try:
             return kind.model_validate(data)
         except ValidationError as error:
-            details = error.errors(include_url=False)
-        detail = details[0]
-        inner: Place = tuple(detail["loc"])
-        key = detail.get("ctx", {}).get("key")
-        if key is not None:
-            inner = (*inner, key)
-        word = WORDING.get(detail["type"])
-        text = word(detail) if word else detail["msg"]
-        more = f" (the first of {len(details)} errors)" if len(details) > 1 else ""
-        raise self._error((*place, *inner), name, text + more)
+            inner, text = first_fault(error)
+        raise self._error((*place, *inner), text, effect)
 
-    def _error(self, place: Place, name: str, text: str) -> ScenarioError:
-        line = next((self._lines[place[:n]] for n in range(len(place), -1, -1) if place[:n] in self._lines), None)
-        steps = [f"[{step}]" if isinstance(step, int) else f".{step}" for step in place]
-        if name:
-            steps[1] += f" ({name})"
-        where = self._label if line is None else f"{self._label}:{line}"
-        path = "".join(steps).lstrip(".")
-        return ScenarioError(one_line(f"{where}: {path}: {text}" if path else f"{where}: {text}"))
+    def _error(self, place: Place, text: str, effect: str = "") -> ScenarioError:
+        where = self._origin.where(place)
+        if effect:  # it stands behind its number
+            before, entry, key = where.rpartition(f"effects[{place[1]}]")
+            where = f"{before}{entry} ({effect}){key}"
+        return ScenarioError(f"{where}: {text}")

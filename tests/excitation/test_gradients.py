@@ -53,7 +53,7 @@ def problem(robot: Robot, criterion: Criterion, workspace: Workspace | None = No
         space.grid(4 * SAMPLES),
         Objective(criterion, 0.3, regressor, scaling),
         KinematicUsage(space, limits),
-        StateUsage(regressor, torque, obstacles),
+        StateUsage(torque, obstacles),
     )
     return made, x.ravel()
 

@@ -21,7 +21,6 @@ from tauscope.export.compensation import (
     JointFriction,
     RecordingSource,
     drive_units,
-    friction_torque,
     to_c_header,
     to_document,
     to_json,
@@ -60,6 +59,14 @@ def model(robot: str = "rrr-arm", names: tuple[str, ...] = ("joint1", "joint2", 
     joints = tuple(JointCompensation(*row, units) for row in zip(names, types, frictions, strict=True))
     source = RecordingSource("run 1.csv", "0f" * 32)
     return CompensationModel(robot, joints, date(2026, 11, 21), (source,), "0.1.0")
+
+
+def friction_torque(friction: JointFriction, velocity: np.ndarray | float) -> np.ndarray:
+    """Equations (7) and (8), and the offset."""
+    v = np.asarray(velocity, dtype=np.float64)
+    step = np.arctan(friction.k_v * v) * (2.0 / np.pi)
+    stribeck = np.arctan((friction.delta or 0.0) * v) * (2.0 / np.pi)
+    return friction.stiction * step + friction.stribeck * stribeck + friction.viscous * v + friction.offset
 
 
 def compiled_table(

@@ -10,6 +10,7 @@ from recording.recording_files import outcome
 from tauscope.recording import csv_format
 from tauscope.recording.csv_dialect import parse_quickly
 from tauscope.recording.csv_format import read_csv
+from tauscope.recording.intake import Choice
 
 TRICKY = [
     "0", "-0", "-0.0", "+1.5", ".5", "-.5", "5.", "007", "1e5", "1E+05", "1e-400", "1e308", "1.7976931348623157e308",
@@ -49,10 +50,10 @@ def test_the_quick_way_agrees_with_the_strict_way(text):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "file.csv"
         path.write_bytes(text)
-        quick = outcome(lambda: read_csv(path, "file.csv"))
+        quick = outcome(lambda: read_csv(path, Choice("file.csv")))
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(csv_format, "parse_quickly", lambda *_: None)
-            strict = outcome(lambda: read_csv(path, "file.csv"))
+            strict = outcome(lambda: read_csv(path, Choice("file.csv")))
     assert quick.message == strict.message
     assert (quick.rows is None) == (strict.rows is None)
     if quick.rows is not None:

@@ -7,6 +7,7 @@ from recording.recording_files import csv_text, message_of, rows_of, snapshot
 from tauscope.errors import RecordingMismatchError
 from tauscope.recording import EffortKind, Reading, read_recording
 from tauscope.recording.csv_format import read_csv
+from tauscope.recording.intake import Choice
 from tauscope.robot import JointType
 
 LINES = csv_text().splitlines()
@@ -277,9 +278,9 @@ def test_absent_and_unreadable_files(tmp_path):
 def test_spooled_reading_gives_the_same_rows(tmp_path):
     path = tmp_path / "long.csv"
     path.write_text(csv_text(30_000))
-    kept = read_csv(path, "long")
+    kept = read_csv(path, Choice("long"))
     for limit in (1000, 400_000):
-        spooled = read_csv(path, "long", spool_above_bytes=limit)
+        spooled = read_csv(path, Choice("long", spool_above_bytes=limit))
         assert type(spooled.table) is not type(kept.table)
         assert np.array_equal(rows_of(spooled), rows_of(kept))
         assert np.array_equal(spooled.samples(777, 29_001).effort, kept.samples(777, 29_001).effort)

@@ -10,7 +10,8 @@ from mcap.writer import CompressionType, Writer
 from recording.recording_files import arrays, encoded_messages, message_of, messages, rows_of
 from tauscope.errors import RecordingError
 from tauscope.recording import read_recording
-from tauscope.recording.joint_state_topic import Choice, JointStateLog
+from tauscope.recording.intake import Choice
+from tauscope.recording.joint_state_topic import JointStateLog
 from tauscope.recording.mcap_format import scan_mcap
 
 MOTION = arrays(400)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from recording.recording_files import arrays, message_of, rows_of, snapshot
-from tauscope.errors import RecordingMismatchError
+from tauscope.errors import MissingExtraError, RecordingMismatchError
 from tauscope.recording import read_recording
+from tauscope.recording.intake import Choice
 from tauscope.recording.parquet_format import read_parquet
 
 pyarrow = pytest.importorskip("pyarrow")
@@ -48,12 +49,14 @@ def test_other_number_types_and_null(tmp_path):
 
 def test_spooled_reading_gives_the_same_rows(tmp_path):
     path = write(tmp_path, columns(200_000))
-    assert np.array_equal(rows_of(read_parquet(path, "x", None, 1000)), rows_of(read_parquet(path, "x")))
+    assert np.array_equal(
+        rows_of(read_parquet(path, Choice("x", spool_above_bytes=1000))), rows_of(read_parquet(path, Choice("x")))
+    )
 
 
 def test_dates_become_seconds_from_the_first_row(tmp_path):
     stamps = (1_700_000_000_000 + np.arange(40)).astype("datetime64[ms]")
-    samples = read_parquet(write(tmp_path, edited(t=stamps)), "x").samples()
+    samples = read_parquet(write(tmp_path, edited(t=stamps)), Choice("x")).samples()
     np.testing.assert_allclose(samples.time, np.arange(40) * 1e-3, atol=1e-12)
 
 
@@ -102,4 +105,5 @@ def test_truncated_and_damaged_files(tmp_path):
 def test_a_missing_pyarrow_is_named(tmp_path, monkeypatch):
     path = write(tmp_path, columns())
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
-    assert "pip install tauscope[parquet]" in message_of(lambda: read_recording(path))
+    with pytest.raises(MissingExtraError, match=r"log\.parquet: Parquet needs the parquet extra: pip install"):
+        read_recording(path)

@@ -2,7 +2,7 @@ import numpy as np
 
 from recording.recording_files import message_of
 from tauscope.recording import EffortKind
-from tauscope.recording.intake import RowIntake
+from tauscope.recording.intake import Choice, RowIntake
 
 
 def place(row: int) -> str:
@@ -14,7 +14,7 @@ def block(*times: float) -> np.ndarray:
 
 
 def intake() -> RowIntake:
-    return RowIntake("file", ("t", "q1", "tau1"), EffortKind.TORQUE)
+    return RowIntake(Choice("file"), ("t", "q1", "tau1"), EffortKind.TORQUE)
 
 
 def test_time_rises_from_block_to_block():

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from tauscope import number_text
 from tauscope.number_text import ABSENT, counted, percent, significant, with_uncertainty
-from tauscope.report.words import base_parameter_unit, torque_unit, velocity_unit
+from tauscope.report.words import base_parameter_unit
 from tauscope.robot import JointType
 
 numbers = st.floats(-1e12, 1e12)
@@ -77,8 +77,8 @@ def test_counts() -> None:
 
 
 def test_units() -> None:
-    assert (torque_unit(JointType.PRISMATIC), velocity_unit(JointType.PRISMATIC)) == ("N", "m/s")
-    assert (torque_unit(JointType.REVOLUTE), velocity_unit(JointType.REVOLUTE)) == ("Nm", "rad/s")
+    assert (JointType.PRISMATIC.torque_unit, JointType.PRISMATIC.unit) == ("N", "m")
+    assert (JointType.REVOLUTE.torque_unit, JointType.REVOLUTE.unit) == ("Nm", "rad")
     assert base_parameter_unit({"m2": 1.0, "msx2": 2.0}) == "kg"
     assert base_parameter_unit({"msx2": 1.0, "m3": 0.5}) == "kg m"
     assert base_parameter_unit({"Ixx2": 1.0, "msx2": 0.5}) == "kg m²"

@@ -13,11 +13,10 @@ from tauscope_drivers.canopen.bus import NMT_START, CanBus
 from tauscope_drivers.canopen.commissioning import commission_drive, write_settings
 from tauscope_drivers.canopen.configuration import BusConfiguration, read_configuration, require_targets
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST
-from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.session import Session, blind_state, listed, possible_rate_hz, rate_limited_by
+from tauscope_drivers.canopen.node import BEATS, DriveNode
+from tauscope_drivers.canopen.session import SETTLING_CYCLE_S, Session, listed, possible_rate_hz, rate_limited_by
 from tauscope_drivers.canopen.state_machine import Goal
 from tauscope_drivers.canopen.target_limiter import TargetLimiter
-from tauscope_drivers.canopen.watchdog import BEATS
 from tauscope_drivers.clock import Clock, MonotonicClock
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
@@ -126,7 +125,7 @@ class CanopenArm:
         require_sensible(limits, state.position, [node.place for node in session.nodes])
         if state.faults:
             raise DriverError(DriverErrorKind.FAULT, f"{listed(state.faults)}; acknowledge it first", state.faults)
-        session.learn_cycle(cycle_s)
+        session.settling_ns = round((SETTLING_CYCLE_S if cycle_s is None else cycle_s) * 1e9)
         session.bus.start_heartbeat(watchdog_s / BEATS)
         try:
             for node in session.nodes:
@@ -177,7 +176,7 @@ class CanopenArm:
         """Quick stop and hold, or ramp and let go; drives that are in such a state already stay as they are."""
         session, mode = self._session, self._mode
         if session is None:
-            return blind_state(self.clock.now_ns(), len(self._configuration.nodes))
+            return ArmState.unknown(self.clock.now_ns(), len(self._configuration.nodes))
         goal = power.POLICY_GOALS.get(policy, Goal.QUICK_STOP)
         for node in session.nodes:
             node.glitches.limit = math.inf

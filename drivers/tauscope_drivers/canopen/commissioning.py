@@ -13,7 +13,6 @@ from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, Setting,
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import STAYING_OPTIONS, DriveObject
 from tauscope_drivers.canopen.state_machine import POWERED, decode_state
-from tauscope_drivers.canopen.watchdog import arm_watchdog
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 
 _STAYS_STOPPED = (6, 5)  # quick stop options that keep the power: by the quick stop ramp, by the slow one
@@ -100,12 +99,18 @@ def commission_drive(
     node.dictionary.write(objects.MODE_OF_OPERATION, node.mode_numbers[mode])
     option = _choose(node, objects.QUICK_STOP_OPTION, _STAYS_STOPPED if holds else _LETS_GO)
     node.stays_stopped = option in STAYING_OPTIONS
-    _arm_abort(node, holds=holds and node.stays_stopped)
+    # without a master it shall stop by itself
+    aborts = (_ABORT_BY_QUICK_STOP if holds and node.stays_stopped else _ABORT_BY_DISABLING, _ABORT_BY_FAULT)
+    if _choose(node, objects.ABORT_CONNECTION, aborts) == _NOTHING:
+        raise DriverError.refusal(
+            f"{node.place}: {objects.ABORT_CONNECTION} stays 0: it goes on when the host is gone; "
+            "set it to 1, 2 or 3 with the maker's tool"
+        )
     _choose(node, objects.FAULT_REACTION_OPTION, _FAULT_BY_RAMP)
     _write_limits(node, limits)
     if cycle_s is not None:
         _tell_cycle(node, cycle_s)
-    arm_watchdog(node, watchdog_s)
+    node.arm_watchdog(watchdog_s)
     map_process_data(node, mode)
 
 
@@ -115,16 +120,6 @@ def _choose(node: DriveNode, entry: DriveObject, values: Sequence[int]) -> int |
         if _takes(node, entry, value):
             return value
     return node.dictionary.read_optional(entry)
-
-
-def _arm_abort(node: DriveNode, *, holds: bool) -> None:
-    """Make the drive stop by itself where its master is silent. Raises DriverError ``refused`` where it would go on."""
-    values = (_ABORT_BY_QUICK_STOP if holds else _ABORT_BY_DISABLING, _ABORT_BY_FAULT)
-    if _choose(node, objects.ABORT_CONNECTION, values) == _NOTHING:
-        raise DriverError.refusal(
-            f"{node.place}: {objects.ABORT_CONNECTION} stays 0: it goes on when the host is gone; "
-            "set it to 1, 2 or 3 with the maker's tool"
-        )
 
 
 def _write_limits(node: DriveNode, limits: DriveLimits) -> None:
@@ -241,12 +236,16 @@ def _write_pdo(node: DriveNode, pdo: process_data.Pdo) -> bool:
     """Set up one PDO; False where its mapping cannot be written, and is known as fixed from now on."""
     places = pdo.direction.parameters(pdo.number, len(pdo.layout.objects))
     identifier = pdo.direction.identifier(pdo.number, node.configuration.node_id)
-    wanted = process_data.mapping_entries(pdo.layout.objects)
+    wanted = [entry.mapping for entry in pdo.layout.objects]
     if pdo.is_fixed:
         if read_mapping(node, places) != wanted:
             _learn(node, pdo, places)
             return False
-        _use_as_it_is(node, places, identifier, is_sent=pdo.direction is process_data.SENT)
+        kind = node.dictionary.read(places.kind)
+        if kind != _EVERY_SYNC and (kind > _LAST_SYNCHRONOUS or pdo.direction is process_data.SENT):
+            node.dictionary.write(places.kind, _EVERY_SYNC)
+        if node.dictionary.read(places.identifier) & (_PDO_OFF | _IDENTIFIER) != identifier:
+            node.dictionary.write(places.identifier, identifier)
         return True
     node.dictionary.write(places.identifier, _PDO_OFF | identifier)
     node.dictionary.write(places.kind, _EVERY_SYNC)
@@ -273,15 +272,6 @@ def _map(node: DriveNode, places: process_data.PdoParameters, wanted: list[int])
     return all(node.dictionary.read(place) == entry for place, entry in zip(places.entries, wanted, strict=True))
 
 
-def _use_as_it_is(node: DriveNode, places: process_data.PdoParameters, identifier: int, *, is_sent: bool) -> None:
-    dictionary = node.dictionary
-    kind = dictionary.read(places.kind)
-    if not (kind == _EVERY_SYNC or (kind <= _LAST_SYNCHRONOUS and not is_sent)):
-        dictionary.write(places.kind, _EVERY_SYNC)
-    if dictionary.read(places.identifier) & (_PDO_OFF | _IDENTIFIER) != identifier:
-        dictionary.write(places.identifier, identifier)
-
-
 def read_mapping(node: DriveNode, places: process_data.PdoParameters) -> list[int]:
     """Mapping that a drive has."""
     count = min(node.dictionary.read_optional(places.count) or 0, _LONGEST_MAPPING)
@@ -290,15 +280,11 @@ def read_mapping(node: DriveNode, places: process_data.PdoParameters) -> list[in
 
 def _learn(node: DriveNode, pdo: process_data.Pdo, places: process_data.PdoParameters) -> None:
     """Keep that a PDO is fixed, and what it holds; others that the drive has may be free."""
-    slots = {
-        slot.number: slot for slot in (node.slots.sent if pdo.direction is process_data.SENT else node.slots.received)
-    }
+    is_sent = pdo.direction is process_data.SENT
+    slots = {slot.number: slot for slot in (node.slots.sent if is_sent else node.slots.received)}
     for number in set(range(process_data.PDO_COUNT)) - slots.keys():
         if node.dictionary.read_optional(pdo.direction.parameters(number, 0).identifier) is not None:
             slots[number] = process_data.PdoSlot(number)
     slots[pdo.number] = process_data.PdoSlot(pdo.number, process_data.decode_mapping(read_mapping(node, places)) or ())
     ordered = tuple(slots[number] for number in sorted(slots))
-    received, sent = (
-        (node.slots.received, ordered) if pdo.direction is process_data.SENT else (ordered, node.slots.sent)
-    )
-    node.slots = process_data.PdoSlots(received, sent)
+    node.slots = replace(node.slots, sent=ordered) if is_sent else replace(node.slots, received=ordered)

@@ -11,13 +11,12 @@ from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import CanBus
 from tauscope_drivers.canopen.commissioning import find_missing, read_mapping, require_plan
 from tauscope_drivers.canopen.configuration import BusConfiguration, read_configuration
-from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile, settings_of
+from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, settings_of
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import DOUBTFUL, TARGETS
 from tauscope_drivers.canopen.process_data import decode_mapping
 from tauscope_drivers.canopen.session import possible_rate_hz
 from tauscope_drivers.canopen.state_machine import POWERED
-from tauscope_drivers.canopen.watchdog import require_guarding
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError
 from tauscope_drivers.inspection import Finding, FoundDevice, Severity, failure
@@ -130,16 +129,13 @@ def _examine_file(file: DeviceFile, place: str) -> list[Finding]:
         given = ", ".join(f"{one.entry} = {one.text}" for one in settings.written)
         findings.append(Finding(Severity.GOOD, place, f"{file.name} gives it, before each run: {given}"))
     for reason, described in settings.left_out.items():
-        detail = f"{file.name} has values that are not written ({reason}): {_list_places(described)}"
+        subindices: dict[int, list[str]] = {}
+        for one in described:
+            subindices.setdefault(one.index, []).append(f"{one.subindex:02X}")
+        places = ", ".join(f"0x{index:04X}:{'/'.join(found)}" for index, found in subindices.items())
+        detail = f"{file.name} has values that are not written ({reason}): {places}"
         findings.append(Finding(Severity.GOOD, place, detail))
     return findings
-
-
-def _list_places(described: Sequence[DescribedObject]) -> str:
-    subindices: dict[int, list[str]] = {}
-    for one in described:
-        subindices.setdefault(one.index, []).append(f"{one.subindex:02X}")
-    return ", ".join(f"0x{index:04X}:{'/'.join(found)}" for index, found in subindices.items())
 
 
 def _loop_rate(configuration: BusConfiguration, nodes: Sequence[DriveNode], subject: str) -> Finding:
@@ -281,5 +277,5 @@ def _examine_guarding(node: DriveNode, _: DriveLimits) -> list[Finding]:
         detail = f"{objects.PRODUCER_HEARTBEAT} is {beats} ms and read-only: such a drive is not guarded"
         return [Finding(Severity.FAILURE, node.place, detail, "set it to 0 with the maker's tool")]
     if not beats:
-        require_guarding(node)
+        node.require_guarding()
     return []

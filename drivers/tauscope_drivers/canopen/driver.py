@@ -45,8 +45,7 @@ class CanopenDriver(BusDriver):
         """Nodes that answer when they are asked for their device type."""
         interface, _, channel = port.partition(":")
         if not interface or not channel:
-            text = f"{port!r:.60} names no CAN bus; write INTERFACE:CHANNEL, as in socketcan:can0"
-            raise DriverError.refusal(text)
+            raise DriverError.refusal(f"{port!r:.60} names no CAN bus; write INTERFACE:CHANNEL, as in socketcan:can0")
         return self.load("doctor").scan_bus(interface, channel, bit_rates)
 
 

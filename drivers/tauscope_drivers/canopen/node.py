@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects, process_data
-from tauscope_drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, NMT_OPERATIONAL_STATE, CanBus
+from tauscope_drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, MASTER_NODE, NMT_OPERATIONAL_STATE, CanBus
 from tauscope_drivers.canopen.configuration import NodeConfiguration
 from tauscope_drivers.canopen.data_sheet.needs import needs_guarding, pdo_slots, present_objects, require_identity
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST, decode_emergency, describe_error
@@ -22,6 +22,9 @@ from tauscope_drivers.canopen.sdo import NodeDictionary
 from tauscope_drivers.canopen.state_machine import ENABLE_OPERATION, DriveState, Goal, decode_state, next_controlword
 from tauscope_drivers.canopen.units import DriveUnits, drive_units, read_rated_torque
 from tauscope_drivers.errors import DriverError, Fault
+
+BEATS = 10  # of the host within a drive's watchdog time: one lost frame stops nothing
+PRODUCER_HEARTBEAT_MS = 100
 
 FASTEST = 3.0  # a joint is believed to be so many times as fast as its limit, no faster
 SLACK_S = 0.002  # how much later than the host thinks a drive may have sampled [s]
@@ -44,7 +47,9 @@ class GlitchFilter:
         """Whether a position may be true; NaN is no lie. Instants never run backwards."""
         if math.isnan(position):
             return True
-        self._doubts_place = not self._doubts_place and self._is_out_of_reach(position, time_ns)
+        before, before_ns = self._believed or (position, time_ns)
+        reach = FASTEST * self.limit * ((time_ns - before_ns) * 1e-9 + SLACK_S)
+        self._doubts_place = not self._doubts_place and abs(position - before) > reach
         if not self._doubts_place:
             self._believed = position, time_ns
         return not self._doubts_place
@@ -53,13 +58,6 @@ class GlitchFilter:
         """Whether a velocity may be true; NaN is no lie."""
         self._doubts_speed = not self._doubts_speed and abs(velocity) > FASTEST * self.limit
         return not self._doubts_speed
-
-    def _is_out_of_reach(self, position: float, time_ns: int) -> bool:
-        """Whether the joint cannot have gone there since it was believed last."""
-        if self._believed is None:
-            return False
-        before, before_ns = self._believed
-        return abs(position - before) > FASTEST * self.limit * ((time_ns - before_ns) * 1e-9 + SLACK_S)
 
 
 _CIA_402 = 402
@@ -281,6 +279,41 @@ class DriveNode:
                 f"{self.place}: has neither {objects.CONSUMER_HEARTBEAT} nor node guarding (0x100C, 0x100D): it would "
                 "not notice that the host is gone; use a drive that watches its host"
             )
+
+    def arm_watchdog(self, watchdog_s: float) -> None:
+        """Let it stop where the host is silent for longer: by heartbeat, or by node guarding where it watches none.
+
+        Node guarding (CiA 301): the host asks for its state by remote frames. One that is not asked within its life
+        time, guard time (0x100C) × factor (0x100D), stops as one that misses a heartbeat. Raises DriverError
+        ``refused`` where it does not take a value, or answers no remote frame.
+        """
+        write = self.dictionary.write
+        if not self.is_guarded:
+            write(objects.CONSUMER_HEARTBEAT, MASTER_NODE << 16 | round(watchdog_s * 1e3))
+        if self.has(objects.PRODUCER_HEARTBEAT):
+            # a node that produces heartbeats is not guarded
+            write(objects.PRODUCER_HEARTBEAT, 0 if self.is_guarded else PRODUCER_HEARTBEAT_MS)
+        if self.is_guarded:
+            write(objects.LIFE_TIME_FACTOR, BEATS)
+            write(objects.GUARD_TIME, int(watchdog_s * 1e3 / BEATS))
+            self.require_guarding()
+            self.bus.guarded.add(self.configuration.node_id)
+
+    def require_guarding(self) -> None:
+        """Ask it by a remote frame: an adapter that sends none would leave it unguarded, for it counts from the first.
+
+        Raises DriverError ``refused`` where it does not answer.
+        """
+        if not self.bus.ask_guard(self.configuration.node_id):
+            raise DriverError.refusal(
+                f"{self.place}: answers no remote frame, and would not notice that the host is gone; "
+                "use an adapter that sends remote frames, or a drive with a heartbeat consumer (0x1016)"
+            )
+
+    def disarm_watchdog(self) -> None:
+        """Let it be without its host. Raises DriverError where it does not answer, or does not take the value."""
+        for entry in objects.GUARDING if self.is_guarded else (objects.CONSUMER_HEARTBEAT,):
+            self.dictionary.write(entry, 0)
 
     def _take(self, layout: process_data.PdoLayout, data: bytes) -> None:
         values = process_data.decode_pdo(layout, data)

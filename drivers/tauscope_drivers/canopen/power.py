@@ -8,7 +8,6 @@ from tauscope_drivers.canopen.bus import NMT_START
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.session import Session, listed, stay_at
 from tauscope_drivers.canopen.state_machine import DISABLE_VOLTAGE, FAULT_RESET, DriveState, Goal, next_controlword
-from tauscope_drivers.canopen.watchdog import disarm_watchdog
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
 from tauscope_drivers.state import ArmState, Array
 
@@ -41,7 +40,8 @@ def power_up(session: Session, mode: ControlMode) -> tuple[ArmState, Array]:
         session.wait_for_next(state)
         state = session.step_until(lambda: all(node.has_answered for node in session.nodes), cycle, TRANSITION_S)
     _require_up(session, state)
-    session.learn_answer_time()
+    if 2 * session.answer_time.usual_ns > session.answer_ns:  # this bus usually takes most of the time for answers
+        session.answer_ns += session.answer_time.usual_ns
     for node in session.nodes:
         _note_mode(node, mode)
     return state, place
@@ -144,7 +144,7 @@ def stop_one_by_one(nodes: Sequence[DriveNode], goal: Goal, *, is_stopped: bool)
             is_driven = node.state is DriveState.OPERATION_ENABLED and node.stays_stopped
             if not is_stopped and (goal is not Goal.QUICK_STOP or is_driven):
                 node.dictionary.write(objects.CONTROLWORD, next_controlword(node.state, goal))
-            disarm_watchdog(node)
+            node.disarm_watchdog()
             node.read_now()
         except DriverError as error:
             if error.kind is DriverErrorKind.LOST:

@@ -1,7 +1,7 @@
 """Process data: frames of several objects, where a drive keeps what they are, and which of its PDOs are used."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 from tauscope_drivers.canopen import objects
@@ -51,11 +51,6 @@ def decode_pdo(layout: PdoLayout, payload: bytes) -> dict[DriveObject, int] | No
         values[entry] = int.from_bytes(payload[start:stop], "little", signed=entry.signed)
         start = stop
     return values
-
-
-def mapping_entries(objects: Sequence[DriveObject]) -> list[int]:
-    """What the mapping parameter's subindices 1, 2, … hold."""
-    return [entry.mapping for entry in objects]
 
 
 @dataclass(frozen=True)
@@ -141,8 +136,8 @@ class PdoPlan:
 class PdoSlots:
     """The PDOs of a drive; all that the driver needs are free where nobody knows."""
 
-    received: tuple[PdoSlot, ...] = field(default=(PdoSlot(0),))
-    sent: tuple[PdoSlot, ...] = field(default=(PdoSlot(0), PdoSlot(1)))
+    received: tuple[PdoSlot, ...] = (PdoSlot(0),)
+    sent: tuple[PdoSlot, ...] = (PdoSlot(0), PdoSlot(1))
 
 
 def plan_pdos(slots: PdoSlots, target: DriveObject, optional: Iterable[DriveObject]) -> PdoPlan:

@@ -43,10 +43,7 @@ _MEANINGS: Mapping[int, tuple[str, str]] = {
 }
 
 
-def describe_abort(code: int) -> tuple[str, str]:
-    """Meaning and remedy of an abort code."""
-    return _MEANINGS.get(code, ("the drive aborts the transfer", "see the drive's manual for the code"))
-
+_UNKNOWN = ("the drive aborts the transfer", "see the drive's manual for the code")
 
 SDO_TIMEOUT_S = 0.3
 ATTEMPTS = 2  # a question is asked so many times in a transfer; each answer is waited for as long as `SDO_TIMEOUT_S`
@@ -163,7 +160,7 @@ class NodeDictionary:
 
     def _failure(self, what: str, error: Exception) -> DriverError:
         if isinstance(error, SdoAbortedError):
-            meaning, remedy = describe_abort(error.code)
+            meaning, remedy = _MEANINGS.get(error.code, _UNKNOWN)
             return DriverError.refusal(f"node {self.node_id}: {what}: {meaning} (abort 0x{error.code:08X}); {remedy}")
         return DriverError.no_connection(
             f"node {self.node_id}: {what} ({' '.join(str(error).split())}); check node number, power and wiring"

@@ -11,7 +11,7 @@ import numpy as np
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import NMT_PRE_OPERATIONAL, SYNC_ID, CanBus
-from tauscope_drivers.canopen.bus_budget import CycleFrames, largest_rate_hz, rate_limit
+from tauscope_drivers.canopen.bus_budget import largest_rate_hz, rate_limit
 from tauscope_drivers.canopen.configuration import BusConfiguration
 from tauscope_drivers.canopen.emergency import WATCHDOG_CODE
 from tauscope_drivers.canopen.node import DriveNode
@@ -28,12 +28,6 @@ def arm_faults(nodes: Sequence[DriveNode], caught: Fault | None) -> tuple[Fault,
     silence = [replace(fault, joint=None) for fault in reported if fault.code == WATCHDOG_CODE]
     own = [] if caught is None else [caught]
     return (*own, *silence[:1], *(fault for fault in reported if fault.code != WATCHDOG_CODE))
-
-
-def blind_state(time_ns: int, joint_count: int) -> ArmState:
-    """The state of an arm that nobody is connected to."""
-    unknown = np.full(joint_count, math.nan)
-    return ArmState(time_ns, unknown, unknown, unknown, unknown, np.zeros(joint_count, dtype=np.bool_))
 
 
 def listed(faults: Sequence[Fault]) -> str:
@@ -65,10 +59,8 @@ class HostBrake:
 
 
 _PLAN = plan_pdos(PdoSlots(), objects.TARGET_POSITION, MEASURED_WHERE_THERE)
-# frames of a drive that has everything and whose PDOs are free
-CYCLE_FRAMES = CycleFrames(
-    tuple(pdo.layout.size for pdo in _PLAN.received), tuple(pdo.layout.size for pdo in _PLAN.sent)
-)
+# payloads of a drive that has everything and whose PDOs are free [bytes]
+CYCLE_FRAMES = tuple(pdo.layout.size for pdo in (*_PLAN.received, *_PLAN.sent))
 # cycle while drives change state, before and after the control loop's own, where that is not known
 SETTLING_CYCLE_S = 0.01
 
@@ -128,13 +120,6 @@ class Session:
             if state is not DriveState.OPERATION_ENABLED:
                 self.bus.command_nodes(NMT_PRE_OPERATIONAL, node.configuration.node_id)
 
-    def learn_cycle(self, cycle_s: float | None) -> None:
-        """Settle in the control loop's own cycle from now on.
-
-        `cycle_s`: of the loop; `SETTLING_CYCLE_S` where it is not known [s].
-        """
-        self.settling_ns = round((SETTLING_CYCLE_S if cycle_s is None else cycle_s) * 1e9)
-
     @property
     def has_braked(self) -> bool:
         """Whether the targets of `stop_targets` have come to rest."""
@@ -147,12 +132,6 @@ class Session:
             speed = np.array([node.last_velocity for node in self.nodes])
             self.brake = HostBrake(self.standstill().position, speed, now_ns)
         return stay_at(self.brake.targets(now_ns))
-
-    def learn_answer_time(self) -> None:
-        """Wait longer for answers from now on where this bus and adapter usually take most of the time for them."""
-        usual_ns = self.answer_time.usual_ns
-        if 2 * usual_ns > self.answer_ns:
-            self.answer_ns += usual_ns
 
     def standstill(self) -> Setpoint:
         """Targets where the joints are, by the last answer of each."""

@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 from tauscope_drivers.backend import DriveLimits
 from tauscope_drivers.clock import CycleGrid
 from tauscope_drivers.limits import SPEED_MARGIN
-from tauscope_drivers.state import Setpoint
-
-Array = NDArray[np.float64]
+from tauscope_drivers.state import Array, Setpoint
 
 # how much farther than its cycle's way a target may lie, in ways of a cycle: plans and their instants are rounded
 _SLACK = 0.4

@@ -4,7 +4,6 @@ import contextlib
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope_drivers.backend import Capabilities, ControlMode, DriveLimits, StopPolicy
 from tauscope_drivers.clock import Clock
@@ -22,9 +21,7 @@ from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.limits import RunawayWatch
 from tauscope_drivers.serial_servos.arm import SerialServoArm
 from tauscope_drivers.serial_servos.bus import PATIENCE_S, BusTiming, CycleTraffic, largest_part, largest_rate_hz
-from tauscope_drivers.state import ArmState, Setpoint
-
-Array = NDArray[np.float64]
+from tauscope_drivers.state import ArmState, Array, Setpoint
 
 # what the servos do by themselves when their watchdog fires
 _POLICIES = {ControlMode.POSITION: frozenset([StopPolicy.HOLD]), ControlMode.TORQUE: frozenset([StopPolicy.TORQUE_OFF])}
@@ -183,16 +180,16 @@ class DynamixelArm(SerialServoArm[Session]):
         if (session := self._session) is None:
             return planned_budget(self._configuration)
         longest = max(block.length for servo in session.servos for block in servo.model.watched_blocks)
-        group, timing = session.group, BusTiming(self._port.baudrate, session.bus.return_delay_s, self._port.latency_s)
-        families = group.family_count
-        return count_traffic(len(session.servos), health_bytes=longest, fast=group.fast, families=families), timing
+        fast, families = session.group.fast, len(session.group.families)
+        traffic = count_traffic(len(session.servos), health_bytes=longest, fast=fast, families=families)
+        return traffic, BusTiming(self._port.baudrate, session.bus.return_delay_s, self._port.latency_s)
 
 
 def _arm_state(session: Session, reading: GroupReading, temperature: Array) -> ArmState:
     """State of a cycle. `temperature`: (n,), where it was read in this cycle, else NaN [°C]."""
     for joint, alert in enumerate(reading.alerts):
         if alert is not None:
-            session.health.take_alert(joint, alert)
+            session.health.alerts[joint] = alert
     return ArmState(
         time_ns=reading.time_ns,
         position=reading.position,

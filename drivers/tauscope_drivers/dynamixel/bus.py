@@ -77,6 +77,7 @@ class Turns:
 
 _AFTERTHOUGHT_NS = 2_000_000
 _STATUS_BYTES = 11
+_STATE_BYTES = 10
 _PING_ANSWER_BYTES = 14
 _SYNC_BYTES = 14
 _READ_BYTES = 14
@@ -86,20 +87,14 @@ _FAST_SERVO_BYTES = 4
 
 
 def count_traffic(
-    servos: int,
-    *,
-    state_bytes: int = 10,
-    goal_bytes: int = 4,
-    health_bytes: int = 3,
-    fast: bool = False,
-    families: int = 1,
+    servos: int, *, goal_bytes: int = 4, health_bytes: int = 3, fast: bool = False, families: int = 1
 ) -> CycleTraffic:
     """A cycle of so many servos. `health_bytes`: that one servo is asked for besides; 0 for no such read [bytes]."""
     write = families * _SYNC_BYTES + servos * (1 + goal_bytes)
     ask = families * _SYNC_BYTES + servos
-    answers = servos * (_STATUS_BYTES + state_bytes)
+    answers = servos * (_STATUS_BYTES + _STATE_BYTES)
     if fast:
-        answers = families * _FAST_BYTES + servos * (state_bytes + _FAST_SERVO_BYTES)
+        answers = families * _FAST_BYTES + servos * (_STATE_BYTES + _FAST_SERVO_BYTES)
     health = _READ_BYTES + _STATUS_BYTES + health_bytes if health_bytes else 0
     return CycleTraffic(
         servos,
@@ -296,5 +291,5 @@ def _failure(servo: int, what: str, answer: Status | None) -> DriverError:
         return DriverError.no_connection(
             f"servo {servo} does not answer ({what}); check its power, cable, ID and baud rate"
         )
-    reason = packets.describe_refusal(answer.refusal)
+    reason = packets.REFUSALS.get(answer.refusal, f"error {answer.refusal}")
     return DriverError.refusal(f"servo {servo}: {what}: {reason}; check the servo with its wizard")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
+from typing import NamedTuple
 
 from tauscope_drivers.errors import DriverError
 
@@ -22,8 +23,7 @@ _ARDUINO = "ROBOTIS Dynamixel2Arduino, table of units"
 _E_MANUAL = "ROBOTIS e-Manual, unit of Present Current"
 
 
-@dataclass(frozen=True)
-class CurrentUnit:
+class CurrentUnit(NamedTuple):
     """What one unit of Present Current and Goal Current is."""
 
     milliampere: float
@@ -46,40 +46,15 @@ _MX = FamilyFacts("MX", CURRENT_BASED_POSITION_MODE)
 _P = FamilyFacts("P", POSITION_MODE)
 _Y = FamilyFacts("Y", POSITION_MODE, voltage_unit_v=0.01, error_is_code=True)
 
-_FAMILIES: tuple[tuple[str, FamilyFacts], ...] = (
-    ("mx_", _MX),
-    ("ym", _Y),
-    ("ph", _P),
-    ("pm", _P),
-    ("h42", _P),
-    ("h54", _P),
-    ("m42", _P),
-    ("m54", _P),
-    ("x", _X),
-    ("2x", _X),
-)
-
-_CURRENT_UNITS: tuple[tuple[str, CurrentUnit], ...] = (
-    ("xh430_v", CurrentUnit(1.34, _ARDUINO)),
-    ("xm430", CurrentUnit(2.69, _ARDUINO)),
-    ("xh430_w", CurrentUnit(2.69, _ARDUINO)),
-    ("xd430", CurrentUnit(2.69, _ARDUINO)),
-    ("xw430", CurrentUnit(2.69, _ARDUINO)),
-    ("xm540", CurrentUnit(2.69, _ARDUINO)),
-    ("xh540", CurrentUnit(2.69, _ARDUINO)),
-    ("xd540", CurrentUnit(2.69, _ARDUINO)),
-    ("xw540", CurrentUnit(2.69, _ARDUINO)),
-    ("xl330", CurrentUnit(1.0, _E_MANUAL)),
-    ("xc330", CurrentUnit(1.0, _E_MANUAL)),
-    ("mx_64", CurrentUnit(3.36, _ARDUINO)),
-    ("mx_106", CurrentUnit(3.36, _ARDUINO)),
-    ("ph", CurrentUnit(1.0, _E_MANUAL)),
-    ("pm", CurrentUnit(1.0, _E_MANUAL)),
-    ("h42", CurrentUnit(1.0, _E_MANUAL)),
-    ("h54", CurrentUnit(1.0, _E_MANUAL)),
-    ("m42", CurrentUnit(1.0, _E_MANUAL)),
-    ("m54", CurrentUnit(1.0, _E_MANUAL)),
-    ("ym", CurrentUnit(10.0, _E_MANUAL)),
+# by the beginnings of the models' names
+_PRO = ("ph", "pm", "h42", "h54", "m42", "m54")
+_FAMILIES = ((("mx_",), _MX), (("ym",), _Y), (_PRO, _P), (("x", "2x"), _X))
+_CURRENT_UNITS = (
+    (("xh430_v",), CurrentUnit(1.34, _ARDUINO)),
+    (("xm430", "xh430_w", "xd430", "xw430", "xm540", "xh540", "xd540", "xw540"), CurrentUnit(2.69, _ARDUINO)),
+    (("mx_64", "mx_106"), CurrentUnit(3.36, _ARDUINO)),
+    (("xl330", "xc330", *_PRO), CurrentUnit(1.0, _E_MANUAL)),
+    (("ym",), CurrentUnit(10.0, _E_MANUAL)),
 )
 
 # items that the firmware has and the library's tables leave out: e-Manual, MX(2.0), Bus Watchdog, from firmware 38
@@ -107,7 +82,7 @@ LEGACY_PRO: Mapping[int, str] = {
 
 def family_of(model: str) -> FamilyFacts | None:
     """Facts of the family that a model belongs to; None for a family that this driver does not know."""
-    return next((facts for prefix, facts in _FAMILIES if model.startswith(prefix)), None)
+    return next((facts for beginnings, facts in _FAMILIES if model.startswith(beginnings)), None)
 
 
 def gear_ratio_of(model: str) -> int:
@@ -118,11 +93,6 @@ def gear_ratio_of(model: str) -> int:
     Resolution and Electronic GearRatio Numerator; the model's name ends in the ratio.
     """
     return int(model[-3:]) if model.startswith("ym") else 1
-
-
-def current_unit_of(model: str) -> CurrentUnit | None:
-    """Unit of current of a model; None where no source states one."""
-    return next((unit for prefix, unit in _CURRENT_UNITS if model.startswith(prefix)), None)
 
 
 _SIGNED = re.compile(
@@ -190,7 +160,7 @@ class ServoModel:
     @property
     def label(self) -> str:
         """The model as printed on its case: ``XM430-W350``."""
-        return self.name.upper().replace("_", "-")
+        return describe_model(self.number)
 
     @property
     def senses_current(self) -> bool:
@@ -232,14 +202,12 @@ class ServoModel:
         taken for the answer to another.
         """
         blocks: list[Block] = []
-        for names in (
-            ("Bus Watchdog",),
-            (self.error_item.name,),
-            ("Present Input Voltage", self.temperature_item.name),
-        ):
+        warmth = ("Present Input Voltage", self.temperature_item.name)
+        for names in (("Bus Watchdog",), (self.error_item.name,), warmth):
             block = _block([self.items[name] for name in names if name in self.items])
             while any(block.length == other.length for other in blocks):
-                block = _block([self._item_before(block.address), *block.items])
+                before = next(item for item in self.items.values() if item.address + item.size == block.address)
+                block = _block([before, *block.items])
             blocks.append(block)
         return tuple(blocks)
 
@@ -253,9 +221,6 @@ class ServoModel:
             else:
                 stretches.append([item])
         return tuple(_block(items) for items in stretches)
-
-    def _item_before(self, address: int) -> Item:
-        return next(item for item in self.items.values() if item.address + item.size == address)
 
 
 def _block(items: Iterable[Item]) -> Block:
@@ -299,7 +264,8 @@ def find_model(number: int, firmware: int = 0) -> ServoModel:
             "use a servo of the X, MX(2.0), P, PRO(A) or Y series, or a newer dynamixel-sdk"
         )
     sections = _sections(_table_text(name, firmware))
-    items = {row[2]: _item(row) for row in sections["control table"] if row[0].isdigit()}
+    rows = ((int(row[0]), int(row[1]), row[2]) for row in sections["control table"] if row[0].isdigit())
+    items = {item: Item(item, at, size, _SIGNED.fullmatch(item) is not None) for at, size, item in rows}
     for missing, (address, size) in MISSING_ITEMS.get(name, {}).items():
         items.setdefault(missing, Item(missing, address, size, signed=False))
     shape = {row[0]: float(row[1]) for row in sections["type info"][1:]}
@@ -314,7 +280,7 @@ def find_model(number: int, firmware: int = 0) -> ServoModel:
         counts_per_radian=(zero - lowest) / math.pi,
         zero_count=round(zero),
         velocity_unit=units.get("Present Velocity", math.nan),
-        current_unit=current_unit_of(name),
+        current_unit=next((unit for beginnings, unit in _CURRENT_UNITS if name.startswith(beginnings)), None),
     )
 
 
@@ -336,13 +302,10 @@ def _folder() -> Traversable:
 
 def _table_text(name: str, firmware: int) -> str:
     """Text of a model's table; some models have another from firmware 52 on."""
-    newer = _folder().joinpath(f"{name}_fw52.model")
-    if firmware >= 52 and newer.is_file():
-        return newer.read_text("utf-8")
-    own = _folder().joinpath(f"{name}.model")
-    return (own if own.is_file() else _folder().joinpath(f"{dict(NEWER_MODELS.values())[name]}.model")).read_text(
-        "utf-8"
-    )
+    substitute = dict(NEWER_MODELS.values()).get(name, name)
+    names = ([f"{name}_fw52"] if firmware >= 52 else []) + [name, substitute]
+    tables = (_folder().joinpath(f"{each}.model") for each in names)
+    return next(table for table in tables if table.is_file()).read_text("utf-8")
 
 
 def _sections(text: str) -> dict[str, list[list[str]]]:
@@ -356,7 +319,3 @@ def _sections(text: str) -> dict[str, list[list[str]]]:
         elif stripped:
             rows.append([cell.strip() for cell in line.split("\t")])
     return sections
-
-
-def _item(row: list[str]) -> Item:
-    return Item(row[2], int(row[0]), int(row[1]), signed=_SIGNED.fullmatch(row[2]) is not None)

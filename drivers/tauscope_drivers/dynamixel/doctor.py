@@ -53,7 +53,12 @@ def _examine_servos(
             settings = read_settings(bus, servo)
             settings |= read_items(bus, servo, (*_EXAMINED, servo.model.error_item.name))
         except DriverError as error:
-            findings.append(_unreadable(bus, wanted.servo, subject, error))
+            answers_pings = error.kind is DriverErrorKind.CANNOT_CONNECT and bus.ping(wanted.servo)
+            if answers_pings and bus.read_once(wanted.servo, 0, 1) is None:
+                remedy = "set Status Return Level to 2 with the DYNAMIXEL Wizard"
+                findings.append(Finding(Severity.FAILURE, subject, "answers pings and no reads", remedy))
+            else:
+                findings.append(failure(subject, str(error)))
             continue
         findings += _examine_servo(servo, settings)
         servos.append(servo)
@@ -67,14 +72,6 @@ def _examine_servos(
         ask = partial(bus.sync_read, identifiers, block)
         findings.append(measure_loop_rate(bus, ask, traffic, SHORTEST_RETURN_DELAY_S))
     return findings
-
-
-def _unreadable(bus: ServoBus, servo: int, subject: str, error: DriverError) -> Finding:
-    """A servo that is not fit, or answers pings alone."""
-    if error.kind is DriverErrorKind.CANNOT_CONNECT and bus.ping(servo) and bus.read_once(servo, 0, 1) is None:
-        remedy = "set Status Return Level to 2 with the DYNAMIXEL Wizard"
-        return Finding(Severity.FAILURE, subject, "answers pings and no reads", remedy)
-    return failure(subject, str(error))
 
 
 def _rehearse(session: Session, joints: Sequence[DriveJoint]) -> list[Finding]:
@@ -101,14 +98,10 @@ def _turn_offset(session: Session, joint: DriveJoint) -> list[Finding]:
     place = servo.units.position(counts)
     for turns in range(-_MOST_TURNS, _MOST_TURNS + 1):
         if turns and not low <= place <= high and low <= servo.units.position(counts - round(turns * turn)) <= high:
-            detail = f"its multi-turn position is off by {_count_turns(turns)}"
+            detail = f"its multi-turn position is off by {turns} turn{'s' if abs(turns) > 1 else ''}"
             remedy = "support the arm and switch the servo's power off and on, or correct drive.zero_count"
             return [Finding(Severity.FAILURE, servo.label, detail, remedy)]
     return []
-
-
-def _count_turns(turns: int) -> str:
-    return f"{turns} turn{'s' if abs(turns) > 1 else ''}"
 
 
 def _slow_servo(servo: JointServo, settings: dict[str, int], joint: DriveJoint) -> list[Finding]:
@@ -159,11 +152,8 @@ def _examine_servo(servo: JointServo, settings: dict[str, int]) -> list[Finding]
     if not settings["Current Limit"]:
         find(Severity.FAILURE, "Current Limit is 0: it cannot exert any torque", "raise it with the DYNAMIXEL Wizard")
     if settings["Torque Enable"]:
-        find(
-            Severity.WARNING,
-            "is under torque",
-            "none where it holds the arm; else support the arm and switch torque off",
-        )
+        remedy = "none where it holds the arm; else support the arm and switch torque off"
+        find(Severity.WARNING, "is under torque", remedy)
     if not 0 <= settings["Bus Watchdog"] <= WATCHDOG_MOST:
         fault = watchdog_fault(servo.number)
         find(Severity.FAILURE, fault.detail, fault.remedy)

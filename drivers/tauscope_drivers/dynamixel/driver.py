@@ -26,8 +26,7 @@ class DynamixelDriver(SerialBusDriver):
 
         keeps = settings.get("keep_settings", False)
         if not isinstance(keeps, bool):
-            text = f"backend {self.name}: keep_settings is {keeps!r:.60}; give true or false"
-            raise DriverError.refusal(text)
+            raise DriverError.refusal(f"backend {self.name}: keep_settings is {keeps!r:.60}; give true or false")
         servos = DynamixelArm(arm.joints, slack_s=self.read_patience_s(settings), keeps_settings=keeps)
         return Connection(servos, is_real_time=True)
 

@@ -4,15 +4,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope_drivers.dynamixel.bus import ServoBus
 from tauscope_drivers.dynamixel.control_table import BYTES_BEFORE_STATE, STATE_ITEMS, Block, Item
 from tauscope_drivers.dynamixel.packets import Status
 from tauscope_drivers.dynamixel.servo import JointServo
 from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers
-
-Array = NDArray[np.float64]
+from tauscope_drivers.state import Array
 
 PROBES = 3  # how often Fast Sync Read is tried before the firmware counts as not knowing it
 PLAIN_CYCLES = 50  # for how many cycles each servo answers for itself, after a common packet broke off at a silent one
@@ -39,21 +37,17 @@ class ServoGroup:
         self.servos = tuple(servos)
         self.fast = False
         self._bus = bus
-        self._families = servo_families(servos)
+        self.families = servo_families(servos)
         self._plain_cycles = 0
         self._turns = health_turns(servos)
         self._turn = 0
         self._alerted: set[int] = set()
         self._known_alerts: set[int] = set()
 
-    def probe_fast(self) -> bool:
-        """Find out whether all servos know Fast Sync Read, and use it from now on if they do."""
+    def probe(self) -> list[Answers[Status]]:
+        """Use Fast Sync Read from now on if all servos know it; answers, by which an adapter's latency is learnt."""
         probes = (self._read_all(fast=True, patience_s=PATIENCE_S).statuses for _ in range(PROBES))
         self.fast = any(statuses.keys() == self._ids for statuses in probes)
-        return self.fast
-
-    def probe(self) -> list[Answers[Status]]:
-        """Answers of all servos, by which the latency of an adapter is learnt."""
         return [self._read_all(fast=self.fast, patience_s=PATIENCE_S) for _ in range(PROBES)]
 
     def write(self, name: str, values: Sequence[int | None]) -> None:
@@ -111,7 +105,7 @@ class ServoGroup:
     def read_watchdogs(self) -> dict[int, dict[str, int]]:
         """Health around the watchdog of all servos, asked for once: values by name for each index of a joint."""
         found: dict[int, dict[str, int]] = {}
-        for _, members in self._families:
+        for _, members in self.families:
             blocks = self.servos[members[0]].model.health_blocks
             block = next(block for block in blocks if any(item.name == "Bus Watchdog" for item in block.items))
             answers = self._bus.sync_read([self.servos[index].servo for index in members], block)
@@ -119,11 +113,6 @@ class ServoGroup:
                 if (status := answers.statuses.get(self.servos[index].servo)) is not None:
                     found[index] = block.decode(status.data)
         return found
-
-    @property
-    def family_count(self) -> int:
-        """Into how many group instructions an arm's servos fall."""
-        return len(self._families)
 
     @property
     def _ids(self) -> set[int]:
@@ -139,7 +128,7 @@ class ServoGroup:
                 patience_s=patience_s,
                 spare=BYTES_BEFORE_STATE,
             )
-            for block, members in self._families
+            for block, members in self.families
         ]
         statuses = {servo: status for answers in found for servo, status in answers.statuses.items()}
         late_ns, beyond_ns = (max(getattr(one, name) for one in found) for name in ("late_ns", "beyond_ns"))

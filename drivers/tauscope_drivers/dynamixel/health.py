@@ -89,7 +89,7 @@ class Health:
         self._servos = servos
         self._expected = np.zeros(count, dtype=np.bool_)
         self._registers = [0] * count
-        self._alerts = np.zeros(count, dtype=np.bool_)
+        self.alerts = np.zeros(count, dtype=np.bool_)  # alert bit of the last answer of each
         self._lost = np.zeros(count, dtype=np.bool_)
 
     def take(self, joint: int, values: Mapping[str, int]) -> None:
@@ -108,10 +108,6 @@ class Health:
         if model.temperature_item.name in values:
             self.temperature[joint] = float(values[model.temperature_item.name])
 
-    def take_alert(self, joint: int, alert: bool) -> None:
-        """Take the alert bit of an answer. `joint`: index of the joint, from 0."""
-        self._alerts[joint] = alert
-
     def states_error(self, joint: int) -> bool:
         """Whether a servo's error register was read and stated an error. `joint`: index of the joint, from 0."""
         return bool(self._registers[joint])
@@ -124,7 +120,7 @@ class Health:
         """Forget that servos lost their torque, set their alert bits or were caught: the operator knows."""
         self.runaway = None
         self._lost[:] = False
-        self._alerts[:] = False
+        self.alerts[:] = False
 
     @property
     def faults(self) -> tuple[Fault, ...]:
@@ -136,7 +132,7 @@ class Health:
             found += [fault for fault in hardware if fault.code != "watchdog"]
             if self.is_latched[index] and not self.is_latched.all():
                 found.append(watchdog_fault(servo.number))
-            if self._alerts[index] and not hardware:
+            if self.alerts[index] and not hardware:
                 found.append(Fault("hardware-error", servo.number, *_ALERT))
             if self._lost[index] and not hardware:
                 found.append(Fault("restarted", servo.number, *_TORQUE_LOST))

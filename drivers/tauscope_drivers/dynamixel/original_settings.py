@@ -3,6 +3,7 @@
 A run that holds the arm ends with servos under torque, whose EEPROM is locked: another process puts the settings back.
 """
 
+import contextlib
 import json
 import os
 import tempfile
@@ -21,14 +22,18 @@ class OriginalSettings:
         """Read what is kept; nothing is kept where the file is missing or damaged."""
         name = f"{os.path.realpath(port).strip('/').replace('/', '-')}-{servo}.json"
         self._path = _find_folder() / "servos" / name
-        self._before: dict[str, int] = {}
+        self.before: dict[str, int] = {}  # value of each changed item before the first change
         self._after: dict[str, int] = {}
-        self._load()
-
-    @property
-    def before(self) -> Mapping[str, int]:
-        """Value of each changed item before the first change."""
-        return dict(self._before)
+        try:
+            content = json.loads(self._path.read_text(encoding="utf-8"))
+            before, after = (
+                {item: int(value) for item, value in content[kind].items() if item in CHANGED}
+                for kind in ("before", "after")
+            )
+        except (OSError, ValueError, TypeError, KeyError, AttributeError):
+            return
+        if before.keys() == after.keys():
+            self.before, self._after = before, after
 
     def check(self, present: Mapping[str, int]) -> None:
         """Forget everything where an item is not as it was left: it is another servo, or somebody else set it."""
@@ -37,33 +42,17 @@ class OriginalSettings:
 
     def remember(self, name: str, before: int, after: int) -> None:
         """Keep a change; a disk that does not take it loses it, and the run goes on."""
-        self._before.setdefault(name, before)
+        self.before.setdefault(name, before)
         self._after[name] = after
-        try:
+        with contextlib.suppress(OSError):
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            self._path.write_text(json.dumps({"before": self._before, "after": self._after}), encoding="utf-8")
-        except OSError:
-            return
+            self._path.write_text(json.dumps({"before": self.before, "after": self._after}), encoding="utf-8")
 
     def forget(self) -> None:
         """They are put back, or nobody's."""
-        self._before, self._after = {}, {}
-        try:
+        self.before, self._after = {}, {}
+        with contextlib.suppress(OSError):
             self._path.unlink(missing_ok=True)
-        except OSError:
-            return
-
-    def _load(self) -> None:
-        try:
-            content = json.loads(self._path.read_text(encoding="utf-8"))
-            before, after = (
-                {name: int(value) for name, value in content[kind].items() if name in CHANGED}
-                for kind in ("before", "after")
-            )
-        except (OSError, ValueError, TypeError, KeyError, AttributeError):
-            return
-        if before.keys() == after.keys():
-            self._before, self._after = before, after
 
 
 def _find_folder() -> Path:

@@ -162,12 +162,8 @@ def decode_fast(frame: bytes, servos: Sequence[int], length: int) -> list[Status
     return found
 
 
-def describe_refusal(number: int) -> str:
-    """What an error number of a status packet means."""
-    return _REFUSALS.get(number, f"error {number}")
-
-
-_REFUSALS = {
+# what an error number of a status packet means
+REFUSALS = {
     0x01: "the instruction failed",
     0x02: "the instruction is not known to the servo",
     0x03: "the instruction arrived damaged",

@@ -124,12 +124,13 @@ def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -
     `torque`: limit of the joint, infinite where there is none [Nm or N].
     """
     cap = settings["Current Limit"]
-    if servo.current_limit_ma is not None:
-        cap = min(cap, math.floor(servo.current_limit_ma / abs(servo.units.milliampere) + _ROUNDING))
+    stated_ma = servo.configuration.current_limit_ma
+    if stated_ma is not None:
+        cap = min(cap, math.floor(stated_ma / abs(servo.units.milliampere) + _ROUNDING))
     if torque != math.inf:
         if servo.units.torque_per_milliampere is not None:
             cap = min(cap, servo.units.current_cap(torque))
-        elif servo.current_limit_ma is None:
+        elif stated_ma is None:
             raise DriverError.refusal(
                 f"{servo.label}: a torque limit of {torque:g} Nm is no current without a torque constant; state "
                 "torque_constant, or drive.current_limit_ma"

@@ -27,6 +27,24 @@ class ServoUnits:
     source: str
     torque_per_milliampere: float | None = None
 
+    @staticmethod
+    def of(model: ServoModel, configuration: ServoConfiguration) -> "ServoUnits":
+        """Units of a servo of this model at its joint. Raises ValueError where no unit of its current is known."""
+        size, source = configuration.milliampere_per_unit, "robot file"
+        if size is None:
+            if model.current_unit is None:
+                raise ValueError(f"no unit of current is known for the {model.label}")
+            size, source = model.current_unit
+        direction, reduction = configuration.direction, configuration.reduction
+        return ServoUnits(
+            radians_per_count=direction / (model.counts_per_radian * reduction),
+            zero_count=model.zero_count if configuration.zero_count is None else configuration.zero_count,
+            velocity_unit=direction * model.velocity_unit / reduction,
+            milliampere=direction * size,
+            source=source,
+            torque_per_milliampere=configuration.torque_per_milliampere,
+        )
+
     def position(self, counts: int) -> float:
         """Joint position [rad or m]."""
         return (counts - self.zero_count) * self.radians_per_count
@@ -84,48 +102,20 @@ _ROUNDING = 1e-9
 _LARGEST_PROFILE = 32_767
 
 
-def servo_units(
-    model: ServoModel,
-    *,
-    direction: int = 1,
-    reduction: float = 1.0,
-    zero_count: int | None = None,
-    milliampere: float | None = None,
-    torque_per_milliampere: float | None = None,
-) -> ServoUnits:
-    """Units of a servo of this model at its joint.
-
-    Raises ValueError where no unit of current is known for the model, and none is given.
-    `reduction`: turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints.
-    `zero_count`: count at which the joint stands at zero; None for the model's own.
-    `milliampere`: one unit of Present Current, in place of the model's [mA].
-    `torque_per_milliampere`: as recorded torque constants are: joint torque for one milliampere [Nm/mA or N/mA].
-    """
-    unit = model.current_unit
-    if milliampere is None and unit is None:
-        raise ValueError(f"no unit of current is known for the {model.label}")
-    size = milliampere if milliampere is not None else unit.milliampere if unit is not None else math.nan
-    return ServoUnits(
-        radians_per_count=direction / (model.counts_per_radian * reduction),
-        zero_count=model.zero_count if zero_count is None else zero_count,
-        velocity_unit=direction * model.velocity_unit / reduction,
-        milliampere=direction * size,
-        source="robot file" if milliampere is not None or unit is None else unit.source,
-        torque_per_milliampere=torque_per_milliampere,
-    )
-
-
 @dataclass(frozen=True)
 class JointServo:
     """A servo and what its numbers mean."""
 
     number: int  # of the joint, from 1
-    joint: str
-    servo: int
+    configuration: ServoConfiguration
     model: ServoModel
     firmware: int
     units: ServoUnits
-    current_limit_ma: float | None = None
+
+    @property
+    def servo(self) -> int:
+        """ID."""
+        return self.configuration.servo
 
     @property
     def counts_per_speed_unit(self) -> float:
@@ -135,7 +125,7 @@ class JointServo:
     @property
     def label(self) -> str:
         """What messages call it."""
-        return f"joint {self.joint} (servo {self.servo}, {self.model.label})"
+        return f"joint {self.configuration.joint} (servo {self.servo}, {self.model.label})"
 
 
 def make_servo(number: int, configuration: ServoConfiguration, identity: tuple[int, int] | None) -> JointServo:
@@ -159,19 +149,9 @@ def make_servo(number: int, configuration: ServoConfiguration, identity: tuple[i
     if "Bus Watchdog" not in model.items:
         raise _unfit(place, f"is a {model.label} without Bus Watchdog; it would run on when the host dies")
     try:
-        units = servo_units(
-            model,
-            direction=configuration.direction,
-            reduction=configuration.reduction,
-            zero_count=configuration.zero_count,
-            milliampere=configuration.milliampere_per_unit,
-            torque_per_milliampere=configuration.torque_per_milliampere,
-        )
+        return JointServo(number, configuration, model, firmware, ServoUnits.of(model, configuration))
     except ValueError as error:
         raise _unfit(place, f"{error}; state drive.milliampere_per_unit") from error
-    return JointServo(
-        number, configuration.joint, configuration.servo, model, firmware, units, configuration.current_limit_ma
-    )
 
 
 def _unfit(place: str, reason: str) -> DriverError:

@@ -73,7 +73,7 @@ class Session:
     def changes(self) -> tuple[str, ...]:
         """What was changed in EEPROM, one line a servo."""
         return tuple(
-            f"joint {servo.joint}: in EEPROM until the arm is let go: "
+            f"joint {servo.configuration.joint}: in EEPROM until the arm is let go: "
             + ", ".join(f"{name} {self.settings[joint][name]} in place of {value}" for name, value in before.items())
             for joint, servo in enumerate(self.servos)
             if self.originals and (before := self.originals[joint].before)
@@ -114,7 +114,6 @@ def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) ->
         session.carry_out(joint, commissioning_writes(servo, settings[joint], holds=holds))
     slowest = max(values["Return Delay Time"] for values in settings) * RETURN_DELAY_UNIT_S
     bus.return_delay_s = max(SHORTEST_RETURN_DELAY_S, slowest)
-    session.group.probe_fast()
     learn_latency(bus.port, session.group.probe())
     return session
 
@@ -132,23 +131,15 @@ def read_settings(bus: ServoBus, servo: JointServo) -> dict[str, int]:
 
     Raises DriverError ``cannot-connect`` where it does not answer, or its gear is another one.
     """
-    settings = read_items(bus, servo, SETTINGS)
-    _require_delivered_gear(bus, servo)
-    return settings
-
-
-def _require_delivered_gear(bus: ServoBus, servo: JointServo) -> None:
-    """Refuse a servo whose counts and speeds are not those of its model's table."""
-    gear = read_items(bus, servo, ELECTRONIC_GEAR)
-    if not gear:
-        return
-    numerator, denominator = (gear[name] for name in ELECTRONIC_GEAR)
+    settings, gear = read_items(bus, servo, SETTINGS), read_items(bus, servo, ELECTRONIC_GEAR)
+    numerator, denominator = (gear.get(name, 1) for name in ELECTRONIC_GEAR)
     ratio = gear_ratio_of(servo.model.name)
-    if numerator != ratio * denominator:
+    if gear and numerator != ratio * denominator:
         raise DriverError.no_connection(
             f"{servo.label}: its Electronic GearRatio is {numerator}:{denominator}, its counts are right at {ratio}:1; "
             "set it back with the wizard, and state a reduction of your own as drive.reduction"
         )
+    return settings
 
 
 def read_items(bus: ServoBus, servo: JointServo, names: Iterable[str]) -> dict[str, int]:
@@ -172,12 +163,7 @@ def _reach(bus: ServoBus, number: int, configuration: ServoConfiguration) -> Joi
             f"{bus.port.baudrate} baud; check its power, cable, ID and baud rate"
         )
     servo = make_servo(number, configuration, identity)
-    _let_answer(bus, servo)
-    return servo
-
-
-def _let_answer(bus: ServoBus, servo: JointServo) -> None:
-    """Let a servo answer every instruction that answers pings alone (Status Return Level 0)."""
     level = servo.model.items["Status Return Level"]
-    if bus.read_once(servo.servo, level.address, level.size, PATIENCE_S) is None:
+    if bus.read_once(servo.servo, level.address, level.size, PATIENCE_S) is None:  # it answers pings alone
         bus.sync_write([level], {servo.servo: [ANSWERS_ALL]})
+    return servo

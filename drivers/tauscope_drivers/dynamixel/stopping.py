@@ -1,6 +1,7 @@
 """Stopping an arm, and clearing what stopped it. Nothing here restarts a servo, and nothing lets go unasked."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from tauscope_drivers.backend import ControlMode, StopPolicy
 from tauscope_drivers.dynamixel.control_table import CURRENT_MODE
@@ -8,6 +9,7 @@ from tauscope_drivers.dynamixel.group import GroupReading
 from tauscope_drivers.dynamixel.preparation import operating_mode
 from tauscope_drivers.dynamixel.session import Session
 from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.serial_servos.arm import act_on_each
 
 # a servo that is no further than this from its goal only lags behind it, or gives way to a load [rad of the horn]
 NEAR_GOAL_RAD = 0.1
@@ -29,7 +31,7 @@ def stop_servos(
     session.health.expect_torque(False)
     if policy is StopPolicy.TORQUE_OFF:
         session.group.write("Torque Enable", [0] * len(everybody))
-        _each(session, everybody, _let_go)
+        act_on_each(everybody, partial(_let_go, session))
         return
     in_current_mode = [joint for joint in everybody if session.settings[joint]["Operating Mode"] == CURRENT_MODE]
     holding = [joint for joint in everybody if session.health.has_torque[joint]]
@@ -38,7 +40,7 @@ def stop_servos(
     else:
         silent = _hold_in_place(session, last_goals)
     # Those that do not answer come last: while they are waited for, the others' watchdogs would fire.
-    _each(session, sorted(everybody, key=silent.__contains__), _confirm_hold)
+    act_on_each(sorted(everybody, key=silent.__contains__), partial(_confirm_hold, session))
 
 
 def clear_watchdogs(session: Session) -> None:
@@ -68,11 +70,18 @@ def clear_errors(session: Session) -> None:
 
 
 def _clear(session: Session, joints: Sequence[int], clear: Callable[[int], None]) -> None:
-    """Clear what keeps servos from taking goals, without moving the arm."""
+    """Clear what keeps servos from taking goals, without moving the arm; none goes where it no longer belongs."""
     in_current_mode = [joint for joint in joints if session.settings[joint]["Operating Mode"] == CURRENT_MODE]
     holding = [joint for joint in joints if session.health.has_torque[joint] and joint not in in_current_mode]
     for joint in holding:
-        _require_near_goal(session, joint)
+        servo, values = session.servos[joint], session.read(joint, ["Present Position", "Goal Position"])
+        distance = abs(values["Present Position"] - values["Goal Position"]) / servo.model.counts_per_radian
+        if distance > NEAR_GOAL_RAD:
+            text = (
+                f"{servo.label} holds {distance:.2f} rad from its old goal and would go there; support the arm, "
+                "stop it with torque_off, then acknowledge"
+            )
+            raise DriverError(DriverErrorKind.FAULT, text, session.health.faults)
     for joint in in_current_mode:
         session.write(joint, "Torque Enable", 0)
     for joint in holding:
@@ -81,20 +90,6 @@ def _clear(session: Session, joints: Sequence[int], clear: Callable[[int], None]
         clear(joint)
         if joint in holding:
             session.write(joint, "Goal Position", session.read(joint, ["Present Position"])["Present Position"])
-
-
-def _require_near_goal(session: Session, joint: int) -> None:
-    """Refuse to let a servo go where it no longer belongs."""
-    servo = session.servos[joint]
-    values = session.read(joint, ["Present Position", "Goal Position"])
-    distance = abs(values["Present Position"] - values["Goal Position"]) / servo.model.counts_per_radian
-    if distance > NEAR_GOAL_RAD:
-        raise DriverError(
-            DriverErrorKind.FAULT,
-            f"{servo.label} holds {distance:.2f} rad from its old goal and would go there; support the arm, "
-            "stop it with torque_off, then acknowledge",
-            session.health.faults,
-        )
 
 
 def _hold_in_place(session: Session, last_goals: Sequence[int | None] | None) -> set[int]:
@@ -157,15 +152,3 @@ def _end_watchdog(session: Session, joint: int) -> None:
     session.health.take(joint, session.read(joint, ["Torque Enable", "Bus Watchdog"]))
     if not session.health.is_latched[joint]:
         session.write(joint, "Bus Watchdog", 0)
-
-
-def _each(session: Session, joints: Sequence[int], act: Callable[[Session, int], None]) -> None:
-    """Do something to every servo, also after one that failed; the first failure is raised at the end."""
-    failure: DriverError | None = None
-    for joint in joints:
-        try:
-            act(session, joint)
-        except DriverError as error:
-            failure = failure or error
-    if failure is not None:
-        raise failure

@@ -141,7 +141,7 @@ def _arm_state(session: Session, answers: bus.Answers[Status]) -> ArmState:
         velocity[joint] = servo.velocity(values["Present Speed"])
         load[joint] = servo.load(values["Present Load"])
         temperature[joint], voltage[joint] = values["Present Temperature"], values["Present Voltage"] * VOLT
-        session.health.take_alarms(joint, status.alarms)
+        session.health.alarms[joint] |= status.alarms
     return ArmState(
         time_ns=answers.asked_ns,
         position=position,

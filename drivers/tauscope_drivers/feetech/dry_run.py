@@ -29,8 +29,7 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
     Raises DriverError: ``refused``: a ``drive`` block, a limit or the mode is not possible.
     """
     if request.mode is not ControlMode.POSITION:
-        text = f"these servos cannot do mode {request.mode}; choose {ControlMode.POSITION}"
-        raise DriverError.refusal(text)
+        raise DriverError.refusal(f"these servos cannot do mode {request.mode}; choose {ControlMode.POSITION}")
     servos = [JointServo(number, servo) for number, servo in enumerate(read_configuration(joints).servos, 1)]
     require_sensible(request.limits, request.targets[0], [servo.label for servo in servos])
     tasks = [plan_task(servo, _DELIVERED, request.limits, joint) for joint, servo in enumerate(servos)]

@@ -1,17 +1,19 @@
 """Taking an arm under power where it is, and stopping it."""
 
 import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from tauscope_drivers.backend import DriveLimits, StopPolicy
-from tauscope_drivers.errors import DriverError, DriverErrorKind
-from tauscope_drivers.feetech.commissioning import Reading, ServoTask, find_flaws, plan_task, read_servo
+from tauscope_drivers.errors import DriverError
+from tauscope_drivers.feetech.commissioning import ServoTask, find_flaws, plan_task, read_servo
 from tauscope_drivers.feetech.registers import COUNTS_PER_RADIAN
 from tauscope_drivers.feetech.session import Session
 from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.limits import require_sensible
+from tauscope_drivers.serial_servos.arm import act_on_each
 
 # a servo that is no further than this from its goal only lags behind it, or gives way to a load [rad of the horn]
 NEAR_GOAL_RAD = 0.1
@@ -29,14 +31,13 @@ def plan_tasks(session: Session, limits: DriveLimits) -> list[ServoTask]:
         for servo, reading in zip(session.servos, readings, strict=True)
     ]
     require_sensible(limits, np.array(places), [servo.label for servo in session.servos])
-    return [_plan(session, joint, reading, limits) for joint, reading in enumerate(readings)]
-
-
-def _plan(session: Session, joint: int, reading: Reading, limits: DriveLimits) -> ServoTask:
-    servo = session.servos[joint]
-    for flaw in find_flaws(servo, reading, limits, joint):
-        raise DriverError.refusal(f"{servo.label}: {flaw.detail}; {flaw.remedy}")
-    return plan_task(servo, reading, limits, joint)
+    for joint, (servo, reading) in enumerate(zip(session.servos, readings, strict=True)):
+        for flaw in find_flaws(servo, reading, limits, joint):
+            raise DriverError.refusal(f"{servo.label}: {flaw.detail}; {flaw.remedy}")
+    return [
+        plan_task(servo, reading, limits, joint)
+        for joint, (servo, reading) in enumerate(zip(session.servos, readings, strict=True))
+    ]
 
 
 def enable_servos(session: Session, tasks: Sequence[ServoTask]) -> list[int]:
@@ -111,9 +112,8 @@ def stop_servos(session: Session, policy: StopPolicy) -> None:
         session.health.expect(joint, {})
     if policy is StopPolicy.TORQUE_OFF:
         session.bus.sync_write(dict.fromkeys(session.identifiers, _LET_GO))
-        _each(session, _let_go)
-        return
-    _each(session, _hold)
+    act = _let_go if policy is StopPolicy.TORQUE_OFF else _hold
+    act_on_each(range(len(session.servos)), partial(act, session), partial(_let_go_blindly, session))
 
 
 def _hold(session: Session, joint: int) -> None:
@@ -140,18 +140,3 @@ def _let_go_blindly(session: Session, joint: int) -> None:
         with contextlib.suppress(DriverError):
             session.bus.sync_write({session.servos[joint].servo: _LET_GO})
     session.health.has_torque[joint] = False
-
-
-def _each(session: Session, act: Callable[[Session, int], None]) -> None:
-    """Do something to every servo, also after one that failed; the first failure is raised at the end."""
-    failed: DriverError | None = None
-    for joint in range(len(session.servos)):
-        try:
-            act(session, joint)
-        except DriverError as error:
-            if error.kind is DriverErrorKind.LOST:
-                raise
-            _let_go_blindly(session, joint)
-            failed = failed or error
-    if failed is not None:
-        raise failed

@@ -59,10 +59,6 @@ class Health:
         self._expected: list[Mapping[str, int]] = [{}] * count
         self._lost = np.zeros(count, dtype=np.bool_)
 
-    def take_alarms(self, joint: int, alarms: int) -> None:
-        """Take the alarms of an answer."""
-        self.alarms[joint] |= alarms
-
     def take_targets(self, joint: int, values: Mapping[str, int]) -> None:
         """Take torque and limits as they were read."""
         self.has_torque[joint] = bool(values["Torque Enable"])
@@ -114,19 +110,13 @@ class Session:
 
     def read_targets(self, joint: int) -> dict[str, int]:
         """Torque, targets and limits of one servo. `joint`: index of the joint, from 0."""
-        with naming(self.servos[joint]):
-            alarms, values = self.bus.read(self.servos[joint].servo, registers.TARGETS)
-        self.health.take_alarms(joint, alarms)
-        self.health.take_targets(joint, values)
-        self.unsure.discard(joint)
+        values = self._read(joint, registers.TARGETS)
+        self._take_targets(joint, values)
         return values
 
     def read_feedback(self, joint: int) -> dict[str, int]:
         """Position, speed, load, voltage and temperature of one servo. `joint`: index of the joint, from 0."""
-        with naming(self.servos[joint]):
-            alarms, values = self.bus.read(self.servos[joint].servo, registers.FEEDBACK)
-        self.health.take_alarms(joint, alarms)
-        return values
+        return self._read(joint, registers.FEEDBACK)
 
     def write(self, joint: int, values: Mapping[str, int]) -> None:
         """Write registers of one servo and read them back. `joint`: index of the joint, from 0."""
@@ -141,13 +131,22 @@ class Session:
         self.turn = (joint + 1) % count
         answer = self.bus.read_once(self.servos[joint].servo, registers.TARGETS)
         if answer is not None:
-            self.health.take_alarms(joint, answer.alarms)
-            self.health.take_targets(joint, registers.TARGETS.decode(answer.data))
-            self.unsure.discard(joint)
+            self.health.alarms[joint] |= answer.alarms
+            self._take_targets(joint, registers.TARGETS.decode(answer.data))
 
     def follows(self, joint: int) -> bool:
         """Whether a servo may be sent a goal, which might switch torque on. `joint`: index of the joint, from 0."""
         return self.health.is_sound(joint) and joint not in self.unsure
+
+    def _read(self, joint: int, block: registers.Block) -> dict[str, int]:
+        with naming(self.servos[joint]):
+            alarms, values = self.bus.read(self.servos[joint].servo, block)
+        self.health.alarms[joint] |= alarms
+        return values
+
+    def _take_targets(self, joint: int, values: Mapping[str, int]) -> None:
+        self.health.take_targets(joint, values)
+        self.unsure.discard(joint)
 
 
 @contextmanager

@@ -2,11 +2,9 @@
 
 import contextlib
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Any, Generic, TypeVar
-
-import numpy as np
 
 from tauscope_drivers.backend import Capabilities, ControlMode, DriveLimits, StopPolicy
 from tauscope_drivers.clock import Clock, MonotonicClock
@@ -190,9 +188,7 @@ class SerialServoArm(ABC, Generic[_Session]):
             return self._read_state(session, is_health_fresh=is_health_fresh)
 
     def _blind(self) -> ArmState:
-        unknown = np.full(len(self._configuration.servos), np.nan)
-        nobody = np.zeros(len(unknown), dtype=np.bool_)
-        return ArmState(self._clock.now_ns(), unknown, unknown, unknown, unknown, nobody, self._lost)
+        return ArmState.unknown(self._clock.now_ns(), len(self._configuration.servos), self._lost)
 
     def _require_session(self) -> _Session:
         if self._session is None:
@@ -212,6 +208,25 @@ class SerialServoArm(ABC, Generic[_Session]):
                 self._port.close()
                 raise DriverError(error.kind, str(error), self._lost) from error
             raise
+
+
+def act_on_each(joints: Iterable[int], act: Callable[[int], None], let_go: Callable[[int], None] | None = None) -> None:
+    """Do something to every servo, also after one that failed; the first failure is raised at the end.
+
+    `let_go`: what is done to one that failed.
+    """
+    failure: DriverError | None = None
+    for joint in joints:
+        try:
+            act(joint)
+        except DriverError as error:
+            if error.kind is DriverErrorKind.LOST:
+                raise
+            if let_go is not None:
+                let_go(joint)
+            failure = failure or error
+    if failure is not None:
+        raise failure
 
 
 def _require_none(faults: tuple[Fault, ...]) -> None:

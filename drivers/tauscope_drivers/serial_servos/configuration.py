@@ -49,6 +49,5 @@ def read_torque_constant(joint: DriveJoint) -> float | None:
     """
     constant = joint.torque_per_unit
     if constant is not None and (not math.isfinite(constant) or constant == 0.0):
-        text = f"joint {joint.name}: torque_constant = {constant}; give one that is not zero"
-        raise DriverError.refusal(text)
+        raise DriverError.refusal(f"joint {joint.name}: torque_constant = {constant}; give one that is not zero")
     return constant

@@ -1,13 +1,13 @@
 """Files that the program writes: complete or not at all, and never over a file that it read."""
 
 import os
-import secrets
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import typer
 
 from tauscope.errors import ExportError
+from tauscope.files import open_atomically
 
 STANDARD_OUTPUT = Path("-")  # stands for standard output where a file to write is asked for
 
@@ -73,18 +73,7 @@ def write_file(path: Path, content: bytes) -> None:
         if real.exists() and not real.is_file():  # a device or a pipe: there is nothing to replace
             real.write_bytes(content)
         else:
-            _replace(real, content)
+            with open_atomically(real) as file:
+                file.write(content)
     except OSError as error:
         raise ExportError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
-
-
-def _replace(path: Path, content: bytes) -> None:
-    partial = path.with_name(f".tauscope-{secrets.token_hex(6)}.partial")
-    try:
-        with partial.open("xb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)

@@ -155,7 +155,7 @@ def _prepare_process() -> None:
 def _fail(message: str) -> int:
     if os.environ.get(DEBUG):
         traceback.print_exc()
-    from tauscope.robot.messages import one_line
+    from tauscope.errors import one_line
 
     typer.echo(one_line(message), err=True)
     return ExitStatus.CANNOT_ANSWER

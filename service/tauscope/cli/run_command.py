@@ -17,11 +17,10 @@ from tauscope.cli.device_command import show_frames
 from tauscope.cli.output_files import keep_file, require_new
 from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
-from tauscope.errors import AcquisitionError
+from tauscope.errors import AcquisitionError, one_line
 from tauscope.number_text import ABSENT, counted, significant
 from tauscope.report.tables import Table
-from tauscope.robot import JointType, Robot
-from tauscope.robot.messages import one_line
+from tauscope.robot import Robot
 from tauscope.runtime.drivers import DEFAULT_BACKEND, BackendName, driver_names, find_driver
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.record import RunRecord
@@ -215,7 +214,7 @@ def _whole(record: RunRecord) -> Table:
 def _joints(record: RunRecord, robot: Robot) -> Table:
     stale = (0,) * robot.joint_count if record.timing is None else record.timing.stale_samples
     rows = [
-        (joint.name, f"{significant(following, 3)} {'rad' if joint.type is JointType.REVOLUTE else 'm'}", str(count))
+        (joint.name, f"{significant(following, 3)} {joint.type.unit}", str(count))
         for joint, following, count in zip(robot.joints, record.worst_following, stale, strict=True)
     ]
     return Table(("joint", "largest following error", "samples not answered"), rows)

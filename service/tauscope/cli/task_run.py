@@ -9,9 +9,9 @@ import typer
 
 from tauscope.cli.output_files import STANDARD_OUTPUT, require_distinct, require_free, write_file
 from tauscope.cli.terminal import Told, say, show_progress
+from tauscope.errors import one_line
 from tauscope.export.formats import SUFFIXES, ExportFile, ExportFormat
 from tauscope.robot import Robot, Severity, read_robot
-from tauscope.robot.messages import one_line
 from tauscope.tasks.task import LocalFiles
 
 

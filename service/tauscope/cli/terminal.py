@@ -10,8 +10,8 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from tauscope.errors import one_line
 from tauscope.report.tables import Table
-from tauscope.robot.messages import one_line
 
 PIPE_WIDTH = 240  # columns where nobody looks: wide enough for every table
 

@@ -8,11 +8,11 @@ import numpy as np
 from tauscope.closed_loop.laws import RELAXED, LoadFriction
 from tauscope.closed_loop.segments import STEP_S, Segments
 from tauscope.dynamics import torque_regressor
+from tauscope.dynamics.friction import smooth_sign
 from tauscope.recording.recording import Array
 from tauscope.robot import Actuator, Robot
 
 SWEEPS = 4  # Gauss-Seidel sweeps over the dry friction of coupled joints
-_TWO_OVER_PI = 2.0 / np.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ def simulate_segments(robot: Robot, loops: Sequence[Actuator], segments: Segment
         inverse = _invert(mass)
         free = drive - bias - offset - viscous * velocity
         faster = velocity + STEP_S * np.einsum("ijsv,jsv->isv", inverse, free)
-        level = stiction + stribeck * _TWO_OVER_PI * np.arctan(delta * np.abs(velocity))
+        level = stiction + stribeck * smooth_sign(np.abs(velocity), delta)
         level = np.maximum(level + friction.level(load, np.sign(faster)), 0.0)
         faster = _brake(inverse, faster, STEP_S * level)
         acceleration = (faster - velocity) / STEP_S

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tauscope.dynamics.friction import smooth_sign
 from tauscope.effects import Signals
 from tauscope.export.compensation import JointFriction
 from tauscope.export.model import ExportModel, FoundEffect
@@ -39,8 +40,6 @@ class LoadFriction:
         size = np.abs(load)
         return np.where(direction * load > 0.0, self.driving * size, self.braking) * size
 
-
-_TWO_OVER_PI = 2.0 / np.pi
 
 RESTING = 1e-4  # speed below which a joint's direction is that of the torque on it [rad/s or m/s]
 
@@ -98,7 +97,7 @@ class JointLaws:
         `position`, `velocity`: (n,), q, q̇; `load`: (n,), torque of the rigid body [Nm or N]; `drive`: (n,), torque of
         the drive, which gives a resting joint its direction [Nm or N]. Returns (n,), (n,) [Nm or N].
         """
-        level = self._stiction + self._stribeck * _TWO_OVER_PI * np.arctan(self._delta * np.abs(velocity))
+        level = self._stiction + self._stribeck * smooth_sign(np.abs(velocity), self._delta)
         torque = self._offset.copy()
         direction = np.where(np.abs(velocity) > RESTING, np.sign(velocity), np.sign(drive - load))
         if self._by_load is not None:

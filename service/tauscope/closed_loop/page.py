@@ -1,8 +1,5 @@
 """The rollout as a page: real and simulated motion, and their errors."""
 
-import shlex
-
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from tauscope.closed_loop.result import RolloutDocument
@@ -20,7 +17,8 @@ from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Sectio
 from tauscope.report.provenance import Provenance
 from tauscope.report.series import envelope_indices
 from tauscope.report.svg import HELD_OUT, INK, MEASURED, PREDICTED, RESIDUAL, draw_svg
-from tauscope.report.tables import csv_text, input_table
+from tauscope.report.tables import csv_text
+from tauscope.report.torque_figure import plot_envelope
 
 HEIGHT_INCHES = 3.4
 
@@ -34,33 +32,25 @@ def rollout_page(rollout: Rollout, provenance: Provenance) -> str:
     worst = max(rollout.traces, key=lambda trace: max(trace.entry.models[-1].rms))
     names = [joint.name for joint in rollout.robot.joints]
     parts = [_motion(worst, joint, name) for joint, name in enumerate(names)]
-    entry = document.refinement
-    tables = [] if entry is None else [Part(table=refinement_table(entry))]
-    refinement = [Section("refinement", "Refined parameters", tables)] if tables else []
+    errors = [Part(table=summary_table(document)), Part(table=recording_table(document))]
+    refined = document.refinement
+    refinement = [] if refined is None else [Part(table=refinement_table(refined))]
     sections = [
-        Section(
-            "errors", "Position error", [Part(table=summary_table(document)), Part(table=recording_table(document))]
-        ),
-        *refinement,
+        Section("errors", "Position error", errors),
+        *([Section("refinement", "Refined parameters", refinement)] if refinement else []),
         Section("motion", "Motion where the error is largest", parts, [f"{worst.motion.name}."]),
-        Section(
-            "reproduce",
-            "Reproduce",
-            [Part(table=input_table(provenance)), Part(command=shlex.join(provenance.command))],
-        ),
     ]
-    created = provenance.created.strftime("%Y-%m-%d %H:%M %Z").strip()
-    counts = f"{counted(len(names), 'joint')} · {counted(len(rollout.traces), 'recording')}"
+    counts = [counted(len(names), "joint"), counted(len(rollout.traces), "recording")]
     return render(
         Page(
+            kind="rollout",
             robot=document.robot,
-            subtitle=f"{counts} · closed loop in MuJoCo · {created}",
+            facts=[*counts, "closed loop in MuJoCo"],
             key_figures=_key_figures(document),
             sentences=list(rollout_sentences(document)),
             cautions=[warning.sentence for warning in document.warnings],
-            sections=sections,
-            footer=", ".join(f"{name} {version}" for name, version in provenance.versions),
-            kind="rollout",
+            story=sections,
+            provenance=provenance,
         )
     )
 
@@ -80,19 +70,17 @@ def _motion(trace: Trace, joint: int, name: str) -> Part:
 
     def draw(figure: Figure) -> None:
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.7, 1.0))
-        kept = envelope_indices(real, MOST_POINTS)
-        above.plot(time[kept], real[kept], color=MEASURED, linewidth=0.9, label="real")
+        plot_envelope(above, time, real, MOST_POINTS, color=MEASURED, linewidth=0.9, label="real")
         for model, curve in curves.items():
-            kept = envelope_indices(curve, MOST_POINTS)
-            above.plot(time[kept], curve[kept], color=COLOURS[model], linewidth=1.0, label=MODEL_WORDS[model])
-            below.plot(time[kept], MILLI * (curve - real)[kept], color=COLOURS[model], linewidth=0.7)
+            style = {"color": COLOURS[model], "linewidth": 1.0, "label": MODEL_WORDS[model]}
+            plot_envelope(above, time, curve, MOST_POINTS, **style)
+            plot_envelope(below, time, MILLI * (curve - real), MOST_POINTS, color=COLOURS[model], linewidth=0.7)
         above.set_ylabel("position [rad, m]")
         above.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.0, borderpad=0.2)
         below.set_ylabel("error [mrad, mm]")
         below.set_xlabel("time [s]")
-        below.margins(x=0.0)
 
-    svg = Markup(draw_svg(f"motion-{joint + 1}", HEIGHT_INCHES, draw))  # noqa: S704 - our own drawing
+    svg = draw_svg(f"motion-{joint + 1}", HEIGHT_INCHES, draw)
     kept = envelope_indices(real, MOST_POINTS // 2)
     columns = {"time": time, "real": real, **curves}
     numbers = Numbers(f"Numbers of {name}", text=csv_text({key: each[kept].tolist() for key, each in columns.items()}))

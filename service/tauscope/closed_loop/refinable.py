@@ -75,11 +75,11 @@ class RefinableModel:
         """Friction of each joint; a constant torque has no cause but a spring, and is as large as dry friction."""
         terms = []
         for joint, law in zip(self._model.robot.joints, self._model.friction, strict=True):
-            unit, speed = ("Nm", "Nm s/rad") if joint.type.value == "revolute" else ("N", "N s/m")
+            unit = joint.type.torque_unit
             level, damping = max(law.stiction + min(law.stribeck, 0.0), 1e-6), max(law.viscous, 1e-6)
             terms += [
                 Term(f"stiction {joint.name}", unit, law.stiction, STEP * level, least=0.0),
-                Term(f"viscous {joint.name}", speed, law.viscous, STEP * damping, least=0.0),
+                Term(f"viscous {joint.name}", f"{unit} s/{joint.type.unit}", law.viscous, STEP * damping, least=0.0),
                 Term(f"offset {joint.name}", unit, 0.0, STEP * level, level),
                 Term(f"driving friction {joint.name}", f"1/{unit}", 0.0, STEP, least=0.0, is_optional=True),
                 Term(f"braking friction {joint.name}", "1", 0.0, STEP, least=0.0, is_optional=True),

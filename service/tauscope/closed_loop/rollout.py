@@ -15,7 +15,6 @@ from tauscope.closed_loop.drive import (
     record_motion,
     simulate_motion,
 )
-from tauscope.closed_loop.measure import lag, reversal_error, rms_error, worst_error
 from tauscope.closed_loop.model import RolloutModel, rollout_model, stated_model
 from tauscope.closed_loop.plant import STEP_S, make_plant
 from tauscope.closed_loop.refine import Refined, refine_model
@@ -244,16 +243,76 @@ def _entry(
     name: str, motion: RecordedMotion, runs: dict[float | None, Array], stabiliser: list[float] | None
 ) -> ModelEntry:
     real, free = motion.measured, runs[None]
-    turned = reversal_error(motion.rows, real, free, motion.time, motion.velocity)
+    turned = _reversal_error(motion.rows, real, free, motion.time, motion.velocity)
+
+    def rms(run: Array) -> list[float]:
+        return np.sqrt(np.nanmean((run - real) ** 2, axis=0)).tolist()
+
     return ModelEntry(
         model=name,  # pyright: ignore[reportArgumentType]
-        rms=rms_error(real, free).tolist(),
-        worst=worst_error(real, free).tolist(),
+        rms=rms(free),
+        worst=np.nanmax(np.abs(free - real), axis=0).tolist(),
         reversals=[None if np.isnan(value) else float(value) for value in turned],
-        lag=lag(motion.rows, real, free).tolist(),
-        horizons=[HorizonEntry(horizon_s=at, rms=rms_error(real, run).tolist()) for at, run in runs.items()],
+        lag=_lag(motion.rows, real, free).tolist(),
+        horizons=[HorizonEntry(horizon_s=at, rms=rms(run)) for at, run in runs.items()],
         stabiliser_rms=stabiliser,
     )
+
+
+LONGEST_LAG_S = 0.25  # largest delay between both motions that is looked for [s]
+REVERSAL_S = 0.1  # time on either side of a reversal that belongs to it [s]
+MOVES = 0.05  # share of its top speed above which a joint moves: below it, it may rest and turn for noise
+
+
+def _lag(time: Array, measured: Array, simulated: Array) -> Array:
+    """Delay of the real motion behind the simulated one, (n,) [s]: that at which both differ least.
+
+    `time`: (N,) [s]; `measured`, `simulated`: (N, n), q of the real and of the simulated arm [rad or m]; NaN where it
+    was missed.
+    """
+    step = float(np.median(np.diff(time)))
+    reach = int(LONGEST_LAG_S / step)
+    found = np.zeros(measured.shape[1])
+    shifts = np.arange(-reach, reach + 1)
+    at = np.arange(reach, len(time) - reach)
+    if not len(at):
+        return found
+    for joint in range(measured.shape[1]):
+        real, other = measured[:, joint], simulated[:, joint]
+        errors = np.array([np.nanmean((real[at] - other[at - shift]) ** 2) for shift in shifts])
+        best = int(np.argmin(errors))
+        if 0 < best < len(shifts) - 1:
+            before, least, after = errors[best - 1 : best + 2]
+            bend = before - 2.0 * least + after
+            found[joint] = step * (shifts[best] + (0.5 * (before - after) / bend if bend > 0.0 else 0.0))
+        else:
+            found[joint] = step * shifts[best]
+    return found
+
+
+def _reversal_error(rows: Array, measured: Array, simulated: Array, time: Array, velocity: Array) -> Array:
+    """Rms of the position error within `REVERSAL_S` of a reversal of the real joint, (n,) [rad or m]; NaN without one.
+
+    `rows`: (N,), instants of both positions [s].
+    `measured`, `simulated`: (N, n), q of the real and of the simulated arm [rad or m]; NaN where it was missed.
+    `time`: (K,), instants of the velocity [s].
+    `velocity`: (K, n), of the real arm [rad/s or m/s].
+    """
+    found = np.full(measured.shape[1], np.nan)
+    for joint, speed in enumerate(velocity.T):
+        moving = np.flatnonzero(np.abs(speed) > MOVES * np.abs(speed).max())
+        turns = np.flatnonzero(np.diff(np.sign(speed[moving])) != 0)
+        if not len(turns):
+            continue
+        instants = 0.5 * (time[moving[turns]] + time[moving[turns + 1]])
+        place = np.clip(np.searchsorted(instants, rows), 1, len(instants) - 1) if len(instants) > 1 else None
+        near = np.abs(rows - instants[0])
+        if place is not None:
+            near = np.minimum(np.abs(rows - instants[place]), np.abs(rows - instants[place - 1]))
+        error = (simulated - measured)[near <= REVERSAL_S, joint]
+        if np.isfinite(error).any():
+            found[joint] = float(np.sqrt(np.nanmean(error**2)))
+    return found
 
 
 def _warn_drive(*, is_closed: bool) -> tuple[ResultWarning, ...]:

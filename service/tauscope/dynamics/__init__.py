@@ -2,7 +2,6 @@
 
 from tauscope.dynamics.base_parameters import BaseParameters, base_parameters
 from tauscope.dynamics.friction import (
-    FRICTION_COLUMNS,
     friction_columns,
     friction_torque,
     smooth_sign,
@@ -12,7 +11,6 @@ from tauscope.dynamics.regressor import TorqueRegressor, torque_regressor
 from tauscope.dynamics.rigid_body import gravity_torque, inverse_dynamics, mass_matrix
 
 __all__ = [
-    "FRICTION_COLUMNS",
     "BaseParameters",
     "TorqueRegressor",
     "base_parameters",

@@ -26,12 +26,10 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.dynamics.chain_step import ABOUT_Z, Offset, Plane, Step
-from tauscope.robot.robot import Robot
+from tauscope.robot.robot import Array, Robot
 
-Array = NDArray[np.float64]
 Vectors = tuple[Array, Array, Array]
 """The x, y and z components, each an array of the same shape."""
 

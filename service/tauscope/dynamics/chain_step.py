@@ -5,11 +5,9 @@ with its angle, so that a segment given by Denavit-Hartenberg parameters takes t
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tauscope.robot.robot import JointType, Segment
+from tauscope.robot.robot import Array, JointType, Segment
 
-Array = NDArray[np.float64]
 Plane = tuple[int, int]
 """The two components that a turn mixes, in the order in which a positive angle leads from one to the other."""
 

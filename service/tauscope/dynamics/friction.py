@@ -1,12 +1,9 @@
 """Static friction of one joint: the seed paper's equations (7) to (9), with a constant offset beside them."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import IdentificationError
-from tauscope.robot.robot import FrictionCoefficients, FrictionShape
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array, FrictionCoefficients, FrictionShape
 
 FRICTION_COLUMNS = ("stiction", "stribeck", "viscous", "offset")
 """Names of the columns of `friction_columns`."""

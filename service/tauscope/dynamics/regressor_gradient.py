@@ -21,9 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.dynamics.chain_motion import ChainMotion, LinkMotion
-from tauscope.robot.robot import STANDARD_PARAMETERS, Robot
+from tauscope.robot.robot import STANDARD_PARAMETERS, Array, Robot
 
-Array = NDArray[np.float64]
 Columns = NDArray[np.intp]
 
 _PER_LINK = len(STANDARD_PARAMETERS)

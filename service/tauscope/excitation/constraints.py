@@ -9,16 +9,14 @@ what it is off at the present motion: (⟨u^p⟩)^{1/p} · (max u / (⟨u^p⟩)^
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tauscope.excitation.information import ExcitationRegressor, MotionGradient
+from tauscope.excitation.information import MotionGradient
 from tauscope.excitation.series_space import SeriesSpace
 from tauscope.excitation.torque_prediction import TorquePrediction
 from tauscope.excitation.workspace import WorkspaceUsage
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples, between_samples
 from tauscope.trajectory.limits import MotionLimits
-
-Array = NDArray[np.float64]
 
 POWER = 30.0  # p of the p-norm over time: the largest usages decide, yet several peaks at once have a say
 # Instants a period of the highest harmonic at which kinematic limits are held: 0.3 % is left for what lies between.
@@ -112,6 +110,7 @@ class KinematicUsage:
         return SmoothMaximum(values, jacobian)
 
 
+@dataclass(frozen=True, eq=False)
 class StateUsage:
     """Usage of what depends on the whole state: predicted torque and workspace.
 
@@ -119,24 +118,20 @@ class StateUsage:
     `workspace`: None where nothing is forbidden.
     """
 
-    def __init__(
-        self, regressor: ExcitationRegressor, torque: TorquePrediction | None, workspace: WorkspaceUsage | None
-    ) -> None:
-        self._regressor = regressor
-        self.torque = torque
-        self.workspace = workspace
+    torque: TorquePrediction | None
+    workspace: WorkspaceUsage | None
+
+    @property
+    def parts(self) -> list[TorquePrediction | WorkspaceUsage]:
+        """Torque, then workspace, as far as they are constrained."""
+        return [part for part in (self.torque, self.workspace) if part is not None]
 
     def usages(self, motion: MotionSamples, base: Array | None = None) -> list[Array]:
-        """Usage of torque, then of workspace, as far as they are constrained; (N, n) and (N, obstacles × points).
+        """Usage of each part, (N, n) of torque and (N, obstacles × points) of workspace.
 
         `base`: (n, m, N), base regressor of the same motion, where the caller has it.
         """
-        parts = []
-        if self.torque is not None:
-            parts.append(self.torque.usage(motion, base))
-        if self.workspace is not None:
-            parts.append(self.workspace.usage(motion))
-        return parts
+        return [part.usage(motion, base) for part in self.parts]
 
     def largest(self, motion: MotionSamples) -> float:
         """Largest usage of all, 0 where nothing is constrained."""
@@ -144,24 +139,16 @@ class StateUsage:
 
     def without_inactive(self, limits: MotionLimits, rng: np.random.Generator) -> "StateUsage":
         """Only what random states within the limits come anywhere near."""
-        unit = [rng.uniform(-1.0, 1.0, (RANDOM_STATES, len(limits.velocity))) for _ in range(3)]
-        states = MotionSamples(
-            limits.middle + limits.half_range * unit[0], limits.velocity * unit[1], limits.acceleration * unit[2]
+        states = limits.random_states(RANDOM_STATES, rng)
+        active = [part for part in self.parts if part.usage(states).max() > INACTIVE]
+        return StateUsage(
+            self.torque if self.torque in active else None, self.workspace if self.workspace in active else None
         )
-        parts = iter([bool(part.max() > INACTIVE) for part in self.usages(states)])
-        torque = self.torque if self.torque is not None and next(parts) else None
-        workspace = self.workspace if self.workspace is not None and next(parts) else None
-        return StateUsage(self._regressor, torque, workspace)
-
-    @property
-    def count(self) -> int:
-        """Number of smooth constraints: one for torque, one for workspace, as far as there are any."""
-        return (self.torque is not None) + (self.workspace is not None)
 
     def smooth_values(self, motion: MotionSamples, base: Array, scale: Array) -> Array:
-        """Smooth largest usages over all samples and joints, or points, (count,).
+        """Smooth largest usages over all samples and joints, or points, (parts,).
 
-        `base`: (n, m, N), base regressor of the same motion; `scale`: (count,), factors that make them exact at the
+        `base`: (n, m, N), base regressor of the same motion; `scale`: (parts,), factors that make them exact at the
         present motion.
         """
         parts = self.usages(motion, base)
@@ -170,16 +157,14 @@ class StateUsage:
     def smooth_gradients(self, motion: MotionSamples, base: Array, scale: Array) -> list[MotionGradient]:
         """Derivatives of `smooth_values` by the motion.
 
-        `base`: (n, m, N), base regressor of the same motion; `scale`: (count,), factors that make them exact at the
+        `base`: (n, m, N), base regressor of the same motion; `scale`: (parts,), factors that make them exact at the
         present motion.
         """
-        parts = self.usages(motion, base)
-        weights = [smooth_maximum(p.reshape(-1, 1), s)[1].reshape(p.shape) for p, s in zip(parts, scale, strict=True)]
         gradients = []
-        if self.torque is not None:
-            gradients.append(self.torque.pull_back(motion, base, weights.pop(0)))
-        if self.workspace is not None:
-            gradients.append(self.workspace.pull_back(motion, weights.pop(0)))
+        for part, factor in zip(self.parts, scale, strict=True):
+            usage = part.usage(motion, base)
+            _, weight = smooth_maximum(usage.reshape(-1, 1), factor)
+            gradients.append(part.pull_back(motion, base, weight.reshape(usage.shape)))
         return gradients
 
 

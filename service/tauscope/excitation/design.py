@@ -26,8 +26,7 @@ ACTIVE_CLEARANCE_M = 0.005  # clearance from floor or boxes at which they limit 
 class ExcitationDesign:
     """A designed excitation.
 
-    `history`: tuple of (int, int, float, float), start, iteration, criterion's value as the optimiser sees it, largest
-        violation of a constraint.
+    `history`: every iteration, with the criterion as the optimiser sees it.
     `seconds`: time that the optimiser took [s].
     """
 
@@ -38,7 +37,7 @@ class ExcitationDesign:
     value: float
     condition_number: float
     random_value: float
-    history: tuple[tuple[int, int, float, float], ...]
+    history: tuple[HistoryPart, ...]
     margins: Margins
     active: tuple[str, ...]
     notes: tuple[str, ...]
@@ -77,8 +76,9 @@ def design_excitation(
         condition_number=condition_number,
         random_value=result.random_value,
         history=tuple(
-            (entry.start, entry.iteration, reported_value(options.criterion, entry.own), entry.violation)
-            for entry in result.history
+            HistoryPart(start=each.start, iteration=each.iteration, value=value, violation=each.violation)
+            for each in result.history
+            if np.isfinite(value := reported_value(options.criterion, each.own))
         ),
         margins=margins,
         active=_active(robot, margins, options),
@@ -147,10 +147,6 @@ def excitation_document(design: ExcitationDesign) -> ExcitationDocument:
         notes=list(design.notes),
         evaluations=design.evaluations,
         seconds=design.seconds,
-        history=[
-            HistoryPart(start=start, iteration=iteration, value=value, violation=violation)
-            for start, iteration, value, violation in design.history
-            if np.isfinite(value)
-        ],
+        history=list(design.history),
         trajectory=trajectory,
     )

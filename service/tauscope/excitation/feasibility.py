@@ -3,16 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import ExcitationError
 from tauscope.excitation.constraints import KinematicUsage, StateUsage
 from tauscope.excitation.series_space import SeriesGrid, SeriesSpace
-from tauscope.robot import JointType, Robot
+from tauscope.robot import Robot
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
 from tauscope.trajectory.limits import MotionLimits
-
-Array = NDArray[np.float64]
 
 POSTURES = 2048  # random postures at which is asked whether the arm can stand there at all
 LEAST_HALF_RANGE = 1e-3  # half range below which a joint has no room to move [rad or m]
@@ -102,7 +100,7 @@ class Feasibility:
         `x`: (n, columns), centre and coefficients.
         """
         largest = 0.0
-        for part in self.states.usages(self.grid.motion(x)) if self.states.count else ():
+        for part in self.states.usages(self.grid.motion(x)) if self.states.parts else ():
             # Between samples a smooth function exceeds them by an eighth of its second difference.
             bend = np.abs(np.roll(part, -1, axis=0) - 2.0 * part + np.roll(part, 1, axis=0))
             largest = max(largest, float((part + bend / 8.0).max()))
@@ -117,7 +115,7 @@ class Feasibility:
             if least.max() > SETTLED:
                 j = int(np.argmax(least))
                 joint = self.robot.joints[j]
-                unit = "Nm" if joint.type is JointType.REVOLUTE else "N"
+                unit = joint.type.torque_unit
                 needed = least[j] * torque.available[j]
                 raise ExcitationError(
                     f"{joint.name}: torque limit: at rest the prior model needs {needed:.4g} {unit} or more in every "
@@ -146,7 +144,7 @@ class Feasibility:
 def require_room(robot: Robot, limits: MotionLimits) -> None:
     """Refuse limits of a joint that leave no motion. Raises ExcitationError naming the joint and the limit."""
     for j, joint in enumerate(robot.joints):
-        unit = "rad" if joint.type is JointType.REVOLUTE else "m"
+        unit = joint.type.unit
         low, high = limits.position_low[j], limits.position_high[j]
         if not 0.5 * (high - low) >= LEAST_HALF_RANGE:
             raise ExcitationError(

@@ -22,9 +22,9 @@ from tauscope.dynamics.friction import smooth_sign
 from tauscope.dynamics.regressor import TorqueRegressor
 from tauscope.dynamics.regressor_gradient import RegressorGradient
 from tauscope.robot import STANDARD_PARAMETERS, Robot
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
 
-Array = NDArray[np.float64]
 Columns = NDArray[np.intp]
 
 # K_v where the robot file states none [s/rad or s/m]: its sign function turns within a hundredth of usual speeds.
@@ -78,18 +78,14 @@ class ExcitationRegressor:
         self._weight = np.ones(robot.joint_count) if noise_std is None else 1.0 / np.asarray(noise_std)
         self._slopes = [_slopes(robot, joint, steepest) for joint in range(robot.joint_count)]
         first = np.searchsorted(self.base_columns, len(STANDARD_PARAMETERS) * np.array(robot.first_links))
-        self._first = [int(place) for place in first]
+        self.first_columns = [int(place) for place in first]
+        """For each joint its first base column that is not always zero."""
         self._columns: list[Columns] = []
         self.column_count = len(self.base_columns)
-        for first_own, slopes in zip(self._first, self._slopes, strict=True):
+        for first_own, slopes in zip(self.first_columns, self._slopes, strict=True):
             friction = self.column_count + np.arange(len(slopes) + 2)
             self._columns.append(np.concatenate([np.arange(first_own, len(self.base_columns)), friction]))
             self.column_count += len(friction)
-
-    @property
-    def first_columns(self) -> list[int]:
-        """For each joint its first base column that is not always zero."""
-        return self._first
 
     def base_regressor(self, motion: MotionSamples) -> Array:
         """Columns of the base parameters, (n, m, N): those of links before a joint are not set."""
@@ -106,7 +102,7 @@ class ExcitationRegressor:
         rows = []
         for joint, slopes in enumerate(self._slopes):
             velocity = motion.velocity[:, joint]
-            own = base[joint, self._first[joint] :]
+            own = base[joint, self.first_columns[joint] :]
             block = np.empty((len(self._columns[joint]), len(velocity)))
             np.multiply(own, self._weight[joint], out=block[: len(own)])
             for place, slope in enumerate(slopes, len(own)):
@@ -141,8 +137,8 @@ class ExcitationRegressor:
         of_velocity = np.zeros_like(motion.velocity)
         for joint, (block, columns) in enumerate(zip(rows, self._columns, strict=True)):
             back = (2.0 * self._weight[joint] / count) * (by_information[np.ix_(columns, columns)] @ block)
-            own = len(self.base_columns) - self._first[joint]
-            weight[joint, self._first[joint] :] = back[:own]
+            own = len(self.base_columns) - self.first_columns[joint]
+            weight[joint, self.first_columns[joint] :] = back[:own]
             velocity = motion.velocity[:, joint]
             for slope, of_column in zip(self._slopes[joint], back[own:], strict=False):
                 of_velocity[:, joint] += of_column * (2.0 / np.pi) * slope / (1.0 + (slope * velocity) ** 2)

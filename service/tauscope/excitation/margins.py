@@ -4,17 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import ExcitationError
 from tauscope.excitation.constraints import StateUsage
-from tauscope.robot import JointType, Robot
+from tauscope.robot import Robot
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples, between_samples
 from tauscope.trajectory.limits import MotionLimits
 from tauscope.trajectory.segments import FourierSegment, Segment
 from tauscope.trajectory.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 CHECK_RATE_HZ = 500.0  # rate at which segments are looked at that are no Fourier series [Hz]
 SAMPLES_PER_HARMONIC = 400  # instants a period of the highest harmonic at which a Fourier series is looked at
@@ -46,15 +44,10 @@ class Margins:
         return {kind: tuple(float(v) if np.isfinite(v) else None for v in values) for kind, values in kinds.items()}
 
 
-def kinematic_margins(trajectory: Trajectory, limits: MotionLimits) -> Margins:
-    """Margins of position, velocity and acceleration over a whole trajectory; of Fourier series at every instant."""
-    return trajectory_margins(trajectory, limits, None, limits.torque)
-
-
 def trajectory_margins(
     trajectory: Trajectory, limits: MotionLimits, states: StateUsage | None, available: Array
 ) -> Margins:
-    """Margins over a whole trajectory.
+    """Margins over a whole trajectory; of Fourier series at every instant.
 
     `available`: (n,), torque that may be used, infinite where there is no limit [Nm or N].
     """
@@ -81,7 +74,7 @@ def require_within_limits(trajectory: Trajectory, robot: Robot, limits: MotionLi
 
     Raises ExcitationError naming joint, instant, value and limit.
     """
-    margins = kinematic_margins(trajectory, limits)
+    margins = trajectory_margins(trajectory, limits, None, limits.torque)
     for kind in ("position", "velocity", "acceleration"):
         left = getattr(margins, kind)
         if (left >= -ROUNDING).all():
@@ -97,15 +90,11 @@ def require_within_limits(trajectory: Trajectory, robot: Robot, limits: MotionLi
             instant = begin + at * segment.duration_s / max(len(values) - 1, 1)
             worst = max(worst, (abs(values[at] - centre), instant, float(values[at])))
             begin += segment.duration_s
-        unit = ("rad" if robot.joints[j].type is JointType.REVOLUTE else "m") + {
-            "position": "",
-            "velocity": "/s",
-            "acceleration": "/s²",
-        }[kind]
-        bound = {
-            "position": f"{limits.position_low[j]:.6g} to {limits.position_high[j]:.6g}",
-            "velocity": f"{limits.velocity[j]:.6g}",
-            "acceleration": f"{limits.acceleration[j]:.6g}",
+        length = robot.joints[j].type.unit
+        unit, bound = {
+            "position": (length, f"{limits.position_low[j]:.6g} to {limits.position_high[j]:.6g}"),
+            "velocity": (f"{length}/s", f"{limits.velocity[j]:.6g}"),
+            "acceleration": (f"{length}/s²", f"{limits.acceleration[j]:.6g}"),
         }[kind]
         raise ExcitationError(
             f"{name}: {robot.joints[j].name}: {kind} is {worst[2]:.6g} {unit} at {worst[1]:.3f} s, "
@@ -127,10 +116,6 @@ def _sample_extremes(segment: Segment) -> tuple[MotionSamples, float]:
 def _kinematic_usage(segment: Segment, motion: MotionSamples, between: float, limits: MotionLimits) -> Array:
     """Largest usage of position, velocity and acceleration, (3, n)."""
     centre = segment.series.centre if isinstance(segment, FourierSegment) else limits.middle
-    place = centre + between * (motion.position - centre) - limits.middle
-    parts = (
-        np.abs(place) / limits.half_range,
-        between * np.abs(motion.velocity) / limits.velocity,
-        between * np.abs(motion.acceleration) / limits.acceleration,
-    )
-    return np.stack([part.max(axis=0) for part in parts])
+    position = centre + between * (motion.position - centre)
+    parts = limits.usage(MotionSamples(position, between * motion.velocity, between * motion.acceleration))
+    return np.stack([np.abs(part).max(axis=0) for part in parts])

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from threadpoolctl import threadpool_limits
 
@@ -13,8 +12,7 @@ from tauscope.errors import ExcitationError
 from tauscope.excitation.feasibility import Feasibility
 from tauscope.excitation.information import CriterionValue, reported_value
 from tauscope.excitation.problem import ExcitationProblem
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array
 
 CANDIDATES = 192  # random feasible series of which the best are improved
 STARTS = 4  # series that are improved from

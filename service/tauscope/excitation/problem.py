@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.excitation.constraints import KinematicUsage, StateUsage
 from tauscope.excitation.information import Criterion, CriterionValue, ExcitationRegressor, criterion_value
 from tauscope.excitation.series_space import SeriesGrid, SeriesSpace
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +58,7 @@ class ExcitationProblem:
         self._kinematics = kinematics
         self._states = states
         self._kinematic_scale = np.ones(3 * space.joint_count)
-        self._state_scale = np.ones(states.count)
+        self._state_scale = np.ones(len(states.parts))
         self._last: _Evaluation | None = None
 
     def cost(self, vector: Array) -> float:
@@ -100,7 +98,7 @@ class ExcitationProblem:
         at = self._at(vector)
         smooth = self._kinematics.smooth(at.x, np.ones_like(self._kinematic_scale)).values
         self._kinematic_scale = self._kinematics.largest(at.x).ravel() / np.maximum(smooth, 1e-12)
-        parts = self._states.usages(self._fine.motion(at.x)) if self._states.count else []
+        parts = self._states.usages(self._fine.motion(at.x)) if self._states.parts else []
         smooth = self._states.smooth_values(at.motion, at.base, np.ones_like(self._state_scale))
         largest = np.array([part.max() for part in parts])
         self._state_scale = np.where(smooth > 1e-6, largest / np.maximum(smooth, 1e-6), 1.0)

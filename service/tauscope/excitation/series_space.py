@@ -5,15 +5,13 @@ these coefficients leaves 2 (M - 1) free numbers a joint, and its centre.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import null_space
 
 from tauscope.errors import ExcitationError
 from tauscope.excitation.information import MotionGradient
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import LEAST_HARMONICS, FourierSeries, MotionSamples
 from tauscope.trajectory.limits import MotionLimits
-
-Array = NDArray[np.float64]
 
 
 class SeriesSpace:

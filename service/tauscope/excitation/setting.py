@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.dynamics import BaseParameters, base_parameters
 from tauscope.errors import ExcitationError
@@ -23,10 +22,9 @@ from tauscope.excitation.series_space import SeriesSpace
 from tauscope.excitation.torque_prediction import TorquePrediction
 from tauscope.excitation.workspace import Workspace, WorkspaceUsage
 from tauscope.robot import Robot
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import FourierSeries, MotionSamples
 from tauscope.trajectory.limits import MotionLimits, motion_limits
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +103,9 @@ class Setting:
     @staticmethod
     def of(robot: Robot, options: ExcitationOptions) -> "Setting":
         """Prepare a design. Raises ExcitationError for options that do not fit the robot."""
-        if options.noise_std is not None:
-            _require_noise(np.asarray(options.noise_std), robot)
+        noise = np.ones(robot.joint_count) if options.noise_std is None else np.asarray(options.noise_std)
+        if noise.shape != (robot.joint_count,) or not (np.isfinite(noise) & (noise > 0.0)).all():
+            raise ExcitationError(f"noise_std needs {robot.joint_count} positive numbers, one a joint")
         base = base_parameters(robot)
         stated = motion_limits(robot)
         require_room(robot, stated)
@@ -122,7 +121,7 @@ class Setting:
         if workspace is not None and not workspace.names:
             workspace = None
         limited = torque if torque is not None and np.isfinite(available).any() else None
-        states = StateUsage(regressor, limited, workspace)
+        states = StateUsage(limited, workspace)
         kinematics = KinematicUsage(space, planned)
         feasibility = Feasibility(robot, space, fine, planned, kinematics, states)
         return Setting(robot, options, base, stated, planned, available, space, states, feasibility)
@@ -154,7 +153,7 @@ class Setting:
             self.robot, self.base, capacity=grid.samples, noise_std=options.noise_std, steepest=RESOLVED_STEPS / change
         )
         if states.torque is not None:
-            states = StateUsage(regressor, states.torque.seen_by(regressor), states.workspace)
+            states = StateUsage(states.torque.seen_by(regressor), states.workspace)
         objective = Objective(options.criterion, options.information_weight, regressor, scaling)
         fine, kinematics = self.feasibility.grid, self.feasibility.kinematics
         return ExcitationProblem(self.space, grid, fine, objective, kinematics, states)
@@ -174,11 +173,7 @@ class Setting:
         if self.options.scaling is ColumnScaling.NONE:
             return np.ones(regressor.column_count)
         rng = np.random.default_rng(self.options.seed)
-        unit = [rng.uniform(-1.0, 1.0, (SCALING_STATES, self.robot.joint_count)) for _ in range(3)]
-        limits = self.planned
-        states = MotionSamples(
-            limits.middle + limits.half_range * unit[0], limits.velocity * unit[1], limits.acceleration * unit[2]
-        )
+        states = self.planned.random_states(SCALING_STATES, rng)
         return np.sqrt(np.mean(regressor.stacked(states) ** 2, axis=0) * self.robot.joint_count)
 
 
@@ -195,8 +190,3 @@ def _available_torque(robot: Robot, stated: MotionLimits, options: ExcitationOpt
                 "lower the margin or raise the limit"
             )
     return available
-
-
-def _require_noise(noise_std: Array, robot: Robot) -> None:
-    if noise_std.shape != (robot.joint_count,) or not (np.isfinite(noise_std) & (noise_std > 0.0)).all():
-        raise ExcitationError(f"noise_std needs {robot.joint_count} positive numbers, one a joint")

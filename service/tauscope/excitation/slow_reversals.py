@@ -13,16 +13,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.excitation.constraints import StateUsage
 from tauscope.robot import JointType, Robot
-from tauscope.trajectory.fourier_series import FourierSeries, MotionSamples
+from tauscope.robot.robot import Array
+from tauscope.trajectory.fourier_series import FourierSeries
 from tauscope.trajectory.limits import MotionLimits
 from tauscope.trajectory.segments import FourierSegment, MoveSegment, PathSegment, Segment
 from tauscope.trajectory.trajectory import ramp, whole_steps
-
-Array = NDArray[np.float64]
 
 SPEED_SHARE = 0.05  # peak speed as part of the speed limit
 # Peak speed however fast the joint may move [rad/s or m/s].
@@ -54,7 +52,7 @@ def slow_part(robot: Robot, series: FourierSeries, limits: MotionLimits, states:
     instants = np.arange(float(PLACES)) * (series.period_s / PLACES)
     postures = series.evaluate(instants).position
     swings = [_swing(robot, posture, limits, 1.0) for posture in postures]
-    most = _size_in_the_middle(robot, limits)
+    most = _size(_swing(robot, limits.middle, limits, 1.0))
     roomy = [place for place in range(PLACES) if (_size(swings[place]) >= ROOMY * most).all()]
     admissible = [place for place in roomy if _is_free(swings[place], limits, states)]
     chosen = sorted(_far_apart(postures / limits.half_range, admissible, count))
@@ -89,10 +87,6 @@ def _swing(robot: Robot, posture: Array, limits: MotionLimits, level: float) -> 
 
 def _size(swing: FourierSegment) -> Array:
     return np.abs(swing.series.cosine).max(axis=1)
-
-
-def _size_in_the_middle(robot: Robot, limits: MotionLimits) -> Array:
-    return _size(_swing(robot, limits.middle, limits, 1.0))
 
 
 def _far_apart(places: Array, admissible: list[int], count: int) -> list[int]:
@@ -133,13 +127,5 @@ def _transfer(
 def _is_free(segment: FourierSegment | MoveSegment | PathSegment, limits: MotionLimits, states: StateUsage) -> bool:
     count = max(int(np.ceil(segment.duration_s / STEP_S)), 2)
     motion = segment.evaluate(np.linspace(0.0, segment.duration_s, count + 1))
-    return _kinematic(motion, limits) <= 1.0 + 1e-9 and states.largest(motion) <= 1.0
-
-
-def _kinematic(motion: MotionSamples, limits: MotionLimits) -> float:
-    parts = (
-        np.abs(motion.position - limits.middle) / limits.half_range,
-        np.abs(motion.velocity) / limits.velocity,
-        np.abs(motion.acceleration) / limits.acceleration,
-    )
-    return max(float(part.max()) for part in parts)
+    kinematic = max(np.abs(part).max() for part in limits.usage(motion))
+    return bool(kinematic <= 1.0 + 1e-9 and states.largest(motion) <= 1.0)

@@ -1,14 +1,12 @@
 """Torque that a motion will need, as far as the prior model knows."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.dynamics import BaseParameters
 from tauscope.excitation.information import ExcitationRegressor, MotionGradient
 from tauscope.robot import FrictionCoefficients, Robot
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
-
-Array = NDArray[np.float64]
 
 REST_SPEED = 1e-3  # part of the speed limit below which |v| is rounded off, for a gradient at rest
 SMALL_TORQUE = 1e-2  # part of the torque limit below which |τ| is rounded off, for a gradient where it changes its sign

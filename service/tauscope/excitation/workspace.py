@@ -3,15 +3,13 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import ExcitationError
 from tauscope.excitation.information import MotionGradient
 from tauscope.robot import JointType, Robot
 from tauscope.robot.kinematics import homogeneous, link_placements
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
-
-Array = NDArray[np.float64]
 
 REFERENCE_M = 0.1  # clearance from which nothing is said to be used of it; at zero clearance all of it is [m]
 STILL_M = 1e-9  # a point that moves less than this is fixed to the base: where it stands is nobody's choice [m]
@@ -111,12 +109,15 @@ class WorkspaceUsage:
             columns.append(_beyond(box, points).max(axis=-1))
         return np.concatenate(columns, axis=1) if columns else np.empty((len(position), 0))
 
-    def usage(self, motion: MotionSamples) -> Array:
+    def usage(self, motion: MotionSamples, _base: Array | None = None) -> Array:
         """1 - clearance / `REFERENCE_M`, not below 0, (N, obstacles × points)."""
         return np.maximum(1.0 - self.clearance(motion.position) / REFERENCE_M, 0.0)
 
-    def pull_back(self, motion: MotionSamples, weight: Array) -> MotionGradient:
-        """Derivatives by the motion of Σ weight · usage. `weight`: (N, obstacles × points), derivative by `usage`."""
+    def pull_back(self, motion: MotionSamples, _base: Array, weight: Array) -> MotionGradient:
+        """Derivatives by the motion of Σ weight · usage.
+
+        `_base`: (n, m, N), not needed; `weight`: (N, obstacles × points), derivative by `usage`.
+        """
         chain = self._frames(motion.position)
         points = self._places(chain)
         force = np.zeros_like(points)

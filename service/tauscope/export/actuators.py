@@ -13,8 +13,8 @@ import numpy as np
 from tauscope.dynamics import mass_matrix
 from tauscope.errors import ExportError
 from tauscope.export.compensation.source_code import comment_text, identifier
-from tauscope.export.joint_model import dry_friction_and_damping
-from tauscope.export.mjcf_findings import effects_in, numbers
+from tauscope.export.joint_model import dry_friction_and_damping, numbers
+from tauscope.export.mjcf_findings import effects_in
 from tauscope.export.model import ExportModel
 from tauscope.robot import Joint, LinkInertia, Robot
 

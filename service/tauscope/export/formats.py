@@ -13,7 +13,6 @@ from tauscope.export.mjcf import to_mjcf
 from tauscope.export.mjcf_findings import effects_in
 from tauscope.export.model import ExportModel
 from tauscope.export.urdf import patch_urdf
-from tauscope.robot.messages import one_line
 
 
 class ExportFormat(StrEnum):
@@ -89,7 +88,7 @@ def make_export(export_format: ExportFormat, model: ExportModel, choice: Actuato
         case ExportFormat.URDF:
             if model.origin.urdf is None:
                 text = "its chain does not come from a URDF; export an MJCF (.xml) instead"
-                raise ExportError(one_line(f"robot {model.robot.name}: {text}"))
+                raise ExportError(f"robot {model.robot.name}: {text}")
             notes = effects_in(model, (), "a URDF has no such element")
             return patch_urdf(model.origin.urdf, model.joint_models, notes).data
         case ExportFormat.MJCF:
@@ -104,13 +103,7 @@ def effect_entries(model: ExportModel) -> list[dict[str, Any]]:
             "effect": found.effect.id,
             "joint": None if found.effect.joint is None else names[found.effect.joint],
             "equation": found.effect.equation,
-            "parameters": {
-                each.name: float(value)
-                for each, value in (
-                    *zip(found.effect.coefficients, found.coefficients, strict=True),
-                    *zip(found.effect.shapes, found.shape, strict=True),
-                )
-            },
+            "parameters": found.values,
         }
         for found in model.effects
     ]

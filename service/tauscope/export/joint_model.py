@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tauscope.errors import ExportError
 from tauscope.export.compensation.model import JointFriction, check_friction
 from tauscope.robot import LinkInertia, Robot, find_defect, nearest_body
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +42,16 @@ class CentredInertia:
     mass: float
     centre: NDArray[np.float64]
     inertia: NDArray[np.float64]
+
+    @property
+    def full(self) -> NDArray[np.float64]:
+        """The six entries of the inertia as an MJCF lists them: xx, yy, zz, xy, xz, yz [kg m²]."""
+        return LinkInertia(self.mass, self.mass * self.centre, self.inertia).to_vector()[:6]
+
+
+def numbers(*values: float | np.float64) -> str:
+    """Numbers that read back as the same float64; no negative zero."""
+    return " ".join(repr(float(value) + 0.0) for value in values)
 
 
 def joint_models(
@@ -74,7 +84,7 @@ def centred(joint: str, link: LinkInertia) -> CentredInertia:
     defect = find_defect(link) if finite and link.mass > 0.0 else f"mass {link.mass:g} kg"
     if defect is not None:
         text = f"the link of joint {shown(joint)} cannot exist ({defect}); export the physically consistent model"
-        raise ExportError(one_line(text))
+        raise ExportError(text)
     centre = link.first_moment / link.mass
     inertia = link.inertia - link.mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     return CentredInertia(link.mass, centre, 0.5 * (inertia + inertia.T))
@@ -128,6 +138,6 @@ def without_branch(name: str, model: JointModel) -> tuple[LinkInertia, list[str]
     body = nearest_body(own)
     if not body.mass > 0.0:
         raise ExportError(
-            one_line(f"joint {shown(name)}: the bodies beside the chain weigh more than its link; export .xml instead")
+            f"joint {shown(name)}: the bodies beside the chain weigh more than its link; export .xml instead"
         )
     return body, [text]

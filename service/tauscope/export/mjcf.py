@@ -1,17 +1,18 @@
 """The identified model as a MuJoCo model file (MJCF)."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from tauscope.errors import ExportError
 from tauscope.export.actuators import ActuatorChoice, actuator_elements
 from tauscope.export.compensation.source_code import comment_text
-from tauscope.export.joint_model import JointModel, centred, dry_friction_and_damping, friction_notes, joint_models
-from tauscope.export.mjcf_findings import NEWER, REST, Additions, JointExtras, add_findings, numbers
+from tauscope.export.joint_model import JointModel, centred, numbers
+from tauscope.export.mjcf_findings import NEWER, Additions, JointExtras, MjcfSegment, add_findings
 from tauscope.export.model import ExportModel
-from tauscope.robot import JointLimits, JointType, Robot, Segment
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot import JointType, Robot, Segment
+from tauscope.robot.kinematics import compose
+from tauscope.robot.messages import shown
 
 MOTORS = ActuatorChoice()  # torque motors, which need no gains
 
@@ -33,20 +34,14 @@ def to_mjcf(model: ExportModel, choice: ActuatorChoice = MOTORS) -> MjcfModel:
     """
     added = add_findings(model)
     robot, labels = added.robot, model.robot.segment_labels
-    models = joint_models(robot, added.links, model.friction, model.rotor_inertia)
     names = [_quote(labels[link]) for link in robot.own_links]
     notes: list[str] = []
     lines: list[str] = []
-    own_joints = {link: joint for joint, link in enumerate(robot.own_links)}
-    for index, label in enumerate(labels):
-        own = own_joints.get(index)
-        extras = JointExtras() if own is None else added.joints[own]
-        limits = JointLimits() if own is None else robot.joints[own].limits
-        lines += [f"{'  ' * (index + 2)}{line}" for line in _body(robot, index, label, models[label], extras, limits)]
-        if (friction := models[label].friction) is not None:
-            notes += friction_notes(label, replace(friction, offset=0.0) if extras.has_offset else friction, "MJCF")
-        if _xml_name(label) != label:
-            notes.append(f"{label}: the name holds characters that XML cannot; they are written as U+FFFD.")
+    for index, segment in enumerate(added.segments(model)):
+        lines += [f"{'  ' * (index + 2)}{line}" for line in _body(robot.segments[index], segment)]
+        notes += segment.notes
+        if _xml_name(segment.label) != segment.label:
+            notes.append(f"{segment.label}: the name holds characters that XML cannot; they are written as U+FFFD.")
     lines += [f"{'  ' * (index + 2)}</body>" for index in reversed(range(robot.link_count))]
     rotors = [value or 0.0 for value in model.rotor_inertia]
     actuators, chosen = actuator_elements(robot, added.links, rotors, names, choice)
@@ -112,52 +107,46 @@ def tendon_elements(added: Additions, names: list[str]) -> list[str]:
     return lines
 
 
-def _body(
-    robot: Robot, index: int, label: str, model: JointModel, extras: JointExtras, limits: JointLimits
-) -> list[str]:
+def _body(motion: Segment, segment: MjcfSegment) -> list[str]:
     from scipy.spatial.transform import Rotation
 
-    if model.link is None:
-        raise ExportError(one_line(f"joint {shown(label)} has no link to write; give the link of every joint"))
-    inertia = centred(label, model.link)
-    segment = robot.segments[index]
+    label, link = segment.label, segment.model.link
+    if link is None:
+        raise ExportError(f"joint {shown(label)} has no link to write; give the link of every joint")
+    inertia = centred(label, link)
+    centre, mass, full = numbers(*inertia.centre), numbers(inertia.mass), numbers(*inertia.full)
     # At q = 0 the link frame is before · after; the joint's axis is the z axis between the two.
-    rotation = segment.before.rotation @ segment.after.rotation
-    position = segment.before.rotation @ segment.after.translation + segment.before.translation
-    quaternion = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
-    full = [inertia.inertia[row, column] for row, column in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    frame = compose(motion.before, motion.after)
+    quaternion = Rotation.from_matrix(frame.rotation).as_quat(scalar_first=True)
     name = _quote(f"{label}_link")
     return [
-        f'<body name={name} pos="{numbers(*position)}" quat="{numbers(*quaternion)}">',
-        f'  <inertial pos="{numbers(*inertia.centre)}" mass="{numbers(inertia.mass)}" fullinertia="{numbers(*full)}"/>',
-        f"  {_joint(segment, label, model, extras, limits)}",
+        f'<body name={name} pos="{numbers(*frame.translation)}" quat="{numbers(*quaternion)}">',
+        f'  <inertial pos="{centre}" mass="{mass}" fullinertia="{full}"/>',
+        f"  {_joint(motion, segment)}",
     ]
 
 
-def _joint(segment: Segment, label: str, model: JointModel, extras: JointExtras, limits: JointLimits) -> str:
-    after = segment.after
+def _joint(motion: Segment, segment: MjcfSegment) -> str:
+    after, model, extras = motion.after, segment.model, segment.extras
     attributes = {
-        "type": "slide" if segment.type is JointType.PRISMATIC else "hinge",
+        "type": "slide" if motion.type is JointType.PRISMATIC else "hinge",
         "axis": numbers(*after.rotation[2]),
         "pos": numbers(*(-after.rotation.T @ after.translation)),
     }
-    if limits.position is not None:
-        attributes["range"] = numbers(*limits.position)
+    if segment.joint is not None and segment.joint.limits.position is not None:
+        attributes["range"] = numbers(*segment.joint.limits.position)
     if model.friction is not None:
-        dry, damping = dry_friction_and_damping(label, model.friction)
-        orders = (damping, *extras.damping) if any(extras.damping) else (damping,)
-        attributes |= {"damping": numbers(*orders), "frictionloss": numbers(max(0.0, dry - extras.dry_friction))}
-        attributes |= REST
-    attributes["armature"] = numbers(_armature(label, model))
+        attributes |= extras.friction_attributes(segment.label, model.friction)
+    attributes["armature"] = numbers(_armature(segment.label, model))
     written = " ".join(f'{key}="{value}"' for key, value in (attributes | extras.attributes).items())
-    return f"<joint name={_quote(label)} {written}/>"
+    return f"<joint name={_quote(segment.label)} {written}/>"
 
 
 def _armature(label: str, model: JointModel) -> float:
     armature = 0.0 if model.rotor_inertia is None else float(model.rotor_inertia)
     if not (np.isfinite(armature) and armature >= 0.0):
         text = f"joint {shown(label)}: rotor inertia {armature:g} must be 0 or more; export the consistent model"
-        raise ExportError(one_line(text))
+        raise ExportError(text)
     return armature
 
 

@@ -4,7 +4,7 @@
 ``dcmotor`` elements, which MuJoCo has from version 3.8 on; all else loads in any version.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import atan2, hypot
 
@@ -15,8 +15,9 @@ from tauscope.effects.carried_body import unit_body
 from tauscope.effects.friction_coupling import FrictionCoupling
 from tauscope.effects.kinematic_error import displaced
 from tauscope.export.compensation.model import JointFriction
+from tauscope.export.joint_model import JointModel, dry_friction_and_damping, friction_notes, joint_models, numbers
 from tauscope.export.model import ExportModel, FoundEffect
-from tauscope.robot import LinkInertia, Robot
+from tauscope.robot import Joint, LinkInertia, Robot
 
 # Effects that the joints' own friction and armature hold.
 IN_THE_MODEL = frozenset({"coulomb_friction", "viscous_friction", "torque_offset", "rotor_inertia"})
@@ -39,6 +40,26 @@ class JointExtras:
     passive: list[str] = field(default_factory=list)
     has_offset: bool = False
 
+    def friction_attributes(self, label: str, friction: JointFriction) -> dict[str, str]:
+        """Attributes of the joint that hold its friction, beside these findings."""
+        dry, damping = dry_friction_and_damping(label, friction)
+        orders = (damping, *self.damping) if any(self.damping) else (damping,)
+        return {"damping": numbers(*orders), "frictionloss": numbers(max(0.0, dry - self.dry_friction)), **REST}
+
+
+@dataclass(frozen=True)
+class MjcfSegment:
+    """What a file says of a segment; one that follows another has no joint of the robot, and no findings.
+
+    `notes`: what is lost of its friction.
+    """
+
+    label: str
+    model: JointModel
+    joint: Joint | None
+    extras: JointExtras
+    notes: list[str]
+
 
 @dataclass
 class Additions:
@@ -55,10 +76,16 @@ class Additions:
     notes: list[str] = field(default_factory=list)
     left: list[FoundEffect] = field(default_factory=list)
 
-
-def numbers(*values: float | np.float64) -> str:
-    """Numbers that read back as the same float64; no negative zero."""
-    return " ".join(repr(float(value) + 0.0) for value in values)
+    def segments(self, model: ExportModel) -> Iterator[MjcfSegment]:
+        """The segments of the model that these are added to, base first."""
+        own = {link: joint for joint, link in enumerate(self.robot.own_links)}
+        made = joint_models(model.robot, self.links, model.friction, model.rotor_inertia)
+        for link, (label, each) in enumerate(made.items()):
+            joint = None if link not in own else self.robot.joints[own[link]]
+            extras = JointExtras() if link not in own else self.joints[own[link]]
+            friction = replace(each.friction, offset=0.0) if each.friction and extras.has_offset else each.friction
+            notes = [] if friction is None else friction_notes(label, friction, "MJCF")
+            yield MjcfSegment(label, each, joint, extras, notes)
 
 
 def add_findings(model: ExportModel, *, without: Collection[str] = ()) -> Additions:
@@ -87,9 +114,7 @@ def add_findings(model: ExportModel, *, without: Collection[str] = ()) -> Additi
 
 
 def _values(found: FoundEffect) -> str:
-    named = [*zip(found.effect.coefficients, found.coefficients, strict=True)]
-    shaped = [*zip(found.effect.shapes, found.shape, strict=True)]
-    values = ", ".join(f"{each.name} = {float(value):.6g}" for each, value in (*named, *shaped))
+    values = ", ".join(f"{name} = {value:.6g}" for name, value in found.values.items())
     return f"{found.effect.equation}; {values}."
 
 

@@ -21,6 +21,8 @@ from tauscope.export.compensation import (
 )
 from tauscope.export.joint_model import JointModel, joint_models
 from tauscope.identification import Identification
+from tauscope.identification.friction_shape import EstimatedShape
+from tauscope.identification.structure import JointTerms, ModelStructure
 from tauscope.recording import EffortKind
 from tauscope.robot import LinkInertia, Robot
 from tauscope.version import tauscope_version
@@ -37,6 +39,13 @@ class FoundEffect:
     effect: Effect
     coefficients: NDArray[np.float64]
     shape: NDArray[np.float64]
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Coefficients and shape parameters by name."""
+        named = (*self.effect.coefficients, *self.effect.shapes)
+        pairs = zip(named, (*self.coefficients, *self.shape), strict=True)
+        return {each.name: float(value) for each, value in pairs}
 
 
 @dataclass(frozen=True)
@@ -92,16 +101,15 @@ class ExportModel:
 
 def of_identification(identification: Identification, origin: Origin) -> ExportModel:
     """The model that an identification delivers; simulators get the friction that fits its bodies."""
-    parameters = identification.consistent_parameters
-    rotors = [
-        _coefficient(identification, parameters, joint, "rotor_inertia")
-        for joint in range(identification.robot.joint_count)
-    ]
+    robot, structure, parameters = identification.robot, identification.structure, identification.consistent_parameters
+    rotors: list[float | None] = [None] * robot.joint_count
+    for joint, column in structure.coefficients("rotor_inertia").items():
+        rotors[joint] = float(parameters[column])
     return ExportModel(
-        robot=identification.robot,
+        robot=robot,
         links=tuple(identification.consistent.links),
-        friction=_frictions(identification, parameters),
-        delivered_friction=_frictions(identification, identification.parameters),
+        friction=_frictions(structure, parameters, identification.shapes),
+        delivered_friction=_frictions(structure, identification.parameters, identification.shapes),
         rotor_inertia=tuple(rotors),
         effects=(),
         origin=origin,
@@ -116,11 +124,7 @@ def of_diagnosis(diagnosis: Diagnosis, origin: Origin) -> ExportModel:
 def of_extended_model(model: ExtendedModel, links: Sequence[LinkInertia], origin: Origin) -> ExportModel:
     """An extended model beside bodies that can exist."""
     robot, structure = model.structure.robot, model.structure
-    frictions: list[JointFriction] = []
-    for joint, terms in enumerate(structure.terms):
-        places = {name: structure.coefficient(joint, name) for name in ("stiction", "stribeck", "viscous", "offset")}
-        values = {name: 0.0 if at is None else float(model.parameters[at]) for name, at in places.items()}
-        frictions.append(JointFriction(**values, k_v=float(terms.k_v), delta=_float(terms.delta)))
+    friction = _frictions(structure, model.parameters, structure.terms)
     found = tuple(FoundEffect(t.effect, on_the_arm(model, t).coefficients, t.shape) for t in model.terms)
     rotors: list[float | None] = [None] * robot.joint_count
     for each in found:
@@ -129,29 +133,21 @@ def of_extended_model(model: ExtendedModel, links: Sequence[LinkInertia], origin
     return ExportModel(
         robot=robot,
         links=tuple(links),
-        friction=tuple(frictions),
-        delivered_friction=tuple(frictions),
+        friction=friction,
+        delivered_friction=friction,
         rotor_inertia=tuple(rotors),
         effects=found,
         origin=origin,
     )
 
 
-def _frictions(identification: Identification, parameters: NDArray[np.float64]) -> tuple[JointFriction, ...]:
+def _frictions(
+    structure: ModelStructure, parameters: NDArray[np.float64], shapes: Sequence[EstimatedShape | JointTerms]
+) -> tuple[JointFriction, ...]:
     frictions = []
-    for joint, shape in enumerate(identification.shapes):
-        names = ("stiction", "stribeck", "viscous", "offset")
-        values = {name: _coefficient(identification, parameters, joint, name) or 0.0 for name in names}
-        frictions.append(JointFriction(**values, k_v=shape.k_v, delta=shape.delta))
+    for joint, shape in enumerate(shapes):
+        places = {name: structure.coefficient(joint, name) for name in ("stiction", "stribeck", "viscous", "offset")}
+        values = {name: 0.0 if at is None else float(parameters[at]) for name, at in places.items()}
+        delta = None if shape.delta is None else float(shape.delta)
+        frictions.append(JointFriction(**values, k_v=float(shape.k_v), delta=delta))
     return tuple(frictions)
-
-
-def _coefficient(
-    identification: Identification, parameters: NDArray[np.float64], joint: int, name: str
-) -> float | None:
-    column = identification.structure.coefficient(joint, name)
-    return None if column is None else float(parameters[column])
-
-
-def _float(value: float | None) -> float | None:
-    return None if value is None else float(value)

@@ -25,7 +25,6 @@ from tauscope.identification import Identification
 from tauscope.recording import EffortKind
 from tauscope.robot import LinkInertia, Robot, robot_from_dict, robot_to_dict
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
-from tauscope.robot.messages import one_line
 from tauscope.strict_model import ResultModel
 
 
@@ -57,7 +56,7 @@ def model_file(document: ModelDocument, robot: Robot, origin: Origin, plain: Mod
     arm = ArmEntry(
         robot=robot_to_dict(robot),
         segments=list(robot.segment_names),
-        branches=[[float(value) for value in link.to_vector()] for link in robot.branches],
+        branches=[link.to_vector().tolist() for link in robot.branches],
         urdf=None if origin.urdf is None else origin.urdf.decode("latin-1"),
         is_mjcf=origin.is_mjcf,
         effort=origin.effort_kind.value,
@@ -79,7 +78,7 @@ def identified_document(result: Identification) -> ModelDocument:
         robot=result.robot.name,
         joints=names,
         base_parameters=[NamedValue(name=name, value=values[name]) for name in structure.base.expressions],
-        links=[[float(value) for value in link.to_vector()] for link in result.consistent.links],
+        links=[link.to_vector().tolist() for link in result.consistent.links],
         friction=list_friction(structure, values),
         effects=[
             EffectEntry(
@@ -108,7 +107,7 @@ def read_model_file(path: Path) -> ModelFile:
         fault = error.errors(include_url=False, include_context=False)[0]
         key = ".".join(str(part) for part in fault["loc"]) or "the document"
         hint = "give a file that identify or diagnose wrote with --model"
-        raise IdentificationError(one_line(f"{path}: {key}: {fault['msg']}; {hint}")) from None
+        raise IdentificationError(f"{path}: {key}: {fault['msg']}; {hint}") from None
 
 
 def read_extended_model(path: Path, robot: Robot) -> ExtendedModel:
@@ -120,7 +119,7 @@ def read_extended_model(path: Path, robot: Robot) -> ExtendedModel:
         return restore_model(read_model_file(path), robot)
     except IdentificationError as error:
         text = str(error)
-        raise IdentificationError(text if text.startswith(str(path)) else one_line(f"{path}: {text}")) from None
+        raise IdentificationError(text if text.startswith(str(path)) else f"{path}: {text}") from None
 
 
 def read_export_model(path: Path) -> ExportModel:
@@ -140,7 +139,7 @@ def read_export_models(path: Path) -> tuple[ExportModel, ...]:
     arm = document.arm
     if arm is None:
         text = "the file has no block arm: it was written by an older version; write it again with --model"
-        raise ExportError(one_line(f"{path}: {text}"))
+        raise ExportError(f"{path}: {text}")
     urdf = None if arm.urdf is None else arm.urdf.encode("latin-1", errors="replace")
     models = []
     try:
@@ -153,7 +152,7 @@ def read_export_models(path: Path) -> tuple[ExportModel, ...]:
                 links = [LinkInertia.from_vector(np.array(link)) for link in each.links]
                 models.append(of_extended_model(restore_model(each, robot), links, origin))
     except (IdentificationError, RobotFileError, ValueError, TypeError) as error:
-        raise IdentificationError(one_line(f"{path}: {error}")) from None
+        raise IdentificationError(f"{path}: {error}") from None
     return tuple(models)
 
 

@@ -6,9 +6,8 @@ say is a comment in it, never left out silently.
 
 import io
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from ruamel.yaml import YAML
 
@@ -17,11 +16,10 @@ from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.model.torque_scale import on_the_arm
 from tauscope.effects import Effect, Entry
 from tauscope.effects.plain_terms import TorqueOffset
-from tauscope.robot import LinkInertia, Robot
+from tauscope.robot import Robot
+from tauscope.robot.robot_data import link_to_dict
 from tauscope.robot.robot_file import describe_bare_file
 from tauscope.robot.xml_text import is_xml
-
-INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
 def improved_robot(diagnosis: Diagnosis, source: Path, target: Path) -> str:
@@ -48,7 +46,7 @@ def improved_robot(diagnosis: Diagnosis, source: Path, target: Path) -> str:
         entry["friction_shape"] = {"k_v": float(terms.k_v)}
         entry["friction_shape"]["delta"] = float(terms.delta if terms.delta is not None else 10.0)
     links = consistent_links(diagnosis)
-    data["model"] = {"links": [_link(link) for link in links], "friction": friction}
+    data["model"] = {"links": [link_to_dict(link) for link in links], "friction": friction}
     text = io.StringIO()
     yaml.dump(data, text)
     return text.getvalue()
@@ -75,12 +73,6 @@ def scenario_text(diagnosis: Diagnosis) -> str:
     return f"# What {robot.name}'s recordings show beyond rigid bodies and plain friction.\n" + "".join(
         [*remarks, text.getvalue()]
     )
-
-
-def _link(link: LinkInertia) -> Mapping[str, Any]:
-    vector = [float(value) for value in link.to_vector()]
-    xx, yy, zz, xy, xz, yz, mass, *moment = vector
-    return {"mass": mass, "first_moment": moment, "inertia": dict(zip(INERTIA, (xx, yy, zz, xy, xz, yz), strict=True))}
 
 
 def _entries(effect: Effect, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> list[Entry]:

@@ -4,8 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from tauscope.errors import ExportError
 from tauscope.export.compensation.model import JointFriction
 from tauscope.export.compensation.source_code import comment_text
@@ -15,10 +13,11 @@ from tauscope.export.joint_model import (
     centred,
     dry_friction_and_damping,
     friction_notes,
+    numbers,
     without_branch,
 )
 from tauscope.export.xml_spans import Element, XmlText
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import nearest, shown
 
 _MARKER = "Model identified by Tauscope."
 _INERTIA = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2), ("izz", 2, 2))
@@ -47,7 +46,7 @@ def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel], remarks: 
     data, label = _read(source)
     text = XmlText(data, label)
     if text.root.name.rpartition(":")[2] != "robot":
-        raise ExportError(one_line(f"{label}: the outermost element is <{text.root.name}>, not <robot>; give a URDF"))
+        raise ExportError(f"{label}: the outermost element is <{text.root.name}>, not <robot>; give a URDF")
     tree = _Tree(text.root, label)
     notes: list[str] = []
     for name, model in models.items():
@@ -88,7 +87,7 @@ class _Tree:
     def link(self, name: str) -> Element:
         """The link element of a name."""
         if name not in self._links:
-            raise ExportError(one_line(f"{self.label}: link {shown(name)} is not in the file; add it"))
+            raise ExportError(f"{self.label}: link {shown(name)} is not in the file; add it")
         return self._links[name]
 
     def moving_joint(self, name: str) -> _Joint:
@@ -96,10 +95,10 @@ class _Tree:
         joint = self._joints.get(name)
         if joint is None:
             hint = nearest(name, self._joints)
-            raise ExportError(one_line(f"{self.label}: joint {shown(name)} is not in the file; {hint}"))
+            raise ExportError(f"{self.label}: joint {shown(name)} is not in the file; {hint}")
         if joint.type == "fixed":
             text = f"joint {shown(name)} is fixed; name the moving joint that carries its link"
-            raise ExportError(one_line(f"{self.label}: {text}"))
+            raise ExportError(f"{self.label}: {text}")
         return joint
 
     def below(self, link: str) -> list[tuple[str, _Joint]]:
@@ -111,9 +110,9 @@ def _read(source: bytes | Path) -> tuple[bytes, str]:
     if isinstance(source, bytes):
         return source, "URDF"
     try:
-        return source.read_bytes(), one_line(str(source))
+        return source.read_bytes(), str(source)
     except OSError as error:
-        raise ExportError(one_line(f"{source}: cannot be read: {error.strerror}; check the path")) from None
+        raise ExportError(f"{source}: cannot be read: {error.strerror}; check the path") from None
 
 
 def _joint(element: Element) -> _Joint:
@@ -123,9 +122,9 @@ def _joint(element: Element) -> _Joint:
 
 def _write_inertial(text: XmlText, link: Element, inertia: CentredInertia) -> None:
     values = {
-        "origin": {"xyz": _numbers(*inertia.centre), "rpy": "0 0 0"},
-        "mass": {"value": _numbers(inertia.mass)},
-        "inertia": {key: _numbers(inertia.inertia[row, column]) for key, row, column in _INERTIA},
+        "origin": {"xyz": numbers(*inertia.centre), "rpy": "0 0 0"},
+        "mass": {"value": numbers(inertia.mass)},
+        "inertia": {key: numbers(inertia.inertia[row, column]) for key, row, column in _INERTIA},
     }
     tags = {kind: _tag(f"{link.prefix}{kind}", attributes) for kind, attributes in values.items()}
     inertials = list(link.named("inertial"))
@@ -184,7 +183,7 @@ def _zero_inertial(text: XmlText, element: Element, name: str, joint: str, carri
 
 def _write_dynamics(text: XmlText, element: Element, name: str, friction: JointFriction) -> list[str]:
     dry, damping = dry_friction_and_damping(name, friction)
-    values = {"damping": _numbers(damping), "friction": _numbers(dry)}
+    values = {"damping": numbers(damping), "friction": numbers(dry)}
     existing = list(element.named("dynamics"))
     for dynamics in existing:
         text.set_attributes(dynamics, values)
@@ -195,8 +194,3 @@ def _write_dynamics(text: XmlText, element: Element, name: str, friction: JointF
 
 def _tag(name: str, attributes: Mapping[str, str]) -> str:
     return f"<{name} " + " ".join(f'{key}="{value}"' for key, value in attributes.items()) + "/>"
-
-
-def _numbers(*values: float | np.float64) -> str:
-    """Numbers that read back as the same float64; no negative zero."""
-    return " ".join(repr(float(value) + 0.0) for value in values)

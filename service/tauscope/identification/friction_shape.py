@@ -238,12 +238,8 @@ def _candidate_slopes(speed: Array, given: Sequence[FrictionShape]) -> list[Arra
 
 
 def _shared_columns(structure: ModelStructure) -> NDArray[np.intp]:
-    steps = [
-        structure.coefficient(joint, name)
-        for joint in range(structure.robot.joint_count)
-        for name in ("stiction", "stribeck")
-    ]
-    return np.setdiff1d(np.arange(structure.size), [column for column in steps if column is not None])
+    steps = [*structure.coefficients("stiction").values(), *structure.coefficients("stribeck").values()]
+    return np.setdiff1d(np.arange(structure.size), steps)
 
 
 def _search(grids: list[JointGrid], given: Sequence[FrictionShape]) -> list[list[int]]:

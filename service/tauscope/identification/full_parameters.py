@@ -33,8 +33,9 @@ class FullParameters:
         shift = standard - structure.base_count
 
         def places(name: str) -> tuple[int | None, ...]:
-            columns = (structure.coefficient(joint, name) for joint in range(structure.robot.joint_count))
-            return tuple(None if column is None else column + shift for column in columns)
+            columns = structure.coefficients(name)
+            joints = range(structure.robot.joint_count)
+            return tuple(columns[joint] + shift if joint in columns else None for joint in joints)
 
         friction = FrictionColumns(places("stiction"), places("stribeck"), places("viscous"), places("rotor_inertia"))
         return FullParameters(full, friction, structure.base_count)

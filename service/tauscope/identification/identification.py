@@ -159,7 +159,17 @@ def identify(
     (residuals,) = evaluate(motions, structure, [parameters]) if options.prior else (found.free,)
     progress("estimate uncertainty")
     scales = [max(each) for each in zip(*(r.effort_std for r in recordings if r.effort_std), strict=True)]
-    covariance = _estimate_covariance(motions, found, parameters, residuals, scales, options)
+    covariance = parameter_covariance(
+        motions,
+        structure,
+        parameters,
+        found.factors,
+        found.posterior.weights if options.prior else found.weights,
+        residuals.autoregressions,
+        shape_parameters(found.shapes),
+        found.posterior if options.prior else None,
+        scale_std=scales,
+    )
     predict = partial(_predict_residual, found, parameters, residuals.fit, covariance)
     progress("evaluate held-out recordings")
     held_conditioners = [Conditioner.survey(recording, robot) for recording in held_out]
@@ -206,33 +216,15 @@ def identify(
     )
 
 
-def _estimate_covariance(
-    motions: Dataset,
-    found: _Estimates,
-    parameters: Array,
-    residuals: ResidualStatistics,
-    scales: list[float],
-    options: Options,
-) -> Array:
-    return parameter_covariance(
-        motions,
-        found.structure,
-        parameters,
-        found.factors,
-        found.posterior.weights if options.prior else found.weights,
-        residuals.autoregressions,
-        shape_parameters(found.shapes),
-        found.posterior if options.prior else None,
-        scale_std=scales,
-    )
-
-
 def _predict_residual(
     found: _Estimates, parameters: Array, fit: Fit, covariance: Array, motions: Dataset
 ) -> tuple[Array, Array]:
     """Expected residual of motions, and what of it the parameters leave uncertain, (n,) each."""
-    noise, shapes = _moving_noise(found, fit), shape_parameters(found.shapes)
+    left = np.sqrt([factor.squared_residual(found.posterior.mean) / factor.rows for factor in found.factors])
+    # In the common band while a joint moves, with the freedom of the parameters.
+    noise = fit.moving_rms * found.posterior.noise_std / np.maximum(left, np.finfo(float).tiny)
     outside = np.maximum(fit.rms**2 - fit.band_rms**2, 0.0)
+    shapes = shape_parameters(found.shapes)
     uncertain = uncertain_torque(motions, found.structure, parameters, shapes, covariance, noise)
     return np.sqrt(outside + noise**2 + uncertain**2), uncertain
 
@@ -259,12 +251,6 @@ def _estimate(motions: Dataset, options: Options, progress: Progress) -> _Estima
     progress("compare signs")
     wrong = reversed_joints(motions, structure, factors, ratios, posterior, consistent)
     return _Estimates(structure, shapes, factors, weights, solution, free, posterior, consistent, wrong)
-
-
-def _moving_noise(found: _Estimates, fit: Fit) -> Array:
-    """Noise in the common band while a joint moves, with the freedom of the parameters, (n,) [Nm or N]."""
-    left = np.sqrt([factor.squared_residual(found.posterior.mean) / factor.rows for factor in found.factors])
-    return fit.moving_rms * found.posterior.noise_std / np.maximum(left, np.finfo(float).tiny)
 
 
 @contextmanager

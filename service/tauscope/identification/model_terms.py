@@ -58,8 +58,8 @@ def _doubt_friction_at_rest(motions: Dataset, structure: ModelStructure) -> None
     if not any(prepared.at_rest.any() for prepared in motions):
         return
     posterior = infer(structure, factorise(motions, structure))
-    columns = [structure.coefficient(joint, "stiction") for joint in range(structure.robot.joint_count)]
-    stiction = np.array([0.0 if column is None else max(posterior.mean[column], 0.0) for column in columns])
+    columns = [*structure.coefficients("stiction").values()]  # every joint has one
+    stiction = np.maximum(posterior.mean[columns], 0.0)
     motions.rest_variance = stiction**2 / 3.0 / posterior.noise_std**2
     posterior = infer(structure, factorise(motions, structure))
     held, rows = np.zeros(len(columns)), np.full(len(columns), np.finfo(float).tiny)

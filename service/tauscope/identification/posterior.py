@@ -102,9 +102,8 @@ def _friction_doubt(structure: ModelStructure, deviation: Array, learnt: Array) 
     `learnt`: (p,), share of the prior's variance that the data took away.
     """
     doubt = np.ones(structure.size)
-    joints = range(structure.robot.joint_count)
     for name in FRICTION_COLUMNS:
-        columns = [column for joint in joints if (column := structure.coefficient(joint, name)) is not None]
+        columns = [*structure.coefficients(name).values()]
         known = [column for column in columns if learnt[column] > DETERMINED]
         if known:
             doubt[columns] = min(np.sqrt(np.mean(deviation[known] ** 2)), 1.0)

@@ -100,16 +100,30 @@ def evaluate(
     return tuple(total.statistics() for total in sums)
 
 
+class _MeanSquare:
+    """Running mean square of every joint's samples, of those that count."""
+
+    def __init__(self, joint_count: int) -> None:
+        self.squares, self._count = np.zeros(joint_count), np.zeros(joint_count)
+
+    def add(self, values: Array, used: NDArray[np.bool_], repetitions: int = 1) -> None:
+        """Add samples (n, M) that stand for so many each."""
+        kept = values if used.all() else np.where(used, values, 0.0)
+        self.squares += repetitions * np.einsum("jt,jt->j", kept, kept)
+        self._count += repetitions * used.sum(axis=1)
+
+    @property
+    def rms(self) -> Array:
+        """Root mean square, (n,)."""
+        return np.sqrt(self.squares / np.maximum(self._count, 1))
+
+
 class _Sums:
     """Running sums for one parameter set."""
 
     def __init__(self, joint_count: int) -> None:
-        zeros = np.zeros(joint_count)
-        self._raw_squares, self._raw_count = zeros.copy(), zeros.copy()
-        self._band_squares, self._band_count = zeros.copy(), zeros.copy()
-        self._moving_squares, self._moving_count = zeros.copy(), zeros.copy()
-        self._torque_squares = zeros.copy()
-        self._period_squares, self._period_count = zeros.copy(), zeros.copy()
+        self._raw, self._band, self._moving, self._torque = (_MeanSquare(joint_count) for _ in range(4))
+        self._period_squares, self._period_count = np.zeros(joint_count), np.zeros(joint_count)
         self._raw_lags = tuple(AutocovarianceSum() for _ in range(joint_count))
         self._band_lags = tuple(AutocovarianceSum(FILTERED_LAGS) for _ in range(joint_count))
         self._unfiltered, self._unaveraged = True, True
@@ -128,11 +142,9 @@ class _Sums:
         ]
         for total, products in zip(self._band_lags, lagged, strict=True):
             total.add(products, filtered_white)
-        self._band_squares += motion.repetitions * _squares(band, prepared.used)
-        self._moving_squares += motion.repetitions * _squares(band, prepared.moving)
-        self._moving_count += motion.repetitions * prepared.moving.sum(axis=1)
-        self._torque_squares += motion.repetitions * _squares(prepared.reduced_torque, prepared.used)
-        self._band_count += motion.repetitions * prepared.used.sum(axis=1)
+        self._band.add(band, prepared.used, motion.repetitions)
+        self._moving.add(band, prepared.moving, motion.repetitions)
+        self._torque.add(prepared.reduced_torque, prepared.used, motion.repetitions)
         self._add_raw(prepared, predicted, lagged)
 
     def _add_raw(self, prepared: PreparedMotion, predicted: Array, lagged: Sequence[LaggedProducts]) -> None:
@@ -143,8 +155,7 @@ class _Sums:
         self._add_periods(prepared, residual.swapaxes(1, 2))
         residual, measured = residual[..., motion.own], measured[..., motion.own]  # windows overlap: count samples once
         for repetition, known in zip(residual, measured, strict=True):
-            self._raw_squares += _squares(repetition, known)
-            self._raw_count += known.sum(axis=1)
+            self._raw.add(repetition, known)
         if isinstance(motion.band, AllPass) and motion.repetitions == 1:  # nothing was filtered: the same series
             for total, products in zip(self._raw_lags, lagged, strict=True):
                 total.add(products)
@@ -155,13 +166,9 @@ class _Sums:
 
     def statistics(self) -> ResidualStatistics:
         """The sums, turned into what they stand for."""
-        band_rms = np.sqrt(self._band_squares / np.maximum(self._band_count, 1))
-        left, torque = self._band_squares.sum(), self._torque_squares.sum()
+        left, torque = self._band.squares.sum(), self._torque.squares.sum()
         relative = np.sqrt(left / max(torque, LEAST_TORQUE**2 * left, np.finfo(float).tiny))
-        torque_rms = np.sqrt(self._torque_squares / np.maximum(self._band_count, 1))
-        rms = np.sqrt(self._raw_squares / np.maximum(self._raw_count, 1))
-        moving_rms = np.sqrt(self._moving_squares / np.maximum(self._moving_count, 1))
-        fit = Fit(rms, band_rms, moving_rms, torque_rms, float(relative))
+        fit = Fit(self._raw.rms, self._band.rms, self._moving.rms, self._torque.rms, float(relative))
         by_periods = bool((self._period_count >= FEWEST_PERIOD_SAMPLES).all())
         noise = np.sqrt(self._period_squares / self._period_count) if by_periods else None
         raw_lags = self._band_lags if self._unfiltered and self._unaveraged else self._raw_lags
@@ -183,8 +190,3 @@ class _Sums:
         deviation = np.where(measured, residual - mean, 0.0)
         self._period_squares += np.einsum("pij,pij->j", deviation, deviation)
         self._period_count += np.maximum(count - 1, 0).sum(axis=0)
-
-
-def _squares(residual: Array, used: NDArray[np.bool_]) -> Array:
-    kept = residual if used.all() else np.where(used, residual, 0.0)
-    return np.einsum("jt,jt->j", kept, kept)

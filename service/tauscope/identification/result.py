@@ -1,5 +1,6 @@
 """The identification as a document: what ``identify --json`` writes and the REST API returns (CONTRACT.md)."""
 
+from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any, ClassVar, Literal
 
@@ -13,7 +14,8 @@ from tauscope.identification.residuals import Fit
 from tauscope.identification.warnings import identification_warnings, weak_points
 from tauscope.recording.conditioning import ConditioningSummary
 from tauscope.result_warning import ResultWarning
-from tauscope.robot import STANDARD_PARAMETERS, LinkInertia
+from tauscope.robot import STANDARD_PARAMETERS
+from tauscope.robot.robot_data import link_to_dict
 from tauscope.strict_model import ResultModel
 
 
@@ -185,10 +187,13 @@ class IdentificationDocument(ResultModel):
     held_out_conditioning: list[ConditioningEntry] = Field(description="one a held-out recording")
 
 
+_COEFFICIENTS = ("stiction", "stribeck", "viscous", "offset")
+
+
 def document(identification: Identification) -> IdentificationDocument:
     """The document of an identification."""
     result = identification
-    names = _standard_names(result.robot.link_count)
+    names = [f"{name}{link + 1}" for link in range(result.robot.link_count) for name in STANDARD_PARAMETERS]
     return IdentificationDocument(
         warnings=identification_warnings(result),
         robot=result.robot.name,
@@ -197,7 +202,7 @@ def document(identification: Identification) -> IdentificationDocument:
         prior=result.options.prior,
         constrained=result.constrained,
         cutoff_hz=result.cutoff_hz,
-        noise_std=_floats(result.residuals.noise_std),
+        noise_std=result.residuals.noise_std.tolist(),
         noise_method="periods" if result.residuals.noise_method == "periods" else "residual",
         condition_number=result.condition_number,
         base_parameters=_base_parameters(result),
@@ -205,29 +210,21 @@ def document(identification: Identification) -> IdentificationDocument:
         undetermined=[name for name, open_ in zip(result.structure.names, result.undetermined, strict=True) if open_],
         friction=_friction(result, result.parameters),
         rotor_inertia=_rotors(result),
-        links=[_link(link) for link in result.consistent.links],
+        links=[LinkEntry.model_validate(link_to_dict(link)) for link in result.consistent.links],
         links_friction=_friction(result, result.consistent_parameters),
         fit=FitsEntry(
             train=_fit(result.residuals.fit, result.predicted_train),
             held_out=None if result.held_out is None else _fit(result.held_out, result.predicted_held_out),
-            price_of_bodies=_floats(result.price_of_bodies),
+            price_of_bodies=result.price_of_bodies.tolist(),
         ),
         excitation=_excitation(result),
-        conditioning=[_conditioning(summary) for summary in result.conditioning],
-        held_out_conditioning=[_conditioning(summary) for summary in result.held_out_conditioning],
+        conditioning=_conditioning(result.conditioning),
+        held_out_conditioning=_conditioning(result.held_out_conditioning),
     )
 
 
-def _floats(values: np.ndarray) -> list[float]:
-    return [float(value) for value in values]
-
-
-def _standard_names(link_count: int) -> list[str]:
-    return [f"{name}{link + 1}" for link in range(link_count) for name in STANDARD_PARAMETERS]
-
-
 def _std(result: Identification) -> list[float | None]:
-    errors: list[float | None] = [*_floats(np.sqrt(np.maximum(np.diag(result.covariance), 0.0)))]
+    errors: list[float | None] = np.sqrt(np.maximum(np.diag(result.covariance), 0.0)).tolist()
     believed = result.structure.base_count if result.options.prior else 0
     for column in np.flatnonzero(result.undetermined):
         errors[column] = errors[column] if column < believed else None
@@ -262,9 +259,7 @@ def _friction(result: Identification, parameters: np.ndarray) -> list[FrictionEn
     shape_std = dict(zip(shape_parameters(result.shapes), std[result.structure.size :], strict=True))
     entries = []
     for joint, (shape, known) in enumerate(zip(result.shapes, result.identifiable, strict=True)):
-        columns = {
-            name: result.structure.coefficient(joint, name) for name in ("stiction", "stribeck", "viscous", "offset")
-        }
+        columns = {name: result.structure.coefficient(joint, name) for name in _COEFFICIENTS}
         present = {name: column for name, column in columns.items() if column is not None}
         errors = {name: std[column] for name, column in present.items()}
         for name, value in (("k_v", shape.k_v), ("delta", shape.delta)):
@@ -278,9 +273,7 @@ def _friction(result: Identification, parameters: np.ndarray) -> list[FrictionEn
                 k_v=shape.k_v,
                 delta=shape.delta,
                 std=errors,
-                identifiable={
-                    name: known[name] for name in ("stiction", "stribeck", "viscous", "offset", "k_v", "delta")
-                },
+                identifiable={name: known[name] for name in (*_COEFFICIENTS, "k_v", "delta")},
             )
         )
     return entries
@@ -288,26 +281,18 @@ def _friction(result: Identification, parameters: np.ndarray) -> list[FrictionEn
 
 def _rotors(result: Identification) -> list[RotorEntry]:
     std = _std(result)
-    columns = [(j, result.structure.coefficient(j, "rotor_inertia")) for j in range(result.robot.joint_count)]
     return [
         RotorEntry(joint=result.robot.joints[joint].name, value=float(result.parameters[column]), std=std[column])
-        for joint, column in columns
-        if column is not None
+        for joint, column in result.structure.coefficients("rotor_inertia").items()
     ]
-
-
-def _link(link: LinkInertia) -> LinkEntry:
-    xx, yy, zz, xy, xz, yz = _floats(link.to_vector()[:6])
-    inertia = InertiaEntry(xx=xx, yy=yy, zz=zz, xy=xy, xz=xz, yz=yz)
-    return LinkEntry(mass=float(link.mass), first_moment=_floats(link.first_moment), inertia=inertia)
 
 
 def _fit(fit: Fit, predicted: np.ndarray | None = None) -> FitEntry:
     return FitEntry(
-        rms=_floats(fit.rms),
-        band_rms=_floats(fit.band_rms),
+        rms=fit.rms.tolist(),
+        band_rms=fit.band_rms.tolist(),
         relative_error=fit.relative_error,
-        predicted_rms=None if predicted is None else _floats(predicted),
+        predicted_rms=None if predicted is None else predicted.tolist(),
     )
 
 
@@ -323,9 +308,9 @@ def _excitation(result: Identification) -> ExcitationEntry:
         )
         for joint, each in enumerate(result.robot.joints)
     ]
-    extrapolation = None if result.extrapolation is None else _floats(result.extrapolation)
+    extrapolation = None if result.extrapolation is None else result.extrapolation.tolist()
     return ExcitationEntry(joints=joints, extrapolation=extrapolation)
 
 
-def _conditioning(summary: ConditioningSummary) -> ConditioningEntry:
-    return ConditioningEntry.model_validate(asdict(summary), strict=False)
+def _conditioning(summaries: Iterable[ConditioningSummary]) -> list[ConditioningEntry]:
+    return [ConditioningEntry.model_validate(asdict(each), strict=False) for each in summaries]

@@ -68,7 +68,8 @@ def needed_rotors(
         keep = kept_columns(structure, joints)
         smaller = restrict(factors, keep)
         solution = solve(smaller, len(keep), noise_std)
-        places = {joint: int(np.searchsorted(keep, _column(structure, joint))) for joint in joints}
+        columns = structure.coefficients("rotor_inertia")
+        places = {joint: int(np.searchsorted(keep, columns[joint])) for joint in joints}
         excess = {
             joint: max(solution.parameters[place], 0.0) ** 2
             / np.sum(solution.spread[place] ** 2)
@@ -104,10 +105,5 @@ def _needed_gain(structure: ModelStructure, joint: int, inflation: float, rows: 
 
 def kept_columns(structure: ModelStructure, rotors: set[int]) -> np.ndarray:
     """Global columns of a model when only some of its rotors stay. Returns (k,) int, ascending."""
-    dropped = [_column(structure, j) for j, terms in enumerate(structure.terms) if terms.rotor and j not in rotors]
+    dropped = [column for joint, column in structure.coefficients("rotor_inertia").items() if joint not in rotors]
     return np.setdiff1d(np.arange(structure.size), np.array(dropped, dtype=int))
-
-
-def _column(structure: ModelStructure, joint: int) -> int:
-    column = structure.coefficient(joint, "rotor_inertia")
-    return -1 if column is None else column

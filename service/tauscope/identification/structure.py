@@ -67,15 +67,16 @@ class ModelStructure:
             return None
         return self.base_count + sum(len(terms.names) for terms in self.terms[:joint]) + names.index(name)
 
+    def coefficients(self, name: str) -> dict[int, int]:
+        """Global column of a coefficient by joint, of the joints that have it."""
+        columns = ((joint, self.coefficient(joint, name)) for joint in range(self.robot.joint_count))
+        return {joint: column for joint, column in columns if column is not None}
+
     def joint_columns(self, joint: int) -> NDArray[np.intp]:
         """Global columns, (p_j,), that can be non-zero in a joint's equation: links from it outwards, its own terms."""
         first = self.base_count + sum(len(terms.names) for terms in self.terms[:joint])
         own = np.arange(first, first + len(self.terms[joint].names))
-        return np.concatenate([self.outward_columns(joint), own])
-
-    def outward_columns(self, joint: int) -> NDArray[np.intp]:
-        """Base columns of the links that a joint moves, (p_j,)."""
-        return np.arange(self.base_count)[self.base.outward(joint)]
+        return np.concatenate([np.arange(self.base_count)[self.base.outward(joint)], own])
 
     def joint_term_columns(self, joint: int, velocity: Array, acceleration: Array) -> Array:
         """The joint's own columns along a motion.

@@ -8,7 +8,7 @@ from tauscope.identification.identification import Identification
 from tauscope.identification.posterior import DETERMINED
 from tauscope.recording.conditioning import ConditioningSummary
 from tauscope.result_warning import ResultWarning
-from tauscope.robot import JointType, Robot
+from tauscope.robot import Robot
 from tauscope.robot.messages import listed
 
 FEWEST_REVERSALS = 2  # a joint turns round at least so often where friction is to be told from a constant torque
@@ -127,7 +127,7 @@ def extrapolations(result: Identification) -> dict[int, str]:
     own, other = result.excitation, result.held_out_excitation
     found = {}
     for joint, each in enumerate(result.robot.joints):
-        unit = "m" if each.type is JointType.PRISMATIC else "rad"
+        unit = each.type.unit
         reasons = []
         if other.speed[joint] > BEYOND * own.speed[joint]:
             reasons.append(

@@ -1,16 +1,15 @@
 """What was measured: recordings read, checked, converted and conditioned."""
 
 from tauscope.recording.checks import RecordingReport, check_recording, report_recording
-from tauscope.recording.convert import Conversion, convert_recording, write_recording
+from tauscope.recording.convert import convert_recording, write_recording
 from tauscope.recording.examination import examine_recording, open_recording
 from tauscope.recording.layout.guess import flow_text
 from tauscope.recording.reading import ColumnMapping, find_mapping, read_recording
 from tauscope.recording.recording import EffortKind, Recording, Samples
-from tauscope.recording.units import Reading, parse_units
+from tauscope.recording.units import Reading
 
 __all__ = [
     "ColumnMapping",
-    "Conversion",
     "EffortKind",
     "Reading",
     "Recording",
@@ -22,7 +21,6 @@ __all__ = [
     "find_mapping",
     "flow_text",
     "open_recording",
-    "parse_units",
     "read_recording",
     "report_recording",
     "write_recording",

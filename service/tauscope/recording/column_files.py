@@ -4,6 +4,7 @@ import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,9 @@ import numpy as np
 from tauscope.errors import RecordingError
 from tauscope.recording.columns import ColumnLayout, find_layout, require_joint_count
 from tauscope.recording.inflation import HELD_BYTES, require_plausible_inflation
-from tauscope.recording.intake import EpisodeClock, RowIntake, SplitClock
+from tauscope.recording.intake import Choice, EpisodeClock, RowIntake, SplitClock
 from tauscope.recording.recording import Array, Recording
-from tauscope.recording.table import SPOOL_ABOVE_BYTES
-from tauscope.recording.units import SECONDS, SI, Reading
+from tauscope.recording.units import SECONDS
 from tauscope.robot.messages import listed, reason
 
 ROWS_AT_ONCE = 2**16
@@ -25,14 +25,11 @@ Batch = Callable[[str], Array]  # values of a column of the file, (rows,) float6
 
 
 def read_batches(
-    name: str,
+    choice: Choice,
     header: Sequence[str],
     rows: int,
     open_batches: Callable[[ColumnLayout, Sequence[str]], Iterable[Batch]],
     *,
-    joint_count: int | None = None,
-    spool_above_bytes: int = SPOOL_ABOVE_BYTES,
-    reading: Reading = SI,
     first_row: int = 0,
     has_episodes: bool = False,
 ) -> Recording:
@@ -46,8 +43,8 @@ def read_batches(
     `first_row`: number of the file's first row in messages.
     `has_episodes`: whether a column `episode_index` splits the rows into episodes, each on a clock of its own.
     """
-    reading, layout = find_layout(header, reading, name)
-    require_joint_count(layout.joint_count, joint_count, name)
+    reading, layout = find_layout(header, choice.reading, choice.file)
+    require_joint_count(layout.joint_count, choice.joint_count, choice.file)
     wanted = [header[index] for index in layout.source]
     nanoseconds = None if layout.nanoseconds is None else header[layout.nanoseconds]
     episodes = None
@@ -55,7 +52,7 @@ def read_batches(
         episodes = EpisodeClock(SECONDS.get(reading.units.get("t", "s"), 1.0))
     further = [*([] if nanoseconds is None else [nanoseconds]), *([_EPISODE] if episodes else [])]
     batches = open_batches(layout, [*wanted, *further])  # before there is memory for rows, which it may refuse
-    intake = RowIntake(name, layout.names, layout.effort_kind, reading, rows, spool_above_bytes)
+    intake = RowIntake(replace(choice, reading=reading), layout.names, layout.effort_kind, rows)
     split = SplitClock()
     for take in batches:
         block, first = np.column_stack([take(column) for column in wanted]), first_row + len(intake)
@@ -74,32 +71,24 @@ ZIP_MAGIC = b"PK\x03\x04"
 _MOST_COLUMNS = 10_000
 # Errors that damaged archives raise; NumPy reads the header of an array as Python.
 _UNREADABLE = (
-    zipfile.BadZipFile,
-    zlib.error,
-    ValueError,
-    OSError,
-    EOFError,
-    NotImplementedError,
-    MemoryError,
-    KeyError,
-    RecursionError,
-    tokenize.TokenError,
+    *(zipfile.BadZipFile, zlib.error, tokenize.TokenError),
+    *(ValueError, OSError, EOFError, RuntimeError, MemoryError, KeyError),
 )
 
 
-def read_npz(path: Path, name: str, joint_count: int | None = None, reading: Reading = SI) -> Recording:
+def read_npz(path: Path, choice: Choice) -> Recording:
     """Read an archive; columns of an array are named ``qpos[0]``, ``qpos[1]``, ….
 
     Raises RecordingError where the archive is damaged, is none of NumPy's, or names the row and column at fault.
     """
-    columns = _read_columns(path, name)
+    columns = _read_columns(path, choice.file)
     rows = len(next(iter(columns.values())))
 
     def open_batches(_layout: ColumnLayout, _wanted: Sequence[str]) -> Iterator[Batch]:
         for start in range(0, rows, ROWS_AT_ONCE):
             yield lambda column, start=start: columns[column][start : start + ROWS_AT_ONCE]
 
-    return read_batches(name, list(columns), rows, open_batches, joint_count=joint_count, reading=reading)
+    return read_batches(choice, list(columns), rows, open_batches)
 
 
 def read_npz_header(path: Path, name: str) -> list[str]:

@@ -1,8 +1,6 @@
 """Write a recording in another format, whole or not at all."""
 
-import os
-import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -11,10 +9,11 @@ import numpy as np
 from mcap_ros2.writer import Writer
 
 from tauscope.errors import RecordingError
+from tauscope.files import open_atomically
 from tauscope.recording.csv_format import write_csv
+from tauscope.recording.intake import Choice
 from tauscope.recording.joint_state import JOINT_STATE_DEFINITION
 from tauscope.recording.joint_state_decoders import JOINT_STATE_TYPES
-from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.mcap_format import MCAP_MAGIC, recover_mcap
 from tauscope.recording.parquet_format import write_parquet
 from tauscope.recording.reading import first_bytes, read_recording
@@ -117,20 +116,14 @@ def write_recording(
     """
     path = Path(path)
     _require_writable(path, overwrite=overwrite)
-    dropped: tuple[str, ...] = ()
-
-    def write(file: BinaryIO) -> None:
-        nonlocal dropped
-        suffix = path.suffix.lower()
-        if suffix == ".mcap":
-            dropped = write_mcap(recording, file, joint_names)
-        elif suffix == ".parquet":
-            write_parquet(recording, file)
-        else:
-            write_csv(recording, file)
-
-    _write_atomically(path, write)
-    return dropped
+    try:
+        with open_atomically(path) as file:
+            if path.suffix.lower() == ".mcap":
+                return write_mcap(recording, file, joint_names)
+            (write_parquet if path.suffix.lower() == ".parquet" else write_csv)(recording, file)
+            return ()
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
 def _read(
@@ -138,8 +131,7 @@ def _read(
 ) -> tuple[Recording, str | None]:
     if recover and path.is_file() and first_bytes(path, name).startswith(MCAP_MAGIC):
         names = tuple(joint_names) if joint_names is not None else None
-        salvage = recover_mcap(path, Choice(name, len(names) if names else None, names, reading=reading))
-        return salvage.recording, salvage.damage
+        return recover_mcap(path, Choice(name, len(names) if names else None, names, reading=reading))
     return read_recording(path, joint_names=joint_names, reading=reading), None
 
 
@@ -155,19 +147,3 @@ def _require_writable(path: Path, *, overwrite: bool) -> None:
         raise RecordingError(f"{path}: the suffix names no format that can be written; use {', '.join(FORMATS)}")
     if path.is_dir() or (path.exists() and not overwrite):
         raise RecordingError(f"{path}: exists already; choose another name or ask for it to be overwritten")
-
-
-def _write_atomically(path: Path, write: Callable[[BinaryIO], None]) -> None:
-    """Write beside the target and move into place; nothing is left where writing fails."""
-    partial = path.with_name(f".{path.name}.{secrets.token_hex(6)}.partial")
-    try:
-        try:
-            with partial.open("xb") as file:
-                write(file)
-                file.flush()
-                os.fsync(file.fileno())
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be written ({error.strerror or error})") from error

@@ -42,7 +42,10 @@ def parse_quickly(text: bytes, delimiter: bytes, width: int, source: Sequence[in
     lines = len(separators) // width
     if separators == (b"," * (width - 1) + b"\n") * lines:
         values = _parse_numbers(text[:-1].replace(b"\n", b","))
-        return None if values is None else _select(values.reshape(lines, width), source)
+        if values is None:
+            return None
+        table = values.reshape(lines, width)
+        return table if tuple(source) == tuple(range(width)) else table[:, list(source)]  # all in order: no copy
     if len(source) == width or b"#" in text or b"\0" in text:
         return None
     # Columns that nobody reads may hold any text: set them aside and try again.
@@ -55,11 +58,6 @@ def parse_quickly(text: bytes, delimiter: bytes, width: int, source: Sequence[in
         return None
     values = _parse_numbers(wanted)
     return None if values is None else np.ascontiguousarray(values.reshape(len(source), lines).T)
-
-
-def _select(table: Array, source: Sequence[int]) -> Array:
-    """The wanted columns, without a copy where they are all columns in order."""
-    return table if tuple(source) == tuple(range(table.shape[1])) else table[:, list(source)]
 
 
 def _parse_numbers(text: bytes) -> Array | None:

@@ -22,9 +22,8 @@ from tauscope.recording.csv_dialect import (
     read_units_row,
     shown,
 )
-from tauscope.recording.intake import RowIntake, SplitClock
+from tauscope.recording.intake import Choice, RowIntake, SplitClock
 from tauscope.recording.recording import Array, Recording
-from tauscope.recording.table import SPOOL_ABOVE_BYTES
 from tauscope.recording.units import SI, Reading
 
 _CHUNK_BYTES = 2**18
@@ -34,24 +33,18 @@ _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _SAMPLE_BYTES = 2**16
 
 
-def read_csv(
-    path: Path,
-    name: str,
-    joint_count: int | None = None,
-    spool_above_bytes: int = SPOOL_ABOVE_BYTES,
-    reading: Reading = SI,
-) -> Recording:
+def read_csv(path: Path, choice: Choice) -> Recording:
     """Read a CSV recording, in time linear and in memory bounded in its number of lines.
 
     Comma, semicolon, tab, | or blanks between the fields; an empty field or ``nan`` is a missed sample. Raises
     RecordingError, which names the line and column at fault. Raises RecordingMismatchError where the file has another
     number of joints.
     """
+    name = choice.file
     with path.open("rb") as file:
-        header = _read_header(file, name, reading)
-        reading = header.reading
-        require_joint_count(header.layout.joint_count, joint_count, name)
-        layout = header.layout
+        header = _read_header(file, name, choice.reading)
+        choice, layout = replace(choice, reading=header.reading), header.layout
+        require_joint_count(layout.joint_count, choice.joint_count, name)
         intake: RowIntake | None = None
         for chunk in _chunks(file, header.line + 1, name):
             block, lines = _parse_chunk(chunk, header, name, is_first=intake is None or not len(intake))
@@ -59,19 +52,19 @@ def read_csv(
                 block[:, 0] = np.arange(len(block)) + (0 if intake is None else len(intake))
             if intake is None:
                 expected = int(len(block) * os.fstat(file.fileno()).st_size / len(chunk.text) * 1.01) + 16
-                intake = RowIntake(name, layout.names, layout.effort_kind, reading, expected, spool_above_bytes)
+                intake = RowIntake(choice, layout.names, layout.effort_kind, expected)
             intake.add(block, lambda row, lines=lines: f"line {lines[row]}")
-    intake = intake or RowIntake(name, layout.names, layout.effort_kind, reading)
+    intake = intake or RowIntake(choice, layout.names, layout.effort_kind)
     return intake.finish(layout.joint_count, layout.ignored, layout.notes)
 
 
-def read_csv_header(path: Path, name: str, reading: Reading = SI) -> list[str]:
+def read_csv_header(path: Path, name: str) -> list[str]:
     """Names of a file's columns, or numbers from 1 where it has none.
 
     Raises RecordingError where the file holds no line of text.
     """
     with path.open("rb") as file:
-        return _read_names(file, name, reading).names
+        return _read_names(file, name, SI).names
 
 
 def write_csv(recording: Recording, file: BinaryIO) -> None:

@@ -1,6 +1,7 @@
 """The rows of all formats: converted to SI, checked, put in order of time, kept in a table."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,24 @@ from tauscope.recording.samples import Array, EffortKind, RowCheck, require_risi
 from tauscope.recording.table import SPOOL_ABOVE_BYTES, TableBuilder
 from tauscope.recording.units import SI, Conversion, Reading
 from tauscope.result_warning import ResultWarning
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is wanted of a file.
+
+    `joint_count`: joints that the recording must have; None where any number is welcome.
+    `spool_above_bytes`: size above which the rows go to a temporary file [bytes].
+    `packed_bytes`: size of a log, by which its messages are plausible [bytes]; None where any are.
+    """
+
+    file: str
+    joint_count: int | None = None
+    joint_names: tuple[str, ...] | None = None
+    spool_above_bytes: int = SPOOL_ABOVE_BYTES
+    reading: Reading = SI
+    packed_bytes: int | None = None
+
 
 PAUSE_S = 60.0  # between two episodes [s]: no filter and no fit bridges a gap of this length
 
@@ -78,23 +97,11 @@ REPEATED_SHARE = 0.05
 class RowIntake:
     """Takes a file's rows block by block, in the order of the file."""
 
-    def __init__(
-        self,
-        file: str,
-        names: Sequence[str],
-        effort_kind: EffortKind,
-        reading: Reading = SI,
-        expected_rows: int = 0,
-        spool_above_bytes: int = SPOOL_ABOVE_BYTES,
-    ) -> None:
-        """Prepare for the first block.
-
-        `spool_above_bytes`: size above which the rows go to a temporary file [bytes].
-        """
-        self._file = file
-        self._conversion = Conversion.design(names, effort_kind, reading)
-        self._check = RowCheck(file, self._conversion.names)
-        self._builder = TableBuilder(self._conversion.names, expected_rows, spool_above_bytes)
+    def __init__(self, choice: Choice, names: Sequence[str], effort_kind: EffortKind, expected_rows: int = 0) -> None:
+        self._file = choice.file
+        self._conversion = Conversion.design(names, effort_kind, choice.reading)
+        self._check = RowCheck(choice.file, self._conversion.names)
+        self._builder = TableBuilder(self._conversion.names, expected_rows, choice.spool_above_bytes)
         self._tail = np.empty((0, len(names)))
         self._tail_rows = np.empty(0, dtype=np.intp)
         self._origin: float | None = None

@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.recording.columns import table_columns
-from tauscope.recording.intake import RowIntake
+from tauscope.recording.intake import Choice, RowIntake
 from tauscope.recording.joint_state import JointStates
 from tauscope.recording.recording import EffortKind, Recording
 from tauscope.recording.samples import Array
-from tauscope.recording.units import Reading
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.messages import listed
 
@@ -53,7 +52,7 @@ class JointParts:
         return instants, values[known][first]
 
 
-def merge_parts(topics: Sequence[JointParts], wanted: Sequence[str], file: str, reading: Reading) -> Recording | None:
+def merge_parts(topics: Sequence[JointParts], wanted: Sequence[str], choice: Choice) -> Recording | None:
     """The recording at the instants of the joint with fewest positions, the others interpolated to them.
 
     Rows within a gap of a joint are NaN there. Returns None where a joint has no positions or no efforts.
@@ -73,7 +72,7 @@ def merge_parts(topics: Sequence[JointParts], wanted: Sequence[str], file: str, 
     time = (clock - start).astype(np.float64) * 1e-9
     columns = [_interpolate(time, (instants - start).astype(np.float64) * 1e-9, values) for instants, values in known]
     names = table_columns(len(wanted), EffortKind.TORQUE, ("qd",) if has_velocity else ())
-    intake = RowIntake(file, names, EffortKind.TORQUE, reading)
+    intake = RowIntake(choice, names, EffortKind.TORQUE)
     intake.add(np.column_stack([time, *columns]), lambda row: f"merged message {row + 1}")
     count, names_of = sum(topic.messages for topic in used), listed([topic.topic for topic in used])
     text = (

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeAlias, TypeVar
 
 import numpy as np
@@ -16,13 +16,11 @@ from tauscope.recording.inflation import (
     decompress_message,
     require_plausible_inflation,
 )
-from tauscope.recording.intake import RowIntake
+from tauscope.recording.intake import Choice, RowIntake
 from tauscope.recording.joint_parts import JointParts, merge_parts
 from tauscope.recording.joint_state import JointState, JointStateLayout, JointStates, decode_cdr
 from tauscope.recording.joint_state_decoders import Decoder, find_decoder
 from tauscope.recording.recording import EffortKind, Recording
-from tauscope.recording.table import SPOOL_ABOVE_BYTES
-from tauscope.recording.units import SI, Reading
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.messages import listed, reason
 
@@ -79,23 +77,6 @@ Decoded = TypeVar("Decoded")
 Rows: TypeAlias = NDArray[np.intp]
 # Messages of one layout, and their places among those that were taken at once.
 Batch: TypeAlias = tuple[Rows, JointStates]
-
-
-@dataclass(frozen=True)
-class Choice:
-    """What the user wants out of a log.
-
-    `joint_count`: joints that the recording must have; None where any number is welcome.
-    `spool_above_bytes`: size above which the rows go to a temporary file [bytes].
-    `packed_bytes`: size of the log, by which its messages are plausible [bytes]; None where any are.
-    """
-
-    file: str
-    joint_count: int | None = None
-    joint_names: tuple[str, ...] | None = None
-    spool_above_bytes: int = SPOOL_ABOVE_BYTES
-    reading: Reading = SI
-    packed_bytes: int | None = None
 
 
 class JointStateTopic:
@@ -259,8 +240,7 @@ class _Rows:
         self._name, self._topic = choice.file, topic
         self._joint_count, self._has_velocity = joint_count, has_velocity
         columns = table_columns(joint_count, EffortKind.TORQUE, ("qd",) if has_velocity else ())
-        spool = choice.spool_above_bytes
-        self._intake = RowIntake(choice.file, columns, EffortKind.TORQUE, choice.reading, spool_above_bytes=spool)
+        self._intake = RowIntake(choice, columns, EffortKind.TORQUE)
         self._origin: int | None = None
         self._by_log_time = False
         self._unset = 0
@@ -385,7 +365,7 @@ class JointStateLog:
             raise RecordingError(f"{self._choice.file}: no topic {wanted} carries joint states; those that do: {known}")
         parts = [topic.parts for topic in self._topics.values() if topic.fault is None and topic.parts is not None]
         if self._choice.joint_names and not self.samples:
-            merged = merge_parts(parts, self._choice.joint_names, self._choice.file, self._choice.reading)
+            merged = merge_parts(parts, self._choice.joint_names, self._choice)
             if merged is not None:
                 return merged
         return choose_topic(self._topics, self._others, self._choice.file).finish()

@@ -23,7 +23,8 @@ from mcap.summary import Summary
 
 from tauscope.errors import RecordingError
 from tauscope.recording.inflation import HELD_BYTES, LARGEST_RATIO, count_plausible_records, require_plausible_inflation
-from tauscope.recording.joint_state_topic import Choice, JointStateLog, MessageHandler
+from tauscope.recording.intake import Choice
+from tauscope.recording.joint_state_topic import JointStateLog, MessageHandler
 from tauscope.recording.recording import Recording
 from tauscope.recording.samples import MINIMUM_ROWS
 from tauscope.remote_files import open_ranges, read_range
@@ -34,14 +35,8 @@ MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time and publish time
 
 # Errors that damaged records raise.
 UNREADABLE = (
-    McapError,
-    ValueError,
-    struct.error,
-    RuntimeError,
-    EOFError,
-    MemoryError,
-    OverflowError,
-    zstandard.ZstdError,
+    *(McapError, zstandard.ZstdError, struct.error),
+    *(ValueError, RuntimeError, EOFError, MemoryError, OverflowError),
 )
 
 _LARGEST_CHUNK_BYTES = 2**28
@@ -90,6 +85,7 @@ MOST_SHARE = 0.5  # share of the file above which it is read as a whole, which c
 _MAGIC_BYTES = 8
 _FOOTER = struct.Struct("<BQQQI")
 _CHUNK_HEAD = struct.Struct("<QQQII")
+_MESSAGE_INDEX = struct.Struct("<HI")  # channel, bytes of the entries behind it
 _INDEX_ENTRY = struct.Struct("<QQ")
 
 
@@ -178,10 +174,10 @@ def _find_messages(file: BinaryIO, size: int, chunk: ChunkIndex, wanted: set[int
         if opcode != Opcode.MESSAGE_INDEX or length > size - at:
             raise ValueError("no index of messages where one was stated")
         body = _read(file, at + RECORD.size, length)
-        number, entries = struct.unpack_from("<HI", body)
-        if number != channel or entries != len(body) - 6:
+        number, entries_bytes = _MESSAGE_INDEX.unpack_from(body)
+        if number != channel or entries_bytes != len(body) - _MESSAGE_INDEX.size:
             raise ValueError("an index of messages that does not fill its record")
-        offsets += [offset for _, offset in _INDEX_ENTRY.iter_unpack(body[6:])]
+        offsets += [offset for _, offset in _INDEX_ENTRY.iter_unpack(body[_MESSAGE_INDEX.size :])]
     if len(set(offsets)) < len(offsets):
         raise ValueError("an index of messages lists one twice")
     return _Part(chunk, tuple(sorted(offsets)))
@@ -229,29 +225,7 @@ def _read(file: BinaryIO, at: int, length: int) -> bytes:
 
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 
-_MESSAGE_INDEX = struct.Struct("<HI")
 _COPY_BYTES = 2**20
-
-
-@dataclass(frozen=True)
-class Salvage:
-    """What was read of a file that may be damaged.
-
-    `damage`: why reading stopped, None where the file is whole.
-    """
-
-    recording: Recording
-    damage: str | None
-
-
-def read_mcap(path: Path, choice: Choice) -> Recording:
-    """Read the joint states of an MCAP file.
-
-    Raises RecordingError where the file is truncated or damaged, or holds no usable joint states.
-    """
-    log = JointStateLog(choice)
-    add_mcap(path, choice.file, log)
-    return log.finish()
 
 
 def add_mcap(path: Path, name: str, log: JointStateLog) -> None:
@@ -264,13 +238,16 @@ def add_mcap(path: Path, name: str, log: JointStateLog) -> None:
         raise RecordingError(f"{name}: {damage}; {_count(samples)} before that point can be read: {way_out}")
 
 
-def recover_mcap(path: Path, choice: Choice) -> Salvage:
-    """Read a damaged MCAP file up to the damage. Raises RecordingError where nothing usable comes before the damage."""
+def recover_mcap(path: Path, choice: Choice) -> tuple[Recording, str | None]:
+    """What comes before the damage of an MCAP file, and that damage, None where it is whole.
+
+    Raises RecordingError where nothing usable comes before the damage.
+    """
     log = JointStateLog(choice)
     damage = scan_mcap(path, log)
     if damage is not None and log.samples < MINIMUM_ROWS:
         raise RecordingError(f"{choice.file}: {damage}; {_count(log.samples)} before that point: nothing to keep")
-    return Salvage(log.finish(), damage)
+    return log.finish(), damage
 
 
 def scan_mcap(path: Path, sink: MessageSink) -> str | None:
@@ -319,21 +296,7 @@ class _Scan:
             if length > self._size - self._file.tell():
                 raise DamageError(f"the file is truncated: it ends within the record at byte {at}")
             try:
-                if opcode == Opcode.CHUNK:
-                    self._walk_chunk(self._read(length))
-                elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
-                    body = self._read(length)
-                    self._take(opcode, body, 0, len(body))
-                elif opcode == Opcode.DATA_END:
-                    (expected,) = struct.unpack_from("<I", self._read(length))
-                    if expected not in (0, checksum):
-                        raise DamageError("the file is damaged: its data fail their checksum")
-                elif opcode == Opcode.MESSAGE_INDEX:
-                    _require_filled(self._read(length))
-                elif opcode == Opcode.STATISTICS:
-                    self._require_all(*struct.unpack_from("<Q", self._read(length)))
-                else:
-                    self._skip(length)
+                self._read_record(opcode, length, checksum)
             except UNREADABLE as error:
                 place = f"the record at byte {at}"
                 raise DamageError(f"the file is damaged: {place} cannot be read ({reason(error)})") from error
@@ -342,10 +305,27 @@ class _Scan:
         if self._file.read() != MCAP_MAGIC:
             raise DamageError("the file does not end as an MCAP file does")
 
-    def _require_all(self, stated: int) -> None:
-        """A record whose kind was damaged is passed over as one that is not known: its messages are missed here."""
-        if stated != self._messages:
-            raise DamageError(f"the file is damaged: it states {stated} messages and holds {self._messages}")
+    def _read_record(self, opcode: int, length: int, checksum: int) -> None:
+        """Take what a record of the file holds. `checksum`: of the file up to the record."""
+        if opcode == Opcode.CHUNK:
+            self._walk_chunk(self._read(length))
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
+            self._take(opcode, self._read(length), 0, length)
+        elif opcode == Opcode.DATA_END:
+            (expected,) = struct.unpack_from("<I", self._read(length))
+            if expected not in (0, checksum):
+                raise DamageError("the file is damaged: its data fail their checksum")
+        elif opcode == Opcode.MESSAGE_INDEX:
+            _, entries_bytes = _MESSAGE_INDEX.unpack_from(self._read(length))
+            if entries_bytes != length - _MESSAGE_INDEX.size:  # a chunk that is taken for one
+                raise ValueError("an index of messages that does not fill its record")
+        elif opcode == Opcode.STATISTICS:
+            (stated,) = struct.unpack_from("<Q", self._read(length))
+            if stated != self._messages:  # a record whose kind was damaged was passed over as an unknown one
+                raise DamageError(f"the file is damaged: it states {stated} messages and holds {self._messages}")
+        else:  # of any size, in small memory; the checksum wants its bytes
+            while length > 0:
+                length -= len(self._read(min(length, _COPY_BYTES)))
 
     def _walk_chunk(self, body: bytes) -> None:
         data = unpack_chunk(body)
@@ -386,15 +366,3 @@ class _Scan:
             raise DamageError("the file is truncated: it ends without a footer")
         self._checksum = zlib.crc32(data, self._checksum)
         return data
-
-    def _skip(self, length: int) -> None:
-        """Pass over a record of any size in small memory; the checksum wants its bytes."""
-        while length > 0:
-            length -= len(self._read(min(length, _COPY_BYTES)))
-
-
-def _require_filled(index: bytes) -> None:
-    """An index of messages is as long as it says; a chunk that is taken for one is not."""
-    _, entries_bytes = _MESSAGE_INDEX.unpack_from(index)
-    if entries_bytes != len(index) - _MESSAGE_INDEX.size:
-        raise ValueError("an index of messages that does not fill its record")

@@ -12,12 +12,12 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from tauscope.errors import RecordingError
+from tauscope.extras import require_extra
 from tauscope.recording.column_files import ROWS_AT_ONCE, Batch, read_batches
 from tauscope.recording.columns import ColumnLayout
 from tauscope.recording.inflation import require_plausible_inflation
+from tauscope.recording.intake import Choice
 from tauscope.recording.recording import Array, Recording
-from tauscope.recording.table import SPOOL_ABOVE_BYTES
-from tauscope.recording.units import SI, Reading
 from tauscope.robot.messages import printable, reason
 
 _LARGEST_INFO_BYTES = 2**22
@@ -106,18 +106,13 @@ PARQUET_MAGIC = b"PAR1"
 _NUMBER_TYPE = re.compile(r"u?int(8|16|32|64)|halffloat|float|double")
 
 
-def read_parquet(
-    path: Path,
-    name: str,
-    joint_count: int | None = None,
-    spool_above_bytes: int = SPOOL_ABOVE_BYTES,
-    reading: Reading = SI,
-) -> Recording:
+def read_parquet(path: Path, choice: Choice) -> Recording:
     """Read a Parquet recording batch by batch; null is a missed sample.
 
-    Raises RecordingError where pyarrow is not installed, the file is damaged, or names the row and column at fault.
-    Raises RecordingMismatchError where the file has another number of joints.
+    Raises MissingExtraError where pyarrow is not installed. Raises RecordingError where the file is damaged, or
+    names the row and column at fault. Raises RecordingMismatchError where the file has another number of joints.
     """
+    name = choice.file
     arrow = _arrow(name)
     with path.open("rb") as stream, _arrow_errors(arrow, name):
         file = arrow.parquet.ParquetFile(stream, page_checksum_verification=True)
@@ -132,17 +127,7 @@ def read_parquet(
             batches = file.iter_batches(batch_size=ROWS_AT_ONCE, columns=read, use_threads=False)
             return _take_batches(arrow, batches, found, columns[0])
 
-        return read_batches(
-            name,
-            list(found),
-            rows,
-            open_batches,
-            joint_count=joint_count,
-            spool_above_bytes=spool_above_bytes,
-            reading=reading,
-            first_row=1,
-            has_episodes=True,
-        )
+        return read_batches(choice, list(found), rows, open_batches, first_row=1, has_episodes=True)
 
 
 def _take_batches(
@@ -168,7 +153,7 @@ def _take_batches(
 def read_parquet_header(path: Path, name: str) -> list[str]:
     """Names of a file's columns, lists unfolded.
 
-    Raises RecordingError where pyarrow is not installed, or the file is damaged.
+    Raises MissingExtraError where pyarrow is not installed. Raises RecordingError where the file is damaged.
     """
     arrow = _arrow(name)
     with path.open("rb") as stream, _arrow_errors(arrow, name):
@@ -178,7 +163,7 @@ def read_parquet_header(path: Path, name: str) -> list[str]:
 def write_parquet(recording: Recording, file: BinaryIO) -> None:
     """Write a recording as Parquet, float64 columns, checksums on every page.
 
-    Raises RecordingError where pyarrow is not installed.
+    Raises MissingExtraError where pyarrow is not installed.
     """
     arrow = _arrow(recording.name)
     table = recording.table
@@ -192,14 +177,10 @@ def write_parquet(recording: Recording, file: BinaryIO) -> None:
 
 def _arrow(name: str) -> Any:
     """The module pyarrow with its Parquet reader, loaded when first wanted: it is large, and an extra."""
-    try:
+    with require_extra(f"{name}: Parquet"):
         import_module("pyarrow.parquet")
         import_module("pyarrow.compute")
         return import_module("pyarrow")
-    except ImportError as error:
-        raise RecordingError(
-            f"{name}: Parquet needs pyarrow, which is not installed: pip install tauscope[parquet]"
-        ) from error
 
 
 @contextmanager

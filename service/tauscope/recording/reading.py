@@ -1,7 +1,7 @@
 """Read a recording, whatever its format, or tell which of its columns is read as which."""
 
 import errno
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,18 +9,41 @@ from tauscope.errors import RecordingError
 from tauscope.recording.column_files import ZIP_MAGIC, read_npz, read_npz_header
 from tauscope.recording.columns import find_layout, is_column, require_joint_count, suggest_layout
 from tauscope.recording.csv_format import read_csv, read_csv_header
-from tauscope.recording.joint_state_topic import Choice
+from tauscope.recording.intake import Choice
+from tauscope.recording.joint_state_topic import JointStateLog
 from tauscope.recording.layout.guess import guess_parts
 from tauscope.recording.layout.rename import rename_columns
-from tauscope.recording.mcap_format import MCAP_MAGIC, read_mcap
+from tauscope.recording.mcap_format import MCAP_MAGIC, add_mcap
 from tauscope.recording.parquet_format import PARQUET_MAGIC, read_parquet, read_parquet_header
 from tauscope.recording.recording import Recording
-from tauscope.recording.ros_bags import ROS1_MAGIC, SQLITE_MAGIC, read_database, read_ros1_bag, read_rosbag2
+from tauscope.recording.ros_bags import ROS1_MAGIC, SQLITE_MAGIC, add_database, add_ros1_bag, add_rosbag2
 from tauscope.recording.units import SI, Reading
 from tauscope.remote_files import copy_locally, find_path, is_folder, knows_ranges, name_failures, open_ranges
 from tauscope.robot.messages import printable
 from tauscope.robot.recording_layout import UNITS
 from tauscope.robot.robot import Robot
+
+
+@dataclass(frozen=True)
+class _Format:
+    """A table, or a log, whose joint states are added to a `JointStateLog`; told by its first bytes."""
+
+    magic: bytes
+    read_table: Callable[[Path, Choice], Recording] | None = None
+    read_header: Callable[[Path, str], list[str]] | None = None
+    add_log: Callable[[Path, str, JointStateLog], None] | None = None
+    reads_ranges: bool = False  # of a remote file; others are copied first
+
+
+_FORMATS = (
+    _Format(PARQUET_MAGIC, read_parquet, read_parquet_header, reads_ranges=True),
+    _Format(MCAP_MAGIC, add_log=add_mcap, reads_ranges=True),
+    _Format(SQLITE_MAGIC, add_log=add_database),
+    _Format(ROS1_MAGIC, add_log=add_ros1_bag),
+    _Format(ZIP_MAGIC, read_npz, read_npz_header),
+)
+_CSV = _Format(b"", read_csv, read_csv_header)
+_FOLDER = _Format(b"", add_log=add_rosbag2, reads_ranges=True)
 
 _LONGEST_PATH = 4096
 _MAGIC_BYTES = 16
@@ -58,7 +81,7 @@ def read_recording(
         with name_failures(path):
             packed_bytes = sum(file.stat().st_size for file in (path.iterdir() if is_folder(path) else [path]))
             choice = Choice(name, joint_count, names, reading=reading, packed_bytes=packed_bytes)
-            recording = _read(path, name, joint_count, choice)
+            recording = _read(path, choice)
     except OSError as error:
         raise RecordingError(f"{name}: {_reason(error)}") from error
     require_joint_count(recording.joint_count, joint_count, name)
@@ -76,15 +99,10 @@ def read_header(path: Path) -> list[str]:
         if not isinstance(path, Path):
             with name_failures(path), copy_locally(path) as copy:
                 return read_header(copy)
-        magic = b"" if path.is_dir() else first_bytes(path, name)
-        if path.is_dir() or magic.startswith((MCAP_MAGIC, SQLITE_MAGIC, ROS1_MAGIC)):
+        found = _find_format(path, name)
+        if found.read_header is None:
             raise RecordingError(f"{name}: a log names its joints itself; choose a topic with --topic")
-        if magic.startswith(PARQUET_MAGIC):
-            return read_parquet_header(path, name)
-        if magic.startswith(ZIP_MAGIC):
-            return read_npz_header(path, name)
-        _refuse_foreign(magic, path, name)
-        return read_csv_header(path, name)
+        return found.read_header(path, name)
     except OSError as error:
         raise RecordingError(f"{name}: {_reason(error)}") from error
 
@@ -102,34 +120,34 @@ def first_bytes(path: Path, name: str) -> bytes:
         return file.read(_MAGIC_BYTES)
 
 
-def _read(path: Path, name: str, joint_count: int | None, choice: Choice) -> Recording:
-    if is_folder(path):
-        return read_rosbag2(path, choice)
-    magic = first_bytes(path, name)
-    if not (isinstance(path, Path) or (magic.startswith((MCAP_MAGIC, PARQUET_MAGIC)) and knows_ranges(path))):
+def _read(path: Path, choice: Choice) -> Recording:
+    found = _find_format(path, choice.file)
+    if not (isinstance(path, Path) or found is _FOLDER or (found.reads_ranges and knows_ranges(path))):
         with copy_locally(path) as copy:
-            return _read(copy, name, joint_count, choice)
-    if magic.startswith(PARQUET_MAGIC):
-        return read_parquet(path, name, joint_count, reading=choice.reading)
-    if magic.startswith(MCAP_MAGIC):
-        return read_mcap(path, choice)
-    if magic.startswith(SQLITE_MAGIC):
-        return read_database(path, choice)
-    if magic.startswith(ROS1_MAGIC):
-        return read_ros1_bag(path, choice)
-    if magic.startswith(ZIP_MAGIC):
-        return read_npz(path, name, joint_count, reading=choice.reading)
-    _refuse_foreign(magic, path, name)
-    return read_csv(path, name, joint_count, reading=choice.reading)
+            return _read(copy, choice)
+    if found.read_table is not None:
+        return found.read_table(path, choice)
+    log = JointStateLog(choice)
+    assert found.add_log is not None  # noqa: S101 - it is no table
+    found.add_log(path, choice.file, log)
+    return log.finish()
 
 
-def _refuse_foreign(magic: bytes, path: Path, name: str) -> None:
+def _find_format(path: Path, name: str) -> _Format:
+    """The format of a file or folder, CSV where nothing tells another. Raises RecordingError where none is read."""
+    if is_folder(path):
+        return _FOLDER
+    magic = first_bytes(path, name)
+    for each in _FORMATS:
+        if magic.startswith(each.magic):
+            return each
     for start, words in _FOREIGN:
         if magic.startswith(start):
             raise RecordingError(f"{name}: {words}")
     if path.suffix.lower() in (".mcap", ".parquet", ".db3", ".bag"):
         found = "is empty" if not magic else f"does not begin as a {path.suffix.lower()} file does"
         raise RecordingError(f"{name}: the file {found}; it is damaged or of another format")
+    return _CSV
 
 
 def _reason(error: OSError) -> str:

@@ -96,45 +96,41 @@ class Recording:
         effort: Array,
         *,
         effort_kind: EffortKind = EffortKind.TORQUE,
-        velocity: Array | None = None,
-        acceleration: Array | None = None,
-        reference: Array | None = None,
-        effort_command: Array | None = None,
-        temperature: Array | None = None,
-        link_position: Array | None = None,
-        voltage: Array | None = None,
-        gain: Array | None = None,
         period: Array | None = None,
+        **optional: Array | None,
     ) -> "Recording":
         """Make a recording of arrays, held to the same rules as a file.
 
         Raises RecordingError, which names the argument, the row (counted from 0, as NumPy does) and the joint at fault.
+        Raises TypeError for another argument than those of `Samples`.
 
         `time`: (N,), strictly increasing [s].
         `position`: (N, n), q [rad or m].
         `effort`: (N, n), τ [Nm or N], or drive units.
-        `velocity`: (N, n), qd [rad/s or m/s].
-        `acceleration`: (N, n), qdd [rad/s² or m/s²].
-        `reference`: (N, n), commanded position [rad or m].
-        `effort_command`: (N, n), commanded effort [Nm or N, or drive units].
-        `temperature`: (N, n), motor or joint temperature [°C].
-        `link_position`: (N, n), position behind the transmission [rad or m].
-        `voltage`: (N, n), supply of the joint's bridge [V].
-        `gain`: (N, n), gain kp in force, in the unit of the robot file's actuator.
         `period`: (N,), index of the repeated excitation period, NaN outside the repeated part.
+        `optional`: (N, n), the optional columns by their names in `Samples`, such as ``velocity``.
         """
-        groups = {
-            "qd": velocity,
-            "qdd": acceleration,
-            "qref": reference,
-            "taucmd": effort_command,
-            "temp": temperature,
-            "qlink": link_position,
-            "volt": voltage,
-            "kp": gain,
-        }
-        present = {group: array for group, array in groups.items() if array is not None}
-        return _from_groups(name, time, position, effort, EffortKind(effort_kind), present, period)
+        unknown = optional.keys() - {_ARGUMENTS[group] for group in OPTIONAL_GROUPS}
+        if unknown:
+            raise TypeError(f"no column of a recording is called {', '.join(sorted(unknown))}")
+        time = _check("time", time, name, None)
+        position = _check("position", position, name, (len(time), None))
+        shape = (len(time), position.shape[1])
+        columns, present = [time[:, None], position, _check("effort", effort, name, shape)], []
+        for group in OPTIONAL_GROUPS:
+            array = optional.get(_ARGUMENTS[group])
+            if array is not None and group != effort_kind:
+                columns.append(_check(_ARGUMENTS[group], array, name, shape))
+                present.append(group)
+        if period is not None:
+            columns.append(_check("period", period, name, (len(time),))[:, None])
+            present.append("period")
+        require_rows(len(time), name)
+        names = table_columns(shape[1], effort_kind, present)
+        data = np.hstack(columns)
+        RowCheck(name, names)(data, lambda row: f"row {row}")
+        require_rising(data[:, 0], -np.inf, name, lambda row: f"row {row}")
+        return Recording(name, shape[1], effort_kind, MemoryTable(names, data))
 
     @staticmethod
     def _group(block: Array, group: str, where: Mapping[str, int]) -> Array | None:
@@ -153,9 +149,6 @@ class Recording:
 
 
 _ARGUMENTS = {
-    "q": "position",
-    "tau": "effort",
-    "i": "effort",
     "volt": "voltage",
     "kp": "gain",
     "qd": "velocity",
@@ -170,32 +163,6 @@ _ARGUMENTS = {
 def _joint_of(name: str, group: str) -> int | None:
     number = name.removeprefix(group)
     return int(number) if number != name and number.isdecimal() else None
-
-
-def _from_groups(
-    name: str,
-    time: Array,
-    position: Array,
-    effort: Array,
-    effort_kind: EffortKind,
-    groups: Mapping[str, Array],
-    period: Array | None,
-) -> Recording:
-    time = _check("time", time, name, None)
-    position = _check("position", position, name, (len(time), None))
-    shape = (len(time), position.shape[1])
-    columns = [time[:, None], position, _check("effort", effort, name, shape)]
-    present = [group for group in OPTIONAL_GROUPS if group in groups and group != effort_kind.value]
-    columns += [_check(_ARGUMENTS[group], groups[group], name, shape) for group in present]
-    if period is not None:
-        columns.append(_check("period", period, name, (len(time),))[:, None])
-        present.append("period")
-    require_rows(len(time), name)
-    names = table_columns(shape[1], effort_kind, present)
-    data = np.hstack(columns)
-    RowCheck(name, names)(data, lambda row: f"row {row}")
-    require_rising(data[:, 0], -np.inf, name, lambda row: f"row {row}")
-    return Recording(name, shape[1], effort_kind, MemoryTable(names, data))
 
 
 def _check(argument: str, array: Array, name: str, shape: tuple[int | None, ...] | None) -> Array:

@@ -15,10 +15,10 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from tauscope.errors import RecordingError
+from tauscope.extras import require_extra
 from tauscope.recording.inflation import HELD_BYTES, LARGEST_RATIO, decompress_file, require_plausible_inflation
-from tauscope.recording.joint_state_topic import Choice, JointStateLog
+from tauscope.recording.joint_state_topic import JointStateLog
 from tauscope.recording.mcap_format import add_mcap
-from tauscope.recording.recording import Recording
 from tauscope.remote_files import copy_locally
 from tauscope.robot.messages import printable, reason
 
@@ -29,24 +29,18 @@ _LARGEST_CHUNK_BYTES = 2**28
 _LARGEST_HEADER_BYTES = 2**16
 
 
-def read_ros1_bag(path: Path, choice: Choice) -> Recording:
-    """Read the joint states of a ROS 1 bag; only chunks that hold messages of their topics are read.
+def add_ros1_bag(path: Path, name: str, log: JointStateLog) -> None:
+    """Add the joint states of a ROS 1 bag to a log; only chunks that hold messages of their topics are read.
 
-    Raises RecordingError where rosbags is not installed, the bag is damaged or not indexed, or there are no usable
-    joint states.
+    Raises MissingExtraError where rosbags is not installed. Raises RecordingError where the bag is damaged or not
+    indexed.
     """
-    name = choice.file
-    try:
-        reader_type: Any = import_module("rosbags.rosbag1").Reader
-        errors = import_module("rosbags.rosbag1").ReaderError
-    except ImportError as error:
-        raise RecordingError(
-            f"{name}: ROS 1 bags need rosbags, which is not installed: pip install 'tauscope[ros1]'"
-        ) from error
-    log = JointStateLog(choice)
+    with require_extra(f"{name}: a ROS 1 bag"):
+        rosbag1: Any = import_module("rosbags.rosbag1")
+    unreadable = (ValueError, KeyError, IndexError, EOFError, OSError, RuntimeError, MemoryError, struct.error)
     try:
         _require_plausible_chunks(path, name)
-        with reader_type(path) as reader:
+        with rosbag1.Reader(path) as reader:
             handlers = {
                 each.id: log.handler(each.topic, each.msgtype.replace("/msg/", "/"), "ros1")
                 for each in reader.connections
@@ -58,21 +52,10 @@ def read_ros1_bag(path: Path, choice: Choice) -> Recording:
                     handler(time, bytes(message))
     except RecordingError:
         raise
-    except (
-        errors,
-        ValueError,
-        KeyError,
-        IndexError,
-        EOFError,
-        OSError,
-        RuntimeError,
-        MemoryError,
-        struct.error,
-    ) as error:
+    except (rosbag1.ReaderError, *unreadable) as error:
         raise RecordingError(
             f"{name}: not a readable ROS 1 bag ({reason(error)}); run `rosbag reindex` on it"
         ) from error
-    return log.finish()
 
 
 def _require_plausible_chunks(path: Path, name: str) -> None:
@@ -122,25 +105,23 @@ METADATA = "metadata.yaml"
 _SQLITE_HEADER_BYTES = 100
 
 
-def read_rosbag2(folder: Path, choice: Choice) -> Recording:
-    """Read the joint states of a rosbag2 folder, its files in the order in which they were recorded.
+def add_rosbag2(folder: Path, bag: str, log: JointStateLog) -> None:
+    """Add the joint states of a rosbag2 folder to a log, its files in the order in which they were recorded.
 
-    Raises RecordingError where a file is missing or damaged, or there are no usable joint states.
+    Raises RecordingError where a file is missing or damaged.
     """
-    log = JointStateLog(choice)
-    for file in _files(folder, choice.file):
-        name = f"{choice.file}/{printable(file)}"
+    for file in _files(folder, bag):
+        name = f"{bag}/{printable(file)}"
         path = folder / file
         if not path.is_file() and (folder / f"{file}.zstd").is_file():  # the names that rosbag2 wrote at first
             path = folder / f"{file}.zstd"
         if not path.is_file():
-            raise RecordingError(f"{choice.file}: {METADATA} names {printable(file)}, which is not there")
+            raise RecordingError(f"{bag}: {METADATA} names {printable(file)}, which is not there")
         if path.suffix == ".zstd":
             with copy_locally(path) as copy, TemporaryDirectory(prefix="tauscope-") as temporary:
                 _add_file(decompress_file(copy, Path(temporary) / path.stem, name), name, log)
         else:
             _add_file(path, name, log)
-    return log.finish()
 
 
 def _add_file(path: Path, name: str, log: JointStateLog) -> None:
@@ -148,19 +129,9 @@ def _add_file(path: Path, name: str, log: JointStateLog) -> None:
         add_mcap(path, name, log)
     elif path.suffix == ".db3":
         with copy_locally(path) as copy:
-            _add_database(copy, name, log)
+            add_database(copy, name, log)
     else:
         raise RecordingError(f"{name}: neither .mcap nor .db3; convert the bag with `ros2 bag convert` first")
-
-
-def read_database(path: Path, choice: Choice) -> Recording:
-    """Read the joint states of one rosbag2 SQLite file.
-
-    Raises RecordingError where the file is damaged, or there are no usable joint states.
-    """
-    log = JointStateLog(choice)
-    _add_database(path, choice.file, log)
-    return log.finish()
 
 
 def _files(folder: Path, name: str) -> list[str]:
@@ -186,8 +157,8 @@ def _files(folder: Path, name: str) -> list[str]:
     return files
 
 
-def _add_database(path: Path, name: str, log: JointStateLog) -> None:
-    """Add the messages of a SQLite file to a log; `immutable` keeps SQLite from making files beside it."""
+def add_database(path: Path, name: str, log: JointStateLog) -> None:
+    """Add the joint states of one rosbag2 SQLite file to a log. Raises RecordingError where the file is damaged."""
     journal = path.with_name(path.name + "-wal")
     if journal.is_file() and journal.stat().st_size:
         raise RecordingError(
@@ -195,6 +166,7 @@ def _add_database(path: Path, name: str, log: JointStateLog) -> None:
         )
     _require_all_pages(path, name)
     try:
+        # `immutable` keeps SQLite from making files beside it.
         connection = sqlite3.connect(f"file:{quote(str(path.absolute()))}?mode=ro&immutable=1", uri=True)
         try:
             (state,) = connection.execute("PRAGMA quick_check(1)").fetchone()

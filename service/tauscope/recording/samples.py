@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.errors import RecordingError
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array
 
 
 class EffortKind(StrEnum):

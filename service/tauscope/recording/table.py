@@ -3,6 +3,8 @@
 import os
 import tempfile
 import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -102,7 +104,8 @@ class TableBuilder:
         if self._spool is None and length > self._limit_rows:
             self._start_spool()
         if self._spool is not None:
-            _append(self._spool, block)
+            with _naming_room():
+                self._spool.append(block)
         else:
             if length > len(self._data):
                 self._grow(length)
@@ -122,23 +125,19 @@ class TableBuilder:
         self._data = grown
 
     def _start_spool(self) -> None:
-        try:
+        with _naming_room():
             self._spool = SpooledTable(self._names)
-        except OSError as error:
-            raise _no_room(error) from error
-        _append(self._spool, self._data[: self._length])
+            self._spool.append(self._data[: self._length])
         self._data = np.empty((0, len(self._names)))
 
 
-def _append(spool: SpooledTable, block: Array) -> None:
+@contextmanager
+def _naming_room() -> Iterator[None]:
+    """Say in which folder there is no room. Raises RecordingError."""
     try:
-        spool.append(block)
+        yield
     except OSError as error:
-        raise _no_room(error) from error
-
-
-def _no_room(error: OSError) -> RecordingError:
-    return RecordingError(
-        f"the temporary folder {tempfile.gettempdir()} cannot hold the recording ({error.strerror}): "
-        "make room there or set TMPDIR to a larger folder"
-    )
+        raise RecordingError(
+            f"the temporary folder {tempfile.gettempdir()} cannot hold the recording ({error.strerror}): "
+            "make room there or set TMPDIR to a larger folder"
+        ) from error

@@ -30,8 +30,7 @@ class Reading:
     `joint_types`: of the robot, where it is known: degrees are of revolute joints only, mm of prismatic ones.
     `joint_names`: of the robot, where it is known.
     `prefers_torque`: whether currents are of no use, because no torque constant is known.
-    columns, decimal, delimiter, topic
-        as in `RecordingLayout`
+    `columns`, `decimal`, `delimiter`, `topic`: as in `RecordingLayout`.
     `is_usual`: whether the columns are those of the robot file: recordings that Tauscope made have their own.
     """
 
@@ -54,7 +53,8 @@ class Reading:
         """
         layout = RecordingLayout() if robot is None else robot.recording
         columns = layout.columns if self.columns is None else self.columns
-        units = {**preset_units(columns), **layout.units, **self.units}
+        preset = PRESET_OF[columns].units if isinstance(columns, str) else {}
+        units = {**preset, **layout.units, **self.units}
         rate_hz = self.rate_hz if self.rate_hz is not None or units.get("t") != "index" else layout.rate_hz
         fault = find_fault(units, rate_hz)
         if fault is not None:
@@ -118,11 +118,6 @@ class Conversion:
     def is_needed(self) -> bool:
         """Whether anything changes."""
         return self.from_first or bool((self.factor != 1.0).any())
-
-
-def preset_units(columns: Mapping[str, Source] | str | None) -> Mapping[str, str]:
-    """Units of a preset, none where columns are not one."""
-    return PRESET_OF[columns].units if isinstance(columns, str) else {}
 
 
 def parse_units(text: str) -> dict[str, str]:

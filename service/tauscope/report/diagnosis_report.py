@@ -3,8 +3,6 @@
 import shlex
 from collections.abc import Iterator, Sequence
 
-from markupsafe import Markup
-
 from tauscope.diagnosis import Diagnosis, DiagnosisDocument
 from tauscope.diagnosis.documents.plots import DiagnosisPlots, diagnosis_plots
 from tauscope.diagnosis.documents.result import FindingEntry
@@ -18,7 +16,6 @@ from tauscope.report.tables import (
     detectable_table,
     difference_table,
     headroom_table,
-    input_table,
     located_table,
     residual_table,
     shift_table,
@@ -36,7 +33,6 @@ from tauscope.report.words import (
     noise_words,
     place_title,
     summary_sentences,
-    torque_unit,
 )
 from tauscope.robot import JointType
 
@@ -46,7 +42,7 @@ def diagnosis_report(
 ) -> str:
     """A self-contained HTML page on a diagnosis."""
     plots = diagnosis_plots(diagnosis)
-    units = [torque_unit(joint.type) for joint in diagnosis.robot.joints]
+    units = [joint.type.torque_unit for joint in diagnosis.robot.joints]
     sections = [
         _where(plots, document, [joint.type for joint in diagnosis.robot.joints]),
         _what(document),
@@ -55,21 +51,18 @@ def diagnosis_report(
         *_headroom(document),
         _next(document, planned),
         _detectable(document),
-        _reproduce(provenance),
     ]
-    joints = counted(len(document.joints), "joint")
-    created = provenance.created.strftime("%Y-%m-%d %H:%M %Z").strip()
     return render(
         Page(
             kind="diagnosis",
             robot=document.robot,
             headline=document.headline,
-            subtitle=f"{joints} · band {significant(document.cutoff_hz, 3)} Hz · {created}",
+            facts=[counted(len(document.joints), "joint"), f"band {significant(document.cutoff_hz, 3)} Hz"],
             key_figures=list(_key_figures(document)),
             sentences=list(summary_sentences(document)),
             cautions=list(doubts(document)),
-            sections=sections,
-            footer=", ".join(f"{name} {version}" for name, version in provenance.versions),
+            story=sections,
+            provenance=provenance,
         )
     )
 
@@ -145,13 +138,12 @@ def _cards(entries: Sequence[FindingEntry], joints: Sequence[str]) -> list[Card]
 def _how_much(document: DiagnosisDocument) -> Section:
     parts = [Part(title="Residual rms at the recorded rate", table=residual_table(document))]
     if document.parameter_differences:
-        svg = Markup(difference_figure("differences", document))  # noqa: S704 - our own drawing
+        svg = difference_figure("differences", document)
         drawing = Drawing(svg, "How far the simulation's parameters are off", "The arm less what it is compared with.")
         parts.append(Part(title="What the simulation has wrong", figure=drawing, table=difference_table(document)))
     if document.parameter_shifts:
-        svg = Markup(shift_figure("shifts", document))  # noqa: S704 - as above
         drawing = Drawing(
-            svg,
+            shift_figure("shifts", document),
             "How far parameters moved when the findings were added",
             "What the left-out effects had been hiding in: estimates with the findings less those without.",
         )
@@ -165,7 +157,6 @@ def _proof(plots: DiagnosisPlots, document: DiagnosisDocument, units: list[str])
     parts = []
     for number, (overlay, unit) in enumerate(zip(plots.overlays, units, strict=True), start=1):
         spectrum = spectra.get(overlay.joint)
-        svg = Markup(proof_figure(f"proof-{number}", overlay, spectrum, unit))  # noqa: S704 - as above
         names = ("time", "measured", "before", "after")
         text = csv_text({name: getattr(overlay, name) for name in names})
         if spectrum is not None:
@@ -175,7 +166,7 @@ def _proof(plots: DiagnosisPlots, document: DiagnosisDocument, units: list[str])
             Part(
                 title=overlay.joint,
                 figure=Drawing(
-                    svg,
+                    proof_figure(f"proof-{number}", overlay, spectrum, unit),
                     f"Torque of {overlay.joint}, measured and modelled without and with the findings",
                     f"{file_title(overlay.recording)}, the stretch in which the findings take most off the residual.",
                 ),
@@ -208,7 +199,7 @@ def _next(document: DiagnosisDocument, planned: PlannedExperiment | None) -> Sec
         sentences.append(f"It tells apart: {', '.join(wanted.separates)}.")
     parts = []
     if planned is not None:
-        svg = Markup(motion_figure("next-motion", planned.trajectory, list(document.joints)))  # noqa: S704 - as above
+        svg = motion_figure("next-motion", planned.trajectory, list(document.joints))
         caption = (
             f"{significant(planned.trajectory.duration_s, 3)} s, within the robot file's limits, from rest to rest."
         )
@@ -225,10 +216,3 @@ def _detectable(document: DiagnosisDocument) -> Section:
     )
     part = Part(table=detectable_table(document))
     return Section("detectable", "What would have been seen", [part], [sentence])
-
-
-def _reproduce(provenance: Provenance) -> Section:
-    parts = [Part(table=input_table(provenance))]
-    if provenance.command:
-        parts.append(Part(command=shlex.join(provenance.command)))
-    return Section("reproduce", "To make it again", parts)

@@ -48,8 +48,8 @@ def heat_map(histograms: Sequence[ResidualHistogram], joints: Sequence[str], *, 
             if own is not None:
                 parts += _cells(own, left, _TOP + _ROW * row, group, after=after)
     for row, joint in enumerate(joints):
-        name = joint if len(joint) <= _MOST_LETTERS else joint[: _MOST_LETTERS - 1] + "…"
-        parts.append(f'<text x="0" y="{_TOP + _ROW * row + 14:g}">{escape(name)}</text>')
+        name = escape(_shorten(joint, _MOST_LETTERS))
+        parts.append(f'<text x="0" y="{_TOP + _ROW * row + 14:g}">{name}</text>')
     parts += _legend(height - 14.0)
     return Markup("".join([*parts, "</svg>"]))  # noqa: S704 - our own drawing; names are escaped
 
@@ -100,7 +100,7 @@ DEVIATIONS = 1.96  # standard errors to either side: 95 % of a normal distributi
 LONGEST_LABEL = 62
 
 
-def parameter_figure(name: str, entries: Sequence[BaseParameterEntry]) -> str:
+def parameter_figure(name: str, entries: Sequence[BaseParameterEntry]) -> Markup:
     """Draw base parameters with their 95 % intervals."""
     panels: dict[str, list[BaseParameterEntry]] = {}
     for entry in entries:
@@ -132,21 +132,26 @@ def _draw_panel(axis: Axes, entries: Sequence[BaseParameterEntry]) -> None:
         elinewidth=1.1,
         capsize=2.2,
     )
-    axis.set_yticks(places, [_shorten(entry.name) for entry in entries])
-    axis.set_ylim(len(entries) - 0.4, -0.6)
     axis.grid(visible=False, axis="y")
+    _name_rows(axis, [_shorten(entry.name, LONGEST_LABEL) for entry in entries])
+
+
+def _name_rows(axis: Axes, names: Sequence[str]) -> None:
+    """A row a name, the first on top."""
+    axis.set_yticks(np.arange(len(names)), names)
+    axis.set_ylim(len(names) - 0.4, -0.6)
     axis.tick_params(axis="y", length=0)
     axis.spines["left"].set_visible(False)
 
 
-def _shorten(name: str) -> str:
-    return name if len(name) <= LONGEST_LABEL else name[: LONGEST_LABEL - 1] + "…"
+def _shorten(name: str, longest: int) -> str:
+    return name if len(name) <= longest else name[: longest - 1] + "…"
 
 
 RESIDUAL_ROW_INCHES = 0.24
 
 
-def residual_figure(name: str, document: IdentificationDocument) -> str:
+def residual_figure(name: str, document: IdentificationDocument) -> Markup:
     """Draw every joint's residual as a multiple of its noise."""
     fits = {"own recordings": (document.fit.train, PREDICTED, "o")}
     if document.fit.held_out is not None:
@@ -161,11 +166,8 @@ def residual_figure(name: str, document: IdentificationDocument) -> str:
             ratios = [noise_ratio(rms, noise) for rms, noise in zip(fit.rms, document.noise_std, strict=True)]
             largest = max(largest, *ratios)
             axis.plot(ratios, places, linestyle="none", marker=marker, markersize=4.5, color=colour, label=label)
-        axis.set_yticks(places, document.joints)
-        axis.set_ylim(len(places) - 0.4, -0.6)
+        _name_rows(axis, document.joints)
         axis.set_xlim(0.0, 1.15 * largest if np.isfinite(largest) else None)
-        axis.tick_params(axis="y", length=0)
-        axis.spines["left"].set_visible(False)
         axis.set_xlabel("residual rms / noise σ")
         handles, labels = axis.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=3, borderpad=0.0)
@@ -180,37 +182,32 @@ LONGEST_SHIFT_LABEL = 58
 TICKS = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 10000.0)
 
 
-def shift_figure(name: str, document: DiagnosisDocument) -> str:
+def shift_figure(name: str, document: DiagnosisDocument) -> Markup:
     """Draw how far parameters moved when the findings were added, in standard errors."""
     entries = document.parameter_shifts[:MOST]
     return _bars(name, [e.parameter for e in entries], [e.shift_in_std for e in entries])
 
 
-def difference_figure(name: str, document: DiagnosisDocument) -> str:
+def difference_figure(name: str, document: DiagnosisDocument) -> Markup:
     """Draw how far the arm's parameters are from the simulation's, in standard errors."""
     entries = document.parameter_differences[:MOST]
     return _bars(name, [e.parameter for e in entries], [e.difference_in_std for e in entries])
 
 
-def _bars(name: str, labels: Sequence[str], values: Sequence[float]) -> str:
-    places = np.arange(len(labels))
-    shown = [label if len(label) <= LONGEST_SHIFT_LABEL else label[: LONGEST_SHIFT_LABEL - 1] + "…" for label in labels]
+def _bars(name: str, labels: Sequence[str], values: Sequence[float]) -> Markup:
 
     def draw(figure: Figure) -> None:
         axis = figure.subplots()
         axis.axvspan(-1.96, 1.96, color=BAND, linewidth=0)
-        axis.barh(places, values, height=0.55, color=PREDICTED)
+        axis.barh(np.arange(len(labels)), values, height=0.55, color=PREDICTED)
         axis.axvline(0.0, color=MUTED, linewidth=0.6)
         axis.set_xscale("symlog", linthresh=TICKS[0])
         shown_ticks = [tick for tick in TICKS if tick <= 1.2 * np.max(np.abs(values))]
         axis.set_xticks([*(-tick for tick in reversed(shown_ticks)), 0.0, *shown_ticks])
         axis.xaxis.set_major_formatter(lambda value, _: power_of_ten(value))
         axis.xaxis.set_minor_locator(NullLocator())
-        axis.set_yticks(places, shown)
-        axis.set_ylim(len(labels) - 0.4, -0.6)
         axis.grid(visible=False, axis="y")
-        axis.tick_params(axis="y", length=0)
-        axis.spines["left"].set_visible(False)
+        _name_rows(axis, [_shorten(label, LONGEST_SHIFT_LABEL) for label in labels])
         axis.set_xlabel("standard errors (band: ± 1.96)")
 
     return draw_svg(name, 0.6 + SHIFT_ROW_INCHES * (len(labels) + 1), draw)
@@ -220,7 +217,7 @@ MOST_SAMPLES = 700
 MOTION_ROW_INCHES = 0.55
 
 
-def motion_figure(name: str, trajectory: Trajectory, joints: list[str]) -> str:
+def motion_figure(name: str, trajectory: Trajectory, joints: list[str]) -> Markup:
     """Draw every joint's position over time."""
     sampled = trajectory.evaluate(np.linspace(0.0, trajectory.duration_s, MOST_SAMPLES))
 
@@ -228,7 +225,7 @@ def motion_figure(name: str, trajectory: Trajectory, joints: list[str]) -> str:
         axes = np.atleast_1d(figure.subplots(len(joints), 1, sharex=True))
         for number, (axis, joint) in enumerate(zip(axes, joints, strict=True)):
             axis.plot(sampled.time, sampled.position[:, number], color=PREDICTED, linewidth=0.9)
-            axis.set_ylabel(joint if len(joint) <= 12 else joint[:11] + "…", rotation=0, ha="right", va="center")
+            axis.set_ylabel(_shorten(joint, 12), rotation=0, ha="right", va="center")
             axis.margins(x=0.0)
         axes[-1].set_xlabel("time [s]")
 
@@ -241,7 +238,7 @@ FRICTION_ROW_INCHES = 2.25
 
 def friction_figure(
     name: str, curves: Sequence[FrictionCurve], titles: Sequence[str], units: Sequence[tuple[str, str]]
-) -> str:
+) -> Markup:
     """Draw the friction of every joint over velocity.
 
     `units`: sequence of (str, str), units of velocity and of torque, one pair a joint.

@@ -10,12 +10,11 @@ from tauscope.identification import Identification
 from tauscope.recording import Recording
 from tauscope.recording.recording import Array
 from tauscope.report.friction_curve import friction_curve
-from tauscope.report.series import TorqueSeries, envelope_indices, torque_series
+from tauscope.report.series import MOST_SERIES, TorqueSeries, envelope_indices, torque_series
 from tauscope.robot import JointType
 from tauscope.strict_model import ResultModel
 
 MOST_POINTS = 4000  # points of one joint's torque: more than any screen is wide, so that a zoom shows more
-MOST_SERIES = 6  # recordings that the friction curves are compared with
 
 
 class TorqueCurve(ResultModel):

@@ -1,9 +1,6 @@
 """The identification as a page: what an engineer reads, shows and files."""
 
-import shlex
 from collections.abc import Iterator, Sequence
-
-from markupsafe import Markup
 
 from tauscope.identification import Identification, IdentificationDocument, document
 from tauscope.number_text import counted, percent, significant
@@ -12,30 +9,19 @@ from tauscope.report.figures import friction_figure, parameter_figure, residual_
 from tauscope.report.friction_curve import friction_curve
 from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.provenance import Provenance
-from tauscope.report.series import TorqueSeries, torque_series
+from tauscope.report.series import MOST_SERIES, TorqueSeries, torque_series
 from tauscope.report.tables import (
     base_parameter_table,
     conditioning_table,
     csv_text,
     fit_table,
     friction_table,
-    input_table,
     link_table,
     rotor_table,
 )
 from tauscope.report.torque_figure import torque_columns, torque_figure
-from tauscope.report.words import (
-    band_words,
-    cautions,
-    fit_sentences,
-    masked_samples,
-    noise_ratio,
-    noise_words,
-    torque_unit,
-    velocity_unit,
-)
+from tauscope.report.words import band_words, cautions, fit_sentences, masked_samples, noise_ratio, noise_words
 
-MOST_SERIES = 6  # recordings that the friction curves are compared with
 _FRICTION_EQUATION = "τ_f(q̇) = τ_s A(K_v q̇) + τ_sc A(δ q̇) + τ_v q̇ + offset,  A(x) = (2/π) arctan x"
 
 
@@ -59,28 +45,26 @@ def identification_report(
         _friction_section(result, identification, train),
         _parameter_section(result),
         _link_section(result),
-        _data_section(result),
-        _source_section(provenance),
+        Section("data", "Recordings", [Part(table=conditioning_table(result))]),
     ]
     return render(
         Page(
+            kind="identification",
             robot=result.robot,
-            subtitle=_subtitle(result, provenance),
+            facts=_facts(result),
             key_figures=list(_key_figures(result)),
             sentences=fit_sentences(result),
             cautions=cautions(result),
-            sections=sections,
-            footer=", ".join(f"{name} {version}" for name, version in provenance.versions),
+            story=sections,
+            provenance=provenance,
         )
     )
 
 
-def _subtitle(result: IdentificationDocument, provenance: Provenance) -> str:
+def _facts(result: IdentificationDocument) -> list[str]:
     counts = [(len(result.conditioning), ""), (len(result.held_out_conditioning), " held out")]
     recordings = ", ".join(f"{counted(count, 'recording')}{what}" for count, what in counts if count)
-    joints = counted(len(result.joints), "joint")
-    date = provenance.created.strftime("%Y-%m-%d %H:%M %Z").strip()
-    return f"{joints} · {recordings} · {result.estimator.upper()} · band {band_words(result)} · {date}"
+    return [counted(len(result.joints), "joint"), recordings, result.estimator.upper(), f"band {band_words(result)}"]
 
 
 def _key_figures(result: IdentificationDocument) -> Iterator[KeyFigure]:
@@ -100,7 +84,7 @@ def _key_figures(result: IdentificationDocument) -> Iterator[KeyFigure]:
 
 def _fit_section(result: IdentificationDocument, identification: Identification) -> Section:
     figure = Drawing(
-        Markup(residual_figure("fit", result)),  # noqa: S704 - our own drawing; its text is escaped
+        residual_figure("fit", result),
         "Residual of every joint as a multiple of its sensor noise",
         "Residual rms at the recorded rate, unfiltered, as a multiple of the sensor noise σ"
         f" ({noise_words(result.noise_method)})."
@@ -114,11 +98,11 @@ def _torque_section(
 ) -> Section:
     parts = []
     for joint, name in enumerate(result.joints):
-        unit = torque_unit(identification.robot.joints[joint].type)
+        unit = identification.robot.joints[joint].type.torque_unit
         svg = torque_figure(f"{kind}-{joint + 1}", series, joint, result.noise_std[joint], unit)
         label = f"Torque of {name}, measured and predicted, and their difference"
         caption = f"{name}: torque at the recorded rate above, what the model leaves below; right, the shaded tenth."
-        drawing = Drawing(Markup(svg), label, caption)  # noqa: S704 - as above
+        drawing = Drawing(svg, label, caption)
         numbers = Numbers(f"Numbers of {name}", text=csv_text(torque_columns(series, joint)))
         parts.append(Part(title=name, figure=drawing, numbers=numbers))
     length = series.time[-1] - series.time[0]
@@ -134,9 +118,9 @@ def _friction_section(
 ) -> Section:
     types = [joint.type for joint in identification.robot.joints]
     curves = [friction_curve(identification, series, joint) for joint in range(len(types))]
-    units = [(velocity_unit(kind), torque_unit(kind)) for kind in types]
+    units = [(f"{kind.unit}/s", kind.torque_unit) for kind in types]
     figure = Drawing(
-        Markup(friction_figure("friction", curves, result.joints, units)),  # noqa: S704 - as above
+        friction_figure("friction", curves, result.joints, units),
         "Friction of every joint over its velocity",
         "Solid where recordings exist, between the upright lines; dashed beyond. The band follows from the standard"
         " errors alone; the dots are the recordings' own: measured torque less that of the rigid body.",
@@ -157,7 +141,7 @@ def _parameter_section(result: IdentificationDocument) -> Section:
     parts = []
     if known:
         caption = "Estimates with 95 % intervals, one panel a unit; inertias about the link frames' origins."
-        svg = Markup(parameter_figure("parameters", known))  # noqa: S704 - as above
+        svg = parameter_figure("parameters", known)
         parts.append(Part(figure=Drawing(svg, "Base parameters with their 95 % intervals", caption)))
     note = f"No motion of this arm shows {', '.join(result.unidentifiable)}." if result.unidentifiable else None
     parts.append(Part(table=base_parameter_table(result), note=note))
@@ -170,14 +154,3 @@ def _link_section(result: IdentificationDocument) -> Section:
         " Data determine their base parameters; the prior determines the rest of each."
     )
     return Section("links", "Links", [Part(table=link_table(result))], [sentence])
-
-
-def _data_section(result: IdentificationDocument) -> Section:
-    return Section("data", "Recordings", [Part(table=conditioning_table(result))])
-
-
-def _source_section(provenance: Provenance) -> Section:
-    parts = [Part(table=input_table(provenance))]
-    if provenance.command:
-        parts.append(Part(command=shlex.join(provenance.command)))
-    return Section("reproduce", "To make it again", parts)

@@ -1,12 +1,14 @@
 """The parts of a page, and how they become HTML."""
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from tauscope.report.tables import Table
+from tauscope.report.provenance import Provenance
+from tauscope.report.tables import Table, input_table
 
 
 @dataclass(frozen=True)
@@ -88,22 +90,38 @@ class KeyFigure:
 
 @dataclass(frozen=True)
 class Page:
-    """Everything on the page."""
+    """Everything on the page.
 
+    `facts`: that stand below the title, beside the date.
+    """
+
+    kind: str
     robot: str
-    subtitle: str
+    facts: Sequence[str]
     key_figures: Sequence[KeyFigure]
     sentences: Sequence[str]
     cautions: Sequence[str]
-    sections: Sequence[Section]
-    footer: str
-    kind: str = "identification"
+    story: Sequence[Section]
+    provenance: Provenance
     headline: str | None = None
 
     @property
-    def contents(self) -> list[tuple[str, str]]:
-        """Anchor and title of every section."""
-        return [(section.anchor, section.title) for section in self.sections]
+    def subtitle(self) -> str:
+        """The facts and the date."""
+        return " · ".join([*self.facts, self.provenance.created.strftime("%Y-%m-%d %H:%M %Z").strip()])
+
+    @property
+    def sections(self) -> list[Section]:
+        """The story, and how to get it again."""
+        parts = [Part(table=input_table(self.provenance))]
+        if self.provenance.command:
+            parts.append(Part(command=shlex.join(self.provenance.command)))
+        return [*self.story, Section("reproduce", "To make it again", parts)]
+
+    @property
+    def footer(self) -> str:
+        """What computed it."""
+        return ", ".join(f"{name} {version}" for name, version in self.provenance.versions)
 
 
 def render(page: Page) -> str:

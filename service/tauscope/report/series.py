@@ -35,6 +35,7 @@ def envelope_indices(values: Array, most: int) -> NDArray[np.intp]:
     return np.array(kept, dtype=np.intp)
 
 
+MOST_SERIES = 6  # recordings that the friction curves are compared with
 MOST_PIECES = 8  # pieces of a recording that are conditioned in search of the longest
 
 

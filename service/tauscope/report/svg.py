@@ -7,6 +7,7 @@ from threading import Lock
 from typing import Any
 
 import matplotlib as mpl
+from markupsafe import Markup
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
@@ -72,7 +73,7 @@ _STYLE: Any = {
 _DRAWING = Lock()  # matplotlib's settings belong to the whole process; one figure at a time has them
 
 
-def draw_svg(name: str, height_inches: float, draw: Callable[[Figure], None]) -> str:
+def draw_svg(name: str, height_inches: float, draw: Callable[[Figure], None]) -> Markup:
     """Draw a figure and return it as an ``<svg>`` element that can stand in a page beside others."""
     with _DRAWING, mpl.rc_context(_STYLE):
         figure = Figure(figsize=(WIDTH_INCHES, height_inches), layout="constrained")
@@ -80,7 +81,7 @@ def draw_svg(name: str, height_inches: float, draw: Callable[[Figure], None]) ->
         draw(figure)
         text = io.StringIO()
         canvas.print_svg(text, metadata={"Date": None})
-    return _adapt_to_page(text.getvalue(), name)
+    return Markup(_adapt_to_page(text.getvalue(), name))  # noqa: S704 - our own drawing; its text is escaped
 
 
 def _adapt_to_page(svg: str, name: str) -> str:

@@ -7,7 +7,7 @@ from tauscope.diagnosis import DiagnosisDocument
 from tauscope.identification import IdentificationDocument
 from tauscope.number_text import ABSENT, percent, significant, with_uncertainty
 from tauscope.report.provenance import Provenance
-from tauscope.report.words import base_parameter_unit, effect_title, noise_ratio, torque_unit
+from tauscope.report.words import base_parameter_unit, effect_title, noise_ratio
 from tauscope.robot import Robot
 
 
@@ -121,7 +121,7 @@ def fit_table(document: IdentificationDocument, robot: Robot) -> Table:
         noise, own, other = document.noise_std[place], fit.train.rms[place], unseen[place]
         ratio = noise_ratio(own if other is None else other, noise)
         numbers = [significant(number, 3) for number in (noise, own, other, ratio)]
-        rows.append([document.joints[place], *numbers, torque_unit(joint.type)])
+        rows.append([document.joints[place], *numbers, joint.type.torque_unit])
     errors = (fit.train.relative_error, fit.held_out.relative_error if fit.held_out else None)
     rows.append(["relative error in the band", "", *(percent(error) for error in errors), "", ""])
     columns = ("joint", "noise σ", "residual rms", "held out", "residual / noise", "unit")

@@ -1,6 +1,9 @@
 """Torque of one joint over time: as it was measured, as models predict it, and what is left."""
 
+from typing import Any
+
 import numpy as np
+from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
@@ -15,7 +18,7 @@ from tauscope.report.svg import BAND, INK, MEASURED, MUTED, PREDICTED, RESIDUAL,
 PROOF_INCHES = 3.5
 
 
-def proof_figure(name: str, overlay: TorqueOverlay, spectrum: ResidualSpectrum | None, unit: str) -> str:
+def proof_figure(name: str, overlay: TorqueOverlay, spectrum: ResidualSpectrum | None, unit: str) -> Markup:
     """Draw torque, residual and the residual's spectrum of one joint, without and with the findings."""
     time, measured, before, after = (
         np.array(values) for values in (overlay.time, overlay.measured, overlay.before, overlay.after)
@@ -69,7 +72,7 @@ MOST_POINTS_ENLARGED = 700
 ENLARGED_SHARE = 0.1  # part of the time that is enlarged: where the residual's mean square is greatest
 
 
-def torque_figure(name: str, series: TorqueSeries, joint: int, noise_std: float, unit: str) -> str:
+def torque_figure(name: str, series: TorqueSeries, joint: int, noise_std: float, unit: str) -> Markup:
     """Draw one joint's torque and residual, whole and enlarged where they differ most.
 
     `joint`: joint index, from 0; `noise_std`: σ of the sensor noise [Nm or N].
@@ -80,8 +83,13 @@ def torque_figure(name: str, series: TorqueSeries, joint: int, noise_std: float,
         axes = figure.subplots(2, 2, sharex="col", sharey="row", height_ratios=(1.7, 1.0), width_ratios=(2.4, 1.0))
         everything = slice(0, len(series.time))
         for column, (rows, most) in enumerate(((everything, MOST_POINTS), (enlarged, MOST_POINTS_ENLARGED))):
-            _draw_torque(axes[0, column], series, joint, rows, most)
-            _draw_residual(axes[1, column], series, joint, rows, most, noise_std)
+            torque, residual, time = axes[0, column], axes[1, column], series.time[rows]
+            measured, predicted = series.measured[rows, joint], series.predicted[rows, joint]
+            plot_envelope(torque, time, measured, most, color=MEASURED, linewidth=0.9, label="measured")
+            plot_envelope(torque, time, predicted, most, color=PREDICTED, linewidth=1.2, label="model")
+            residual.axhspan(-2.0 * noise_std, 2.0 * noise_std, color=BAND, linewidth=0, label="± 2 σ of the noise")
+            difference = measured - predicted
+            plot_envelope(residual, time, difference, most, color=RESIDUAL, linewidth=0.7, label="measured − model")
         start, stop = series.time[enlarged.start], series.time[enlarged.stop - 1]
         for axis in axes[:, 0]:
             axis.axvspan(start, stop, color=MUTED, alpha=0.12, linewidth=0)
@@ -114,19 +122,8 @@ def worst_part(residual: Array, share: float) -> slice:
     return slice(start, start + length)
 
 
-def _draw_torque(axis: Axes, series: TorqueSeries, joint: int, rows: slice, most: int) -> None:
-    time = series.time[rows]
-    measured, predicted = series.measured[rows, joint], series.predicted[rows, joint]
-    kept = envelope_indices(measured, most)
-    axis.plot(time[kept], measured[kept], color=MEASURED, linewidth=0.9, label="measured")
-    kept = envelope_indices(predicted, most)
-    axis.plot(time[kept], predicted[kept], color=PREDICTED, linewidth=1.2, label="model")
-    axis.margins(x=0.0)
-
-
-def _draw_residual(axis: Axes, series: TorqueSeries, joint: int, rows: slice, most: int, noise_std: float) -> None:
-    time, residual = series.time[rows], series.residual[rows, joint]
-    kept = envelope_indices(residual, most)
-    axis.axhspan(-2.0 * noise_std, 2.0 * noise_std, color=BAND, linewidth=0, label="± 2 σ of the noise")
-    axis.plot(time[kept], residual[kept], color=RESIDUAL, linewidth=0.7, label="measured − model")
+def plot_envelope(axis: Axes, time: Array, values: Array, most: int, **style: Any) -> None:
+    """Draw a curve over the whole width of an axis by as many points as keep its look. `time`, `values`: (N,)."""
+    kept = envelope_indices(values, most)
+    axis.plot(time[kept], values[kept], **style)
     axis.margins(x=0.0)

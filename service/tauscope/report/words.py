@@ -13,21 +13,11 @@ from tauscope.robot import JointType
 from tauscope.robot.messages import listed
 
 
-def torque_unit(joint_type: JointType) -> str:
-    """Unit of what drives a joint."""
-    return "N" if joint_type is JointType.PRISMATIC else "Nm"
-
-
-def velocity_unit(joint_type: JointType) -> str:
-    """Unit of a joint's velocity."""
-    return "m/s" if joint_type is JointType.PRISMATIC else "rad/s"
-
-
 def state_unit(variable: str, joint_type: JointType) -> str:
     """Unit of a variable that a residual may depend on."""
-    position = "m" if joint_type is JointType.PRISMATIC else "rad"
+    position = joint_type.unit
     units = {"velocity": f"{position}/s", "position": position, "acceleration": f"{position}/s²", "time": "s"}
-    return {**units, "load": torque_unit(joint_type), "temperature": "°C", "motor_position": "rad"}.get(variable, "")
+    return {**units, "load": joint_type.torque_unit, "temperature": "°C", "motor_position": "rad"}.get(variable, "")
 
 
 def base_parameter_unit(terms: Iterable[str]) -> str:
@@ -216,7 +206,7 @@ def location_sentence(entry: MismatchEntry, joint_type: JointType) -> str:
     """Where one joint's mismatch concentrates."""
     if not entry.significant:
         return f"{entry.joint}: nothing but noise."
-    text = f"{entry.joint}: {significant(entry.excess_rms, 3)} {torque_unit(joint_type)} rms beyond the noise"
+    text = f"{entry.joint}: {significant(entry.excess_rms, 3)} {joint_type.torque_unit} rms beyond the noise"
     if entry.where is not None:
         low, high = (significant(value, 2) for value in entry.where.range)
         variable, unit = entry.where.variable, state_unit(entry.where.variable, joint_type)

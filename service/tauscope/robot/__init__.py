@@ -1,16 +1,10 @@
 """What the arm is: joints, chain, limits, and what the user's simulation believes; the robot file."""
 
-from tauscope.robot.actuator import SERVOS, Actuator, Servo
+from tauscope.robot.actuator import Actuator
 from tauscope.robot.chain import Chain
 from tauscope.robot.check import JointSummary, RobotReport, check_robot
-from tauscope.robot.kinematics import (
-    DenavitHartenbergRow,
-    homogeneous,
-    link_placements,
-    modified_segments,
-    standard_segments,
-)
-from tauscope.robot.messages import Finding, Severity
+from tauscope.robot.kinematics import DenavitHartenbergRow, link_placements, modified_segments, standard_segments
+from tauscope.robot.messages import Severity
 from tauscope.robot.physical import find_defect, nearest_body, pseudo_inertia
 from tauscope.robot.recording_layout import (
     PRESETS,
@@ -30,7 +24,6 @@ from tauscope.robot.robot import (
     LinkInertia,
     Model,
     Placement,
-    Repair,
     Robot,
     Segment,
 )
@@ -40,13 +33,11 @@ from tauscope.robot.urdf import read_urdf_chain
 
 __all__ = [
     "PRESETS",
-    "SERVOS",
     "STANDARD_PARAMETERS",
     "Actuator",
     "Chain",
     "Coupling",
     "DenavitHartenbergRow",
-    "Finding",
     "FrictionCoefficients",
     "FrictionShape",
     "Joint",
@@ -57,18 +48,15 @@ __all__ = [
     "Model",
     "Placement",
     "RecordingLayout",
-    "Repair",
     "Robot",
     "RobotReport",
     "Segment",
-    "Servo",
     "Severity",
     "check_robot",
     "find_column_fault",
     "find_defect",
     "find_fault",
     "find_separator_fault",
-    "homogeneous",
     "layout_from_dict",
     "link_placements",
     "modified_segments",

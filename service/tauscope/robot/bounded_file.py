@@ -4,7 +4,6 @@ import stat
 from pathlib import Path
 
 from tauscope.errors import RobotFileError
-from tauscope.robot.messages import one_line
 
 
 def read_bounded(path: Path, limit: int) -> bytes:
@@ -20,17 +19,17 @@ def read_bounded(path: Path, limit: int) -> bytes:
             with path.open("rb") as file:
                 data = file.read(limit + 1)
     except FileNotFoundError:
-        raise RobotFileError(one_line(f"{path}: no such file; check the path")) from None
+        raise RobotFileError(f"{path}: no such file; check the path") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise RobotFileError(one_line(f"{path}: cannot be read: {reason}")) from error
+        raise RobotFileError(f"{path}: cannot be read: {reason}") from error
     if data is None:
         kind = "a directory" if stat.S_ISDIR(mode) else "not a regular file"
-        raise RobotFileError(one_line(f"{path}: is {kind}; give the path of a file"))
+        raise RobotFileError(f"{path}: is {kind}; give the path of a file")
     if not data:
-        raise RobotFileError(one_line(f"{path}: the file is empty"))
+        raise RobotFileError(f"{path}: the file is empty")
     if len(data) > limit:
-        raise RobotFileError(one_line(f"{path}: the file is larger than {limit // 1024} KiB; is it the right file?"))
+        raise RobotFileError(f"{path}: the file is larger than {limit // 1024} KiB; is it the right file?")
     return data
 
 
@@ -41,6 +40,4 @@ def decode_utf8(data: bytes, label: str) -> str:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         byte = data[error.start]
-        raise RobotFileError(
-            one_line(f"{label}:{line}: byte 0x{byte:02x} is not UTF-8 text; save the file as UTF-8")
-        ) from None
+        raise RobotFileError(f"{label}:{line}: byte 0x{byte:02x} is not UTF-8 text; save the file as UTF-8") from None

@@ -1,16 +1,17 @@
 """The chain between two links of a URDF or MJCF, and notes on how it was chosen."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tauscope.errors import one_line
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.actuator import Actuator
-from tauscope.robot.messages import Finding, one_line, shown
-from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Repair, Segment
+from tauscope.robot.messages import Finding, shown
+from tauscope.robot.robot import Coupling, FrictionCoefficients, JointLimits, JointType, LinkInertia, Repair, Segment
 
 MOST_NAMES = 4  # names that a note lists
 
@@ -47,6 +48,50 @@ class Chain:
     repairs: tuple[Repair, ...]
     notes: tuple[ResultWarning, ...] = ()
     gravity: NDArray[np.float64] | None = None
+
+
+@dataclass(frozen=True)
+class Master:
+    """The joint that another one follows in the end: the other is at multiplier · its position + offset."""
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+class ChainMotion:
+    """Which joints of a chain move, and how.
+
+    `moving`: base first, those that are their own masters, and those that follow one of them.
+    `independent`: those that the others follow, in the order in which they first move the chain.
+    `couplings`: of each that moves; None where it is the next one itself.
+    """
+
+    def __init__(self, masters: Mapping[str, Master | None]) -> None:
+        """Take the joints of a chain that are not held, base first, and what each follows."""
+        every = {name: master or Master(name) for name, master in masters.items()}
+        own = {name for name, master in masters.items() if master is None}
+        self.moving = {name: master for name, master in every.items() if master.joint in own}
+        self.independent = tuple(dict.fromkeys(master.joint for master in self.moving.values()))
+        self.couplings: dict[str, Coupling | None] = {}
+        met: set[str] = set()
+        for name, master in self.moving.items():
+            is_next = master.joint not in met and (master.multiplier, master.offset) == (1.0, 0.0)
+            place = self.independent.index(master.joint)
+            self.couplings[name] = None if is_next else Coupling(place, master.multiplier, master.offset)
+            met.add(master.joint)
+
+    def friction(self, stated: Mapping[str, tuple[float, float]]) -> tuple[FrictionCoefficients, ...]:
+        """Friction of the independent joints, from dry friction and damping of each that moves.
+
+        A joint that follows with multiplier m brakes its master with |m| times its dry friction and m² times its
+        damping.
+        """
+        total = {name: np.zeros(2) for name in self.independent}
+        for name, (dry, damping) in stated.items():
+            master = self.moving[name]
+            total[master.joint] += abs(master.multiplier) * dry, master.multiplier**2 * damping
+        return tuple(FrictionCoefficients(stiction=float(d), viscous=float(v)) for d, v in total.values())
 
 
 def default_ends_note(label: str, kind: str, base: str, tip: str, joints: Sequence[str]) -> ResultWarning:

@@ -28,7 +28,7 @@ from tauscope.robot.document_fields import (
     choice,
     refusal,
 )
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 from tauscope.robot.recording_layout import RecordingLayout, Source, find_column_fault, find_fault, find_separator_fault
 from tauscope.robot.robot import JointType
 from tauscope.robot.yaml_text import Place
@@ -44,6 +44,16 @@ WORDING: Mapping[str, Callable[[ErrorDetails], str]] = {
     "too_short": lambda e: "must not be an empty list; leave the key out instead",
     "too_long": lambda e: f"holds more than {e.get('ctx', {})['max_length']} entries",
 }
+
+
+def first_fault(error: ValidationError) -> tuple[Place, str]:
+    """Where the first of a document's errors is, and what it is in our words."""
+    details = error.errors(include_url=False)
+    place: Place = tuple(details[0]["loc"])
+    key = details[0].get("ctx", {}).get("key")
+    word = WORDING.get(details[0]["type"], lambda e: e["msg"])
+    more = f" (the first of {len(details)} errors)" if len(details) > 1 else ""
+    return place if key is None else (*place, key), word(details[0]) + more
 
 
 @dataclass(frozen=True)
@@ -65,7 +75,7 @@ class DocumentOrigin:
 
     def error(self, place: Place, text: str) -> RobotFileError:
         """The error of an entry."""
-        return RobotFileError(one_line(f"{self.where(place)}: {text}"))
+        return RobotFileError(f"{self.where(place)}: {text}")
 
     def validate(self, kind: type[DocumentType]) -> DocumentType:
         """The data as a validated document. Raises RobotFileError naming the first entry that is not valid."""
@@ -74,18 +84,8 @@ class DocumentOrigin:
         try:
             return kind.model_validate(self.data)
         except ValidationError as error:
-            details = error.errors(include_url=False)
-        place, text = self._word(details[0])
-        more = f" (the first of {len(details)} errors)" if len(details) > 1 else ""
-        raise self.error(place, text + more)
-
-    def _word(self, detail: ErrorDetails) -> tuple[Place, str]:
-        place: Place = tuple(detail["loc"])
-        key = detail.get("ctx", {}).get("key")
-        if key is not None:
-            place = (*place, key)
-        word = WORDING.get(detail["type"])
-        return place, word(detail) if word else detail["msg"]
+            place, text = first_fault(error)
+        raise self.error(place, text)
 
     def _line(self, place: Place) -> int | None:
         """Line of an entry, or of the nearest mapping that should hold it."""

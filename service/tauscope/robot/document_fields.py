@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import AfterValidator, BeforeValidator, model_validator
 from pydantic_core import PydanticCustomError
 
@@ -133,11 +134,10 @@ def _vector(value: list[float]) -> list[float]:
 def _rotation(value: list[list[float]]) -> list[list[float]]:
     if [len(row) for row in value] != [3, 3, 3]:
         raise refusal("must be three rows of three numbers")
-    gram = [[sum(a * b for a, b in zip(p, q, strict=True)) for q in value] for p in value]
-    if any(abs(gram[i][j] - (i == j)) > 1e-9 for i in range(3) for j in range(3)):
+    matrix = np.array(value)
+    if not np.allclose(matrix @ matrix.T, np.eye(3), rtol=0.0, atol=1e-9):
         raise refusal("is not a rotation: its rows are not orthonormal")
-    (a, b, c), (d, e, f), (g, h, i) = value
-    if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0.0:
+    if np.linalg.det(matrix) < 0.0:
         raise refusal("is not a rotation: it mirrors")
     return value
 

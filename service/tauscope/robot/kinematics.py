@@ -4,12 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import RecordingMismatchError
-from tauscope.robot.robot import JointType, Placement, Robot, Segment, segment_couplings
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array, JointType, Placement, Robot, Segment, segment_couplings
 
 
 def compose(first: Placement, second: Placement) -> Placement:
@@ -61,6 +58,14 @@ def rotation_of_z_to(axis: Array) -> Array:
             [-x, -y, c],
         ]
     )
+
+
+def joint_displacement(kind: JointType, axis: Array, position: float) -> Placement:
+    """A turn about an axis through the origin, or a slide along it. `axis`: (3,), unit vector."""
+    if kind is JointType.PRISMATIC:
+        return Placement(translation=position * axis)
+    align = rotation_of_z_to(axis)
+    return Placement(align @ rotation_about_z(position) @ align.T)
 
 
 @dataclass(frozen=True)

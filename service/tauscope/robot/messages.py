@@ -46,15 +46,7 @@ class Finding:
 
 
 LONGEST_VALUE = 60
-LONGEST_MESSAGE = 600
 MOST_CANDIDATES = 1000
-
-
-def one_line(text: str) -> str:
-    """A message as one printable line: white space folded, control characters escaped, cut where it is endless."""
-    folded = " ".join(text.split())
-    printable = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in folded)
-    return printable if len(printable) <= LONGEST_MESSAGE else printable[: LONGEST_MESSAGE - 1] + "…"
 
 
 def shown(value: object) -> str:

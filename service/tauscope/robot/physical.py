@@ -7,12 +7,9 @@ Its limit, inertia without mass, counts as a body: some robot files state motors
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.robot.document_fields import LARGEST_NUMBER
-from tauscope.robot.robot import LinkInertia
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array, LinkInertia
 
 # Violation, relative to the moments of inertia, that rounding to four digits can cause: repaired without a word.
 ROUNDING = 1e-3

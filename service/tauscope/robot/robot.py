@@ -14,6 +14,8 @@ from tauscope.robot.actuator import Actuator
 from tauscope.robot.messages import Finding
 from tauscope.robot.recording_layout import RecordingLayout
 
+Array = NDArray[np.float64]
+
 # Names of a link's ten standard parameters, in the order of the seed paper's equation (3).
 STANDARD_PARAMETERS = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "m", "msx", "msy", "msz")
 
@@ -23,6 +25,16 @@ class JointType(StrEnum):
 
     REVOLUTE = "revolute"
     PRISMATIC = "prismatic"
+
+    @property
+    def unit(self) -> str:
+        """Unit of its position."""
+        return "m" if self is JointType.PRISMATIC else "rad"
+
+    @property
+    def torque_unit(self) -> str:
+        """Unit of what drives it."""
+        return "N" if self is JointType.PRISMATIC else "Nm"
 
 
 @dataclass(frozen=True)
@@ -82,8 +94,8 @@ class Placement:
     `translation`: (3,), p [m].
     """
 
-    rotation: NDArray[np.float64] = field(default_factory=lambda: np.eye(3))
-    translation: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+    translation: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True)
@@ -136,16 +148,16 @@ class LinkInertia:
     """
 
     mass: float
-    first_moment: NDArray[np.float64]
-    inertia: NDArray[np.float64]
+    first_moment: Array
+    inertia: Array
 
-    def to_vector(self) -> NDArray[np.float64]:
+    def to_vector(self) -> Array:
         """The ten standard parameters in the order of `STANDARD_PARAMETERS`, shape (10,)."""
         i = self.inertia
         return np.array([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2], self.mass, *self.first_moment])
 
     @staticmethod
-    def from_vector(vector: NDArray[np.float64]) -> "LinkInertia":
+    def from_vector(vector: Array) -> "LinkInertia":
         """The link of ten standard parameters. `vector`: (10,), in the order of `STANDARD_PARAMETERS`."""
         xx, yy, zz, xy, xz, yz, mass, *first_moment = (float(value) for value in vector)
         inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -212,7 +224,7 @@ class Robot:
     name: str
     joints: tuple[Joint, ...]
     segments: tuple[Segment, ...]
-    gravity: NDArray[np.float64] = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
+    gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
     model: Model = Model()
     source: Path | None = None
     urdf: Path | None = None
@@ -257,7 +269,7 @@ class Robot:
         return tuple(links[joint] for joint in range(self.joint_count))
 
     @property
-    def ratios(self) -> NDArray[np.float64]:
+    def ratios(self) -> Array:
         """Motion of each segment per unit of each joint, (links, joints)."""
         matrix = np.zeros((self.link_count, self.joint_count))
         for link, coupling in enumerate(self.couplings):

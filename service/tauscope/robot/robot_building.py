@@ -1,7 +1,7 @@
 """A validated document to a Robot."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import cast
@@ -166,13 +166,12 @@ def _kinematics(document: RobotDocument, origin: DocumentOrigin, file_source: Fi
 
 
 def _segment(document: SegmentDocument) -> Segment:
-    coupling = document.coupling
-    follows = None if coupling is None else Coupling(coupling.joint, coupling.multiplier, coupling.offset)
+    follows = None if document.coupling is None else Coupling(**document.coupling.model_dump())
     return Segment(document.type, _placement(document.before), _placement(document.after), follows)
 
 
 def _rows(rows: Rows) -> list[DenavitHartenbergRow]:
-    return [DenavitHartenbergRow(r.theta, r.d, r.a, r.alpha, r.type) for r in rows]
+    return [DenavitHartenbergRow(**row.model_dump()) for row in rows]
 
 
 def _placement(document: PlacementDocument) -> Placement:
@@ -203,21 +202,18 @@ def _joints(documents: list[JointDocument] | None, chain: _Kinematics, origin: D
 def _joint(document: JointDocument, kind: JointType, own: JointLimits, actuator: Actuator | None = None) -> Joint:
     """One joint; a limit or actuator of the robot file goes before one of the URDF or MJCF."""
     limits, shape = document.limits, document.friction_shape
-    position = tuple(limits.position) if limits and limits.position else own.position
+    stated = {} if limits is None else limits.model_dump(exclude_none=True)
+    if "position" in stated:
+        stated["position"] = tuple(stated["position"])
     return Joint(
         name=document.name,
         type=kind,
-        limits=JointLimits(
-            position=None if position is None else (position[0], position[1]),
-            velocity=(limits and limits.velocity) or own.velocity,
-            acceleration=(limits and limits.acceleration) or own.acceleration,
-            torque=(limits and limits.torque) or own.torque,
-        ),
+        limits=replace(own, **stated),
         gear_ratio=document.gear_ratio,
         torque_constant=1.0 if document.torque_constant is None else document.torque_constant,
         has_torque_constant=document.torque_constant is not None,
         sign=1 if document.sign is None else document.sign,
-        friction_shape=FrictionShape() if shape is None else FrictionShape(shape.k_v, shape.delta),
+        friction_shape=FrictionShape() if shape is None else FrictionShape(**shape.model_dump()),
         drive=document.drive,
         actuator=actuator if document.actuator is None else _actuator(document.actuator),
     )
@@ -244,7 +240,7 @@ def _model(
         links, repairs = _links(document.links, origin, findings)
     if document.friction is not None:
         _check_count(origin, ("model", "friction"), len(document.friction), count, kinematics.key)
-        friction = tuple(FrictionCoefficients(f.stiction, f.stribeck, f.viscous) for f in document.friction)
+        friction = tuple(FrictionCoefficients(**each.model_dump()) for each in document.friction)
     if document.rotor_inertia is not None:
         _check_count(origin, ("model", "rotor_inertia"), len(document.rotor_inertia), count, kinematics.key)
         rotors = tuple(document.rotor_inertia)

@@ -7,7 +7,7 @@ from typing import Any
 
 from tauscope.errors import RobotFileError
 from tauscope.robot.document import DocumentOrigin, PlainRobotDocument
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import nearest, shown
 from tauscope.robot.robot import Joint, LinkInertia, Model, Placement, Robot, Segment
 from tauscope.robot.robot_building import FileSource, SourceFile, build_robot
 from tauscope.robot.robot_file import parse_robot_file
@@ -42,10 +42,9 @@ def robot_to_dict(robot: Robot) -> dict[str, Any]:
 
     `robot_from_dict` gives the same robot back, but for paths of files, names of links, notes, findings and repairs.
     """
-    segments = [_segment(segment) for segment in robot.segments]
     data: dict[str, Any] = {
         "name": robot.name,
-        "kinematics": {"segments": segments},
+        "kinematics": {"segments": [_segment(segment) for segment in robot.segments]},
         "gravity": robot.gravity.tolist(),
         "joints": [_joint(joint) for joint in robot.joints],
     }
@@ -63,7 +62,7 @@ def _find_given(origin: DocumentOrigin, files: Mapping[str, bytes]) -> FileSourc
         data = files[file]
         if not 0 < len(data) <= LARGEST_XML:
             limit = LARGEST_XML // 1024
-            raise RobotFileError(one_line(f"{file}: must hold 1 byte to {limit} KiB, but holds {len(data)} bytes"))
+            raise RobotFileError(f"{file}: must hold 1 byte to {limit} KiB, but holds {len(data)} bytes")
         return SourceFile(data, file)
 
     return look_up
@@ -80,12 +79,9 @@ def _placement(placement: Placement) -> dict[str, Any]:
 
 
 def _joint(joint: Joint) -> dict[str, Any]:
-    limits = {
-        "position": None if joint.limits.position is None else list(joint.limits.position),
-        "velocity": joint.limits.velocity,
-        "acceleration": joint.limits.acceleration,
-        "torque": joint.limits.torque,
-    }
+    limits = asdict(joint.limits)
+    if joint.limits.position is not None:
+        limits["position"] = list(joint.limits.position)
     is_stated = joint.has_torque_constant or joint.torque_constant != Joint.torque_constant
     return _drop_none(
         {
@@ -94,8 +90,7 @@ def _joint(joint: Joint) -> dict[str, Any]:
             "gear_ratio": joint.gear_ratio,
             "torque_constant": joint.torque_constant if is_stated else None,
             "sign": joint.sign,
-            "friction_shape": _drop_none({"k_v": joint.friction_shape.k_v, "delta": joint.friction_shape.delta})
-            or None,
+            "friction_shape": _drop_none(asdict(joint.friction_shape)) or None,
             "drive": None if joint.drive is None else dict(joint.drive),
             "actuator": (a := joint.actuator) and _drop_none(asdict(a) | ({} if a.has_loop else {"kp": None})),
         }
@@ -103,18 +98,17 @@ def _joint(joint: Joint) -> dict[str, Any]:
 
 
 def _model(model: Model) -> dict[str, Any]:
-    links = None if model.links is None else [_link(link) for link in model.links]
-    friction = None
-    if model.friction is not None:
-        friction = [{"stiction": f.stiction, "stribeck": f.stribeck, "viscous": f.viscous} for f in model.friction]
+    links = None if model.links is None else [link_to_dict(link) for link in model.links]
+    friction = None if model.friction is None else [asdict(each) for each in model.friction]
     rotors = None if model.rotor_inertia is None else list(model.rotor_inertia)
     return _drop_none({"links": links, "friction": friction, "rotor_inertia": rotors})
 
 
-def _link(link: LinkInertia) -> dict[str, Any]:
-    xx, yy, zz, xy, xz, yz = (float(value) for value in link.to_vector()[:6])
-    inertia = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "xz": xz, "yz": yz}
-    return {"mass": float(link.mass), "first_moment": link.first_moment.tolist(), "inertia": inertia}
+def link_to_dict(link: LinkInertia) -> dict[str, Any]:
+    """A link as a robot file states it."""
+    *inertia, mass, _, _, _ = link.to_vector().tolist()
+    entries = dict(zip(("xx", "yy", "zz", "xy", "xz", "yz"), inertia, strict=True))
+    return {"mass": mass, "first_moment": link.first_moment.tolist(), "inertia": entries}
 
 
 def _drop_none(mapping: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,7 +12,6 @@ from tauscope.remote_files import find_path
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.document import DocumentOrigin, RecordingDocument, RobotDocument
 from tauscope.robot.document_fields import LONGEST_NAME
-from tauscope.robot.messages import one_line
 from tauscope.robot.recording_layout import PRESETS, RecordingLayout
 from tauscope.robot.robot import Robot
 from tauscope.robot.robot_building import SourceFile, build_robot
@@ -65,7 +64,7 @@ def _expand(file: SourceFile) -> SourceFile:
     except SubprocessError as error:
         said = getattr(error, "stderr", None) or str(error).encode()
         reason = said.decode(errors="replace").strip().partition("\n")[0]
-        raise RobotFileError(one_line(f"{file.label}: xacro cannot expand the file ({reason})")) from error
+        raise RobotFileError(f"{file.label}: xacro cannot expand the file ({reason})") from error
     return replace(file, data=done.stdout)
 
 
@@ -78,7 +77,7 @@ def parse_robot_file(data: bytes, label: str) -> tuple[RobotDocument, DocumentOr
         origin = DocumentOrigin(label, describe_bare_file(data, label))
         return origin.validate(RobotDocument), origin
     if len(data) > LARGEST_ROBOT_FILE:
-        raise RobotFileError(one_line(f"{label}: the file is larger than {LARGEST_ROBOT_FILE // 1024} KiB"))
+        raise RobotFileError(f"{label}: the file is larger than {LARGEST_ROBOT_FILE // 1024} KiB")
     content = read_yaml(decode_utf8(data, label), label)
     origin = DocumentOrigin(label, content.data, content.lines)
     return origin.validate(RobotDocument), origin
@@ -95,8 +94,7 @@ def describe_bare_file(data: bytes, label: str) -> dict[str, Any]:
         way_out = "give a URDF (<robot>), an MJCF (<mujoco>) or a robot file"
         if local_name(root) == "sdf":
             way_out = "give the URDF or xacro that it was made from, or an MJCF: pip install sdformat-mjcf; sdf2mjcf"
-        text = f"its root element is <{local_name(root)}>; {way_out}"
-        raise RobotFileError(one_line(f"{label}:{root.sourceline}: {text}"))
+        raise RobotFileError(f"{label}:{root.sourceline}: its root element is <{local_name(root)}>; {way_out}")
     stated = root.get("name") or root.get("model") or ""
     is_name = bool(stated.strip()) and stated.isprintable() and len(stated) <= LONGEST_NAME
     return {"name": stated if is_name else Path(label).stem, "kinematics": {kind: {"file": file}}}
@@ -119,7 +117,7 @@ def read_layout(text: str) -> RecordingLayout:
     path = Path(text)
     if not path.exists():
         presets = ", ".join(PRESETS)
-        raise RobotFileError(one_line(f"{text}: neither a preset ({presets}) nor a file; check the name"))
+        raise RobotFileError(f"{text}: neither a preset ({presets}) nor a file; check the name")
     return parse_layout(decode_utf8(read_bounded(path, LARGEST_LAYOUT_FILE), text), text)
 
 
@@ -136,7 +134,7 @@ def layout_from_dict(data: Any, label: str = "columns", lines: Mapping[Place, in
     """
     lines = lines or {}
     if not isinstance(data, Mapping):
-        raise RobotFileError(one_line(f"{label}: must be a mapping, as {{t: time, q: 'position_{{1}}', …}}"))
+        raise RobotFileError(f"{label}: must be a mapping, as {{t: time, q: 'position_{{1}}', …}}")
     if set(data) == {"recording"}:
         data, lines = data["recording"], {place[1:]: line for place, line in lines.items() if place}
     elif not set(data) & set(RecordingDocument.model_fields):

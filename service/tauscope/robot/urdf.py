@@ -17,26 +17,17 @@ import numpy as np
 
 from tauscope.errors import RobotFileError
 from tauscope.result_warning import ResultWarning
-from tauscope.robot.chain import Chain, default_ends_note, rigid_branch_note
+from tauscope.robot.chain import Chain, ChainMotion, Master, default_ends_note, rigid_branch_note
 from tauscope.robot.document import MOST_JOINTS
 from tauscope.robot.document_fields import LARGEST_NUMBER
-from tauscope.robot.kinematics import compose, rotation_about_z, rotation_of_z_to
-from tauscope.robot.messages import Finding, Severity, nearest, one_line, shown
-from tauscope.robot.robot import Coupling, FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
+from tauscope.robot.kinematics import compose, joint_displacement, rotation_of_z_to
+from tauscope.robot.messages import Finding, Severity, nearest, shown
+from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
 from tauscope.robot.urdf_element import Element, number, only_child, origin, urdf_error, vector, where
 from tauscope.robot.urdf_inertia import lumped_inertia, stated_mass
 from tauscope.robot.urdf_xml import UrdfJoint, UrdfTree, parse_urdf
 
 MOVING = frozenset({"revolute", "continuous", "prismatic"})
-
-
-@dataclass(frozen=True)
-class Master:
-    """The joint that another one follows in the end, with multiplier and offset."""
-
-    joint: UrdfJoint
-    multiplier: float
-    offset: float
 
 
 class JointMotions:
@@ -51,28 +42,10 @@ class JointMotions:
         for name in locked:
             if name not in self._joints:
                 hint = nearest(name, self._joints)
-                raise RobotFileError(one_line(f"{tree.label}: locked: joint {shown(name)} is not in the file; {hint}"))
+                raise RobotFileError(f"{tree.label}: locked: joint {shown(name)} is not in the file; {hint}")
         free = [joint for joint in path if joint.type in MOVING and joint.name not in locked]
-        masters = {joint.name: self.master(joint) for joint in free}
-        own = {name for name, master in masters.items() if master is None}
-        moving = [joint for joint in free if (masters[joint.name] or Master(joint, 1.0, 0.0)).joint.name in own]
-        self.moving = tuple(joint.name for joint in moving)
-        """Joints of the path that move, base first: their own masters, and those that follow one of them."""
-        names = list(dict.fromkeys((master.joint.name if (master := masters[name]) else name) for name in self.moving))
-        self.independent = tuple(self._joints[name] for name in names)
-        """Joints that the others follow, in the order in which they first move the chain."""
-        self._couplings: dict[str, Coupling | None] = {}
-        met: set[str] = set()
-        for name in self.moving:
-            master = masters[name] or Master(self._joints[name], 1.0, 0.0)
-            is_next = master.joint.name not in met and (master.multiplier, master.offset) == (1.0, 0.0)
-            place = names.index(master.joint.name)
-            self._couplings[name] = None if is_next else Coupling(place, master.multiplier, master.offset)
-            met.add(master.joint.name)
-
-    def coupling(self, joint: UrdfJoint) -> Coupling | None:
-        """The joint that a joint of the chain follows; None where it is the next one itself."""
-        return self._couplings[joint.name]
+        self.chain = ChainMotion({joint.name: self.master(joint) for joint in free})
+        self.independent = tuple(self._joints[name] for name in self.chain.independent)
 
     def master(self, joint: UrdfJoint) -> Master | None:
         """The joint that a mimic joint follows; None where it follows none."""
@@ -89,7 +62,7 @@ class JointMotions:
             joint = self._joints[name]
             if joint.name in self._locked:
                 break
-        return None if len(met) == 1 else Master(joint, multiplier, offset)
+        return None if len(met) == 1 else Master(joint.name, multiplier, offset)
 
     def remark_on_masters(self, findings: list[Finding]) -> None:
         """Say which mimic joints follow a joint that is not in the file; as in ROS, they move by themselves."""
@@ -97,36 +70,28 @@ class JointMotions:
             mimic = only_child(self._tree.label, joint.element, "mimic", findings)
             if mimic is not None and (name := mimic.get("joint") or "") not in self._joints:
                 text = f"mimics joint {shown(name)}, which is not in the file, and counts as free; "
-                place = one_line(where(self._tree.label, joint.element))
+                place = where(self._tree.label, joint.element)
                 findings.append(Finding(Severity.WARNING, place, text + nearest(name, self._joints)))
-
-    def rigid_position(self, joint: UrdfJoint) -> float:
-        """Position of a joint that does not move with the chain [rad or m]."""
-        if joint.name in self._locked:
-            return self._locked[joint.name]
-        master = self.master(joint)
-        return 0.0 if master is None else master.multiplier * self._locked.get(master.joint.name, 0.0) + master.offset
 
     def is_locked(self, joint: UrdfJoint) -> bool:
         """Whether the robot file states where a joint stands, or where the one stands that it follows."""
         master = self.master(joint)
-        return joint.name in self._locked or (master is not None and master.joint.name in self._locked)
+        return joint.name in self._locked or (master is not None and master.joint in self._locked)
 
-    def follows_chain(self, joint: UrdfJoint) -> str | None:
-        """Name of the chain's joint that a joint beside the chain follows."""
+    def follows_chain(self, joint: UrdfJoint) -> bool:
+        """Whether a joint beside the chain follows one of the chain's."""
         master = None if joint.name in self._locked else self.master(joint)
-        return master.joint.name if master and master.joint in self.independent and master.multiplier else None
+        return bool(master and master.joint in self.chain.independent and master.multiplier)
 
     def rigid_motion(self, joint: UrdfJoint, findings: list[Finding]) -> Placement:
-        """Displacement along or about a joint's axis that does not move with the chain."""
-        position = self.rigid_position(joint) if joint.type in MOVING else 0.0
+        """Displacement along or about a joint's axis that does not move with the chain: locked, following, or none."""
+        if joint.type not in MOVING:
+            return Placement()
+        master = self.master(joint) or Master(joint.name, 0.0)
+        position = self._locked.get(joint.name, master.multiplier * self._locked.get(master.joint, 0.0) + master.offset)
         if position == 0.0:
             return Placement()
-        axis = joint_axis(self._tree, joint, findings)
-        if joint.type == "prismatic":
-            return Placement(np.eye(3), position * axis)
-        align = rotation_of_z_to(axis)
-        return Placement(align @ rotation_about_z(position) @ align.T)
+        return joint_displacement(_joint_type(joint), joint_axis(self._tree, joint, findings), position)
 
 
 def joint_axis(tree: UrdfTree, joint: UrdfJoint, findings: list[Finding]) -> np.ndarray:
@@ -138,7 +103,7 @@ def joint_axis(tree: UrdfTree, joint: UrdfJoint, findings: list[Finding]) -> np.
         raise urdf_error(tree.label, joint.element, "its axis is zero; give the direction, as xyz='0 0 1'")
     if abs(length - 1.0) > 1e-3:
         text = f"its axis has length {length:g}; its direction is used"
-        findings.append(Finding(Severity.INFO, one_line(where(tree.label, joint.element)), text))
+        findings.append(Finding(Severity.INFO, where(tree.label, joint.element), text))
     return axis / length
 
 
@@ -171,10 +136,10 @@ def read_urdf_chain(
         if joint.type not in MOVING and joint.type != "fixed" and joint.name not in (locked or {}):
             text = f"type {joint.type} is not supported in the chain; name the link beyond it as base"
             raise urdf_error(label, joint.element, text)
-    if not motions.moving:
+    if not motions.independent:
         text = f"no moving joint lies between base {shown(base)} and tip {shown(tip)}; name the last link as tip"
-        raise RobotFileError(one_line(f"{label}: {text}"))
-    moving = [joint for joint in path if joint.name in motions.moving]
+        raise RobotFileError(f"{label}: {text}")
+    moving = [joint for joint in path if joint.name in motions.chain.moving]
     branches: list[UrdfJoint] = []
     bodies = [_bodies(tree, joint, path, motions, branches, findings) for joint in moving]
     lumped = [
@@ -185,15 +150,13 @@ def read_urdf_chain(
     _remark_on_base(tree, base, findings)
     for joint, link in zip(moving, links, strict=True):
         if link is None and any(links):
-            place = one_line(where(label, tree.links[joint.child]))
+            place = where(label, tree.links[joint.child])
             findings.append(Finding(Severity.WARNING, place, "has no <inertial>; the model takes it as massless"))
     names = [joint.name for joint in motions.independent]
     for joint in moving:
         if (master := motions.master(joint)) is not None:
-            text = (
-                f"follows {shown(master.joint.name)}: {master.multiplier:g} times its position, plus {master.offset:g}"
-            )
-            findings.append(Finding(Severity.INFO, one_line(where(label, joint.element)), text))
+            text = f"follows {shown(master.joint)}: {master.multiplier:g} times its position, plus {master.offset:g}"
+            findings.append(Finding(Severity.INFO, where(label, joint.element), text))
     notes = [default_ends_note(label, "urdf", base, tip, names)] if is_default else []
     return Chain(
         base=base,
@@ -220,14 +183,14 @@ def _ends(tree: UrdfTree, base: str | None, tip: str | None, locked: Mapping[str
     for role, link in (("base", base), ("tip", tip)):
         if link is not None and link not in tree.links:
             hint = nearest(link, tree.links)
-            raise RobotFileError(one_line(f"{tree.label}: the {role} link {shown(link)} is not in the file; {hint}"))
+            raise RobotFileError(f"{tree.label}: the {role} link {shown(link)} is not in the file; {hint}")
     if tip is None:
         leaves = [link for link in tree.links if link not in tree.child_joints]
         paths = {leaf: _up(tree, leaf, base) for leaf in leaves}
         reached = {leaf: path for leaf, path in paths.items() if path is not None}
         if not reached:
             text = "holds no links" if base is None else f"the base {shown(base)} carries no other link; name another"
-            raise RobotFileError(one_line(f"{tree.label}: {text}"))
+            raise RobotFileError(f"{tree.label}: {text}")
 
         def depth(leaf: str) -> tuple[int, int]:
             moving = [joint for joint in reached[leaf] if joint.type in MOVING and joint.name not in locked]
@@ -262,11 +225,11 @@ def _path(tree: UrdfTree, base: str, tip: str) -> list[UrdfJoint]:
             text = (
                 f"the tip {shown(tip)} hangs on {shown(link)}, not on the base {shown(base)}; name links of one chain"
             )
-            raise RobotFileError(one_line(f"{tree.label}: {text}"))
+            raise RobotFileError(f"{tree.label}: {text}")
         path.append(joint)
         link = joint.parent
     if len(path) > MOST_JOINTS:
-        raise RobotFileError(one_line(f"{tree.label}: the chain has {len(path)} joints, more than {MOST_JOINTS}"))
+        raise RobotFileError(f"{tree.label}: the chain has {len(path)} joints, more than {MOST_JOINTS}")
     return path[::-1]
 
 
@@ -275,7 +238,7 @@ def _remark_on_base(tree: UrdfTree, base: str, findings: list[Finding]) -> None:
     while (joint := tree.parent_joint.get(link)) is not None:
         if joint.type != "fixed":
             text = f"moves the base {shown(base)}; it is taken to stand still"
-            findings.append(Finding(Severity.INFO, one_line(where(tree.label, joint.element)), text))
+            findings.append(Finding(Severity.INFO, where(tree.label, joint.element), text))
         link = joint.parent
 
 
@@ -291,12 +254,12 @@ def _segments(
     pending = Placement()
     for joint in path:
         pending = compose(pending, origin(tree.label, joint.element, findings))
-        if joint.name not in motions.moving:
+        if joint.name not in motions.chain.moving:
             pending = compose(pending, motions.rigid_motion(joint, findings))
             continue
         align = Placement(rotation_of_z_to(joint_axis(tree, joint, findings)))
         before, after = compose(pending, align), Placement(align.rotation.T)
-        segments.append(Segment(_joint_type(joint), before, after, motions.coupling(joint)))
+        segments.append(Segment(_joint_type(joint), before, after, motions.chain.couplings[joint.name]))
         pending = Placement()
     return tuple(segments)
 
@@ -315,7 +278,7 @@ def _bodies(
         link, placement, on_branch = waiting.pop()
         bodies.append(_Body(tree.links[link], placement, on_branch))
         for below in tree.child_joints.get(link, ()):
-            if below.name in motions.moving:
+            if below.name in motions.chain.moving:
                 continue
             # The chain's own joints are read again for the segments: remarks on them are made there.
             remarks = [] if below in path else findings
@@ -353,7 +316,7 @@ def _limits(tree: UrdfTree, joint: UrdfJoint, findings: list[Finding]) -> JointL
     lower, upper = (_limit(tree, element, key) for key in ("lower", "upper"))
     if lower > upper and joint.type != "continuous":
         text = f"limits reversed: lower {lower:g} is above upper {upper:g}; they count as not stated, correct them"
-        findings.append(Finding(Severity.WARNING, one_line(where(tree.label, joint.element)), text))
+        findings.append(Finding(Severity.WARNING, where(tree.label, joint.element), text))
     stated = joint.type != "continuous" and lower < upper and max(-lower, upper) <= LARGEST_NUMBER
     return JointLimits(
         position=(lower, upper) if stated else None,
@@ -378,23 +341,15 @@ def _limit(tree: UrdfTree, element: Element, key: str) -> float:
 def _friction(
     tree: UrdfTree, moving: list[UrdfJoint], motions: JointMotions, findings: list[Finding]
 ) -> tuple[FrictionCoefficients, ...] | None:
-    """Friction of ``<dynamics>``, one a joint: damping is viscous, friction is stiction without a Stribeck part.
-
-    A joint that follows with multiplier m brakes its master with |m| times its dry friction and m² times its damping.
-    """
-    total = {joint.name: np.zeros(2) for joint in motions.independent}
-    stated = False
+    """Friction of ``<dynamics>``, one a joint: damping is viscous, friction is stiction without a Stribeck part."""
+    stated: dict[str, tuple[float, float]] = {}
     for joint in moving:
         element = only_child(tree.label, joint.element, "dynamics", findings)
         if element is None:
             continue
-        stated = True
         dry, damping = (number(tree.label, element, key, 0.0) for key in ("friction", "damping"))
         if max(abs(damping), abs(dry)) > LARGEST_NUMBER:
             text = f"its <dynamics> is beyond {LARGEST_NUMBER:g}; check the unit (SI)"
             raise urdf_error(tree.label, joint.element, text)
-        master = motions.master(joint) or Master(joint, 1.0, 0.0)
-        total[master.joint.name] += abs(master.multiplier) * dry, master.multiplier**2 * damping
-    if not stated:
-        return None
-    return tuple(FrictionCoefficients(stiction=float(dry), viscous=float(damping)) for dry, damping in total.values())
+        stated[joint.name] = (dry, damping)
+    return motions.chain.friction(stated) if stated else None

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.errors import RobotFileError
+from tauscope.errors import RobotFileError, one_line
 from tauscope.robot.document_fields import LARGEST_NUMBER
 from tauscope.robot.kinematics import rotation_of_roll_pitch_yaw
-from tauscope.robot.messages import Finding, Severity, one_line, shown
+from tauscope.robot.messages import Finding, Severity, shown
 from tauscope.robot.robot import Placement
 
 NUMBER = re.compile(r"[-+]?([0-9]+(?:\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
@@ -26,15 +26,14 @@ def local_name(element: Element) -> str:
 
 
 def where(label: str, element: Element) -> str:
-    """File, line and name of an element."""
+    """File, line and name of an element, as one line."""
     name = element.get("name")
-    kind = local_name(element)
-    return f"{label}:{element.sourceline}: {kind}" + (f" {shown(name)}" if name else "")
+    return one_line(f"{label}:{element.sourceline}: {local_name(element)}" + (f" {shown(name)}" if name else ""))
 
 
 def urdf_error(label: str, element: Element, text: str) -> RobotFileError:
     """The error of an element."""
-    return RobotFileError(one_line(f"{where(label, element)}: {text}"))
+    return RobotFileError(f"{where(label, element)}: {text}")
 
 
 def children(element: Element, kind: str) -> list[Element]:
@@ -47,7 +46,7 @@ def only_child(label: str, element: Element, kind: str, findings: list[Finding])
     found = children(element, kind)
     if len(found) > 1:
         text = f"holds {len(found)} <{kind}> elements; the first counts, as in ROS' own parser: remove the others"
-        findings.append(Finding(Severity.WARNING, one_line(where(label, element)), text))
+        findings.append(Finding(Severity.WARNING, where(label, element), text))
     return found[0] if found else None
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from tauscope.robot.kinematics import compose
-from tauscope.robot.messages import Finding, Severity, one_line, shown
+from tauscope.robot.messages import Finding, Severity, shown
 from tauscope.robot.physical import nearest_body, repair_text
 from tauscope.robot.robot import LinkInertia, Placement, Repair
 from tauscope.robot.urdf_element import Element, bounded_number, number, only_child, origin, where
@@ -44,7 +44,7 @@ def lumped_inertia(
         centre = compose(placement, origin(label, element, findings))
         used = nearest_body(stated)
         before, after = (inertia_about_frame(each.mass, centre, each.inertia) for each in (stated, used))
-        place = one_line(f"{where(label, element)} of link {shown(body.get('name'))}")
+        place = f"{where(label, element)} of link {shown(body.get('name'))}"
         if text := repair_text(stated, used):
             repairs.append(Repair(link, place, text, "correct the <inertial>", before, after))
         else:
@@ -68,7 +68,7 @@ def stated_mass(tree: UrdfTree, link: str) -> float:
 def _read_inertia(label: str, body: Element, element: Element, findings: list[Finding]) -> LinkInertia:
     """An `<inertial>` as it stands, about the centre of mass."""
     parts = {kind: only_child(label, element, kind, findings) for kind in ("mass", "inertia")}
-    place = one_line(f"{where(label, element)} of link {shown(body.get('name'))}")
+    place = f"{where(label, element)} of link {shown(body.get('name'))}"
     for kind, part in parts.items():
         if part is None:
             findings.append(Finding(Severity.WARNING, place, f"has no <{kind}>, which counts as zero; add it"))

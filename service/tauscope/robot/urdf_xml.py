@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tauscope.robot.document_fields import LONGEST_NAME
-from tauscope.robot.messages import Finding, Severity, nearest, one_line, shown
+from tauscope.robot.messages import Finding, Severity, nearest, shown
 from tauscope.robot.urdf_element import EXPAND, Element, children, local_name, urdf_error, where
 from tauscope.robot.xml_text import parse_xml
 
@@ -62,7 +62,7 @@ def _refuse_xacro(root: Element, label: str, findings: list[Finding]) -> None:
         if name not in XACRO_DEFINITIONS:
             raise urdf_error(label, element, f"the file is a xacro; {EXPAND}")
         text = "is left over from xacro; it is ignored, as ROS' own parser does"
-        findings.append(Finding(Severity.INFO, one_line(where(label, element)), text))
+        findings.append(Finding(Severity.INFO, where(label, element), text))
 
 
 def _is_xacro(element: Element) -> bool:

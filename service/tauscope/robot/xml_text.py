@@ -9,8 +9,8 @@ import re
 
 from lxml import etree
 
-from tauscope.errors import RobotFileError
-from tauscope.robot.messages import Finding, Severity, one_line
+from tauscope.errors import RobotFileError, one_line
+from tauscope.robot.messages import Finding, Severity
 from tauscope.robot.urdf_element import Element
 
 LARGEST_XML = 16 * 1024 * 1024
@@ -41,7 +41,7 @@ def parse_xml(data: bytes, label: str, findings: list[Finding]) -> Element:
     doctype = text.find("<!DOCTYPE")
     if doctype >= 0:
         line = text.count("\n", 0, doctype) + 1
-        raise RobotFileError(one_line(f"{label}:{line}: a DOCTYPE is not accepted in a robot description; remove it"))
+        raise RobotFileError(f"{label}:{line}: a DOCTYPE is not accepted in a robot description; remove it")
     parser = etree.XMLParser(
         encoding="utf-8",
         resolve_entities=False,
@@ -55,14 +55,14 @@ def parse_xml(data: bytes, label: str, findings: list[Finding]) -> Element:
     try:
         root = etree.fromstring(text.encode("utf-8"), parser)
     except etree.XMLSyntaxError as error:
-        raise RobotFileError(one_line(f"{label}:{error.lineno or 1}: not valid XML: {error.msg}")) from None
+        raise RobotFileError(f"{label}:{error.lineno or 1}: not valid XML: {error.msg}") from None
     except (ValueError, MemoryError) as error:
-        raise RobotFileError(one_line(f"{label}: not valid XML: {error}")) from error
+        raise RobotFileError(f"{label}: not valid XML: {error}") from error
     for fault in parser.error_log:
         if fault.domain != etree.ErrorDomains.NAMESPACE:
-            raise RobotFileError(one_line(f"{label}:{fault.line or 1}: not valid XML: {fault.message}"))
+            raise RobotFileError(f"{label}:{fault.line or 1}: not valid XML: {fault.message}")
     if root is None:
-        raise RobotFileError(one_line(f"{label}: not valid XML: it has no elements"))
+        raise RobotFileError(f"{label}: not valid XML: it has no elements")
     return root
 
 
@@ -84,7 +84,7 @@ def decode_xml(data: bytes, label: str, findings: list[Finding]) -> str:
             break
     text = None if text is None else text.rstrip("\0")  # as C ends a string, and as ROS reads it
     if text is None or "\0" in text:
-        raise RobotFileError(one_line(f"{label}: is not text; is it the right file?"))
+        raise RobotFileError(f"{label}: is not text; is it the right file?")
     if encoding == "latin-1" and (stated or "").lower() not in ("latin-1", "iso-8859-1"):
         line = data.count(b"\n", 0, next(i for i, byte in enumerate(data) if byte > 127)) + 1
         text_of = "holds bytes that are not UTF-8; the file is read as Latin-1"

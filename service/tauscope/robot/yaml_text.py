@@ -12,7 +12,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 
 from tauscope.errors import RobotFileError
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 
 DEEPEST = 24
 MOST_ENTRIES = 20_000
@@ -69,7 +69,7 @@ def read_yaml(text: str, label: str) -> YamlContent:
     """
     root = _compose(text, label)
     if root is None:
-        raise RobotFileError(one_line(f"{label}: the file holds no entries"))
+        raise RobotFileError(f"{label}: the file holds no entries")
     builder = _PlainBuilder(label)
     data = builder.value(root, (), root.start_mark.line + 1)
     return YamlContent(data, builder.lines)
@@ -82,17 +82,17 @@ def _compose(text: str, label: str) -> Any:
         return yaml.compose(text)
     except _TooMuchError as error:
         reason, line = error.args
-        raise RobotFileError(one_line(f"{label}:{line}: {reason}; this is no robot file")) from None
+        raise RobotFileError(f"{label}:{line}: {reason}; this is no robot file") from None
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f"{label}:{mark.line + 1}" if mark is not None else label
         reason = error.problem or error.context or "malformed"
-        raise RobotFileError(one_line(f"{where}: not valid YAML: {reason}")) from None
+        raise RobotFileError(f"{where}: not valid YAML: {reason}") from None
     except (YAMLError, RecursionError) as error:
-        raise RobotFileError(one_line(f"{label}: not valid YAML: {error}")) from None
+        raise RobotFileError(f"{label}: not valid YAML: {error}") from None
     except Exception as error:
         # ruamel lets builtins escape on malformed text: OverflowError for "\UFFFFFFFF", AttributeError, AssertionError.
-        raise RobotFileError(one_line(f"{label}: not valid YAML: {error or type(error).__name__}")) from error
+        raise RobotFileError(f"{label}: not valid YAML: {error or type(error).__name__}") from error
 
 
 class _PlainBuilder:
@@ -150,7 +150,7 @@ class _PlainBuilder:
         raise self._error(line, f"the tag {shown(str(node.tag))} is not accepted; write plain data")
 
     def _error(self, line: int, text: str) -> RobotFileError:
-        return RobotFileError(one_line(f"{self.label}:{line}: {text}"))
+        return RobotFileError(f"{self.label}:{line}: {text}")
 
 
 def _real(text: str) -> float:

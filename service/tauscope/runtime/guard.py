@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import AcquisitionError
 from tauscope.robot import JointType, Robot
+from tauscope.robot.robot import Array
 from tauscope.trajectory.limits import motion_limits
 from tauscope_drivers import ArmState, DriveLimits, Setpoint
 
@@ -49,7 +49,6 @@ class GuardViolationError(AcquisitionError):
         self.violation = violation
 
 
-Array = NDArray[np.float64]
 DEFAULT_FOLLOWING = {JointType.REVOLUTE: 0.2, JointType.PRISMATIC: 0.05}
 """Following error that is allowed where nothing is stated [rad or m]."""
 DEFAULT_MARGIN = {JointType.REVOLUTE: 0.05, JointType.PRISMATIC: 0.01}
@@ -110,7 +109,7 @@ def guard_limits(
     room = np.array([DEFAULT_MARGIN[joint.type] for joint in joints])
     return GuardLimits(
         joints=tuple(joint.name for joint in joints),
-        units=tuple("rad" if joint.type is JointType.REVOLUTE else "m" for joint in joints),
+        units=tuple(joint.type.unit for joint in joints),
         position_low=np.where(has_range, limits.position_low, np.minimum(limits.position_low, low - room)),
         position_high=np.where(has_range, limits.position_high, np.maximum(limits.position_high, high + room)),
         velocity=np.where(has_speed, limits.velocity, np.maximum(limits.velocity, _ROOM * speed)),

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.recording.journal_rows import Phase, journal_row_type
+from tauscope.robot.robot import Array
 from tauscope.runtime.guard import Guard, GuardViolationError
 from tauscope.runtime.plan import Plan
 from tauscope.runtime.record import RunRecord
@@ -18,8 +19,6 @@ from tauscope.runtime.states import RunState, Stops, raise_if_requested
 from tauscope.runtime.timing import Metronome
 from tauscope.runtime.torque_control import TorqueControl
 from tauscope_drivers import ArmState, Backend, ControlMode, Setpoint
-
-Array = NDArray[np.float64]
 
 
 class GuardedArm:

@@ -9,7 +9,6 @@ from pydantic import AliasChoices, Field, FiniteFloat, ValidationError
 from tauscope.errors import AcquisitionError
 from tauscope.files import write_atomically
 from tauscope.robot import Joint
-from tauscope.robot.messages import one_line
 from tauscope.runtime.drivers import DEFAULT_BACKEND
 from tauscope.strict_model import StrictModel
 from tauscope_drivers import Capabilities, ControlMode, StopPolicy
@@ -146,4 +145,4 @@ def read_order(folder: Path) -> RunOrder:
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "document"
-        raise AcquisitionError(one_line(f"{path}: {place}: {first['msg']}; correct the order")) from None
+        raise AcquisitionError(f"{path}: {place}: {first['msg']}; correct the order") from None

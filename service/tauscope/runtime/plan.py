@@ -9,6 +9,7 @@ from tauscope.dynamics import friction_torque, inverse_dynamics, mass_matrix
 from tauscope.errors import AcquisitionError
 from tauscope.recording.journal_rows import Phase
 from tauscope.robot import Robot
+from tauscope.robot.robot import Array
 from tauscope.runtime.guard import GuardLimits, guard_limits
 from tauscope.runtime.options import RunOptions, choose_rate_hz
 from tauscope.trajectory.limits import motion_limits
@@ -16,7 +17,6 @@ from tauscope.trajectory.segments import MoveSegment
 from tauscope.trajectory.trajectory import Trajectory, ramp
 from tauscope_drivers import Capabilities, ControlMode
 
-Array = NDArray[np.float64]
 _MOST_POSTURES = 100_000
 
 

@@ -16,13 +16,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.errors import AcquisitionError, RecordingError
+from tauscope.errors import AcquisitionError, RecordingError, one_line
 from tauscope.recording import write_recording
 from tauscope.recording.journal import JournalWriter
 from tauscope.recording.journal_process import FRAME, HEADER, ROW, event_frame, frame
 from tauscope.recording.journal_reading import journal_recording, read_journal
 from tauscope.recording.journal_rows import JournalHeader, journal_row_type
-from tauscope.robot.messages import one_line
 from tauscope.runtime.processes import child_environment
 from tauscope.runtime.record import JOURNAL_FILE, RECORDING_STEM, RecordingFiles
 from tauscope.runtime.states import Stops, raise_if_requested

@@ -11,10 +11,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tauscope.errors import AcquisitionError, TauscopeError
+from tauscope.errors import AcquisitionError, TauscopeError, one_line
 from tauscope.recording.journal_rows import JournalHeader, Phase
 from tauscope.robot import Robot
-from tauscope.robot.messages import one_line
 from tauscope.runtime.drivers import DEFAULT_BACKEND, Connection
 from tauscope.runtime.guard import Guard, GuardViolationError
 from tauscope.runtime.loop import Cycles, GuardedArm, ProgressReporter, Report, end_event, state_event

@@ -1,14 +1,13 @@
 """The host's own loop where the drives take torque: proportional-derivative with feed-forward, weighed by inertia."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import AcquisitionError
 from tauscope.robot import Robot
+from tauscope.robot.robot import Array
 from tauscope.runtime.plan import Plan, compute_inertia
 from tauscope_drivers import ArmState
 
-Array = NDArray[np.float64]
 LEAST_RATE_HZ = 200.0  # fewer cycles a second make the loop sluggish or unstable
 _VELOCITY_BANDWIDTHS = 5.0
 _LEAST_INERTIA = 0.1

@@ -9,7 +9,7 @@ from fastapi import Response
 from pydantic import Field, ValidationError
 from starlette.exceptions import HTTPException
 
-from tauscope.robot.messages import one_line
+from tauscope.errors import one_line
 from tauscope.strict_model import StrictModel
 
 MEDIA_TYPE = "application/problem+json"

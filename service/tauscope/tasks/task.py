@@ -17,7 +17,6 @@ from tauscope.recording import EffortKind, Reading, Recording, flow_text, open_r
 from tauscope.remote_files import find_path
 from tauscope.report.provenance import InputFile, Provenance, input_files, versions
 from tauscope.robot import RecordingLayout, Robot, find_column_fault, find_fault, find_separator_fault
-from tauscope.robot.messages import one_line
 from tauscope.strict_model import StrictModel
 
 ROLES = {
@@ -227,7 +226,7 @@ def _open(path: Path, robot: Robot, reading: Reading) -> Recording:
         return open_recording(path, robot, reading)
     except RecordingMismatchError as error:
         chosen = [f"{note.text}; {note.remedy}" for note in robot.notes if note.code == "default-chain"]
-        raise RecordingMismatchError(one_line("; ".join([str(error), *chosen]))) from error
+        raise RecordingMismatchError("; ".join([str(error), *chosen])) from error
 
 
 def record_provenance(files: Files, request: TaskRequest, robot: Robot) -> Provenance:

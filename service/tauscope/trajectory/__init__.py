@@ -3,8 +3,8 @@
 from tauscope.trajectory.files import parse_trajectory_json, read_trajectory, trajectory_json, write_trajectory
 from tauscope.trajectory.fourier_series import FourierSeries, MotionSamples
 from tauscope.trajectory.limits import MotionLimits, motion_limits
-from tauscope.trajectory.segments import FourierSegment, MoveSegment, PathSegment, SampledSegment, Segment
-from tauscope.trajectory.trajectory import DesignRecord, Trajectory, TrajectorySamples, ramp
+from tauscope.trajectory.segments import FourierSegment, MoveSegment, PathSegment, SampledSegment
+from tauscope.trajectory.trajectory import DesignRecord, Trajectory, ramp
 
 __all__ = [
     "DesignRecord",
@@ -15,9 +15,7 @@ __all__ = [
     "MoveSegment",
     "PathSegment",
     "SampledSegment",
-    "Segment",
     "Trajectory",
-    "TrajectorySamples",
     "motion_limits",
     "parse_trajectory_json",
     "ramp",

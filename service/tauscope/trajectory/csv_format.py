@@ -6,15 +6,13 @@ import math
 import re
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import ExcitationError
 from tauscope.robot.messages import nearest, shown
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
 from tauscope.trajectory.segments import SampledSegment
 from tauscope.trajectory.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 GROUPS = ("q", "qd", "qdd")
 """Prefixes of the columns that hold position, velocity and acceleration."""

@@ -4,16 +4,15 @@ from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from tauscope.errors import ExcitationError
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import FourierSeries, MotionSamples
 from tauscope.trajectory.limits import MotionLimits
 from tauscope.trajectory.segments import FourierSegment, MoveSegment, PathSegment, SampledSegment, Segment
 from tauscope.trajectory.trajectory import DesignRecord, Trajectory
 
-Array = NDArray[np.float64]
 Vector = list[float]
 Matrix = list[list[float]]
 

@@ -1,6 +1,5 @@
 """Trajectory files: JSON with exact coefficients, or CSV with samples, by their suffix."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +8,7 @@ from pydantic import BaseModel, Field, ValidationError
 from tauscope.errors import ExcitationError, RobotFileError
 from tauscope.robot import Robot
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 from tauscope.trajectory.csv_format import parse_trajectory_csv, trajectory_csv
 from tauscope.trajectory.document import TrajectoryDocument, trajectory_document, trajectory_of
 from tauscope.trajectory.excitation_document import EXCITATION_SCHEMA, ExcitationDocument
@@ -34,8 +33,7 @@ def read_trajectory(path: str | Path, robot: Robot) -> Trajectory:
         raise ExcitationError(str(error)) from None
     if path.suffix.lower() == ".json":
         return parse_trajectory_json(text, str(path), robot)
-    joints = tuple(joint.name for joint in robot.joints)
-    return _one_line_errors(lambda: parse_trajectory_csv(text, str(path), robot.name, joints))
+    return parse_trajectory_csv(text, str(path), robot.name, tuple(joint.name for joint in robot.joints))
 
 
 def parse_trajectory_json(text: str | bytes, name: str, robot: Robot) -> Trajectory:
@@ -43,17 +41,17 @@ def parse_trajectory_json(text: str | bytes, name: str, robot: Robot) -> Traject
     try:
         document = _document(text)
     except ValidationError as error:
-        raise ExcitationError(one_line(f"{name}: {_first_fault(error)}")) from None
+        raise ExcitationError(f"{name}: {_first_fault(error)}") from None
 
-    def build() -> Trajectory:
-        if len(document.joints) != robot.joint_count:
-            raise ExcitationError(
-                f"joints: the trajectory moves {len(document.joints)} joints, robot {robot.name!r} has "
-                f"{robot.joint_count}; take one that was made for it"
-            )
+    if len(document.joints) != robot.joint_count:
+        raise ExcitationError(
+            f"{name}: joints: the trajectory moves {len(document.joints)} joints, robot {robot.name!r} has "
+            f"{robot.joint_count}; take one that was made for it"
+        )
+    try:
         return trajectory_of(document)
-
-    return _one_line_errors(build, f"{name}: ")
+    except ExcitationError as error:
+        raise ExcitationError(f"{name}: {error}") from None
 
 
 def trajectory_json(trajectory: Trajectory) -> str:
@@ -90,14 +88,6 @@ class _Schema(BaseModel):
     """Which kind of document it is; a trajectory's where it says nothing that we know."""
 
     schema_: Any = Field(default=None, alias="schema")
-
-
-def _one_line_errors(build: Callable[[], Trajectory], prefix: str = "") -> Trajectory:
-    """Whatever a user's file holds, a message about it stays one line."""
-    try:
-        return build()
-    except ExcitationError as error:
-        raise ExcitationError(one_line(f"{prefix}{error}")) from None
 
 
 def _first_fault(error: ValidationError) -> str:

@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import ExcitationError
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array
 
 LEAST_HARMONICS = 2
 """One harmonic alone cannot be at rest, with zero acceleration, at the ends of its period."""

@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.robot import JointType, Robot
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array
+from tauscope.trajectory.fourier_series import MotionSamples
 
 DEFAULT_RANGE = {JointType.REVOLUTE: np.pi, JointType.PRISMATIC: 0.25}
 """Positions from minus to plus this where no range is stated [rad or m]."""
@@ -57,14 +56,23 @@ class MotionLimits:
             self.assumed,
         )
 
+    def usage(self, motion: MotionSamples) -> tuple[Array, Array, Array]:
+        """Position, velocity and acceleration as parts of their limits, -1 to 1 within; (N, n) each."""
+        place = (motion.position - self.middle) / self.half_range
+        return place, motion.velocity / self.velocity, motion.acceleration / self.acceleration
+
+    def random_states(self, count: int, rng: np.random.Generator) -> MotionSamples:
+        """States anywhere within the limits."""
+        place, speed, change = (rng.uniform(-1.0, 1.0, (count, len(self.velocity))) for _ in range(3))
+        return MotionSamples(self.middle + self.half_range * place, self.velocity * speed, self.acceleration * change)
+
 
 def motion_limits(robot: Robot) -> MotionLimits:
     """The limits of a robot's joints; where none is stated a careful default, named in `MotionLimits.assumed`."""
     assumed: list[str] = []
     low, high, velocity, acceleration, torque = (np.empty(robot.joint_count) for _ in range(5))
     for j, joint in enumerate(robot.joints):
-        unit = "rad" if joint.type is JointType.REVOLUTE else "m"
-        limits = joint.limits
+        unit, limits = joint.type.unit, joint.limits
         reach = DEFAULT_RANGE[joint.type]
         low[j], high[j] = limits.position or (-reach, reach)
         velocity[j] = DEFAULT_SPEED[joint.type] if limits.velocity is None else limits.velocity

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import ExcitationError
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import FourierSeries, MotionSamples
-
-Array = NDArray[np.float64]
 
 PEAK_SPEED = 1.875
 """Largest speed of the minimum-jerk move over distance and duration one."""

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import ExcitationError
+from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
 from tauscope.trajectory.limits import MotionLimits
 from tauscope.trajectory.segments import (
@@ -18,8 +18,6 @@ from tauscope.trajectory.segments import (
     SampledSegment,
     Segment,
 )
-
-Array = NDArray[np.float64]
 
 JOIN_TOLERANCE = 1e-9
 """Largest jump between segments that rounding explains [rad or m, and per s, per s²]."""

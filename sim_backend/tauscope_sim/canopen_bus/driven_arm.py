@@ -3,15 +3,14 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tauscope.robot import Robot
+from tauscope.robot.robot import Array
 from tauscope_sim.canopen_bus.drive import AxisDemand, AxisMeasurement, AxisMode, EmulatedDrive
 from tauscope_sim.device.servo import InertiaSchedule, Servo
 from tauscope_sim.device.target import Target, catching_up_acceleration
 from tauscope_sim.scenario import Scenario
-
-Array = NDArray[np.float64]
 
 FASTEST = 1.25  # of a joint's speed limit: the voltage of its motor lets it turn no faster
 

@@ -79,12 +79,11 @@ class ObjectDictionary:
         low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if entry.signed else (0, (1 << bits) - 1)
         entry.value = min(max(value, low), high)
 
-    def read(self, index: int, subindex: int) -> bytes:
-        """Value of an entry as a master gets it, little end first. Raises AbortError where there is no such entry."""
-        return self.encode(index, subindex, by_master=True)
-
     def encode(self, index: int, subindex: int, *, by_master: bool = False) -> bytes:
-        """Value of an entry as the drive itself sends it, little end first."""
+        """Value of an entry, little end first, as the drive itself sends it, or as a master gets it.
+
+        Raises AbortError where there is no such entry.
+        """
         entry = self._find(index, subindex, by_master=by_master)
         return entry.value.to_bytes(entry.bytes, "little", signed=entry.signed)
 
@@ -128,7 +127,7 @@ def answer_request(dictionary: ObjectDictionary, request: bytes) -> bytes | None
     index, subindex = int.from_bytes(request[1:3], "little"), request[3]
     try:
         if command == _UPLOAD:
-            data = dictionary.read(index, subindex)
+            data = dictionary.encode(index, subindex, by_master=True)
             return bytes([0x43 | (4 - len(data)) << 2]) + request[1:4] + data.ljust(4, b"\0")
         if command != _DOWNLOAD or not request[0] & 0x02:  # expedited ones alone
             raise AbortError(Abort.UNKNOWN_COMMAND)

@@ -5,10 +5,10 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tauscope.errors import ScenarioError
-from tauscope.robot.robot import Robot
+from tauscope.robot.robot import Array, Robot
 from tauscope_drivers import ArmState, Capabilities, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_drivers.limits import require_finite, require_sensible
@@ -16,8 +16,6 @@ from tauscope_sim.device.drives import COMMANDED, POWERED, Activity, Drives, Mot
 from tauscope_sim.device.faults import Disturbances, FaultCode, FaultLatch, Injection, device_fault
 from tauscope_sim.device.mechanism import Mechanism
 from tauscope_sim.scenario import Scenario
-
-Array = NDArray[np.float64]
 
 TICK_NS = 500_000  # time between two ticks of the drives: 2 kHz [ns]
 HOTTEST = 85.0  # temperature of a motor above which its drive reports a fault [°C]

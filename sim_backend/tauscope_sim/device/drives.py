@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tauscope.robot.robot import Robot
+from tauscope.robot.robot import Array, Robot
 from tauscope_drivers import ControlMode, DriveLimits, Setpoint, StopPolicy
 from tauscope_sim.device.faults import FaultCode
 from tauscope_sim.device.servo import InertiaSchedule, Servo
@@ -56,8 +55,6 @@ def stopped_by(activity: Activity, policy: StopPolicy) -> Activity:
     asked = _BY_POLICY[policy]
     return asked if asked in TRANSITIONS[activity] else activity
 
-
-Array = NDArray[np.float64]
 
 _MARGIN = 2e-3
 

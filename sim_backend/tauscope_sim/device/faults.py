@@ -6,6 +6,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from tauscope.robot.robot import Array
 from tauscope_drivers import Fault
 
 
@@ -80,9 +81,6 @@ class FaultLatch:
         """Forget them all."""
         self._faults.clear()
         self.faults = ()
-
-
-Array = NDArray[np.float64]
 
 
 class Disturbances:

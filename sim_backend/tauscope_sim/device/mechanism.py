@@ -3,14 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tauscope.robot.robot import Robot
+from tauscope.robot.robot import Array, Robot
 from tauscope_sim.plant.rigid_bodies import RigidBodies
 from tauscope_sim.scenario import Scenario
-
-Array = NDArray[np.float64]
-
 
 LEAST_SHARE = 1e-3
 """A joint whose inertia is below this share of what it has elsewhere stands in line with its links: steep friction on

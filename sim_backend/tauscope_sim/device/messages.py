@@ -2,18 +2,18 @@
 
 import json
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
+from functools import cache
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from tauscope_drivers import ArmState, ControlMode, DriveLimits, DriverError, Fault, Setpoint, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
-from tauscope_sim.device.faults import Disturbance, Injection
 
 PROTOCOL = 1  # version that host and device have to agree on
 LARGEST_BODY = 65536  # longest body that is accepted [B]
@@ -85,29 +85,46 @@ class FrameBuffer:
         return frames
 
 
-Array = NDArray[np.float64]
-
 _INSTANT = struct.Struct("<q")
 _STATE_HEAD = struct.Struct("<qH")
-_LIMIT_FIELDS = ("position_low", "position_high", "velocity", "torque")
 
 
 class BadMessageError(ValueError):
     """A body that does not hold what its kind of frame says."""
 
 
-def encode_document(document: Mapping[str, Any]) -> bytes:
-    """Plain data as JSON, with Python's words for infinity and not-a-number."""
-    return json.dumps(document).encode()
+@dataclass(frozen=True)
+class Enabling:
+    """A request to enable."""
+
+    mode: ControlMode
+    stop_policy: StopPolicy
+    watchdog_s: float
+    limits: Mapping[str, Sequence[float]]  # the fields of `DriveLimits`
 
 
-def decode_document(body: bytes) -> dict[str, Any]:
-    """Plain data from JSON. Raises BadMessageError where it is not a JSON object."""
-    with _expecting("JSON"):
-        document = json.loads(body)
-    if not isinstance(document, dict):
-        raise BadMessageError("the body is not a JSON object")
-    return document
+@dataclass(frozen=True)
+class Refusal:
+    """A `DriverError`."""
+
+    kind: DriverErrorKind
+    message: str
+    faults: tuple[Fault, ...]
+
+
+_Document = TypeVar("_Document")
+_find_adapter = cache(TypeAdapter)
+
+
+def encode_document(document: Any) -> bytes:
+    """Plain data or a dataclass as JSON, with Python's words for infinity and not-a-number."""
+    return json.dumps(document, default=vars).encode()
+
+
+def decode_document(kind: type[_Document], body: bytes) -> _Document:
+    """What `encode_document` wrote. Raises BadMessageError where it is not of this type."""
+    with _expecting(kind.__name__):
+        return _find_adapter(kind).validate_python(json.loads(body))
 
 
 def encode_setpoint(sent_ns: int, setpoint: Setpoint) -> bytes:
@@ -132,88 +149,46 @@ def decode_setpoint(body: bytes, joint_count: int) -> tuple[int, Setpoint]:
 def encode_state(state: ArmState) -> bytes:
     """Time, position, velocity, effort, temperature, enabled, and the faults as JSON where there are any."""
     numbers = np.concatenate([state.position, state.velocity, state.effort, state.temperature]).astype("<f8")
-    faults = json.dumps([vars(fault) for fault in state.faults]).encode() if state.faults else b""
+    faults = encode_document(state.faults) if state.faults else b""
     head = _STATE_HEAD.pack(state.time_ns, len(state.position))
     return b"".join((head, numbers.tobytes(), state.enabled.tobytes(), faults))
 
 
 def decode_state(body: bytes) -> ArmState:
     """The reading that `encode_state` wrote. Raises BadMessageError where it does not hold a reading."""
-    with _expecting("a reading of the arm"):
+    with _expecting("reading of the arm"):
         time_ns, count = _STATE_HEAD.unpack_from(body)
         numbers = np.frombuffer(body, "<f8", 4 * count, _STATE_HEAD.size).astype(np.float64).reshape(4, count)
         end = _STATE_HEAD.size + 33 * count
         enabled = np.frombuffer(body, np.uint8, count, end - count).astype(np.bool_)
-        faults = _faults(json.loads(body[end:])) if len(body) > end else ()
+        faults = decode_document(tuple[Fault, ...], body[end:]) if len(body) > end else ()
     position, velocity, effort, temperature = numbers
     return ArmState(time_ns, position, velocity, effort, temperature, enabled, faults)
 
 
 def encode_error(error: DriverError) -> bytes:
     """A refusal."""
-    faults = [vars(fault) for fault in error.faults]
-    return encode_document({"kind": error.kind.value, "message": str(error), "faults": faults})
+    return encode_document(Refusal(error.kind, str(error), error.faults))
 
 
 def decode_error(body: bytes) -> DriverError:
     """The error that `encode_error` wrote. Raises BadMessageError where it does not hold one."""
-    document = decode_document(body)
-    with _expecting("an error"):
-        kind = DriverErrorKind(document["kind"])
-        return DriverError(kind, str(document["message"]), _faults(document["faults"]))
+    refusal = decode_document(Refusal, body)
+    return DriverError(refusal.kind, refusal.message, refusal.faults)
 
 
 def encode_enable(mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> bytes:
     """A request to enable; `watchdog_s`: time of the watchdog [s]."""
-    document = {
-        "mode": mode.value,
-        "stop_policy": stop_policy.value,
-        "watchdog_s": watchdog_s,
-        "limits": {name: np.ravel(getattr(limits, name)).tolist() for name in _LIMIT_FIELDS},
-    }
-    return encode_document(document)
+    plain = {name: np.ravel(values).tolist() for name, values in vars(limits).items()}
+    return encode_document(Enabling(mode, stop_policy, watchdog_s, plain))
 
 
 def decode_enable(body: bytes) -> tuple[ControlMode, DriveLimits, StopPolicy, float]:
     """The arguments of `encode_enable`. Raises BadMessageError where a field is missing or of the wrong kind."""
-    document = decode_document(body)
-    with _expecting("a request to enable"):
-        limits = DriveLimits(*(np.array(document["limits"][name], dtype=np.float64) for name in _LIMIT_FIELDS))
-        mode, policy = ControlMode(document["mode"]), StopPolicy(document["stop_policy"])
-        return mode, limits, policy, float(document["watchdog_s"])
-
-
-def encode_stop(policy: StopPolicy) -> bytes:
-    """A request to stop."""
-    return encode_document({"policy": policy.value})
-
-
-def decode_stop(body: bytes) -> StopPolicy:
-    """The policy of `encode_stop`. Raises BadMessageError where it names no policy."""
-    with _expecting("a request to stop"):
-        return StopPolicy(decode_document(body)["policy"])
-
-
-def encode_injection(injection: Injection) -> bytes:
-    """A disturbance for a test."""
-    return encode_document({**vars(injection), "kind": injection.kind.value})
-
-
-def decode_injection(body: bytes) -> Injection:
-    """The disturbance that `encode_injection` wrote.
-
-    Raises BadMessageError where a field is missing or of the wrong kind.
-    """
-    document = decode_document(body)
-    with _expecting("a disturbance"):
-        duration = document["duration_ns"]
-        return Injection(
-            kind=Disturbance(document["kind"]),
-            joint=int(document["joint"]),
-            start_ns=int(document["start_ns"]),
-            duration_ns=None if duration is None else int(duration),
-            size=float(document["size"]),
-        )
+    asked = decode_document(Enabling, body)
+    with _expecting("DriveLimits"):
+        limits = DriveLimits(**{name: np.array(values, dtype=np.float64) for name, values in asked.limits.items()})
+    return asked.mode, limits, asked.stop_policy, asked.watchdog_s
 
 
 @contextmanager
@@ -222,11 +197,4 @@ def _expecting(what: str) -> Iterator[None]:
     try:
         yield
     except (struct.error, ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
-        raise BadMessageError(f"the body is not {what}") from error
-
-
-def _faults(documents: Any) -> tuple[Fault, ...]:
-    return tuple(
-        Fault(str(one["code"]), one["joint"] and int(one["joint"]), str(one["detail"]), str(one["remedy"]))
-        for one in documents
-    )
+        raise BadMessageError(f"the body is no {what}") from error

@@ -8,10 +8,11 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from tauscope_drivers import DriverError
+from tauscope_drivers import DriverError, StopPolicy
 from tauscope_sim.device import messages
 from tauscope_sim.device.device import SimulatedDevice
 from tauscope_sim.device.drives import Activity
+from tauscope_sim.device.faults import Injection
 
 _INTERVAL_NS = 4_000_000
 _INTERVAL_AT_REST_NS = 500_000_000
@@ -75,7 +76,8 @@ class _Host:
         connection.setblocking(False)
         self.connection = connection
         self.buffer = messages.FrameBuffer()
-        self.process = peer_process(connection)
+        self.process: int  # at the other end, as the kernel knows it
+        self.process, _, _ = _PEER.unpack(connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size))
 
     def send(self, frame: messages.Frame) -> None:
         """Send a reply whole, or give the connection up: a host that reads nothing must not block the device."""
@@ -207,35 +209,36 @@ class DeviceServer:
     def _carry_out(self, kind: messages.FrameKind, body: bytes) -> tuple[messages.FrameKind, bytes]:
         """Carry out a request; returns the kind and the body of the reply."""
         device = self._device
-        if kind is messages.FrameKind.HELLO:
-            return messages.FrameKind.WELCOME, self._welcome(body)
-        if kind is messages.FrameKind.STATUS:
-            return messages.FrameKind.REPORT, self._report()
-        if kind is messages.FrameKind.EXCHANGE:
-            sent_ns, setpoint = messages.decode_setpoint(body, device.capabilities.joint_count)
-            now_ns = time.monotonic_ns()
-            device.command(setpoint, min(max(sent_ns, device.time_ns, now_ns - OLDEST_NS), now_ns))
-        elif kind is messages.FrameKind.ENABLE:
-            device.enable(*messages.decode_enable(body))
-        elif kind is messages.FrameKind.STOP:
-            device.stop(messages.decode_stop(body))
-        elif kind is messages.FrameKind.ACKNOWLEDGE:
-            device.acknowledge_faults()
-        elif kind is messages.FrameKind.INJECT:
-            device.inject(messages.decode_injection(body))
-        elif kind is messages.FrameKind.PUT_BACK:
-            device.put_back()
-        elif kind is messages.FrameKind.GOODBYE:
-            device.stop()
-        elif kind is messages.FrameKind.SHUT_DOWN:
-            device.stop()
-            self.finish()
-        elif kind is not messages.FrameKind.READ:
-            raise messages.BadMessageError(f"{kind.name} is no request")
+        match kind:
+            case messages.FrameKind.HELLO:
+                return messages.FrameKind.WELCOME, self._welcome(body)
+            case messages.FrameKind.STATUS:
+                return messages.FrameKind.REPORT, self._report()
+            case messages.FrameKind.EXCHANGE:
+                sent_ns, setpoint = messages.decode_setpoint(body, device.capabilities.joint_count)
+                now_ns = time.monotonic_ns()
+                device.command(setpoint, min(max(sent_ns, device.time_ns, now_ns - OLDEST_NS), now_ns))
+            case messages.FrameKind.ENABLE:
+                device.enable(*messages.decode_enable(body))
+            case messages.FrameKind.STOP:
+                device.stop(messages.decode_document(StopPolicy, body))
+            case messages.FrameKind.ACKNOWLEDGE:
+                device.acknowledge_faults()
+            case messages.FrameKind.INJECT:
+                device.inject(messages.decode_document(Injection, body))
+            case messages.FrameKind.PUT_BACK:
+                device.put_back()
+            case messages.FrameKind.GOODBYE | messages.FrameKind.SHUT_DOWN:
+                device.stop()
+                self._finished |= kind is messages.FrameKind.SHUT_DOWN
+            case messages.FrameKind.READ:
+                pass
+            case _:
+                raise messages.BadMessageError(f"{kind.name} is no request")
         return messages.FrameKind.STATE, messages.encode_state(device.read())
 
     def _welcome(self, body: bytes) -> bytes:
-        if (asked := messages.decode_document(body).get("protocol")) != messages.PROTOCOL:
+        if (asked := messages.decode_document(dict, body).get("protocol")) != messages.PROTOCOL:
             raise DriverError.no_connection(
                 f"the device speaks version {messages.PROTOCOL}, not {asked!r}; use one Tauscope for both"
             )
@@ -250,8 +253,3 @@ class DeviceServer:
                 "largest_lag_ns": self.punctuality.largest_lag_ns,
             }
         )
-
-
-def peer_process(connection: socket.socket) -> int:
-    """Id of the process at the other end of a Unix socket, as the kernel knows it."""
-    return _PEER.unpack(connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size))[0]

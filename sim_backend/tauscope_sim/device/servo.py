@@ -16,13 +16,10 @@ from collections.abc import Sequence
 from functools import reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tauscope.robot.robot import Robot
+from tauscope.robot.robot import Array, Robot
 from tauscope_sim.plant.rigid_bodies import RigidBodies
 from tauscope_sim.plant.term import PhysicalEffect
-
-Array = NDArray[np.float64]
 
 # the damping of a drive with a compliant transmission is tuned to at most this many times its rotor's inertia
 LARGEST_EXCESS = 4.0

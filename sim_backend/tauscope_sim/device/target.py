@@ -8,11 +8,8 @@ from collections import deque
 from statistics import median_low
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tauscope.robot.robot import Robot
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array, Robot
 
 _LATEST_PHASE = 5.0
 _CURVED_CYCLES = 2.0

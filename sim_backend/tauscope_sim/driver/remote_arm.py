@@ -86,7 +86,10 @@ def start_device(
             f"{socket}: longer than a socket's path can be; choose a folder with a shorter path"
         )
     command = [sys.executable, "-m", "tauscope_sim.device", "--linger", str(linger_s)]
-    command += ["--robot", str(_robot_file(robot, folder)), "--socket", str(socket), "--trace", str(trace)]
+    if isinstance(robot, Robot):
+        plain, robot = robot_to_dict(robot), folder / "device-robot.json"
+        robot.write_text(json.dumps(plain), encoding="utf-8")
+    command += ["--robot", str(robot), "--socket", str(socket), "--trace", str(trace)]
     if scenario is not None:
         command += ["--scenario", str(scenario)]
     if start_position is not None:
@@ -103,14 +106,6 @@ def start_device(
     device = DeviceProcess(process, socket, trace)
     _await_ready(device, log)
     return device
-
-
-def _robot_file(robot: Robot | Path, folder: Path) -> Path:
-    if isinstance(robot, Path):
-        return robot
-    file = folder / "device-robot.json"
-    file.write_text(json.dumps(robot_to_dict(robot)), encoding="utf-8")
-    return file
 
 
 def _await_ready(device: DeviceProcess, log: Path) -> None:
@@ -186,7 +181,7 @@ class RemoteSimulatedArm:
         self._socket, self._buffer = connection, messages.FrameBuffer()
         try:
             hello = messages.encode_document({"protocol": messages.PROTOCOL, "process": os.getpid()})
-            welcome = messages.decode_document(self._request(messages.FrameKind.HELLO, hello).body)
+            welcome = messages.decode_document(dict, self._request(messages.FrameKind.HELLO, hello).body)
             if welcome.get("joint_count") != self._count:
                 raise DriverError.no_connection(
                     f"{self._path}: the simulated arm has {welcome.get('joint_count')} joints, the robot file "
@@ -214,9 +209,8 @@ class RemoteSimulatedArm:
         `watchdog_s`: time without `exchange` after which it does [s].
         """
         del cycle_s
-        return self._state_after(
-            messages.FrameKind.ENABLE, messages.encode_enable(mode, limits, stop_policy, watchdog_s)
-        )
+        asked = messages.encode_enable(mode, limits, stop_policy, watchdog_s)
+        return self._state_after(messages.FrameKind.ENABLE, asked)
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
         """Write the setpoints, read the arm; see `drivers.Backend`."""
@@ -233,11 +227,9 @@ class RemoteSimulatedArm:
 
         Raises DriverError: ``lost`` where the device does not confirm.
         """
-        return (
-            self._miss()
-            if self._socket is None
-            else self._state_after(messages.FrameKind.STOP, messages.encode_stop(policy))
-        )
+        if self._socket is None:
+            return self._miss()
+        return self._state_after(messages.FrameKind.STOP, messages.encode_document(policy))
 
     def disconnect(self) -> None:
         """Let go of the device, which stops an arm that is still enabled by its own policy."""
@@ -249,11 +241,11 @@ class RemoteSimulatedArm:
 
     def status(self) -> dict[str, Any]:
         """What the device says of itself: ``activity``, ``time_ns``, ``overruns``, ``largest_lag_ns``."""
-        return messages.decode_document(self._patiently(messages.FrameKind.STATUS).body)
+        return messages.decode_document(dict, self._patiently(messages.FrameKind.STATUS).body)
 
     def inject(self, injection: Injection) -> ArmState:
         """Make a disturbance happen, for a test."""
-        return self._state_after(messages.FrameKind.INJECT, messages.encode_injection(injection))
+        return self._state_after(messages.FrameKind.INJECT, messages.encode_document(injection))
 
     def put_back(self) -> ArmState:
         """Have the arm carried back to where it began; see `tauscope_sim.device.SimulatedDevice.put_back`."""

@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tauscope.robot.robot import Array
 from tauscope_sim.dynamixel_bus.servo import Demand
-
-Array = NDArray[np.float64]
 
 BANDWIDTH_HZ = 8.0  # of the pendulums' position loops [Hz]
 

@@ -79,12 +79,8 @@ class InstructionParser:
                 frame = list(self._buffer[:end])
                 del self._buffer[:end]
                 if frame[7] != _STATUS:
-                    found.append(_instruction(frame))
-
-
-def _instruction(frame: list[int]) -> Instruction:
-    body = _remove_stuffing(frame[7:-2])
-    return Instruction(frame[4], body[0], bytes(body[1:]), len(frame))
+                    body = _remove_stuffing(frame[7:-2])
+                    found.append(Instruction(frame[4], body[0], bytes(body[1:]), len(frame)))
 
 
 def _remove_stuffing(stuffed: list[int]) -> list[int]:
@@ -125,9 +121,11 @@ class EmulatedBus:
             READ: self._read,
             WRITE: self._write,
             REG_WRITE: self._write,
-            ACTION: self._act,
+            ACTION: lambda instruction, end_s: self._confirm(instruction, end_s, lambda servo: _attempt(servo.act)),
             REBOOT: self._reboot,
-            CLEAR: self._clear,
+            CLEAR: lambda instruction, end_s: self._confirm(
+                instruction, end_s, lambda servo: _attempt(partial(servo.clear, instruction.parameters))
+            ),
             SYNC_READ: self._sync_read,
             SYNC_WRITE: self._sync_write,
             BULK_READ: self._bulk_read,
@@ -155,6 +153,7 @@ class EmulatedBus:
         return deliveries
 
     def _obey(self, instruction: Instruction, end_s: float) -> list[Delivery]:
+        """Answers to an instruction; servos of another protocol on the same line have their own."""
         return self._handlers.get(instruction.code, self._refuse)(instruction, end_s)
 
     def carry_out(self, fault: InjectedFault, now_s: float) -> None:
@@ -241,29 +240,20 @@ class EmulatedBus:
                 deliveries += self._answer(servo, error, b"", end_s)
         return deliveries
 
-    def _act(self, instruction: Instruction, end_s: float) -> list[Delivery]:
-        servos = self._find_addressed(instruction, end_s)
-        return self._confirm(instruction, [(servo, _attempt(servo.act), b"") for servo in servos], end_s)
-
-    def _clear(self, instruction: Instruction, end_s: float) -> list[Delivery]:
-        clear, servos = EmulatedServo.clear, self._find_addressed(instruction, end_s)
-        errors = [_attempt(partial(clear, servo, instruction.parameters)) for servo in servos]
-        return self._confirm(instruction, [(one, error, b"") for one, error in zip(servos, errors, strict=True)], end_s)
-
-    def _confirm(self, instruction: Instruction, parts: list[Part], end_s: float) -> list[Delivery]:
-        """Answers to an instruction; none to one that concerns all."""
+    def _confirm(self, instruction: Instruction, end_s: float, act: Callable[[EmulatedServo], int]) -> list[Delivery]:
+        """Let every addressed servo do what is asked, and answer with its error; nobody answers what concerns all."""
+        parts = [(servo, act(servo), b"") for servo in self._find_addressed(instruction, end_s)]
         return [] if instruction.servo == BROADCAST_ID else self._answers(parts, end_s)
 
     def _reboot(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         servos = self._find_addressed(instruction, end_s)
-        answers = self._confirm(instruction, [(servo, 0, b"") for servo in servos], end_s)
+        answers = self._confirm(instruction, end_s, lambda _: 0)
         for servo in servos:
             self._restart(servo.servo, end_s + _REBOOT_S)
         return answers
 
     def _refuse(self, instruction: Instruction, end_s: float) -> list[Delivery]:
-        servos = self._find_addressed(instruction, end_s)
-        return self._confirm(instruction, [(servo, _UNKNOWN_INSTRUCTION, b"") for servo in servos], end_s)
+        return self._confirm(instruction, end_s, lambda _: _UNKNOWN_INSTRUCTION)
 
     def _sync_read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         address, length = _words(instruction.parameters)

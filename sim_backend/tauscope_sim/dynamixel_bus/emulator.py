@@ -34,16 +34,11 @@ class DynamixelEmulator(Emulator):
         self.arm = arm
         self.stands_on_stand = True
         self.torque = np.zeros(arm.joint_count)
-        self._servos = list(bus.servos.values())
-        self._bauds = {servo.specification.baud for servo in self._servos}
+        self.servos = list(bus.servos.values())  # in the order of the joints
+        self._bauds = {servo.specification.baud for servo in self.servos}
         self._latency_s = latency_s
         self._outgoing = TimedQueue[bytes]()
         self._look()
-
-    @property
-    def servos(self) -> list[EmulatedServo]:
-        """In the order of the joints."""
-        return self._servos
 
     def hears(self, baud: int) -> bool:
         """Whether a master that has set this baud rate is understood. `baud`: of the master's port [bit/s]."""
@@ -57,7 +52,7 @@ class DynamixelEmulator(Emulator):
         """
         instructions = self.bus.hear(data, now_s)
         self._clock.catch_up(now_s, self._step, ALL_STEPS)
-        for servo in self._servos:
+        for servo in self.servos:
             servo.sense(self.now_s, min(1.0, max(0.0, now_s - self.now_s) / STEP_S))
         for due_s, frame in self.bus.answer(instructions, now_s):
             self._outgoing.put(due_s + self._latency_s, frame)
@@ -79,11 +74,11 @@ class DynamixelEmulator(Emulator):
             "position": position.tolist(),
             "velocity": velocity.tolist(),
             "torque": self.torque.tolist(),
-            "enabled": [servo.has_torque for servo in self._servos],
-            "latched": [servo.memory.is_latched for servo in self._servos],
-            "commanded": [servo.is_commanded for servo in self._servos],
-            "latched_at": [servo.latched_s for servo in self._servos],
-            "error": [servo.hardware_error for servo in self._servos],
+            "enabled": [servo.has_torque for servo in self.servos],
+            "latched": [servo.memory.is_latched for servo in self.servos],
+            "commanded": [servo.is_commanded for servo in self.servos],
+            "latched_at": [servo.latched_s for servo in self.servos],
+            "error": [servo.hardware_error for servo in self.servos],
             "on_stand": self.stands_on_stand,
             "lost": self._clock.lost_s,
         }
@@ -104,11 +99,11 @@ class DynamixelEmulator(Emulator):
         self._run_faults()
         position, _ = self.arm.motion
         demands = [
-            servo.demand(float(place), self.now_s, STEP_S) for servo, place in zip(self._servos, position, strict=True)
+            servo.demand(float(place), self.now_s, STEP_S) for servo, place in zip(self.servos, position, strict=True)
         ]
         self.torque = self.arm.torque(demands)
         if self.stands_on_stand:
-            self.stands_on_stand = not all(servo.has_torque for servo in self._servos)
+            self.stands_on_stand = not all(servo.has_torque for servo in self.servos)
         if not self.stands_on_stand:
             self.arm.advance(self.torque, STEP_S)
         self._look()
@@ -118,7 +113,7 @@ class DynamixelEmulator(Emulator):
 
     def _look(self) -> None:
         position, velocity = self.arm.motion
-        for servo, *seen in zip(self._servos, position, velocity, self.torque, strict=True):
+        for servo, *seen in zip(self.servos, position, velocity, self.torque, strict=True):
             servo.take_motion(*map(float, seen))
 
 

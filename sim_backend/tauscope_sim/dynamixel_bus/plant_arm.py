@@ -3,14 +3,13 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tauscope.robot import Robot
+from tauscope.robot.robot import Array
 from tauscope_sim.device.servo import InertiaSchedule
 from tauscope_sim.dynamixel_bus.servo import Demand
 from tauscope_sim.scenario import Scenario
-
-Array = NDArray[np.float64]
 
 BANDWIDTH = 40.0  # ω of the position loops [rad/s]
 

@@ -6,7 +6,7 @@ from pkgutil import iter_modules
 from types import MappingProxyType
 
 from tauscope_sim.effects.effect import Effect, ScenarioEntry
-from tauscope_sim.effects.sensor_effects import Channel, SensorEffect
+from tauscope_sim.effects.sensor_effects import SensorEffect
 
 
 def _entries() -> Iterator[type[ScenarioEntry]]:
@@ -20,4 +20,4 @@ def _entries() -> Iterator[type[ScenarioEntry]]:
 
 # class of each effect, by its id
 EFFECTS: Mapping[str, type[ScenarioEntry]] = MappingProxyType({entry.effect_id: entry for entry in _entries()})
-__all__ = ["EFFECTS", "Channel", "Effect", "ScenarioEntry", "SensorEffect"]
+__all__ = ["EFFECTS", "Effect", "ScenarioEntry", "SensorEffect"]

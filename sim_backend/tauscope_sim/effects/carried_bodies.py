@@ -4,16 +4,13 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from tauscope.robot.document_fields import Number, Positive, Vector
-from tauscope.robot.robot import LinkInertia, Robot
+from tauscope.robot.robot import Array, LinkInertia, Robot
 from tauscope_sim.effects.effect import Effect, JointEffect, zero_vector
 from tauscope_sim.plant.rigid_bodies import RigidBodies
 from tauscope_sim.plant.term import Coordinates, Term
-
-Array = NDArray[np.float64]
 
 
 class Payload(Effect):

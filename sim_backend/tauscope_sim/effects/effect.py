@@ -5,15 +5,13 @@ from collections.abc import Callable
 from enum import StrEnum
 from typing import Annotated, Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, BeforeValidator
 
 from tauscope.errors import ScenarioError
 from tauscope.robot.document_fields import Document, Number, Positive, refusal
 from tauscope.robot.messages import shown
 from tauscope.robot.robot import Joint, Robot
-from tauscope_sim.plant.term import Coordinates, Forces, Moment, Slopes, Term, Transmission
+from tauscope_sim.plant.term import Coordinates, Forces, Moment, PhysicalEffect, Slopes, Term
 
 LARGEST_EXPONENT = 10.0  # of a power law in speed or angle
 
@@ -70,9 +68,6 @@ def single_zero() -> list[float]:
     return [0.0]
 
 
-Array = NDArray[np.float64]
-
-
 class ScenarioEntry(Document):
     """One entry of a scenario's list of effects: its fields are the entry's keys."""
 
@@ -89,27 +84,8 @@ class ScenarioEntry(Document):
         return ScenarioError(f"{self.effect_id}.{key}: {text}")
 
 
-class Effect(ScenarioEntry):
-    """A concealed effect of arm, transmission or surroundings.
-
-    All torques are signed as what the drive has to overcome in addition: measured = rigid bodies + friction + effect.
-    """
-
-    def alter(self, robot: Robot) -> Robot:
-        """The arm as it really is, before its model is built."""
-        return robot
-
-    def added_rotor_inertia(self, robot: Robot) -> Array:
-        """Reflected inertia of the motors of rigid joints, (n,) [kg m² or kg]."""
-        return np.zeros(robot.joint_count)
-
-    def transmission(self) -> Transmission | None:
-        """The compliant transmission that it makes of a joint, if it does."""
-        return None
-
-    def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """What it adds to the equations of motion."""
-        return ()
+class Effect(ScenarioEntry, PhysicalEffect):
+    """A concealed effect of arm, transmission or surroundings."""
 
 
 class JointEffect(Effect):

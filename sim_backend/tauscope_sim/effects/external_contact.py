@@ -11,7 +11,6 @@ import math
 from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from tauscope.robot.document_fields import Number, Positive, Vector
@@ -19,8 +18,6 @@ from tauscope.robot.robot import Robot
 from tauscope_sim.effects.effect import Effect, JointNumber, NotNegative, one_of, zero_vector
 from tauscope_sim.plant.rigid_bodies import RigidBodies
 from tauscope_sim.plant.term import Coordinates, Forces, Moment, Term
-
-Array = NDArray[np.float64]
 
 
 class ExternalContact(Effect):

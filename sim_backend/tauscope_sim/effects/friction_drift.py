@@ -13,16 +13,11 @@ change by their own coefficients c_c, c_v [1/K]:
 import math
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tauscope.robot.document_fields import Number, Positive
-from tauscope.robot.robot import Robot
+from tauscope.robot.robot import Array, Robot
 from tauscope_sim.effects.effect import JointEffect
 from tauscope_sim.friction import shape_constants, smooth_sign, smooth_sign_slope
 from tauscope_sim.plant.term import AMBIENT, Coordinates, Forces, Moment, Slopes, Term
-
-Array = NDArray[np.float64]
 
 LARGEST_EXPONENT = 20.0  # beyond any oil: keeps nonsense coefficients from overflowing
 

@@ -13,16 +13,11 @@ z = ±1 or ±g(v), takes as much torque as before. τ_s, τ_sc in Nm (N), σ₁ 
 import math
 from typing import Annotated, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tauscope.robot.document_fields import Positive
 from tauscope.robot.robot import Robot
 from tauscope_sim.effects.effect import JointEffect, NotNegative, one_of
 from tauscope_sim.friction import shape_constants, smooth_sign, smooth_sign_slope
 from tauscope_sim.plant.term import Coordinates, Forces, Moment, Slopes, Term
-
-Array = NDArray[np.float64]
 
 
 class PreslidingHysteresis(JointEffect):

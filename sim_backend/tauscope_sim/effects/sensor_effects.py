@@ -5,13 +5,10 @@ from collections.abc import Callable
 from typing import Annotated, ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.robot.document_fields import Nonzero, Positive
-from tauscope.robot.robot import Robot
+from tauscope.robot.robot import Array, Robot
 from tauscope_sim.effects.effect import JointNumber, ScenarioEntry, one_of
-
-Array = NDArray[np.float64]
 
 
 class Channel(Protocol):

@@ -6,10 +6,9 @@ from math import atan, pi
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import ScenarioError
-from tauscope.robot.robot import FrictionCoefficients, FrictionShape, Robot
+from tauscope.robot.robot import Array, FrictionCoefficients, FrictionShape, Robot
 from tauscope_sim.friction import shape_constants
 from tauscope_sim.plant.rigid_bodies import RigidBodies
 from tauscope_sim.plant.term import (
@@ -22,8 +21,6 @@ from tauscope_sim.plant.term import (
     Transmission,
     loaded_accelerations,
 )
-
-Array = NDArray[np.float64]
 
 
 def compliant_transmissions(effects: Sequence[PhysicalEffect], rotor_inertia: Array) -> dict[int, Transmission]:
@@ -160,7 +157,10 @@ class EquationsOfMotion:
         self.compliance = Compliance(transmissions, self.coordinates)
         self.bodies = RigidBodies(real, self._rotors)
         self._terms = _terms(real, effects, self.coordinates)
-        self.state_count = _allot_states(self._terms)
+        self.state_count = 0
+        for term in self._terms:
+            term.first_state = self.state_count
+            self.state_count += term.state_count
         self._acting = _overriding(self._terms, "act")
         self._linearising = _overriding(self._terms, "linearise")
         self._evolving = _overriding(self._terms, "rates")
@@ -196,7 +196,7 @@ class EquationsOfMotion:
         `time`: t [s]; `drive`: u, torque of the drives on the joint's side, one a joint [Nm or N].
         """
         size = self._size
-        link_side = self._sum_forces(time, vector)
+        link_side = self.load_at(time, vector)
         forces, moment = self._forces, self._moment
         motor_side = [u - f - m for u, f, m in zip(drive, forces.friction, forces.motor, strict=True)]
         velocity = vector[size : 2 * size]
@@ -228,14 +228,10 @@ class EquationsOfMotion:
         return self._matrix, slopes
 
     def load_at(self, time: float, vector: list[float]) -> list[float]:
-        """Torque h + c + link that links need from their transmissions when they do not accelerate [Nm or N].
+        """Move the links, sum the terms' torque into `Forces`, and return h + c + link, one a joint [Nm or N].
 
-        `time`: t [s].
+        That is what links need from their transmissions when they do not accelerate. `time`: t [s].
         """
-        return self._sum_forces(time, vector)
-
-    def _sum_forces(self, time: float, vector: list[float]) -> list[float]:
-        """Move the links and sum the terms' torque into `Forces`; returns h + c + link, one a joint."""
         count, size = self._count, self._size
         moment, forces = self._moment, self._forces
         self.bodies.update(vector[:count], vector[size : size + count])
@@ -278,14 +274,6 @@ def _terms(robot: Robot, effects: Sequence[PhysicalEffect], coordinates: Coordin
         shape = [joint.friction_shape for joint in robot.joints]
         own = (StaticFriction(robot.model.friction, shape, coordinates),)
     return own + tuple(term for effect in effects for term in effect.terms(robot, coordinates))
-
-
-def _allot_states(terms: Sequence[Term]) -> int:
-    count = 0
-    for term in terms:
-        term.first_state = count
-        count += term.state_count
-    return count
 
 
 def _overriding(terms: Sequence[Term], hook: str) -> tuple[Term, ...]:

@@ -5,16 +5,13 @@ from dataclasses import dataclass
 from math import ceil, isfinite
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tauscope.errors import ScenarioError
-from tauscope.robot.robot import Robot
+from tauscope.robot.robot import Array, Robot
 from tauscope_sim.plant.equations import EquationsOfMotion
 from tauscope_sim.plant.rosenbrock import RosenbrockStep
 from tauscope_sim.plant.term import AMBIENT, PhysicalEffect
-
-Array = NDArray[np.float64]
-
 
 # the twist shrinks by the ratio of gravity's gradient to stiffness each time; a few rounds are usual
 MOST_ITERATIONS = 200

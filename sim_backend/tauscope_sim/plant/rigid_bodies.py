@@ -5,12 +5,9 @@
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from tauscope.robot.robot import LinkInertia, Robot
+from tauscope.robot.robot import Array, LinkInertia, Robot
 from tauscope_sim.model import body_inertia, build_model
-
-Array = NDArray[np.float64]
 
 
 class RigidBodies:

@@ -12,12 +12,10 @@ from math import isfinite, nan
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dgesv
 
+from tauscope.robot.robot import Array
 from tauscope_sim.plant.equations import EquationsOfMotion
-
-Array = NDArray[np.float64]
 
 GAMMA = 1.0 - float(np.sqrt(0.5))  # γ: L-stable, with the smaller of the two error constants
 

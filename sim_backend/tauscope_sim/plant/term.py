@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dgesv
 
 from tauscope.errors import ScenarioError
-from tauscope.robot.robot import Robot
+from tauscope.robot.robot import Array, Robot
 from tauscope_sim.plant.rigid_bodies import RigidBodies
 
 
@@ -48,8 +47,6 @@ class Coordinates:
         """Places of all motors, one a joint."""
         return [self.motor(joint) for joint in range(self.joint_count)]
 
-
-Array = NDArray[np.float64]
 
 AMBIENT = 25.0  # temperature of joints that no effect heats [°C]
 
@@ -165,24 +162,27 @@ class Transmission(Protocol):
         ...
 
 
-class PhysicalEffect(Protocol):
-    """What the plant asks of a concealed effect."""
+class PhysicalEffect:
+    """What the plant asks of a concealed effect; a subclass overrides what it changes.
+
+    All torques are signed as what the drive has to overcome in addition: measured = rigid bodies + friction + effect.
+    """
 
     def alter(self, robot: Robot) -> Robot:
         """The arm as it really is, before its model is built."""
-        ...
+        return robot
 
     def added_rotor_inertia(self, robot: Robot) -> Array:
         """Reflected inertia of the motors of rigid joints, (n,) [kg m² or kg]."""
-        ...
+        return np.zeros(robot.joint_count)
 
     def transmission(self) -> Transmission | None:
         """The compliant transmission that it makes of a joint, if it does."""
-        ...
+        return None
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
         """What it adds to the equations of motion."""
-        ...
+        return ()
 
 
 MOST_SIGN_CHANGES = 60  # sign patterns that are tried; a handful is needed, and the solution exists and is unique

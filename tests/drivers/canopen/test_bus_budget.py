@@ -2,9 +2,9 @@
 
 import pytest
 
-from tauscope_drivers.canopen.bus_budget import CycleFrames, cycle_bits, frame_bits, largest_rate_hz, rate_limit
+from tauscope_drivers.canopen.bus_budget import cycle_bits, frame_bits, largest_rate_hz, rate_limit
 
-TORQUE_CYCLE = CycleFrames((4,), (8, 4))
+TORQUE_CYCLE = (4, 8, 4)
 
 
 @pytest.mark.parametrize(("payload", "bits"), [(0, 55), (1, 65), (4, 95), (8, 135)])

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tauscope_drivers.canopen import objects
-from tauscope_drivers.canopen.process_data import PdoLayout, decode_pdo, encode_pdo, mapping_entries
+from tauscope_drivers.canopen.process_data import PdoLayout, decode_pdo, encode_pdo
 from tauscope_drivers.canopen.units import DriveUnits
 
 STATE_PDO = PdoLayout((objects.STATUSWORD, objects.TORQUE_ACTUAL, objects.POSITION_ACTUAL))
@@ -19,7 +19,7 @@ def test_the_bytes_of_a_target_frame() -> None:
     layout = PdoLayout((objects.CONTROLWORD, objects.TARGET_POSITION))
     payload = encode_pdo(layout, {objects.CONTROLWORD: 0x000F, objects.TARGET_POSITION: -2})
     assert payload == bytes.fromhex("0F 00 FE FF FF FF")
-    assert mapping_entries(layout.objects) == [0x60400010, 0x607A0020]
+    assert [entry.mapping for entry in layout.objects] == [0x60400010, 0x607A0020]
 
 
 def test_the_bytes_of_a_state_frame() -> None:

@@ -2,6 +2,7 @@
 
 import json
 from contextlib import suppress
+from functools import partial
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ from tauscope_sim.device import messages as m
 from tauscope_sim.device.messages import LARGEST_BODY, BrokenFrameError, Frame, FrameBuffer, FrameKind
 
 FAULT = Fault("overload", 2, "détail", "remedy")
-DECODERS = [m.decode_document, m.decode_state, m.decode_error, m.decode_enable, m.decode_injection, m.decode_stop]
+DOCUMENTS = [partial(m.decode_document, kind) for kind in (dict, Injection, StopPolicy)]
+DECODERS = [*DOCUMENTS, m.decode_state, m.decode_error, m.decode_enable]
 
 
 @given(st.lists(st.tuples(st.sampled_from(FrameKind), st.integers(0, 2**32 - 1), st.binary(max_size=200))), st.data())
@@ -75,8 +77,9 @@ def test_requests_go_both_ways() -> None:
     for name in ("position_low", "position_high", "velocity", "torque"):
         np.testing.assert_array_equal(getattr(kept, name), getattr(limits, name))
     injection = Injection(Disturbance.ENCODER_JUMP, 3, 5, None, -0.25)
-    assert m.decode_injection(m.encode_injection(injection)) == injection
-    assert m.decode_stop(m.encode_stop(StopPolicy.TORQUE_OFF)) is StopPolicy.TORQUE_OFF
+    assert m.decode_document(Injection, m.encode_document(injection)) == injection
+    stop = m.encode_document(StopPolicy.TORQUE_OFF)
+    assert m.decode_document(StopPolicy, stop) is StopPolicy.TORQUE_OFF
 
 
 def test_errors_go_both_ways() -> None:

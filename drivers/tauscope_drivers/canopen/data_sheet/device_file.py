@@ -3,16 +3,13 @@
 import codecs
 import configparser
 import contextlib
-import io
-import logging
 import re
 import struct
 from collections.abc import Iterator, Mapping
-from configparser import Error as SectionError
 from dataclasses import dataclass
 from pathlib import Path
 
-from canopen.objectdictionary import ObjectDictionary, ObjectDictionaryError, ODVariable, datatypes, eds
+from canopen.objectdictionary import ObjectDictionaryError, ODVariable, datatypes
 
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.objects import DriveObject
@@ -66,20 +63,9 @@ def read_sections(text: str) -> Sections:
             raise DataSheetError(f"[{name}] stands twice; remove one")
         # What stands for nothing counts as left out: many makers' tools write every keyword.
         entries = {_KEYWORDS.get(key, key): value for key, value in parser.items(given) if value}
-        # The library reads fewer ways of writing a number, and does not know the place of a wrong one.
         sections[name] = entries | {key: str(_number(name, key, entries[key])) for key in _NUMBERS if key in entries}
     _write_out_compact(sections)
-    sections.setdefault("DeviceInfo", {})
     return sections
-
-
-def library_text(sections: Sections) -> str:
-    """The sections for the library's reader: parents before their subindices, and known keywords alone."""
-    lines: list[str] = []
-    for name in sorted(sections, key=lambda name: "sub" in name):
-        known = ((key, value) for key, value in sections[name].items() if key in _KEYWORDS.values())
-        lines += [f"[{name}]", *(f"{key}={value}" for key, value in known)]
-    return "\n".join(lines)
 
 
 def _section_name(given: str) -> str | None:
@@ -163,10 +149,11 @@ _TYPE_NAMES = (
 )
 # data types of CiA 301 by their number
 TYPE_NAMES: Mapping[int, str] = {getattr(datatypes, name): name for name in _TYPE_NAMES}
+_TEXTS = ("VISIBLE_STRING", "UNICODE_STRING", "OCTET_STRING")
+_VARIABLE = re.compile(r"([0-9A-F]{4})(?:sub([0-9A-F]+))?")  # canonical names of sections
+_GROUPS = ("8", "9")  # object types of arrays and records, whose subindices are entries of their own
+_LARGEST_TYPE = 0x1B  # a type beyond is the maker's own: [A0] and so on say what it is made of
 _LONGEST_NAME = 60
-
-# The library warns of each of a maker's own data types, on the terminal where nobody listens; the driver needs none.
-logging.getLogger(eds.__name__).setLevel(logging.ERROR)
 
 
 @dataclass(frozen=True)
@@ -207,22 +194,21 @@ class DeviceFile:
 def read_device_file(path: Path, node_id: int) -> DeviceFile:
     """Read a file. Raises DataSheetError where it cannot be read, or is no such file."""
     sections = read_sections(_content(path))
-    try:
-        dictionary = eds.import_eds(io.StringIO(library_text(sections)), node_id)
-    # All that the library's reader was seen to raise on files that are not whole.
-    except (SectionError, LookupError, ValueError, TypeError, AttributeError, OverflowError) as error:
-        reason = " ".join(str(error.args[0] if error.args else error).split())[:120]
-        raise DataSheetError(f"is no whole EDS or DCF file ({reason!a}); get it anew from the maker") from error
-    variables = list(_variables(dictionary))
-    entries = {(variable.index, variable.subindex): _describe(variable, node_id) for variable in variables}
-    device = dictionary.device_information
+    entries = {(entry.index, entry.subindex): entry for entry in _describe_all(sections, node_id)}
+    device = sections.get("DeviceInfo", {})
+
+    def identity(entry: DriveObject, key: str) -> int | None:
+        """By the device's section, or by the default of the object; zero is how makers leave it open."""
+        described = entries.get((entry.index, entry.subindex))
+        return int(device.get(key, "0")) or (described.default if described else None) or None
+
     made_for = sections.get("DeviceComissioning", {}).get("NodeID")
     return DeviceFile(
         name=_printable(path.name),
         objects=entries,
-        vendor=device.vendor_number or _default(dictionary, 1),
-        product=device.product_number or _default(dictionary, 2),
-        revision=device.revision_number or _default(dictionary, 3),
+        vendor=identity(objects.VENDOR, "VendorNumber"),
+        product=identity(objects.PRODUCT, "ProductNumber"),
+        revision=identity(objects.REVISION, "RevisionNumber"),
         node_id=None if made_for is None else int(made_for),
     )
 
@@ -243,57 +229,61 @@ def _content(path: Path) -> str:
         return data.decode("latin-1")
 
 
-def _variables(dictionary: ObjectDictionary) -> Iterator[ODVariable]:
-    """All entries; subindices that a file does not list are not made up, as the library does of arrays."""
-    for entry in dictionary.indices.values():
-        if isinstance(entry, ODVariable):
-            yield entry
-        else:
-            yield from entry.subindices.values()
-
-
-def _describe(variable: ODVariable, node_id: int) -> DescribedObject:
-    text, default = (getattr(variable, name, None) for name in ("value_raw", "default_raw"))
-    return DescribedObject(
-        name=_printable(variable.name),
-        index=variable.index,
-        subindex=variable.subindex,
-        data_type=variable.data_type or 0,
-        access=variable.access_type,
-        is_mappable=variable.pdo_mappable,
-        value_text=None if text is None else _printable(text),
-        value=None if text is None else _encode_value(variable, text, node_id),
-        default=parse_number(default, node_id) if default and _is_whole(variable) else None,
-    )
+def _describe_all(sections: Sections, node_id: int) -> Iterator[DescribedObject]:
+    """Every variable: objects that are one, and the subindices of the others."""
+    for name, entries in sections.items():
+        match = _VARIABLE.fullmatch(name)
+        if match is None:
+            continue
+        index, subindex = match.groups()
+        missing = [f"0x{index} was not found"] if index not in sections else []
+        if not missing and (sections[index].get("ObjectType") in _GROUPS) != (subindex is not None):
+            continue
+        missing += [f"{key} is missing" for key in ("ParameterName", "DataType", "AccessType") if key not in entries]
+        if missing:
+            reason = f"[{name}]: {missing[0]}"
+            raise DataSheetError(f"is no whole EDS or DCF file ({reason}); get it anew from the maker")
+        data_type = int(entries["DataType"])
+        if data_type > _LARGEST_TYPE:
+            made_of = sections.get(f"{data_type:X}sub1", {}).get("DefaultValue", "")
+            data_type = parse_number(made_of) or datatypes.DOMAIN
+        is_whole = data_type in (datatypes.BOOLEAN, *datatypes.INTEGER_TYPES)
+        text, default = entries.get("ParameterValue"), entries.get("DefaultValue")
+        yield DescribedObject(
+            name=_printable(entries["ParameterName"]),
+            index=int(index, 16),
+            subindex=int(subindex or "0", 16),
+            data_type=data_type,
+            access=entries["AccessType"].lower(),
+            is_mappable=entries.get("PDOMapping", "0") != "0",
+            value_text=None if text is None else _printable(text),
+            value=None if text is None else _encode_value(data_type, text, node_id),
+            default=parse_number(default, node_id) if default and is_whole else None,
+        )
 
 
 def _printable(name: str) -> str:
     return "".join(letter if letter.isprintable() else "?" for letter in name)[:_LONGEST_NAME]
 
 
-def _is_whole(variable: ODVariable) -> bool:
-    return variable.data_type in (datatypes.BOOLEAN, *datatypes.INTEGER_TYPES)
-
-
-def _encode_value(variable: ODVariable, text: str, node_id: int) -> bytes | None:
+def _encode_value(data_type: int, text: str, node_id: int) -> bytes | None:
     """A DCF's value as it goes over the bus; None where it is not of the object's type."""
-    value = parse_number(text, node_id) if _is_whole(variable) else variable.value
-    if value is None:
-        return None
-    if isinstance(value, int) and variable.data_type in datatypes.SIGNED_TYPES and not text.isdecimal():
-        bits = len(variable)
-        value -= (1 << bits) if 1 << bits - 1 <= value < 1 << bits else 0  # makers write -1 as 0xFFFF
+    variable = ODVariable("", 0)
+    variable.data_type = data_type
     try:
-        return bytes(variable.encode_raw(value))
+        if data_type in (datatypes.OCTET_STRING, datatypes.DOMAIN):
+            return bytes.fromhex(text)
+        if TYPE_NAMES.get(data_type) in _TEXTS:
+            return bytes(variable.encode_raw(text))
+        if data_type in datatypes.FLOAT_TYPES:
+            return bytes(variable.encode_raw(float(text)))
+        value = parse_number(text, node_id)
+        if value is not None and data_type in datatypes.SIGNED_TYPES and not text.isdecimal():
+            bits = len(variable)
+            value -= (1 << bits) if 1 << bits - 1 <= value < 1 << bits else 0  # makers write -1 as 0xFFFF
+        return None if value is None else bytes(variable.encode_raw(value))
     except (ValueError, TypeError, OverflowError, struct.error, ObjectDictionaryError):
         return None
-
-
-def _default(dictionary: ObjectDictionary, subindex: int) -> int | None:
-    """Part of the identity (0x1018) by its default; zero is how makers leave it open."""
-    variable = dictionary.get_variable(0x1018, subindex)
-    default = None if variable is None else variable.default
-    return default if isinstance(default, int) and default else None
 
 
 _COMMUNICATION = range(0x1000, 0x2000)
@@ -307,7 +297,6 @@ _OWN = frozenset(
 # controlword, targets, offsets to them, and outputs, among which is the brake: nobody asked to move
 _COMMANDS = frozenset((0x6040, 0x6042, 0x6071, 0x607A, 0x60B0, 0x60B1, 0x60B2, 0x60C1, 0x60FE, 0x60FF))
 _LINE = re.compile(r"node.?id|baud|bit.?rate", re.IGNORECASE)
-_TEXTS = ("VISIBLE_STRING", "UNICODE_STRING", "OCTET_STRING")
 
 
 @dataclass(frozen=True)

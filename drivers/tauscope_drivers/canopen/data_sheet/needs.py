@@ -115,8 +115,10 @@ def _flaw(file: DeviceFile, entry: DriveObject, *, is_mapped: bool = False, is_w
         return f"{entry} is missing"
     if TYPE_NAMES.get(described.data_type) not in [f"{kind}{entry.bits}" for kind in wanted]:
         return f"{entry} is {described.type_name}, not {wanted[0]}{entry.bits}"
-    if is_mapped and not described.is_mappable and not _is_mapped_always(file, entry):
-        return f"{entry} cannot be mapped to a PDO (PDOMapping)"
+    if is_mapped and not described.is_mappable:
+        slots = pdo_slots(file)  # of fixed mapping, one may hold it whatever its PDOMapping states
+        if not any(entry in (slot.fixed or ()) for slot in (*slots.received, *slots.sent)):
+            return f"{entry} cannot be mapped to a PDO (PDOMapping)"
     if is_written and "w" not in described.access:
         return f"{entry} cannot be written (AccessType {described.access[:20]!a})"
     return None
@@ -124,12 +126,6 @@ def _flaw(file: DeviceFile, entry: DriveObject, *, is_mapped: bool = False, is_w
 
 def _unwritable(file: DeviceFile, entry: DriveObject) -> str | None:
     return _flaw(file, entry, is_written=True)
-
-
-def _is_mapped_always(file: DeviceFile, entry: DriveObject) -> bool:
-    """Whether a PDO of fixed mapping holds it, whatever its PDOMapping states."""
-    slots = pdo_slots(file)
-    return any(slot.fixed is not None and entry in slot.fixed for slot in (*slots.received, *slots.sent))
 
 
 def _find(file: DeviceFile, entry: DriveObject) -> DescribedObject | None:
@@ -146,22 +142,14 @@ def require_identity(file: DeviceFile, dictionary: NodeDictionary, place: str) -
 
     Raises DriverError ``refused``, which names what differs.
     """
-    for entry, stated in (
-        (objects.VENDOR, file.vendor),
-        (objects.PRODUCT, file.product),
-        (objects.REVISION, file.revision),
-    ):
-        if stated is None:
+    identity = ((objects.VENDOR, file.vendor), (objects.PRODUCT, file.product), (objects.REVISION, file.revision))
+    for entry, stated in identity:
+        told = None if stated is None else dictionary.read_optional(entry)
+        if stated is None or told in (None, stated):
             continue
-        told = dictionary.read_optional(entry)
-        is_same = told in (None, stated) or (entry is objects.REVISION and _behaves_alike(told, stated))
-        if not is_same:
+        # CiA 301 counts changes of behaviour in the major half of the revision number
+        if entry is not objects.REVISION or not told >> 16 == stated >> 16 != 0:
             raise DriverError.refusal(
                 f"{place}: {entry} reads 0x{told:X}, and {file.name} states 0x{stated:X}; "
                 "check drive.node_id, or give the file of this drive"
             )
-
-
-def _behaves_alike(told: int | None, stated: int) -> bool:
-    """Whether the major half of the revision number is the same: CiA 301 counts changes of behaviour there."""
-    return told is not None and told >> 16 == stated >> 16 != 0

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from datetime import date
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from ruamel.yaml import YAML
 from ruamel.yaml.nodes import ScalarNode
 from ruamel.yaml.representer import SafeRepresenter
@@ -17,7 +15,7 @@ from ruamel.yaml.representer import SafeRepresenter
 from tauscope.errors import ExportError
 from tauscope.recording import EffortKind
 from tauscope.robot import Joint, JointType
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 
 _RATED_TORQUE = "rated_torque_nm"
 
@@ -57,8 +55,8 @@ def _milliampere(joint: Joint, effort_kind: EffortKind) -> tuple[float | None, s
     constant = joint.torque_constant
     if not math.isfinite(constant) or constant == 0.0:
         text = f"joint {shown(joint.name)}: torque_constant = {constant:g} must be finite and not zero"
-        raise ExportError(one_line(f"{text}; correct the robot file"))
-    force = "N" if joint.type is JointType.PRISMATIC else "Nm"
+        raise ExportError(f"{text}; correct the robot file")
+    force = joint.type.torque_unit
     remark = f"mA: torque_constant {constant!r} {force}/A, sign {joint.sign:+d}"
     if constant == 1.0:
         remark += f"; if the robot file gives no torque_constant, all torques here are in A, not in {force}"
@@ -83,7 +81,7 @@ def _permille(joint: Joint) -> tuple[float | None, str]:
 def _positive(joint: Joint, name: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value <= 0.0:
         text = f"joint {shown(joint.name)}: {name} = {shown(value)} must be a positive number; correct the robot file"
-        raise ExportError(one_line(text))
+        raise ExportError(text)
     return float(value)
 
 
@@ -156,30 +154,15 @@ def check_friction(joint: str, friction: JointFriction) -> None:
     """
     for name in ("stiction", "stribeck", "viscous", "offset", "k_v"):
         if not math.isfinite(getattr(friction, name)):
-            raise ExportError(one_line(f"joint {shown(joint)}: {name} is not finite; identify it from other data"))
+            raise ExportError(f"joint {shown(joint)}: {name} is not finite; identify it from other data")
     if friction.k_v <= 0.0:
-        raise ExportError(
-            one_line(f"joint {shown(joint)}: k_v = {friction.k_v:g} is not positive; give a positive k_v")
-        )
+        raise ExportError(f"joint {shown(joint)}: k_v = {friction.k_v:g} is not positive; give a positive k_v")
     if friction.delta is None:
         if friction.stribeck != 0.0:
-            raise ExportError(one_line(f"joint {shown(joint)}: has a Stribeck term but no delta; give its delta"))
+            raise ExportError(f"joint {shown(joint)}: has a Stribeck term but no delta; give its delta")
     elif not (math.isfinite(friction.delta) and friction.delta > 0.0):
         text = f"joint {shown(joint)}: delta = {friction.delta:g} is not positive and finite; give a positive delta"
-        raise ExportError(one_line(text))
-
-
-def friction_torque(friction: JointFriction, velocity: NDArray[np.float64] | float) -> NDArray[np.float64]:
-    """Friction torque τ_s S(K_v v) + τ_sc S(δ v) + τ_v v + offset, S(x) = (2/π) atan x, (N,).
-
-    Seed paper, equations (7) and (8).
-
-    `velocity`: v [rad/s or m/s]. Returns array of: torque of the shape of `velocity` [Nm or N].
-    """
-    v = np.asarray(velocity, dtype=np.float64)
-    step = np.arctan(friction.k_v * v) * (2.0 / np.pi)
-    stribeck = np.arctan((friction.delta or 0.0) * v) * (2.0 / np.pi)
-    return friction.stiction * step + friction.stribeck * stribeck + friction.viscous * v + friction.offset
+        raise ExportError(text)
 
 
 SCHEMA = "tauscope.compensation/1"
@@ -254,7 +237,6 @@ def _quote_text(value: Any) -> Any:
 
 
 def _joint(number: int, joint: JointCompensation) -> dict[str, Any]:
-    prismatic = joint.type is JointType.PRISMATIC
     units = joint.units
     return {
         "number": number,
@@ -262,8 +244,8 @@ def _joint(number: int, joint: JointCompensation) -> dict[str, Any]:
         "type": joint.type.value,
         "k_v": joint.friction.k_v,
         "delta": joint.friction.delta,
-        "velocity_unit": "m/s" if prismatic else "rad/s",
-        "torque": _coefficients(joint, 1.0, "N" if prismatic else "Nm"),
+        "velocity_unit": f"{joint.type.unit}/s",
+        "torque": _coefficients(joint, 1.0, joint.type.torque_unit),
         "current": _coefficients(joint, units.torque_per_milliampere, "mA"),
         "rated_torque": _coefficients(joint, units.torque_per_permille, "per mille of rated torque"),
         "remarks": list(units.remarks),

@@ -6,7 +6,6 @@ import unicodedata
 from dataclasses import dataclass
 
 from tauscope.export.compensation.model import EQUATION, CompensationModel, JointCompensation
-from tauscope.robot import JointType
 
 # Characters that end no comment and no string, and start no trigraph, in C, C++ or Python.
 _PLAIN = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789 ._,:;()+=@#%/-")
@@ -87,8 +86,7 @@ def row(joint: JointCompensation) -> tuple[float, ...]:
 
 
 def _joint_line(number: int, joint: JointCompensation) -> str:
-    kind = "prismatic" if joint.type is JointType.PRISMATIC else "revolute"
-    return f"Joint {number}: {joint.name} ({kind}). " + " ".join(f"{remark}." for remark in joint.units.remarks)
+    return f"Joint {number}: {joint.name} ({joint.type}). " + " ".join(f"{remark}." for remark in joint.units.remarks)
 
 
 _TWO_OVER_PI = "0.6366197723675814"  # the shortest decimal that reads back as 2/π rounded to float64

@@ -4,12 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.robot import STANDARD_PARAMETERS
-
-Array = NDArray[np.float64]
-
+from tauscope.robot.robot import Array
 
 # Share of the stiction that Coulomb friction is at least: dry friction falls by half with speed, hardly by more.
 LEAST_COULOMB = 1 / 3

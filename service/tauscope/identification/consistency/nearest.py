@@ -11,15 +11,13 @@ to μ. Both terms are quadratic in x, so the program is convex.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.errors import IdentificationError
 from tauscope.identification.consistency.inequalities import LinearInequalities
 from tauscope.identification.consistency.prior import Prior
 from tauscope.identification.consistency.program import assemble, solve
 from tauscope.robot import LinkInertia
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array
 
 MARGIN = 1e-8  # ε: smallest eigenvalue of a scaled pseudo-inertia. A link of 0.3 m keeps 0.03 mm of thickness.
 _ACTIVE = 100.0  # a constraint counts as active where less than this many margins are left

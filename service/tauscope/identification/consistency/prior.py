@@ -4,14 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from tauscope.identification.consistency.inequalities import FrictionColumns
 from tauscope.identification.consistency.triangle import congruence, parameter_scale, triangle_of_parameters
 from tauscope.robot import JointType, LinkInertia, Robot
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array
 
 # Radius of gyration of a default link over its length: between a slender rod (0.29) and a compact housing.
 _GYRATION = 0.25

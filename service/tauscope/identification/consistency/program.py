@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import clarabel
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import qr, solve_triangular
 
@@ -19,8 +18,7 @@ from tauscope.identification.consistency.inequalities import LinearInequalities
 from tauscope.identification.consistency.prior import Prior
 from tauscope.identification.consistency.triangle import identity_triangle, triangle_of_parameters
 from tauscope.robot import LinkInertia, pseudo_inertia
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array
 
 _TOLERANCE = 1e-10  # feasibility and duality gap asked of the solver
 _ATTEMPTS = ((1.0, True), (1.0, False), (1e2, True), (1e4, True), (1e6, True), (1e2, False), (1e4, False), (1e6, False))

@@ -6,11 +6,9 @@ inequalities for physically consistent inertial parameter identification", IEEE 
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.robot import LinkInertia, pseudo_inertia
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array
 
 # Entries of a symmetric 4x4 matrix, upper triangle column by column: the order of clarabel's PSDTriangleConeT.
 UPPER_TRIANGLE = tuple((row, column) for column in range(4) for row in range(column + 1))

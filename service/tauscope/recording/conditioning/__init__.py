@@ -1,23 +1,20 @@
 """From raw samples to motion that a regressor can be evaluated on, and to one band for torque and regressor."""
 
-from tauscope.recording.conditioning.common_band import AllPass, BandFilter, Decimator, HarmonicBand
+from tauscope.recording.conditioning.common_band import AllPass, Decimator, HarmonicBand
 from tauscope.recording.conditioning.conditioner import Conditioner, ConditioningSummary
 from tauscope.recording.conditioning.motion import Motion
-from tauscope.recording.conditioning.motion_source import MotionSource, Source
-from tauscope.recording.conditioning.periods import Periods, split_periods
+from tauscope.recording.conditioning.motion_source import Source
+from tauscope.recording.conditioning.periods import split_periods
 from tauscope.recording.conditioning.uniform import Mask, Stretch
 
 __all__ = [
     "AllPass",
-    "BandFilter",
     "Conditioner",
     "ConditioningSummary",
     "Decimator",
     "HarmonicBand",
     "Mask",
     "Motion",
-    "MotionSource",
-    "Periods",
     "Source",
     "Stretch",
     "split_periods",

@@ -4,9 +4,9 @@
 decimated together, so that τ = Φ Θ still holds row by row and noise above the band is gone from both sides.
 """
 
-from dataclasses import dataclass
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
 from math import prod
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,36 +24,33 @@ BRIDGED_FRACTION = 0.2
 BLOCK_VALUES = 1 << 19  # numbers in the intermediate result of a decimation: bounds memory, and stays in the cache
 
 
-class BandFilter(Protocol):
-    """A linear filter with decimation along the last axis, the same for torque and regressor."""
+class BandFilter(ABC):
+    """A linear filter with decimation along the last axis, the same for torque and regressor.
 
-    @property
-    def rate_hz(self) -> float:
-        """Sampling rate of what comes out [Hz]."""
-        ...
+    `rate_hz`: sampling rate of what comes out [Hz].
+    """
 
+    rate_hz: float
+
+    @abstractmethod
     def reduce(self, values: Array) -> Array:
         """Values (..., N) filtered and decimated to (..., M). `values`: (..., N), signals, time last."""
-        ...
 
+    @abstractmethod
     def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Which of the M outputs rest on measured samples, (..., N) → (..., M).
 
         `measured`: (..., N), where a sample was measured.
         """
-        ...
 
     def filtered_white(self, lags: int) -> Array | None:
         """Autocovariance of white noise that passed, up to a factor, (lags + 1,); None where it is white still."""
-        ...
+        return None
 
 
 @dataclass(frozen=True)
-class AllPass:
-    """No filter at all: for motion measured so cleanly that nothing needs to be cut.
-
-    `rate_hz`: sampling rate of what goes in and comes out [Hz].
-    """
+class AllPass(BandFilter):
+    """No filter at all: for motion measured so cleanly that nothing needs to be cut."""
 
     rate_hz: float
 
@@ -65,16 +62,12 @@ class AllPass:
         """The mask as it is. `measured`: (..., N), where a sample was measured."""
         return measured
 
-    def filtered_white(self, lags: int) -> None:
-        """None: white noise stays white."""
-
 
 @dataclass(frozen=True, eq=False)
-class Decimator:
+class Decimator(BandFilter):
     """Linear-phase low-pass (Kaiser window) evaluated only at every `factor`-th sample.
 
     `kernel`: (K,), symmetric impulse response of unit sum; K is a multiple of `factor`.
-    `rate_hz`: sampling rate after decimation [Hz].
 
     Written as one matrix product per group of signals: with X the signal in blocks of D samples,
     y[m] = Σ_b (X H)[m+b, b], H the kernel in K/D columns. That is several times quicker than a convolution.
@@ -127,7 +120,7 @@ class Decimator:
         if measured.all():
             return np.ones((*measured.shape[:-1], self._outputs(measured.shape[-1])), dtype=bool)
         weight = np.abs(self.kernel)
-        share = Decimator(weight / weight.sum(), self.factor, self.rate_hz)
+        share = replace(self, kernel=weight / weight.sum())
         missed = share.reduce((~measured).astype(float))
         in_long_gaps = share.reduce(_mark_long_gaps(measured, self.factor // 4).astype(float))
         return (in_long_gaps <= MASKED_FRACTION) & (missed <= BRIDGED_FRACTION)
@@ -154,11 +147,8 @@ def _mark_long_gaps(measured: NDArray[np.bool_], bridged: int) -> NDArray[np.boo
 
 
 @dataclass(frozen=True)
-class HarmonicBand:
-    """The band of one averaged period: its harmonics up to the cut-off, sampled just often enough to hold them.
-
-    `rate_hz`: sampling rate of the output [Hz].
-    """
+class HarmonicBand(BandFilter):
+    """The band of one averaged period: its harmonics up to the cut-off, sampled just often enough to hold them."""
 
     period_samples: int
     harmonics: int
@@ -186,6 +176,3 @@ class HarmonicBand:
         """
         whole = measured.mean(axis=-1, keepdims=True) >= 1.0 - MASKED_FRACTION
         return np.broadcast_to(whole, (*measured.shape[:-1], 2 * self.harmonics + 1))
-
-    def filtered_white(self, lags: int) -> None:
-        """None: white noise stays white."""

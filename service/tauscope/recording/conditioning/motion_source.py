@@ -145,12 +145,12 @@ def _quieter_bands(stretches: Sequence[Stretch], noise: PositionNoise) -> Array 
 
 
 @dataclass(frozen=True)
-class _VelocityFit:
-    """q̇_recorded = g q̇ - d q̈ + offset.
+class _Fit:
+    """A recorded signal as x_recorded = g x - d ẋ + offset, x by the positions, in their band.
 
     `delay`, `delay_std`: d and its standard error [s].
-    `offset`: relative to the rms of the velocity.
-    `misfit`: rms of the rest [rad/s or m/s].
+    `offset`: relative to the rms of the recorded signal.
+    `misfit`: rms of the rest, `motion` that of x.
     """
 
     gain: float
@@ -159,7 +159,36 @@ class _VelocityFit:
     delay_std: float
     offset: float
     misfit: float
+    motion: float
     band_hz: float
+
+    @staticmethod
+    def solve(
+        matrix: Array, target: Array, rate_hz: float, band_hz: float, offset: float | None = None
+    ) -> "_Fit | None":
+        """Least squares; None where the motion tells nothing.
+
+        `matrix`: (N, 2), x and ẋ, and ones as a third column where the offset is not known; `target`: (N,).
+        """
+        scale = np.sqrt(np.mean(matrix**2, axis=0))
+        if not (scale > 0.0).all() or not target.any() or np.linalg.matrix_rank(matrix / scale) < matrix.shape[1]:
+            return None
+        solution, *_ = np.linalg.lstsq(matrix / scale, target, rcond=None)
+        misfit = float(np.sqrt(np.mean((target - matrix / scale @ solution) ** 2)))
+        independent = max(1.0, len(target) * 2.0 * band_hz / rate_hz)
+        inverse = np.linalg.pinv((matrix / scale).T @ (matrix / scale) * (independent / len(target)))
+        std = np.maximum(misfit, TINY) * np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale
+        gain, delay, *constant = solution / scale
+        return _Fit(
+            gain=float(gain),
+            gain_std=float(std[0]),
+            delay=float(-delay),
+            delay_std=max(float(std[1]), TINY),
+            offset=float(constant[0] / np.sqrt(np.mean(target**2))) if offset is None else offset,
+            misfit=misfit,
+            motion=float(scale[0]),
+            band_hz=band_hz,
+        )
 
     @property
     def is_alike(self) -> bool:
@@ -170,8 +199,18 @@ class _VelocityFit:
             and abs(self.offset) <= RESOLVED
         )
 
+    def is_consistent(self, band_hz: float, interval_s: float) -> bool:
+        """Whether gain and delay, with their standard errors, and offset keep to the tolerances in a band."""
+        delay = abs(self.delay) + self.delay_std
+        return bool(
+            abs(self.gain - 1.0) + self.gain_std <= GAIN_TOLERANCE
+            and delay <= DELAY_TOLERANCE * interval_s
+            and 2.0 * np.pi * band_hz * delay <= PHASE_TOLERANCE
+            and abs(self.offset) <= OFFSET_TOLERANCE
+        )
 
-def _fit_velocity(pieces: Sequence[tuple[Array, Array]], rate_hz: float, limit_hz: float) -> _VelocityFit | None:
+
+def _fit_velocity(pieces: Sequence[tuple[Array, Array]], rate_hz: float, limit_hz: float) -> _Fit | None:
     """Fit the recorded velocity to the positions' own; None where too little of the motion is left."""
     margin = smoothing_margin(rate_hz, limit_hz) + 2 * DIFFERENCE_MARGIN
     columns, targets = [], []
@@ -185,27 +224,10 @@ def _fit_velocity(pieces: Sequence[tuple[Array, Array]], rate_hz: float, limit_h
         targets.append(smooth(recorded[:, None], rate_hz, limit_hz)[inner, 0])
     if not columns:
         return None
-    matrix, target = np.concatenate(columns), np.concatenate(targets)
-    rms = float(np.sqrt(np.mean(target**2)))
-    if rms == 0.0 or np.linalg.matrix_rank(matrix) < matrix.shape[1]:
-        return None
-    solution, *_ = np.linalg.lstsq(matrix, target, rcond=None)
-    misfit = float(np.sqrt(np.mean((target - matrix @ solution) ** 2)))
-    independent = max(1.0, len(target) * 2.0 * limit_hz / rate_hz)
-    inverse = np.linalg.pinv(matrix.T @ matrix * (independent / len(target)))
-    gain_std, delay_std, _ = np.maximum(misfit, TINY) * np.sqrt(np.maximum(np.diag(inverse), 0.0))
-    return _VelocityFit(
-        float(solution[0]),
-        float(gain_std),
-        float(-solution[1]),
-        max(float(delay_std), TINY),
-        float(solution[2] / rms),
-        misfit,
-        limit_hz,
-    )
+    return _Fit.solve(np.concatenate(columns), np.concatenate(targets), rate_hz, limit_hz)
 
 
-def _has_own_noise(fit: _VelocityFit, density: float, rate_hz: float) -> bool:
+def _has_own_noise(fit: _Fit, density: float, rate_hz: float) -> bool:
     """Whether the positions' noise shows in the difference: a velocity that was made from them carries it, too."""
     return fit.misfit**2 >= OWN_NOISE * density * _noise_gain(rate_hz, fit.band_hz, 1)
 
@@ -238,30 +260,7 @@ def _is_flat(spectrum: AccelerationSpectrum, rate_hz: float) -> bool:
     return bool(levels[0] <= FLATNESS * levels[1])
 
 
-@dataclass(frozen=True)
-class _Comparison:
-    """A recorded signal beside the derivative of the positions, in their band."""
-
-    gain: float
-    delay: float
-    gain_std: float
-    delay_std: float
-    offset: float
-    motion: float
-    misfit: float
-
-    def is_consistent(self, band_hz: float, interval_s: float) -> bool:
-        """Whether gain and delay, with their standard errors, and offset keep to the tolerances in a band."""
-        delay = abs(self.delay) + self.delay_std
-        return bool(
-            abs(self.gain - 1.0) + self.gain_std <= GAIN_TOLERANCE
-            and delay <= DELAY_TOLERANCE * interval_s
-            and 2.0 * np.pi * band_hz * delay <= PHASE_TOLERANCE
-            and abs(self.offset) <= OFFSET_TOLERANCE
-        )
-
-
-def _compare(pieces: Sequence[tuple[Array, Array]], order: int, rate_hz: float, limit_hz: float) -> _Comparison | None:
+def _compare(pieces: Sequence[tuple[Array, Array]], order: int, rate_hz: float, limit_hz: float) -> _Fit | None:
     """Fit the recorded signal to the derivatives of the positions; None where too little of the motion is left."""
     margin = smoothing_margin(rate_hz, limit_hz) + 3 * DIFFERENCE_MARGIN
     columns, targets, offsets, squares, count = [], [], 0.0, 0.0, 0
@@ -283,25 +282,9 @@ def _compare(pieces: Sequence[tuple[Array, Array]], order: int, rate_hz: float, 
         targets.append(target[inner, 0])
     if not columns:
         return None
-    matrix, target = np.concatenate(columns), np.concatenate(targets)
-    scale = np.sqrt(np.mean(matrix**2, axis=0))
-    if not (scale > 0.0).all():
-        return None
-    solution, *_ = np.linalg.lstsq(matrix / scale, target, rcond=None)
-    misfit = float(np.sqrt(np.mean((target - matrix / scale @ solution) ** 2)))
-    independent = max(1.0, len(target) * 2.0 * limit_hz / rate_hz)
-    inverse = np.linalg.pinv((matrix / scale).T @ (matrix / scale) * (independent / len(target)))
-    std = misfit * np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale
     rms = np.sqrt(squares / count)
-    return _Comparison(
-        gain=float(solution[0] / scale[0]),
-        delay=float(-solution[1] / scale[1]),
-        gain_std=float(std[0]),
-        delay_std=float(std[1]),
-        offset=float(offsets / count / rms) if rms > 0.0 else np.inf,
-        motion=float(scale[0]),
-        misfit=misfit,
-    )
+    offset = float(offsets / count / rms) if rms > 0.0 else np.inf
+    return _Fit.solve(np.concatenate(columns), np.concatenate(targets), rate_hz, limit_hz, offset)
 
 
 def _noise_gain(rate_hz: float, limit_hz: float, order: int) -> float:

@@ -4,47 +4,34 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-_CORES: Mapping[str, str] = {
-    **dict.fromkeys(("q", "qpos", "position", "positions", "pos", "angle", "angles", "theta", "state", "axis"), "q"),
-    **dict.fromkeys(("qd", "dq", "qdot", "qvel", "velocity", "velocities", "vel", "speed", "speeds", "omega"), "qd"),
-    **dict.fromkeys(("qdd", "ddq", "qacc", "acceleration", "accelerations", "acc"), "qdd"),
-    **dict.fromkeys(("tau", "torque", "torques", "effort", "efforts", "eff", "trq", "moment", "moments"), "tau"),
-    **dict.fromkeys(("force", "drehmoment"), "tau"),
-    "winkel": "q",
-    **dict.fromkeys(("i", "current", "currents", "cur", "curr", "strom", "load"), "i"),
-    **dict.fromkeys(("qref", "action"), "qref"),
-    **dict.fromkeys(("taucmd", "ctrl"), "taucmd"),
-    **dict.fromkeys(("temp", "temperature", "temperatures"), "temp"),
-    **dict.fromkeys(("volt", "volts", "voltage", "voltages"), "volt"),
+
+def _split(words: str) -> tuple[str, ...]:
+    return tuple(words.split())
+
+
+_WORDS_OF = {
+    "q": "q qpos position positions pos angle angles theta state axis winkel",
+    "qd": "qd dq qdot qvel velocity velocities vel speed speeds omega",
+    "qdd": "qdd ddq qacc acceleration accelerations acc",
+    "tau": "tau torque torques effort efforts eff trq moment moments force drehmoment",
+    "i": "i current currents cur curr strom load",
+    "qref": "qref action",
+    "taucmd": "taucmd ctrl",
+    "temp": "temp temperature temperatures",
+    "volt": "volt volts voltage voltages",
     "qlink": "qlink",
 }
-_COMMANDED = frozenset(
-    ("target", "desired", "des", "d", "cmd", "command", "commanded", "ref", "reference", "goal", "setpoint", "ipo")
-)
+_CORES: Mapping[str, str] = {word: group for group, words in _WORDS_OF.items() for word in _split(words)}
+_COMMANDED = _split("target desired des d cmd command commanded ref reference goal setpoint ipo")
 # Words of quantities that belong to no joint, or are not its measurement.
-_FOREIGN = frozenset(
-    ("tcp", "ee", "eef", "cartesian", "base", "tool", "ext", "external", "wrench", "object", "pose", "contact")
-) | frozenset(("qfrc", "gravity", "error", "bias", "limit", "limits", "max", "min", "accelerometer", "imu"))
-
-_QUALIFIERS = frozenset(
-    ("present", "actual", "measured", "meas", "act", "raw", "filtered", "msr", "computed", "applied")
-)
+_FOREIGN = {
+    *_split("tcp ee eef cartesian base tool ext external wrench object pose contact"),
+    *_split("qfrc gravity error bias limit limits max min accelerometer imu"),
+}
+_QUALIFIERS = _split("present actual measured meas act raw filtered msr computed applied")
 # Words that make a family second choice.
 _LEVELS: Mapping[str, int] = {"computed": 1, "force": 2, "theta": 2, "load": 2, "state": 3, "axis": 4}
-_TIMES = (
-    "t",
-    "time",
-    "zeit",
-    "timestamp",
-    "stamp",
-    "sim_time",
-    "time_s",
-    "seconds",
-    "sec",
-    "clock",
-    "elapsed",
-    "duration",
-)
+_TIMES = _split("t time zeit timestamp stamp sim_time time_s seconds sec clock elapsed duration")  # the likeliest first
 _UNIT = re.compile(r"(?<![A-Za-z])(deg(?:rees?)?|mA|mNm|percent|pct)(?![A-Za-z])|([°%])")
 
 
@@ -70,7 +57,7 @@ def role_of(words: Sequence[str]) -> tuple[str, int] | None:
         role = {"q": "qd", "qd": "qdd"}.get(role, role)
     if "link" in words and role == "q":
         role = "qlink"
-    if _COMMANDED.intersection(words):
+    if set(_COMMANDED).intersection(words):
         role = {"q": "qref", "tau": "taucmd", "qref": "qref", "taucmd": "taucmd"}.get(role, "")
     return (role, sum(_LEVELS.get(word, 0) for word in words)) if role else None
 

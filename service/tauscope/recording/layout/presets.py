@@ -1,7 +1,7 @@
 """Layouts that other tools write, by the words of their columns; the first that a file has is taken."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
@@ -13,72 +13,42 @@ class Preset:
     """
 
     columns: Mapping[str, tuple[str, ...]]
-    units: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str]
+
+
+def _preset(units: Mapping[str, str] | None = None, **ends: str) -> Preset:
+    return Preset({group: tuple(names.split()) for group, names in ends.items()}, units or {})
 
 
 # By the names of `tauscope.robot.recording_layout.PRESETS`.
 PRESET_OF: Mapping[str, Preset] = {
-    "rtde": Preset(
-        {
-            "t": ("timestamp",),
-            "q": ("actual_q",),
-            "qd": ("actual_qd",),
-            "qref": ("target_q",),
-            "tau": ("actual_current_as_torque",),
-            "i": ("actual_current",),
-            "taucmd": ("target_moment",),
-            "temp": ("joint_temperatures",),
-        }
+    "rtde": _preset(
+        t="timestamp",
+        q="actual_q",
+        qd="actual_qd",
+        qref="target_q",
+        tau="actual_current_as_torque",
+        i="actual_current",
+        taucmd="target_moment",
+        temp="joint_temperatures",
     ),
-    "libfranka": Preset(
-        {
-            "t": ("time", "timestamp", "t"),
-            "q": ("q",),
-            "qd": ("dq",),
-            "qref": ("q_d",),
-            "tau": ("tau_j",),
-            "taucmd": ("tau_j_d",),
-        }
-    ),
-    "plotjuggler": Preset(
-        {
-            "t": ("time", "timestamp"),
-            "q": ("position",),
-            "qd": ("velocity",),
-            "tau": ("effort", "torque"),
-            "i": ("current",),
-        }
-    ),
-    "lerobot": Preset(
-        {
-            "t": ("timestamp",),
-            "q": ("observation_state",),
-            "qref": ("action",),
-            "tau": ("observation_effort", "observation_torque"),
-            "i": ("observation_current", "observation_load"),
-        },
+    "libfranka": _preset(t="time timestamp t", q="q", qd="dq", qref="q_d", tau="tau_j", taucmd="tau_j_d"),
+    "plotjuggler": _preset(t="time timestamp", q="position", qd="velocity", tau="effort torque", i="current"),
+    "lerobot": _preset(
         {"q": "deg"},
+        t="timestamp",
+        q="observation_state",
+        qref="action",
+        tau="observation_effort observation_torque",
+        i="observation_current observation_load",
     ),
-    "mujoco": Preset(
-        {
-            "t": ("time", "t"),
-            "q": ("qpos",),
-            "qd": ("qvel",),
-            "qdd": ("qacc",),
-            "tau": ("qfrc_actuator", "actuator_force"),
-            "taucmd": ("ctrl",),
-        }
-    ),
-    "isaac": Preset(
-        {
-            "t": ("time", "sim_time", "timestamp", "t"),
-            "q": ("joint_pos", "joint_position", "joint_positions", "dof_pos"),
-            "qd": ("joint_vel", "joint_velocity", "joint_velocities", "dof_vel"),
-            "qref": ("joint_pos_target", "joint_position_target", "joint_position_targets"),
-            "tau": (
-                *("applied_torque", "applied_torques", "joint_effort", "joint_efforts", "measured_joint_efforts"),
-                *("joint_torque", "joint_torques", "dof_force", "computed_torque"),
-            ),
-        }
+    "mujoco": _preset(t="time t", q="qpos", qd="qvel", qdd="qacc", tau="qfrc_actuator actuator_force", taucmd="ctrl"),
+    "isaac": _preset(
+        t="time sim_time timestamp t",
+        q="joint_pos joint_position joint_positions dof_pos",
+        qd="joint_vel joint_velocity joint_velocities dof_vel",
+        qref="joint_pos_target joint_position_target joint_position_targets",
+        tau="applied_torque applied_torques joint_effort joint_efforts measured_joint_efforts"
+        " joint_torque joint_torques dof_force computed_torque",
     ),
 }

@@ -17,7 +17,7 @@ from pydantic import AwareDatetime, Field, ValidationError
 
 from tauscope.errors import TauscopeError
 from tauscope.files import write_atomically
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 from tauscope.server.store.data_folder import utc_now
 from tauscope.server.store.files import lock_file
 from tauscope.strict_model import StrictModel
@@ -133,7 +133,7 @@ class KeyFile:
     def add(self, name: str, scope: Scope, now: datetime, life: timedelta | None) -> tuple[ApiKey, str]:
         """Make a key. Raises TauscopeError if the name is in use, or none."""
         if not (name.isprintable() and 0 < len(name.strip()) <= 100):
-            raise TauscopeError(one_line(f"name {shown(name)}: give 1 to 100 printable characters"))
+            raise TauscopeError(f"name {shown(name)}: give 1 to 100 printable characters")
         secret, salt = secrets.token_urlsafe(32), secrets.token_hex(16)
         expires = None if life is None else now + life
         key = ApiKey(
@@ -147,7 +147,7 @@ class KeyFile:
         )
         with self._changing() as keys:
             if any(other.name == name and other.revoked is None for other in keys):
-                raise TauscopeError(one_line(f"name {shown(name)}: another key has it; choose another, or revoke that"))
+                raise TauscopeError(f"name {shown(name)}: another key has it; choose another, or revoke that")
             keys.append(key)
         return key, f"{_PREFIX}_{key.id}_{secret}"
 
@@ -158,7 +158,7 @@ class KeyFile:
                 if name in (key.name, key.id) and key.revoked is None:
                     keys[place] = key.model_copy(update={"revoked": now})
                     return keys[place]
-        raise TauscopeError(one_line(f"key {shown(name)}: there is none, or it was revoked; see tauscope key list"))
+        raise TauscopeError(f"key {shown(name)}: there is none, or it was revoked; see tauscope key list")
 
     @contextmanager
     def _changing(self) -> Iterator[list[ApiKey]]:

@@ -15,7 +15,6 @@ from itertools import count
 from typing_extensions import override
 
 from tauscope.errors import AcquisitionError
-from tauscope.robot.messages import one_line
 
 
 class BusyError(AcquisitionError):
@@ -53,7 +52,7 @@ class DeviceClaims:
 
     @staticmethod
     def _busy(device: str, holder: str) -> BusyError:
-        return BusyError(one_line(f"{device}: {holder} has it; wait until that has ended, or stop it"))
+        return BusyError(f"{device}: {holder} has it; wait until that has ended, or stop it")
 
 
 class Permit:
@@ -124,10 +123,10 @@ class LeasePermit(Permit):
     def require(self) -> None:
         lost = self._end_of(self._lease)
         if lost is not None:
-            raise LeaseLostError(one_line(f"{self._lease.device}: lease {self._lease.number} ended: {lost}"))
+            raise LeaseLostError(f"{self._lease.device}: lease {self._lease.number} ended: {lost}")
         if not self._lease.is_armed:
             hint = f"POST /api/v1/leases/{self._lease.id}/arm first"
-            raise NotArmedError(one_line(f"{self._lease.device}: its lease is not armed; {hint}"))
+            raise NotArmedError(f"{self._lease.device}: its lease is not armed; {hint}")
 
     @override
     def find_end_reason(self) -> str | None:
@@ -236,7 +235,7 @@ class Leases:
         shown = token.encode("utf-8", "surrogatepass")
         if lease is None or not hmac.compare_digest(shown, lease.token.encode()) or owner != lease.owner:
             now = "nobody has it" if lease is None else f"{lease.holder} has it by lease {lease.number}"
-            raise LeaseLostError(one_line(f"{device}: the lease that was shown does not hold, {now}; take a new one"))
+            raise LeaseLostError(f"{device}: the lease that was shown does not hold, {now}; take a new one")
         return lease
 
     def permit(self, device: str, token: str | None, owner: str, *, is_needed: bool) -> Permit:
@@ -245,7 +244,7 @@ class Leases:
             permit: Permit = LeasePermit(self.require(device, token, owner), self.find_end_reason)
         elif is_needed:
             hint = "POST /api/v1/leases, arm the lease, and send its token as header Lease-Token"
-            raise LeaseNeededError(one_line(f"{device}: moves for whoever has its lease; {hint}"))
+            raise LeaseNeededError(f"{device}: moves for whoever has its lease; {hint}")
         else:
             permit = UnleasedPermit(device, self.require_unleased)
         permit.require()
@@ -274,6 +273,4 @@ class Leases:
 
     def _refuse_leased(self, lease: Lease) -> LeasedError:
         left = self.seconds_left(lease)
-        return LeasedError(
-            one_line(f"{lease.device}: {lease.holder} has its lease, for {left:.1f} s more unless it is renewed")
-        )
+        return LeasedError(f"{lease.device}: {lease.holder} has its lease, for {left:.1f} s more unless it is renewed")

@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session, aliased, undefer
 
 from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import nearest, shown
 from tauscope.server.history.gates import Gate, ModelPolicy
 from tauscope.server.history.model_judgement import Candidate, choose, judge
 from tauscope.server.store.database.database import Database, read_row
@@ -166,7 +166,7 @@ def _robot(session: Session, name: str) -> Robot:
     if robot is None:
         known = session.scalars(select(Robot.name).order_by(Robot.name).limit(1000)).all()
         hint = nearest(name, known) if known else "identify one first"
-        raise NotFoundError(one_line(f"nothing is kept about a robot {shown(name)}; {hint}"))
+        raise NotFoundError(f"nothing is kept about a robot {shown(name)}; {hint}")
     return robot
 
 
@@ -179,7 +179,7 @@ def _model(session: Session, identifier: str) -> Model:
     model = session.scalars(select(Model).where(Model.identifier == identifier).limit(1)).first()
     if model is None:
         hint = "list the models; an identification is judged within seconds of its end"
-        raise NotFoundError(one_line(f"no model {shown(identifier)} is kept here; {hint}"))
+        raise NotFoundError(f"no model {shown(identifier)} is kept here; {hint}")
     return model
 
 

@@ -15,7 +15,7 @@ from python_multipart.multipart import MultipartParser, parse_options_header
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import LimitExceededError, TauscopeError
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 from tauscope.server.auth.gate import require_upload_quota
 from tauscope.server.problems import ProblemError, invalid_request
 from tauscope.server.store.files import FILE_NAME_RULE, IncomingFile, KeptFile, is_file_name
@@ -188,8 +188,7 @@ class _Receiver:
         rule = self._rules.get(self._part)
         if rule is None:
             known = ", ".join(self._rules)
-            text = f"the form has a part {shown(self._part)}; known parts: {known}"
-            raise ProblemError("invalid-request", text)
+            raise ProblemError("invalid-request", f"the form has a part {shown(self._part)}; known parts: {known}")
         self._rule = rule
         if rule.folder is None:
             if self._part in self.form.texts:
@@ -209,7 +208,7 @@ class _Receiver:
         if self._rule.folder is not None and (self._rule.folder / name).exists():
             raise ProblemError("invalid-request", f"part {self._part}: two files are named {name}; rename one")
         if len(files) >= self._rule.most:
-            raise LimitExceededError(one_line(f"part {self._part}: more than {self._rule.most} files; send fewer"))
+            raise LimitExceededError(f"part {self._part}: more than {self._rule.most} files; send fewer")
         return name
 
     def _part_data(self, data: bytes, start: int, end: int) -> None:

@@ -7,8 +7,8 @@ from fastapi import APIRouter, Header, Path, Request, Response
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.errors import NotFoundError
-from tauscope.robot.messages import one_line, shown
+from tauscope.errors import NotFoundError, one_line
+from tauscope.robot.messages import shown
 from tauscope.runtime.drivers import BackendName
 from tauscope.server.auth.gate import find_caller
 from tauscope.server.auth.keys import Scope
@@ -134,7 +134,7 @@ async def get_lease(request: Request, identifier: Identifier, services: Services
     """Who has which arm, and for how long."""
     lease = services.leases.find(identifier)
     if lease is None:
-        raise NotFoundError(one_line(f"no lease {shown(identifier)} holds; list the leases"))
+        raise NotFoundError(f"no lease {shown(identifier)} holds; list the leases")
     return _answer(services, lease, request.url.path.rsplit("/", 1)[0])
 
 
@@ -178,7 +178,7 @@ async def stop_everything(services: ServicesDep) -> StopAllAnswer:
 def _device(services: Services, identifier: str) -> str:
     lease = services.leases.find(identifier)
     if lease is None:
-        raise LeaseLostError(one_line(f"{shown(identifier)}: this lease does not hold (any more); take a new one"))
+        raise LeaseLostError(f"{shown(identifier)}: this lease does not hold (any more); take a new one")
     return lease.device
 
 

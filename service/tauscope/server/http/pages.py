@@ -16,7 +16,7 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 from tauscope.errors import NotFoundError
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import nearest, shown
 from tauscope.server.http.openapi import resolve_reference
 from tauscope.server.problems import KINDS
 
@@ -104,7 +104,7 @@ def get_style() -> Response:
 def show_problem_kind(code: str) -> Response:
     kind = KINDS.get(code)
     if kind is None:
-        raise NotFoundError(one_line(f"there is no error code {shown(code)}; /docs lists them"))
+        raise NotFoundError(f"there is no error code {shown(code)}; /docs lists them")
     chapter = load_chapters().get(f"errors/{code}")
     return HTMLResponse(_templates.get_template("problem.html").render(kind=kind, chapter=chapter))
 
@@ -113,7 +113,7 @@ def show_problem_kind(code: str) -> Response:
 def show_guide(name: str) -> Response:
     chapter = load_chapters().get(f"how-to/{name}")
     if chapter is None:
-        raise NotFoundError(one_line(f"there is no page {shown(name)}; /docs lists them"))
+        raise NotFoundError(f"there is no page {shown(name)}; /docs lists them")
     return HTMLResponse(_templates.get_template("guide.html").render(chapter=chapter))
 
 
@@ -123,7 +123,7 @@ def get_schema(name: str, request: Request) -> Response:
     request.app.openapi()
     schemas: Mapping[str, str] = request.app.state.schemas
     if name not in schemas:
-        raise NotFoundError(one_line(f"there is no schema {shown(name)}; {nearest(name, set(schemas))}"))
+        raise NotFoundError(f"there is no schema {shown(name)}; {nearest(name, set(schemas))}")
     return Response(schemas[name], media_type="application/schema+json")
 
 

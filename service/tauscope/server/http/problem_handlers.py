@@ -12,9 +12,9 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.routing import Route, compile_path
 
-from tauscope.errors import TauscopeError
+from tauscope.errors import TauscopeError, one_line
 from tauscope.files import is_disk_full
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import nearest, shown
 from tauscope.server.auth.keys import is_stop
 from tauscope.server.control.leases import BusyError, LeasedError, LeaseLostError, LeaseNeededError, NotArmedError
 from tauscope.server.problems import (

@@ -5,12 +5,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.dynamics import friction_torque, inverse_dynamics
 from tauscope.robot import Robot, read_robot
-
-Array = NDArray[np.float64]
+from tauscope.robot.robot import Array
 
 ROBOT = """\
 name: example-arm

@@ -11,7 +11,7 @@ from pathlib import Path
 from fastapi import APIRouter, Request, Response
 
 from tauscope.errors import NotFoundError
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 from tauscope.runtime.drivers import driver_names, find_driver
 from tauscope.server.page.example import example_files
 
@@ -52,7 +52,7 @@ def show_asset(request: Request, name: str) -> Response:
 def _answer(request: Request, name: str) -> Response:
     asset = assets().get(name)
     if asset is None:
-        raise NotFoundError(one_line(f"the page has no file {shown(name)}; open / instead"))
+        raise NotFoundError(f"the page has no file {shown(name)}; open / instead")
     headers = {**HEADERS, "ETag": asset.tag}
     if request.headers.get("if-none-match") == asset.tag:
         return Response(status_code=304, headers=headers)
@@ -63,7 +63,7 @@ def _answer(request: Request, name: str) -> Response:
 def show_example(name: str) -> Response:
     content = example_files().get(name)
     if content is None:
-        raise NotFoundError(one_line(f"the example has no file {shown(name)}; it has {', '.join(example_files())}"))
+        raise NotFoundError(f"the example has no file {shown(name)}; it has {', '.join(example_files())}")
     return Response(content, media_type="application/octet-stream", headers=HEADERS)
 
 

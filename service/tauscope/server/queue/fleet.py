@@ -9,10 +9,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from tauscope.errors import RecordingError, TauscopeError
+from tauscope.errors import RecordingError, TauscopeError, one_line
 from tauscope.files import write_atomically
 from tauscope.remote_files import find_path
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 from tauscope.server.queue.cluster_executor import ClusterUnavailableError
 from tauscope.server.store.files import FILE_NAME_RULE, is_file_name
 from tauscope.tasks import diagnose, identify
@@ -55,11 +55,11 @@ def read_manifest(path: Path) -> Iterator[FleetEntry]:
             reader = csv.DictReader(file)
             if tuple(reader.fieldnames or ()) != COLUMNS:
                 found = ",".join(reader.fieldnames or ()) or "nothing"
-                raise RecordingError(one_line(f"{path}: line 1: begins with {found}; write {','.join(COLUMNS)}"))
+                raise RecordingError(f"{path}: line 1: begins with {found}; write {','.join(COLUMNS)}")
             for row in reader:
                 yield _entry(path, reader.line_num, row, names)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise RecordingError(one_line(f"{path}: cannot be read ({error}); write a CSV file in UTF-8")) from None
+        raise RecordingError(f"{path}: cannot be read ({error}); write a CSV file in UTF-8") from None
 
 
 def analyse_fleet(
@@ -157,7 +157,7 @@ def _entry(path: Path, line: int, row: dict[str, str], names: dict[str, int]) ->
         raise RecordingError(f"{place}: has not {len(COLUMNS)} columns; separate recordings by {SEPARATOR}")
     name = row["name"].strip()
     if not is_file_name(name):
-        raise RecordingError(one_line(f"{place}: name {shown(name)}: {FILE_NAME_RULE}"))
+        raise RecordingError(f"{place}: name {shown(name)}: {FILE_NAME_RULE}")
     if name in names:
         raise RecordingError(f"{place}: name {name} is that of line {names[name]} too; give each robot its own")
     names[name] = line

@@ -8,7 +8,7 @@ from typing import Any
 from tauscope.errors import RobotFileError
 from tauscope.robot import Robot, RobotReport, check_robot, read_robot
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.urdf_element import local_name
 from tauscope.robot.xml_text import LARGEST_XML, is_xml, parse_xml
@@ -57,7 +57,7 @@ def _confine_files(folder: Path, file_name: str) -> None:
             continue
         if file not in sent:
             hint = "send that file as part urdf, and write its bare name into the robot file"
-            raise RobotFileError(one_line(f"{file_name}: kinematics.{kind}.file: {shown(file)} was not sent; {hint}"))
+            raise RobotFileError(f"{file_name}: kinematics.{kind}.file: {shown(file)} was not sent; {hint}")
         _confine_xml(read_bounded(folder / file, LARGEST_XML), file)
 
 
@@ -71,8 +71,7 @@ def _confine_xml(data: bytes, label: str) -> None:
         names = [name for name in element.attrib if name.startswith("file") or name in FOLDERS]
         if names or kind in ("extension", "plugin"):
             hint = "send one MJCF without included files and meshes: MuJoCo saves it so (mj_saveLastXML)"
-            text = f"<{kind}> names a file that was not sent; {hint}"
-            raise RobotFileError(one_line(f"{label}:{element.sourceline}: {text}"))
+            raise RobotFileError(f"{label}:{element.sourceline}: <{kind}> names a file that was not sent; {hint}")
     _require_modest(root, label)
 
 
@@ -84,7 +83,7 @@ def _require_modest(root: Any, label: str) -> None:
         bodies *= _multiply(element.get("count", ""))
         if bodies > _MOST_BODIES or math.prod(sizes) > _MOST_CELLS:
             text = f"<{local_name(element)}> generates more than {_MOST_BODIES} bodies or {_MOST_CELLS} cells"
-            raise RobotFileError(one_line(f"{label}:{element.sourceline}: {text}; leave it out: no joint needs it"))
+            raise RobotFileError(f"{label}:{element.sourceline}: {text}; leave it out: no joint needs it")
 
 
 def _multiply(text: str) -> float:

@@ -21,8 +21,7 @@ def _time_zone(value: str) -> str:
     try:
         ZoneInfo(value)
     except (ZoneInfoNotFoundError, ValueError, OSError):
-        text = "is no time zone; write one such as Europe/Berlin or UTC"
-        raise PydanticCustomError("time_zone", text) from None
+        raise PydanticCustomError("time_zone", "is no time zone; write one such as Europe/Berlin or UTC") from None
     return value
 
 

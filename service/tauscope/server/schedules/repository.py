@@ -9,7 +9,7 @@ from sqlalchemy import ColumnElement, delete, or_, select, update
 from sqlalchemy.orm import Session
 
 from tauscope.errors import NotFoundError
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import nearest, shown
 from tauscope.server.store.database.database import Database, read_row
 from tauscope.server.store.database.tables import Firing, Item, Schedule
 
@@ -180,5 +180,5 @@ def _schedule(session: Session, name: str) -> Schedule:
     if row is None:
         known = session.scalars(select(Schedule.name).order_by(Schedule.name).limit(1000)).all()
         hint = nearest(name, known) if known else "there are none yet"
-        raise NotFoundError(one_line(f"no schedule {shown(name)}; {hint}"))
+        raise NotFoundError(f"no schedule {shown(name)}; {hint}")
     return row

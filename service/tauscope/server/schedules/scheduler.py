@@ -12,8 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from tauscope.errors import NotFoundError, TauscopeError
-from tauscope.robot.messages import one_line
+from tauscope.errors import NotFoundError, TauscopeError, one_line
 from tauscope.server.control.campaign import CampaignDependencies, CampaignManager, CampaignOrder, CampaignWorkspace
 from tauscope.server.control.leases import FREE, BusyError, LeasedError, Permit
 from tauscope.server.history.indexer import WORKSPACES

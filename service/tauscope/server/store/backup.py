@@ -5,7 +5,6 @@ import hashlib
 import io
 import json
 import os
-import secrets
 import shutil
 import tarfile
 import tempfile
@@ -18,7 +17,7 @@ from sqlalchemy import Column, Connection, DateTime, Engine, MetaData, Table, in
 from sqlalchemy.exc import SQLAlchemyError
 
 from tauscope.errors import StoreError
-from tauscope.files import sync_folder
+from tauscope.files import open_atomically, sync_folder
 from tauscope.server.store.database.database import (
     FILE_NAME,
     WRITES,
@@ -112,24 +111,20 @@ _PIECE = 2**20
 
 def write_backup(data_folder: Path, database: Database, target: Path, version: str) -> int:
     """The database first, then each folder's state: copies can only be newer, as after a crash. Raises OSError."""
-    partial = target.with_name(f".{target.name}-{secrets.token_hex(4)}.partial")
     hashes: dict[str, dict[str, Any]] = {}
-    try:
-        with partial.open("xb") as file:
-            with gzip.open(file, "wb", compresslevel=3) as packed, tarfile.open(fileobj=packed, mode="w|") as archive:
-                with tempfile.TemporaryFile() as lines:
-                    lines.writelines(dump_lines(database.engine))
-                    _add(archive, _DATABASE, lines, hashes)
-                for path in _files(data_folder):
-                    _add_file(archive, path, data_folder, hashes)
-                manifest = {"form": FORM, "created": datetime.now(UTC).isoformat(), "version": version, "files": hashes}
-                _add(archive, _MANIFEST, io.BytesIO(json.dumps(manifest, indent=1).encode()), {})
-            file.flush()
-            os.fsync(file.fileno())
-        partial.rename(target)
-        sync_folder(target.parent)
-    finally:
-        partial.unlink(missing_ok=True)
+    with (
+        open_atomically(target) as file,
+        gzip.open(file, "wb", compresslevel=3) as packed,
+        tarfile.open(fileobj=packed, mode="w|") as archive,
+    ):
+        with tempfile.TemporaryFile() as lines:
+            lines.writelines(dump_lines(database.engine))
+            _add(archive, _DATABASE, lines, hashes)
+        for path in _files(data_folder):
+            _add_file(archive, path, data_folder, hashes)
+        manifest = {"form": FORM, "created": datetime.now(UTC).isoformat(), "version": version, "files": hashes}
+        _add(archive, _MANIFEST, io.BytesIO(json.dumps(manifest, indent=1).encode()), {})
+    sync_folder(target.parent)
     return len(hashes) - 1
 
 

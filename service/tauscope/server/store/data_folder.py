@@ -12,7 +12,7 @@ from typing import Literal
 
 from tauscope.errors import NotFoundError, StoreError, TauscopeError
 from tauscope.files import sync_folder, write_atomically
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 from tauscope.server.store.files import is_identifier, new_identifier
 
 _STAGED = ".staged-"
@@ -59,7 +59,7 @@ class ItemStore:
         folder = self.root / identifier if is_identifier(identifier) else None
         if folder is None or not folder.is_dir():
             hint = "check the identifier, or list what is kept"
-            raise NotFoundError(one_line(f"no {self.noun} {shown(identifier)} is kept here; {hint}"))
+            raise NotFoundError(f"no {self.noun} {shown(identifier)} is kept here; {hint}")
         return folder
 
     def remove(self, identifier: str) -> None:

@@ -17,7 +17,7 @@ from typing import Self
 
 from tauscope.errors import NotFoundError, RecordingError
 from tauscope.files import sync_folder, write_atomically
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 from tauscope.server.store.files import FILE_NAME_RULE, KeptFile, hash_file, is_file_name, read_stored
 from tauscope.strict_model import StrictModel
 
@@ -133,7 +133,7 @@ class RecordingStore:
     def keep(self, file: KeptFile) -> tuple[StoredRecording, bool]:
         """Name a staged file; False where the same bytes were kept. Raises RecordingError or NameTakenError."""
         if not is_file_name(file.name):
-            raise RecordingError(one_line(f"{shown(file.name)}: no name for a recording; {FILE_NAME_RULE}"))
+            raise RecordingError(f"{shown(file.name)}: no name for a recording; {FILE_NAME_RULE}")
         is_new = self._give_name(file)
         return self.find(file.name), is_new
 
@@ -210,7 +210,7 @@ class RecordingStore:
                 status = None
         if status is None or not stat.S_ISREG(status.st_mode):
             hint = "check the name, or list the recordings"
-            raise NotFoundError(one_line(f"no recording {shown(name)} lies on the server; {hint}"))
+            raise NotFoundError(f"no recording {shown(name)} lies on the server; {hint}")
         return status
 
     def _give_name(self, file: KeptFile) -> bool:

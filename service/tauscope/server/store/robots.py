@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tauscope.errors import NotFoundError
 from tauscope.files import sync_folder, write_atomically
-from tauscope.robot.messages import one_line, shown
+from tauscope.robot.messages import shown
 from tauscope.server.store.data_folder import utc_now
 
 VERSION_PATTERN = "^[0-9a-f]{32}$"
@@ -102,4 +102,4 @@ def hash_robot(folder: Path, robot_file: str) -> str:
 
 
 def _unknown(version: str) -> NotFoundError:
-    return NotFoundError(one_line(f"no robot version {shown(version)} is kept here; GET /api/v1/robots lists them"))
+    return NotFoundError(f"no robot version {shown(version)} is kept here; GET /api/v1/robots lists them")

@@ -14,7 +14,7 @@ from typing_extensions import override
 
 from tauscope.errors import ExportError, NotFoundError
 from tauscope.export.formats import ExportFile, ExportFormat
-from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.messages import nearest, shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
 from tauscope.server.control.run_manager import Manager
@@ -339,7 +339,7 @@ def add_export_route(
         services: ServicesDep,
     ) -> Response:
         if format_ not in formats:
-            raise NotFoundError(one_line(f"there is no export {shown(format_)}; {nearest(format_, set(formats))}"))
+            raise NotFoundError(f"there is no export {shown(format_)}; {nearest(format_, set(formats))}")
         workspace = finished(services, identifier)
         reason = workspace.refused_exports().get(format_)
         if reason is not None:

@@ -12,7 +12,6 @@ from pydantic_core import PydanticCustomError
 
 from tauscope.errors import IdentificationError, RobotFileError, ScenarioError
 from tauscope.robot import Robot
-from tauscope.robot.messages import one_line
 from tauscope.runtime.drivers import BackendName, find_driver
 from tauscope.server.http.bodies import (
     FORM,
@@ -197,4 +196,4 @@ def _refuse_files(robot: Robot, keys: Sequence[str]) -> None:
         for key in keys:
             if (joint.drive or {}).get(key) is not None:
                 hint = "leave it out, or run this arm with tauscope run"
-                raise RobotFileError(one_line(f"{joint.name}: drive.{key} names a file, which cannot be sent; {hint}"))
+                raise RobotFileError(f"{joint.name}: drive.{key} names a file, which cannot be sent; {hint}")

@@ -18,8 +18,7 @@ from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import NullPool
 
-from tauscope.errors import StoreError
-from tauscope.robot.messages import one_line
+from tauscope.errors import StoreError, one_line
 
 TIMEOUT_S = 5  # how long a write waits for another one, and a connection for its server [s]
 WRITES = "tauscope_writes"
