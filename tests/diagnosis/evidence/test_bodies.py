@@ -67,6 +67,21 @@ def test_a_start_has_volume_where_the_bodies_have_none() -> None:
     assert all(np.linalg.eigvalsh(pseudo_inertia(each))[0] > 0.0 for each in found.reshape(-1, 10))
 
 
+@given(SEEDS, st.floats(1e-8, 1e-6))
+def test_bodies_may_be_as_thin_as_rounding_lets_them(seed: int, share: float) -> None:
+    own, _, bodies = prior(seed)
+    thin = np.concatenate([flatten(each, share) for each in bodies.reshape(-1, 10)])
+    assert np.linalg.eigvalsh(own.about(thin).precision).min() > 0.0
+
+
+def flatten(link: Array, share: float) -> Array:
+    """A body with a small share of its second moments along two of its axes."""
+    moments, axes = np.linalg.eigh(pseudo_inertia(link))
+    inertia = axes @ np.diag(moments * [share, share, 1.0, 1.0]) @ axes.T
+    of_parameters = np.stack([pseudo_inertia(unit).ravel() for unit in np.eye(10)], axis=1)
+    return np.linalg.lstsq(of_parameters, inertia.ravel())[0]
+
+
 def test_another_unit_of_mass_changes_nothing_but_the_unit() -> None:
     own, _, bodies = prior(4)
     heavier = BodyPrior(own.base, 1000.0 * own.mean, own.precision / 1e6)

@@ -24,7 +24,7 @@ THINNEST = 1e-6
 """Least part of the believed body's moments that a body keeps along every axis: with its square double numbers work."""
 
 ROUNDING = 1e-10
-"""Added to the diagonal of a correlation matrix: what rounding takes off it."""
+"""Least eigenvalue of a correlation matrix that rounding may have made negative."""
 
 _ROWS, _COLUMNS = np.array(UPPER_TRIANGLE).T
 _WEIGHT = np.where(_ROWS == _COLUMNS, 1.0, np.sqrt(2.0))
@@ -149,7 +149,9 @@ def _factor(correlation: Array) -> tuple[Array, bool]:
     try:
         return cho_factor(correlation)
     except np.linalg.LinAlgError:
-        return cho_factor(correlation + ROUNDING * np.eye(len(correlation)))
+        even = 0.5 * (correlation + correlation.T)
+        lost = max(-float(np.linalg.eigvalsh(even)[0]), 0.0)
+        return cho_factor(even + (2.0 * lost + ROUNDING) * np.eye(len(even)))
 
 
 def _inverse(matrix: Array) -> Array:
