@@ -2,10 +2,10 @@
 
 from collections import defaultdict
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, Numbers, Rows, join_ranges, row_numbers
 from tauscope.recording.examination.effort_defects import ZeroRuns, find_all_stuck, find_spikes, find_stuck
@@ -183,12 +183,17 @@ def _find_bunched(time: Array, interval: float) -> NDArray[np.bool_]:
     is_close = np.diff(time, prepend=-np.inf) < BUNCHED * interval
     if not is_close.any():
         return is_close
-    offset = time - interval * np.arange(len(time))
-    off = np.abs(offset - ndimage.median_filter(offset, ON_A_LINE)) > OFF_THE_LINE * interval
-    waited = off & ndimage.maximum_filter1d(is_close, ON_A_LINE)
+    offset, waited = time - interval * np.arange(len(time)), _surround(is_close).any(axis=1)
+    usual = np.median(_surround(offset)[waited], axis=1)
+    waited[waited] = np.abs(offset[waited] - usual) > OFF_THE_LINE * interval
     kept = np.flatnonzero(~waited)
     waited[kept] = np.diff(time[kept], prepend=-np.inf) < BUNCHED * interval
     return waited
+
+
+def _surround(values: NDArray[Any]) -> NDArray[Any]:
+    """Every value with its neighbours, (N, `ON_A_LINE`)."""
+    return np.lib.stride_tricks.sliding_window_view(np.pad(values, ON_A_LINE // 2, "edge"), ON_A_LINE)
 
 
 def _find_repeated(same: NDArray[np.bool_], hold: int) -> NDArray[np.bool_]:
