@@ -79,7 +79,7 @@ def flatten(link: Array, share: float) -> Array:
     moments, axes = np.linalg.eigh(pseudo_inertia(link))
     inertia = axes @ np.diag(moments * [share, share, 1.0, 1.0]) @ axes.T
     of_parameters = np.stack([pseudo_inertia(unit).ravel() for unit in np.eye(10)], axis=1)
-    return np.linalg.lstsq(of_parameters, inertia.ravel())[0]
+    return np.asarray(np.linalg.lstsq(of_parameters, inertia.ravel())[0], dtype=np.float64)
 
 
 def test_another_unit_of_mass_changes_nothing_but_the_unit() -> None:

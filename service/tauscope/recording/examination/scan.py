@@ -183,9 +183,9 @@ def _find_bunched(time: Array, interval: float) -> NDArray[np.bool_]:
     is_close = np.diff(time, prepend=-np.inf) < BUNCHED * interval
     if not is_close.any():
         return is_close
-    offset, waited = time - interval * np.arange(len(time)), _surround(is_close).any(axis=1)
-    usual = np.median(_surround(offset)[waited], axis=1)
-    waited[waited] = np.abs(offset[waited] - usual) > OFF_THE_LINE * interval
+    offset, waited = time - interval * np.arange(len(time)), np.zeros(len(time), dtype=np.bool_)
+    near = np.flatnonzero(_surround(is_close).max(axis=1))
+    waited[near] = np.abs(offset[near] - np.median(_surround(offset)[near], axis=1)) > OFF_THE_LINE * interval
     kept = np.flatnonzero(~waited)
     waited[kept] = np.diff(time[kept], prepend=-np.inf) < BUNCHED * interval
     return waited
