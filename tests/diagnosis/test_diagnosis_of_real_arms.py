@@ -102,9 +102,7 @@ def test_the_coupled_wrist_of_the_tx40_is_named_first() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    reason="14.4 %: a drift of the first joint's friction, which is found first, hides what joint_4 lacks"
-)
+@pytest.mark.xfail(reason="14.4 %: a drift at joint_1, which is found first, hides what joint_4 lacks")
 def test_the_tx40_is_predicted_far_better_than_by_the_plain_model() -> None:
     """In its README's band: 21.1 % by the plain model, 13.9 % with the wrist's friction and rotors coupled."""
     found = diagnosed("staubli-tx40", 30.0)
