@@ -70,8 +70,9 @@ class PreparedMotion:
         resting = self.at_rest[joint] >= MOSTLY
         edges = np.flatnonzero(np.diff(resting, prepend=False, append=False)).reshape(-1, 2)
         least = STOP_S * self.motion.band.rate_hz
-        long = [slice(*each) for each in edges.tolist() if np.diff(each) >= least or {0, len(resting)} & set(each)]
-        return [stop for stop in long if self.used[joint, stop].any()]
+        is_stop = (edges[:, 1] - edges[:, 0] >= least) | (edges[:, 0] == 0) | (edges[:, 1] == len(resting))
+        stops = (slice(*each) for each in edges[is_stop].tolist())
+        return [stop for stop in stops if self.used[joint, stop].any()]
 
     @property
     def moving(self) -> Mask:

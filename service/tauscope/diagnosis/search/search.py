@@ -241,7 +241,7 @@ class Search:
     def _rank(self, at: Hypothesis, proposals: Sequence[Proposal]) -> list[Proposal]:
         """Proposals that training asks for, or held-out motion alone, the most probable after all motion first."""
         asked = [each for each in proposals if self._log_odds(each) > 0.0]
-        if self.held_out is None:
+        if self.held_out is None or len(asked) == len(proposals) < 2:
             return asked
         held_out = self.held_out
         nearer = {id(each): self.laboratory.approach(self._add(at, each)) for each in proposals}

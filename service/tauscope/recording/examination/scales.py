@@ -14,6 +14,8 @@ BLOCK_ROWS = 1 << 15  # rows that are read at once
 WINDOWS = 8
 WINDOW_ROWS = 1 << 13  # rows of one window; a recording of at most `WINDOWS` of them is looked at whole
 RANKED_ROWS = 4096  # rows of which a percentile is taken
+BUNCHED = 0.1  # share of the usual interval below which two stamps belong to one instant: a buffer was emptied
+MOST_BUNCHED = 0.1  # share of such stamps above which the source always sends in bursts
 BURST = 0.1  # share of the mean step below which the usual step is one within a burst, as buffers are emptied
 
 
@@ -43,9 +45,10 @@ class Sketch:
         mean = float(np.mean(self._steps[self._steps <= longest]))
         return mean if median < BURST * mean else median
 
-    def share_within(self, part: float) -> float:
-        """Share of rows that follow another within a part of the usual time."""
-        return float(np.mean(self._steps < part * self.interval))
+    @cached_property
+    def has_bursts(self) -> bool:
+        """Whether the source always sends in bursts: the conditioning counts its rows."""
+        return bool(np.mean(self._steps < BUNCHED * self.interval) > MOST_BUNCHED)
 
     @cached_property
     def position(self) -> Array:

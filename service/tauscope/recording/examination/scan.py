@@ -12,6 +12,7 @@ from tauscope.recording.examination.effort_defects import ZeroRuns, find_all_stu
 from tauscope.recording.examination.position_defects import scan_position
 from tauscope.recording.examination.scales import (
     BLOCK_ROWS,
+    BUNCHED,
     EffortScale,
     PositionScale,
     Sketch,
@@ -24,11 +25,8 @@ from tauscope.recording.samples import Array
 from tauscope.robot.robot import JointType
 
 SPARE_ROWS = 512  # rows read beyond a block on either side: a run of one value that is longer is taken to end there
-BUNCHED = 0.1  # share of the usual interval below which two stamps belong to one instant: a buffer was emptied
 ON_A_LINE = 31  # rows of which most have the stamp that their number foretells
 OFF_THE_LINE = 0.5  # share of the usual interval by which the stamp of one that waited is off
-# Share of bunched stamps above which the source always sends in bursts: the conditioning counts its rows.
-MOST_BUNCHED = 0.1
 REST_HOLDS = 4  # holds of one value after which it is a rest, and no update that was lost
 
 
@@ -116,7 +114,9 @@ class _Scan:
     def add(self, samples: Samples, first: int, core: tuple[int, int]) -> None:
         """Take a block, of which the rows of `core` are its own and the others neighbours."""
         rows = np.arange(first, first + len(samples.time))
-        close = _find_bunched(samples.time, self.sketch.interval) & (self.sketch.share_within(BUNCHED) <= MOST_BUNCHED)
+        close = np.zeros(len(samples.time), dtype=np.bool_)
+        if not self.sketch.has_bursts:
+            close = _find_bunched(samples.time, self.sketch.interval)
         self._keep(0, "bunched", rows[close], core)
         stuck = find_all_stuck(rows, samples.effort, samples.position, self.efforts)
         for joint, (place, scale) in enumerate(zip(self.defects.joints, self.positions, strict=True)):
