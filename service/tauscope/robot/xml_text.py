@@ -14,6 +14,7 @@ from tauscope.robot.messages import Finding, Severity
 from tauscope.robot.urdf_element import Element
 
 LARGEST_XML = 16 * 1024 * 1024
+LONGEST_REASON = 300  # characters of a parser's message, which quotes names of any length from the file
 
 _DECLARATION = re.compile(rb"""^\s*<\?xml[^>]*encoding\s*=\s*["']([A-Za-z0-9._-]{1,40})["']""")
 # Byte order marks; that of UTF-32 begins with that of UTF-16.
@@ -55,12 +56,12 @@ def parse_xml(data: bytes, label: str, findings: list[Finding]) -> Element:
     try:
         root = etree.fromstring(text.encode("utf-8"), parser)
     except etree.XMLSyntaxError as error:
-        raise RobotFileError(f"{label}:{error.lineno or 1}: not valid XML: {error.msg}") from None
+        raise RobotFileError(f"{label}:{error.lineno or 1}: not valid XML: {error.msg[:LONGEST_REASON]}") from None
     except (ValueError, MemoryError) as error:
         raise RobotFileError(f"{label}: not valid XML: {error}") from error
     for fault in parser.error_log:
         if fault.domain != etree.ErrorDomains.NAMESPACE:
-            raise RobotFileError(f"{label}:{fault.line or 1}: not valid XML: {fault.message}")
+            raise RobotFileError(f"{label}:{fault.line or 1}: not valid XML: {fault.message[:LONGEST_REASON]}")
     if root is None:
         raise RobotFileError(f"{label}: not valid XML: it has no elements")
     return root

@@ -84,15 +84,16 @@ def test_a_damage_is_named_and_costs_little(damage: Damage) -> None:
     assert measure_held_out_error(recording) < 1.2 * sound
 
 
-@given(seed=st.integers(0, 2**31))
-def test_no_row_keeps_a_stamp_that_is_not_its_own(seed: int) -> None:
-    channels = Channels.of(BASE)
+@given(seed=st.integers(0, 2**31), times=st.integers(1, 3))
+def test_no_row_keeps_a_stamp_that_is_not_its_own(seed: int, times: int) -> None:
+    channels, rng = Channels.of(BASE), np.random.default_rng(seed)
     own = channels.time.copy()
-    queue_samples(channels, np.random.default_rng(seed))
+    for _ in range(times):
+        queue_samples(channels, rng)
     samples = read_text(channels.csv()).samples()
     kept = np.isfinite(samples.position).all(axis=1)
     assert np.abs(samples.time - own)[kept].max() < 0.5 * (own[1] - own[0])
-    assert kept.mean() > 0.9
+    assert kept.mean() > 1.0 - 0.1 * times
 
 
 @given(damage=st.sampled_from(list(DAMAGES)), seed=st.integers(0, 2**31))
@@ -106,6 +107,7 @@ def test_a_damage_is_named_wherever_it_is(damage: Damage, seed: int) -> None:
 @settings(max_examples=1000, deadline=None)
 @given(damages=st.lists(st.sampled_from(list(DAMAGES)), min_size=1, max_size=2), seed=st.integers(0, 2**31))
 @example(damages=[reset_encoder, freeze_positions], seed=247598171)  # the reset follows the frozen rows at once
+@example(damages=[queue_samples, queue_samples], seed=3)  # more than a tenth of the rows waited
 def test_damages_end_in_a_line_or_in_a_result_as_good(damages: list[Damage], seed: int) -> None:
     assume(len(set(damages) & set(SLOW)) < 2)
     channels, rng = Channels.of(BASE), np.random.default_rng(seed)

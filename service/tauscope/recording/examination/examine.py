@@ -57,7 +57,7 @@ def _describe_defects(recording: Recording, defects: Defects, joints: Sequence[s
         return f"first at t = {recording.samples(row, row + 1).time[0]:.6g} s"
 
     if len(defects.bunched):
-        text = f"column t: {_count(defects.bunched)} within a tenth of an interval of another row"
+        text = f"column t: {_count(defects.bunched)} that waited for a later one"
         remedy = "stamp samples when they are measured, not when a buffer is emptied"
         yield ResultWarning(
             code="time-stamps", text=f"{text}, {begin(int(defects.bunched[0]))}; left out", remedy=remedy

@@ -15,7 +15,6 @@ WINDOWS = 8
 WINDOW_ROWS = 1 << 13  # rows of one window; a recording of at most `WINDOWS` of them is looked at whole
 RANKED_ROWS = 4096  # rows of which a percentile is taken
 BUNCHED = 0.1  # share of the usual interval below which two stamps belong to one instant: a buffer was emptied
-MOST_BUNCHED = 0.1  # share of such stamps above which the source always sends in bursts
 BURST = 0.1  # share of the mean step below which the usual step is one within a burst, as buffers are emptied
 
 
@@ -41,14 +40,17 @@ class Sketch:
     @cached_property
     def interval(self) -> float:
         """Usual time from row to row [s]: the median, or where rows come in bursts the mean without gaps."""
-        median, longest = np.percentile(self._steps, [50.0, 99.0]).tolist()
-        mean = float(np.mean(self._steps[self._steps <= longest]))
-        return mean if median < BURST * mean else median
+        return self._mean_step if self.has_bursts else float(np.median(self._steps))
 
     @cached_property
     def has_bursts(self) -> bool:
         """Whether the source always sends in bursts: the conditioning counts its rows."""
-        return bool(np.mean(self._steps < BUNCHED * self.interval) > MOST_BUNCHED)
+        return bool(np.median(self._steps) < BURST * self._mean_step)
+
+    @cached_property
+    def _mean_step(self) -> float:
+        """Mean time from row to row without gaps [s]."""
+        return float(np.mean(self._steps[self._steps <= np.percentile(self._steps, 99.0)]))
 
     @cached_property
     def position(self) -> Array:

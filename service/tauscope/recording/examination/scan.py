@@ -25,7 +25,7 @@ from tauscope.recording.samples import Array
 from tauscope.robot.robot import JointType
 
 SPARE_ROWS = 512  # rows read beyond a block on either side: a run of one value that is longer is taken to end there
-ON_A_LINE = 31  # rows of which most have the stamp that their number foretells
+ON_A_LINE = 31  # rows of which a quarter or more came in time, and none before it
 OFF_THE_LINE = 0.5  # share of the usual interval by which the stamp of one that waited is off
 REST_HOLDS = 4  # holds of one value after which it is a rest, and no update that was lost
 
@@ -185,7 +185,8 @@ def _find_bunched(time: Array, interval: float) -> NDArray[np.bool_]:
         return is_close
     offset, waited = time - interval * np.arange(len(time)), np.zeros(len(time), dtype=np.bool_)
     near = np.flatnonzero(_surround(is_close).max(axis=1))
-    waited[near] = np.abs(offset[near] - np.median(_surround(offset)[near], axis=1)) > OFF_THE_LINE * interval
+    line = np.percentile(_surround(offset)[near], 25.0, axis=1)
+    waited[near] = np.abs(offset[near] - line) > OFF_THE_LINE * interval
     kept = np.flatnonzero(~waited)
     waited[kept] = np.diff(time[kept], prepend=-np.inf) < BUNCHED * interval
     return waited
