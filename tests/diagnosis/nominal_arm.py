@@ -11,19 +11,29 @@ from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.nominal import delivered_model
 from tauscope.diagnosis.noise.floor import with_pure_error
 from tauscope.diagnosis.observations.observations import Observations
-from tauscope.identification import identify
+from tauscope.identification import Identification, identify
+from tauscope.recording import Recording
 from tauscope.recording.conditioning import Conditioner
 
 CUTOFF_HZ = 8.0
 
 
+def _record() -> list[Recording]:
+    return recordings((1,), None, np.random.default_rng(3))
+
+
+@cache
+def identified() -> Identification:
+    """What the motion's recording says of the arm."""
+    return identify(paper_robot(), _record())
+
+
 @cache
 def nominal_rows() -> tuple[Observations, ExtendedModel]:
     """Rows of one motion, whitened by what its two periods differ by."""
-    robot, made = paper_robot(), recordings((1,), None, np.random.default_rng(3))
-    identification = identify(robot, made)
-    model = delivered_model(identification)
-    surveyed = [Conditioner.survey(each, robot) for each in made]
+    identification = identified()
+    robot, model = identification.robot, delivered_model(identification)
+    surveyed = [Conditioner.survey(each, robot) for each in _record()]
     bare = Observations.prepare(surveyed, robot, identification.structure.base, CUTOFF_HZ, model.steepness)
     known = with_pure_error(bare, model)
     assert known is not None

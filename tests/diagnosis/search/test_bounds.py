@@ -8,13 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from diagnosis.evidence.test_linear_model import problem
-from diagnosis.nominal_arm import nominal_rows
+from diagnosis.nominal_arm import identified, nominal_rows
 from tauscope.diagnosis.evidence.linear_model import LinearModel
+from tauscope.diagnosis.evidence.rows import EvidenceRows
 from tauscope.diagnosis.fitting.fit import stepped
 from tauscope.diagnosis.model.extended import with_terms
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.search import hypothesis
+from tauscope.diagnosis.search.hypothesis import Laboratory, Prior
 from tauscope.effects.backlash import Backlash
+from tauscope.effects.load_dependent_friction import LoadDependentFriction
 
 MODEL: Any = None
 SEEDS = st.integers(0, 10_000)
@@ -47,6 +50,22 @@ def test_what_stays_within_its_bounds_is_not_touched(seed: int) -> None:
     mean = case.model.posterior(case.scales).mean
     lower[:2], upper[1:3] = mean[:2] - 1.0, mean[1:3] + 1.0
     assert hold(case, lower, upper) is case.model
+
+
+def test_a_bound_changes_the_step_and_not_how_probable_the_parameters_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    observations, model = nominal_rows()
+    laboratory = Laboratory(EvidenceRows.prepare(observations, model), Prior.of(identified(), model), repeated=True)
+    start = laboratory.start(model)
+    friction, size = Term(LoadDependentFriction(1), np.zeros(0), np.array([0.1])), np.array([0.1])
+    moved = with_terms(start.model, [friction])
+    (place,) = (own.start for own in moved.term_places())
+    least = np.full(moved.size, -np.inf)
+    free = laboratory.at(moved, (size,), start.scales, start.dependence)
+    least[place] = -0.05  # the data ask for none of it
+    monkeypatch.setattr(hypothesis, "_bounds", lambda model: (least, np.full(model.size, np.inf)))
+    held = laboratory.at(moved, (size,), start.scales, start.dependence)
+    assert free.posterior.mean[place] < held.posterior.mean[place] == pytest.approx(-0.05, rel=0.01)
+    assert held.misfit == free.misfit
 
 
 def test_a_step_leads_no_gap_beyond_the_one_by_which_the_link_moves() -> None:

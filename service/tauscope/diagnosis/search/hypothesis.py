@@ -65,6 +65,8 @@ class Hypothesis:
     """A model and what the data say of it.
 
     `sizes`: tuple of (c,), standard deviation believed of every term's coefficients.
+    `linear`: about the model, coefficients that would pass a bound held there.
+    `free`: the same with none held.
     `scales`: one entry a joint.
     `dependence`: κ of every joint.
     """
@@ -72,6 +74,7 @@ class Hypothesis:
     model: ExtendedModel
     sizes: tuple[Array, ...]
     linear: LinearModel
+    free: LinearModel
     bodies: NormalBodies
     scales: tuple[Scales, ...]
     dependence: tuple[float, ...]
@@ -90,9 +93,9 @@ class Hypothesis:
     def misfit(self) -> float:
         """-2 log probability of data and parameters as they are, but for what depends on the scales alone."""
         others = slice(len(self.bodies.mean), None)
-        off = self.linear.mean[others]
-        believed = self.bodies.energy + float(off @ self.linear.precision[others, others] @ off)
-        pairs = zip(self.linear.joints, self.scales, strict=True)
+        off = self.free.mean[others]
+        believed = self.bodies.energy + float(off @ self.free.precision[others, others] @ off)
+        pairs = zip(self.free.joints, self.scales, strict=True)
         return believed + sum(float(own.weighted(scales).products[0, 0]) for own, scales in pairs)
 
 
@@ -176,9 +179,9 @@ class Laboratory:
             spread[place] = np.concatenate([size, _shape_spreads(term)])
         diagonal = np.arange(plain, model.size)
         precision[diagonal, diagonal] = 1.0 / spread[plain:] ** 2
-        linear = LinearModel(self.rows.moments(model, dependence, owned=owned), mean, precision)
-        linear = _hold_impossible(linear, model, scales)
-        return Hypothesis(model, tuple(sizes), linear, bodies, tuple(scales), tuple(dependence))
+        free = LinearModel(self.rows.moments(model, dependence, owned=owned), mean, precision)
+        held = _hold_impossible(free, model, scales)
+        return Hypothesis(model, tuple(sizes), held, free, bodies, tuple(scales), tuple(dependence))
 
     def settle(self, start: Hypothesis, joints: Collection[int]) -> Hypothesis:
         """The most probable parameters, and scales of highest evidence at some joints."""
