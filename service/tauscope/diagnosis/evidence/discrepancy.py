@@ -94,6 +94,7 @@ def beyond(columns: Array, features: Array) -> Array:
     """
     length = np.linalg.norm(columns, axis=1, keepdims=True)
     unit = columns / np.where(length > 0.0, length, 1.0)
-    _, sizes, basis = np.linalg.svd(unit, full_matrices=False)
-    basis = basis[sizes > DIRECTION * sizes.max(initial=0.0)]
-    return features - (features @ basis.T) @ basis
+    squares, directions = np.linalg.eigh(unit @ unit.T)
+    known = squares > DIRECTION**2 * squares.max(initial=0.0)
+    basis = directions[:, known] / np.sqrt(squares[known])
+    return features - ((features @ unit.T) @ basis) @ (basis.T @ unit)

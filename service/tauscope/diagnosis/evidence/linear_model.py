@@ -16,7 +16,7 @@ from scipy.linalg import cho_solve, solve_triangular
 from scipy.linalg.lapack import dpotri
 from scipy.optimize import minimize
 
-from tauscope.diagnosis.evidence.moments import Index, JointMoments, factor
+from tauscope.diagnosis.evidence.moments import Index, JointMoments, Weighted, factor
 from tauscope.diagnosis.evidence.scales import Scales
 from tauscope.recording.recording import Array
 
@@ -142,13 +142,13 @@ class LinearModel:
     def _tune(self, joint: int, start: Scales, rest: "_Sum", *, anew: bool) -> Scales:
         """Scales of one joint beside what the others say."""
         own = self.joints[joint]
+        seen, every = rest.marginal(own.index), np.arange(len(own.index))
 
         def objective(values: Array) -> tuple[float, Array]:
             scales = replace(start, values=values)
-            posterior = self._solve(self._sum({joint: scales}, [joint], rest))
-            direction = np.concatenate([[1.0], -posterior.mean[own.index]])
-            covariance = posterior.covariance[np.ix_(own.index, own.index)]
-            slopes = 0.5 * own.slopes(scales, direction, covariance) + scales.penalty_slopes()
+            posterior = self._solve(seen.add(every, own.weighted(scales)))
+            direction = np.concatenate([[1.0], -posterior.mean])
+            slopes = 0.5 * own.slopes(scales, direction, posterior.covariance) + scales.penalty_slopes()
             return scales.penalty() - posterior.log_evidence, slopes
 
         limits = start.bounds()
@@ -182,14 +182,10 @@ class LinearModel:
 
     def _sum(self, scales: Sequence[Scales] | Mapping[int, Scales], joints: Collection[int], start: "_Sum") -> "_Sum":
         """A, its right-hand side, energy and log det C with some joints more."""
-        matrix, right, energy, determinant = start.matrix.copy(), start.right.copy(), start.energy, start.determinant
+        total = start
         for joint in joints:
-            own = self.joints[joint]
-            found = own.weighted(scales[joint])
-            matrix[np.ix_(own.index, own.index)] += found.products[1:, 1:]
-            right[own.index] += found.products[1:, 0]
-            energy, determinant = energy + float(found.products[0, 0]), determinant + found.log_determinant
-        return _Sum(matrix, right, energy, determinant)
+            total = total.add(self.joints[joint].index, self.joints[joint].weighted(scales[joint]))
+        return total
 
     def _solve(self, total: "_Sum") -> Posterior:
         scale = np.sqrt(np.diag(total.matrix))
@@ -209,3 +205,25 @@ class _Sum:
     right: Array
     energy: float
     determinant: float
+
+    def add(self, index: Index, found: Weighted) -> "_Sum":
+        """With one joint more, whose columns have places `index`, (k,)."""
+        matrix, right = self.matrix.copy(), self.right.copy()
+        matrix[np.ix_(index, index)] += found.products[1:, 1:]
+        right[index] += found.products[1:, 0]
+        energy = self.energy + float(found.products[0, 0])
+        return _Sum(matrix, right, energy, self.determinant + found.log_determinant)
+
+    def marginal(self, index: Index) -> "_Sum":
+        """What is left for some parameters when all others are integrated out, less a constant.
+
+        `index`: (k,), places of those that stay.
+        """
+        others = np.setdiff1d(np.arange(len(self.right)), index)
+        scale = np.sqrt(np.diag(self.matrix)[others])
+        root = factor(self.matrix[np.ix_(others, others)], scale)
+        crossed = np.column_stack([self.matrix[np.ix_(others, index)], self.right[others]]) / scale[:, None]
+        taken = solve_triangular(root, crossed, lower=True)
+        left = taken.T @ taken
+        matrix = self.matrix[np.ix_(index, index)] - left[:-1, :-1]
+        return _Sum(matrix, self.right[index] - left[:-1, -1], self.energy - left[-1, -1], self.determinant)

@@ -211,10 +211,10 @@ class Laboratory:
 
     def weigh(self, at: Hypothesis, joints: Collection[int]) -> Hypothesis:
         """The same model under scales of highest evidence, rows counting as much as its best residual lets them."""
-        for weighing in range(WEIGHINGS):
+        for _ in range(WEIGHINGS):
             dependence = self._dependence(at, joints)
             moved = max(abs(np.log(dependence[joint] / at.dependence[joint])) for joint in joints)
-            at = self.tune(self.under(at, dependence, joints), joints, anew=weighing == 0)
+            at = self.tune(self.under(at, dependence, joints), joints, anew=False)
             if moved < ALIKE:
                 break
         return at

@@ -123,7 +123,7 @@ class Proposer:
         if is_open:
             beside = self.laboratory.paint(at, found)
             shape, size = self.zoom(effect, shape, size, beside, signals)
-            found = self._extend(effect, shape, size, beside)
+            found = self._extend(effect, shape, size, beside, anew=False)
         term = found.model.terms[-1]
         own = found.posterior.mean[found.model.term_places()[-1]]
         term = replace(term, coefficients=own[: len(size)])
@@ -151,7 +151,7 @@ class Proposer:
             found.append((float(scorer.score(effect, shape[None], columns)[0].log_factors[0]), shape, size))
         return max(found, key=lambda each: each[0])[1:]
 
-    def _extend(self, effect: Effect, shape: Array, size: Array, at: Hypothesis) -> Hypothesis:
+    def _extend(self, effect: Effect, shape: Array, size: Array, at: Hypothesis, *, anew: bool = True) -> Hypothesis:
         """A hypothesis with an effect of a given shape, under scales of highest evidence.
 
         These are looked for as if rows were independent: under the noise and the dependence of a hypothesis that lacks
@@ -160,7 +160,7 @@ class Proposer:
         joints = effect.touched(len(at.scales))
         added = self.laboratory.with_term(at, Term(effect, shape, np.zeros(len(size))), size)
         added = self.laboratory.under(added, [1.0] * len(at.scales), joints)
-        return self.laboratory.weigh(self.laboratory.tune(added, joints), joints)
+        return self.laboratory.weigh(self.laboratory.tune(added, joints, anew=anew), joints)
 
     def zoom(
         self, effect: Effect, shape: Array, size: Array, at: Hypothesis, signals: Sequence[Signals]

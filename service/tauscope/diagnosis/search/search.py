@@ -117,7 +117,8 @@ class Search:
 
     def _exchange(self, at: Hypothesis, most: int) -> tuple[Hypothesis, tuple[Weighed, ...], int]:
         """Each effect weighed beside all others, a more probable one in its place, and none that does not hold."""
-        weighed = {own: self._weigh(at, places) for own, places in _groups(at.model).items()}
+        groups = _groups(at.model)
+        weighed = dict(zip(groups, side_by_side(lambda places: self._weigh(at, places), groups.values()), strict=True))
         exchanges, stale = 0, set[Place]()
         while weighed:
             own: Place | None = max(weighed, key=lambda each: weighed[each].lead)
@@ -244,7 +245,8 @@ class Search:
         if self.held_out is None or len(asked) == len(proposals) < 2:
             return asked
         held_out = self.held_out
-        nearer = {id(each): self.laboratory.approach(self._add(at, each)) for each in proposals}
+        approached = side_by_side(lambda each: self.laboratory.approach(self._add(at, each)), proposals)
+        nearer = {id(each): found for each, found in zip(proposals, approached, strict=True)}
         for each in proposals:
             if each not in asked and held_out.change(at, nearer[id(each)]).log_odds() > UNASKED:
                 asked.append(each)
