@@ -52,6 +52,11 @@ class Rival:
     log_odds: float
     absent: int | None = None
 
+    @property
+    def place(self) -> Place:
+        """Which effect where."""
+        return self.term.place
+
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
@@ -74,9 +79,14 @@ class Weighed:
         """Log odds of the best rival against it."""
         return self.rivals[0].log_odds - self.log_odds if self.rivals else -np.inf
 
+    @property
+    def is_behind(self) -> bool:
+        """Whether a rival may take its place: it alone has one, and is less probable."""
+        return self.lead > 0.0 and len(self.places) == 1
+
     def refuse(self, rival: Place) -> "Weighed":
         """The same without a rival that held-out motion refuses."""
-        return replace(self, rivals=tuple(each for each in self.rivals if each.term.place != rival))
+        return replace(self, rivals=tuple(each for each in self.rivals if each.place != rival))
 
     @property
     def probability(self) -> float:

@@ -119,11 +119,12 @@ class Search:
         """Each effect weighed beside all others, a more probable one in its place, and none that does not hold."""
         groups = _groups(at.model)
         weighed = dict(zip(groups, side_by_side(lambda places: self._weigh(at, places), groups.values()), strict=True))
-        exchanges, stale = 0, set[Place]()
+        exchanges, stale, gone = 0, set[Place](), set[Place]()
         while weighed:
-            own: Place | None = max(weighed, key=lambda each: weighed[each].lead)
-            if weighed[own].lead <= 0.0 or len(weighed[own].places) > 1 or exchanges >= most:
-                own = next(iter(stale), None)
+            behind = [each for each, found in weighed.items() if found.is_behind and found.rivals[0].place not in gone]
+            own = next(iter(stale), None)
+            if behind and exchanges < most:
+                own = max(behind, key=lambda each: weighed[each].lead)
             if own is None:
                 added = {each: found for each, found in weighed.items() if each not in _places(self.nominal)}
                 doubtful: list[Place] = [each for each, found in added.items() if not self._holds(at, found)]
@@ -138,11 +139,12 @@ class Search:
                 known = {each.place for each in weighed[own].proposals}
                 weighed[own] = self._weigh(at, _groups(at.model)[own], known)
                 continue
-            other, rival = self._try_rival(at, weighed[own]), weighed[own].rivals[0].term.place
+            other, rival = self._try_rival(at, weighed[own]), weighed[own].rivals[0].place
             if other is None:
                 weighed = {each: weighed[each].refuse(rival) for each in weighed}
                 continue
             exchanges += 1
+            gone.add(own)  # what another one took the place of does not come back for it
             at, new = other, other.model.terms[-1].place
             groups = _groups(at.model)
             stale = set(groups) - {new}
@@ -183,11 +185,11 @@ class Search:
         lasts = not isinstance(effect, TimeLocalEffect)
         trained = at.log_evidence - before.log_evidence + self._prior_odds(effect, unnamed_log_odds(before))
         log_odds = trained + (0.0 if self.held_out is None else self.held_out.change(without, at).log_odds())
-        own, others = (effect.id, effect.joint), _places(without)
+        own, may_be_added = (effect.id, effect.joint), _Wanted(_places(without), ())
 
         def competes(each: Effect) -> bool:
             place = each.id, each.joint
-            is_new = (each.repeats and place != own) or place not in others  # itself in another shape, too
+            is_new = may_be_added(each) and not (each.repeats and place == own)  # itself in another shape, too
             is_like = lasts != isinstance(each, TimeLocalEffect)
             is_known = known is None or place in known
             return is_known and is_new and is_like and not shared.isdisjoint(each.touched(len(at.scales)))
