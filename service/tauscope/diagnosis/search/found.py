@@ -1,5 +1,6 @@
 """What a search comes to: the effects it tried, and how probable each is beside its rivals."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,9 +85,9 @@ class Weighed:
         """Whether a rival may take its place: it alone has one, and is less probable."""
         return self.lead > 0.0 and len(self.places) == 1
 
-    def refuse(self, rival: Place) -> "Weighed":
-        """The same without a rival that held-out motion refuses."""
-        return replace(self, rivals=tuple(each for each in self.rivals if each.place != rival))
+    def refuse(self, rivals: Collection[Place]) -> "Weighed":
+        """The same without some rivals."""
+        return replace(self, rivals=tuple(each for each in self.rivals if each.place not in rivals))
 
     @property
     def probability(self) -> float:

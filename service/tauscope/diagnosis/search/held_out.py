@@ -38,13 +38,23 @@ class HeldOut:
 
     def change(self, before: Hypothesis, after: Hypothesis) -> HeldOutChange:
         """What a second hypothesis predicts better than a first from training and all other stretches."""
-        weights = [self._weights(joint, after) for joint in range(len(after.scales))]
-        return _compare(self._errors(before), self._errors(after), weights)
+        return self._compare(self._errors(before), self._errors(after), after)
 
     def trained_change(self, before: Hypothesis, after: Hypothesis) -> HeldOutChange:
-        """…from training alone, of all rows alike: this is what a user of the model gets."""
-        residuals = self._white.residual(before.model), self._white.residual(after.model)
-        return _compare(*residuals, [1.0] * len(after.scales))
+        """…from training alone: this is what a user of the model gets."""
+        return self._compare(self._white.residual(before.model), self._white.residual(after.model), after)
+
+    def _compare(self, before: Sequence[Array], after: Sequence[Array], at: Hypothesis) -> HeldOutChange:
+        """From the errors of every joint; rows near rest count as little as the scales of a hypothesis say."""
+        found = [
+            HeldOutChange.between(
+                *sum_stretches(self._weights(joint, at) * np.square([*pair, pair[0] - pair[1]]))[:, None]
+            )
+            for joint, pair in enumerate(zip(before, after, strict=True))
+        ]
+        return HeldOutChange(
+            *(np.concatenate([getattr(each, name) for each in found]) for name in ("relative", "error", "expected"))
+        )
 
     def _weights(self, joint: int, at: Hypothesis) -> Array:
         """How much each row of a joint counts, (R,): as little as in training near rest and beside friction's step."""
@@ -78,14 +88,3 @@ class HeldOut:
     @cached_property
     def _white(self) -> WhiteColumns:
         return WhiteColumns(self.observations)
-
-
-def _compare(before: Sequence[Array], after: Sequence[Array], weights: Sequence[Array | float]) -> HeldOutChange:
-    """From the errors of every joint, and how much its rows count."""
-    found = [
-        HeldOutChange.between(*sum_stretches(own * np.square([*pair, pair[0] - pair[1]]))[:, None])
-        for *pair, own in zip(before, after, weights, strict=True)
-    ]
-    return HeldOutChange(
-        *(np.concatenate([getattr(each, name) for each in found]) for name in ("relative", "error", "expected"))
-    )

@@ -117,11 +117,11 @@ class Search:
 
     def _exchange(self, at: Hypothesis, most: int) -> tuple[Hypothesis, tuple[Weighed, ...], int]:
         """Each effect weighed beside all others, a more probable one in its place, and none that does not hold."""
-        groups = _groups(at.model)
+        groups, exchanges, stale, refused = _groups(at.model), 0, set[Place](), set[Place]()
         weighed = dict(zip(groups, side_by_side(lambda places: self._weigh(at, places), groups.values()), strict=True))
-        exchanges, stale, gone = 0, set[Place](), set[Place]()
         while weighed:
-            behind = [each for each, found in weighed.items() if found.is_behind and found.rivals[0].place not in gone]
+            weighed = {each: found.refuse(refused) for each, found in weighed.items()}
+            behind = [each for each, found in weighed.items() if found.is_behind]
             own = next(iter(stale), None)
             if behind and exchanges < most:
                 own = max(behind, key=lambda each: weighed[each].lead)
@@ -140,16 +140,15 @@ class Search:
                 weighed[own] = self._weigh(at, _groups(at.model)[own], known)
                 continue
             other, rival = self._try_rival(at, weighed[own]), weighed[own].rivals[0].place
+            refused.add(rival if other is None else own)  # what another one took the place of does not come back
             if other is None:
-                weighed = {each: weighed[each].refuse(rival) for each in weighed}
                 continue
             exchanges += 1
-            gone.add(own)  # what another one took the place of does not come back for it
             at, new = other, other.model.terms[-1].place
             groups = _groups(at.model)
             stale = set(groups) - {new}
             weighed = {each: weighed[each] for each in stale} | {new: self._weigh(at, groups[new])}
-        found = (each.refuse(own) for own, each in weighed.items() if each.log_odds > self._least(at, each))
+        found = (each.refuse({own}) for own, each in weighed.items() if each.log_odds > self._least(at, each))
         return at, tuple(found), exchanges
 
     def _holds(self, at: Hypothesis, weighed: Weighed) -> bool:
