@@ -117,7 +117,7 @@ class Search:
 
     def _exchange(self, at: Hypothesis, most: int) -> tuple[Hypothesis, tuple[Weighed, ...], int]:
         """Each effect weighed beside all others, a more probable one in its place, and none that does not hold."""
-        groups, exchanges, stale, refused = _groups(at.model), 0, set[Place](), set[Place]()
+        groups, exchanges, stale, refused, gone = _groups(at.model), 0, set[Place](), set[Place](), set[Place]()
         weighed = dict(zip(groups, side_by_side(lambda places: self._weigh(at, places), groups.values()), strict=True))
         while weighed:
             weighed = {each: found.refuse(refused) for each, found in weighed.items()}
@@ -139,11 +139,13 @@ class Search:
                 known = {each.place for each in weighed[own].proposals}
                 weighed[own] = self._weigh(at, _groups(at.model)[own], known)
                 continue
-            other, rival = self._try_rival(at, weighed[own]), weighed[own].rivals[0].place
-            refused.add(rival if other is None else own)  # what another one took the place of does not come back
+            rival = weighed[own].rivals[0].place
+            other = None if rival in gone else self._try_rival(at, weighed[own])
             if other is None:
+                refused.add(rival)
                 continue
             exchanges += 1
+            gone.add(own)  # what another one took the place of does not come back
             at, new = other, other.model.terms[-1].place
             groups = _groups(at.model)
             stale = set(groups) - {new}
