@@ -78,9 +78,7 @@ class Backend(Protocol):
     """An arm that can be moved: real drives on a bus, or a simulation of them."""
 
     @property
-    def capabilities(self) -> Capabilities:
-        """What it can do."""
-        ...
+    def capabilities(self) -> Capabilities: ...
 
     @property
     def clock(self) -> Clock:

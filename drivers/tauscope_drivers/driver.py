@@ -64,7 +64,6 @@ class Driver(ABC):
 
     @property
     def option_names(self) -> tuple[str, ...]:
-        """Names of the options."""
         return tuple(option.name for option in self.options)
 
     @abstractmethod

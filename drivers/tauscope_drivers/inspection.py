@@ -10,8 +10,6 @@ from tauscope_drivers.backend import ControlMode, DriveLimits
 
 
 class Severity(StrEnum):
-    """How much a finding matters."""
-
     GOOD = "good"
     WARNING = "warning"
     FAILURE = "failure"
@@ -19,8 +17,6 @@ class Severity(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at."""
-
     severity: Severity
     subject: str
     detail: str
@@ -29,8 +25,6 @@ class Finding:
 
 @dataclass(frozen=True)
 class FoundDevice:
-    """A device that answered on a bus."""
-
     address: int
     bit_rate: int
     model: str

@@ -33,7 +33,6 @@ class SerialPort:
     """
 
     def __init__(self, path: str, baud: int, slack_s: float = 0.002) -> None:
-        """Nothing is opened yet."""
         self.path = path
         self.baudrate = baud
         self.latency_s = LEAST_LATENCY_S

@@ -64,12 +64,10 @@ class _Joint:
 
     @property
     def moves(self) -> bool:
-        """Whether it is a hinge or a slide."""
         return self.kind in (HINGE, SLIDE)
 
     @property
     def type(self) -> JointType:
-        """How it moves."""
         return JointType.PRISMATIC if self.kind == SLIDE else JointType.REVOLUTE
 
 
@@ -93,7 +91,6 @@ class _Reader:
                 raise self._error(f"locked: joint {shown(name)} is not in the file; {nearest(name, self._by_name)}")
 
     def chain(self, base: str | None, tip: str | None) -> Chain:
-        """Read the chain between two bodies."""
         first, last = self._ends(base, tip)
         bodies = self._path(first, last)
         path = [joint for body in bodies for joint in self._joints_of(body)]
@@ -149,7 +146,6 @@ class _Reader:
         return self._data.xmat[base].reshape(3, 3).T @ self._model.opt.gravity
 
     def _remark_on_the_rest(self) -> None:
-        """Say which forces of the file the model leaves out."""
         model, left = self._model, []
         if model.opt.density or model.opt.viscosity:
             left.append("drag of the medium (option density, viscosity)")

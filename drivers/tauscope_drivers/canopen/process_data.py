@@ -115,8 +115,6 @@ class PdoSlot:
 
 @dataclass(frozen=True)
 class Pdo:
-    """A PDO as it is used."""
-
     direction: PdoDirection
     number: int
     layout: PdoLayout

@@ -30,8 +30,6 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class RegisterWrite:
-    """A value for an item of a servo."""
-
     item: Item
     value: int
     reason: str

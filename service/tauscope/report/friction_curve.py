@@ -38,7 +38,6 @@ class FrictionCurve:
 
     @property
     def columns(self) -> dict[str, list[float]]:
-        """The curve as columns: velocity, friction, standard error."""
         values = {"velocity": self.velocity, "friction": self.torque, "standard_error": self.std}
         return {name: each.tolist() for name, each in values.items()}
 

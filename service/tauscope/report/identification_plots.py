@@ -56,7 +56,6 @@ class IdentificationPlots(ResultModel):
 def identification_plots(
     identification: Identification, recordings: Sequence[Recording], held_out: Sequence[Recording]
 ) -> IdentificationPlots:
-    """What an identification is drawn from."""
     series = [torque_series(identification, recording) for recording in recordings[:MOST_SERIES]]
     shown = torque_series(identification, held_out[0]) if held_out else series[0]
     names = [joint.name for joint in identification.robot.joints]

@@ -13,8 +13,6 @@ from tauscope.report.tables import Table, input_table
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure on the page."""
-
     svg: Markup
     label: str
     caption: str
@@ -49,8 +47,6 @@ class Card:
 
 @dataclass(frozen=True)
 class Fold:
-    """Cards that are folded away."""
-
     title: str
     cards: Sequence[Card]
 
@@ -71,8 +67,6 @@ class Part:
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the page."""
-
     anchor: str
     title: str
     parts: Sequence[Part]
@@ -107,7 +101,6 @@ class Page:
 
     @property
     def subtitle(self) -> str:
-        """The facts and the date."""
         return " · ".join([*self.facts, self.provenance.created.strftime("%Y-%m-%d %H:%M %Z").strip()])
 
     @property
@@ -120,7 +113,6 @@ class Page:
 
     @property
     def footer(self) -> str:
-        """What computed it."""
         return ", ".join(f"{name} {version}" for name, version in self.provenance.versions)
 
 

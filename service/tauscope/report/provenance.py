@@ -45,7 +45,6 @@ def versions() -> tuple[tuple[str, str], ...]:
 
 
 def installed_version(package: str) -> str:
-    """Version of an installed package."""
     try:
         return version(package)
     except PackageNotFoundError:

@@ -77,8 +77,6 @@ class Request(TaskRequest):
 
 @dataclass(frozen=True, eq=False)
 class Result(TaskResult):
-    """What came of it."""
-
     held_out: tuple[Recording, ...]
     identification: Identification
     document: IdentificationDocument

@@ -34,7 +34,6 @@ class TaskRequest(StrictModel):
 
     @property
     def command(self) -> tuple[str, ...]:
-        """The command line that does the same."""
         raise NotImplementedError
 
     @property
@@ -161,15 +160,12 @@ class LocalFiles:
     targets: Mapping[str, Path] = field(default_factory=dict)
 
     def find(self, role: str, name: str) -> Path:
-        """The path itself."""
         return find_path(name)
 
     def show(self, path: Path) -> str:
-        """The path itself."""
         return str(path)
 
     def target(self, output: str) -> Path | None:
-        """Where an output is written; None where it is not wanted."""
         return self.targets.get(output)
 
 
@@ -183,7 +179,6 @@ class Outputs(Mapping[str, bytes]):
         self._make = make
 
     def __getitem__(self, name: str) -> bytes:
-        """Content of an output."""
         made = self._make[name]()
         return made.encode() if isinstance(made, str) else made
 
@@ -192,11 +187,9 @@ class Outputs(Mapping[str, bytes]):
         return name in self._make
 
     def __iter__(self) -> Iterator[str]:
-        """Names of all outputs."""
         return iter(self._make)
 
     def __len__(self) -> int:
-        """How many there are."""
         return len(self._make)
 
 

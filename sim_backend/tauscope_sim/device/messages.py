@@ -22,8 +22,6 @@ _HEADER = struct.Struct("<BxxxII")
 
 
 class FrameKind(IntEnum):
-    """What a frame is."""
-
     HELLO = 1
     ENABLE = 2
     EXCHANGE = 3
@@ -43,14 +41,11 @@ class FrameKind(IntEnum):
 
 @dataclass(frozen=True)
 class Frame:
-    """One message."""
-
     kind: FrameKind
     sequence: int
     body: bytes = b""
 
     def encode(self) -> bytes:
-        """The frame as it goes over the wire."""
         return _HEADER.pack(self.kind, self.sequence, len(self.body)) + self.body
 
 
@@ -59,8 +54,6 @@ class BrokenFrameError(ValueError):
 
 
 class FrameBuffer:
-    """Cuts a stream of bytes into frames."""
-
     def __init__(self) -> None:
         self._bytes = bytearray()
 
@@ -95,8 +88,6 @@ class BadMessageError(ValueError):
 
 @dataclass(frozen=True)
 class Enabling:
-    """A request to enable."""
-
     mode: ControlMode
     stop_policy: StopPolicy
     watchdog_s: float
@@ -105,8 +96,6 @@ class Enabling:
 
 @dataclass(frozen=True)
 class Refusal:
-    """A `DriverError`."""
-
     kind: DriverErrorKind
     message: str
     faults: tuple[Fault, ...]
@@ -167,7 +156,6 @@ def decode_state(body: bytes) -> ArmState:
 
 
 def encode_error(error: DriverError) -> bytes:
-    """A refusal."""
     return encode_document(Refusal(error.kind, str(error), error.faults))
 
 

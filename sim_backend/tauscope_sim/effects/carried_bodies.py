@@ -27,7 +27,6 @@ class Payload(Effect):
     moments: Vector = Field(default_factory=zero_vector)
 
     def check(self, robot: Robot) -> None:
-        """Refuse moments of inertia that no body has."""
         super().check(robot)
         if min(self.moments) < 0.0 or 2.0 * max(self.moments) > sum(self.moments) * (1.0 + 1e-9):
             raise self.refused("moments", "no body has these: none may be negative or exceed the sum of the others")
@@ -61,7 +60,6 @@ class PayloadChange(Payload):
     end: Positive | None = None
 
     def check(self, robot: Robot) -> None:
-        """Refuse a payload that never changes."""
         super().check(robot)
         if self.end is None and self.start <= 0.0:
             raise self.refused("start", "is missing: without start and end nothing changes; state one, or use payload")

@@ -59,12 +59,10 @@ def one_of(*words: str) -> Any:
 
 
 def zero_vector() -> list[float]:
-    """Three zeros."""
     return [0.0, 0.0, 0.0]
 
 
 def single_zero() -> list[float]:
-    """A zero for all."""
     return [0.0]
 
 
@@ -80,7 +78,6 @@ class ScenarioEntry(Document):
             raise self.refused("joint", f"is {joint}, but the arm has {robot.joint_count} joints")
 
     def refused(self, key: str, text: str) -> ScenarioError:
-        """The error of one key."""
         return ScenarioError(f"{self.effect_id}.{key}: {text}")
 
 
@@ -98,11 +95,9 @@ class JointEffect(Effect):
 
     @property
     def index(self) -> int:
-        """The joint counted from 0."""
         return self.joint - 1
 
     def joint_of(self, robot: Robot) -> Joint:
-        """The joint that it concerns."""
         return robot.joints[self.index]
 
 
@@ -116,7 +111,6 @@ class SmoothSignEffect(JointEffect):
     k_v: Positive | None = None
 
     def check(self, robot: Robot) -> None:
-        """Refuse a joint that does not exist or has no K_v."""
         super().check(robot)
         self.steepness(robot)
 
@@ -146,11 +140,9 @@ class JointLaw(JointEffect):
     side: ClassVar[Side] = Side.MOTOR
 
     def law(self, robot: Robot) -> Law:
-        """τ(q, v) and its derivatives."""
         raise NotImplementedError
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The law as a term of the equations of motion."""
         place = self.index if self.side is Side.LINK else coordinates.motor(self.index)
         return (_LawTerm(self.index, place, self.side, self.law(robot)),)
 

@@ -41,7 +41,6 @@ class ExternalContact(Effect):
     profile: Annotated[str, one_of("half_sine", "rectangular")] = "half_sine"
 
     def check(self, robot: Robot) -> None:
-        """Refuse anything but a force, or a joint and a torque."""
         super().check(robot)
         if self.force is not None and (self.joint is not None or self.torque is not None):
             raise self.refused(

@@ -29,7 +29,6 @@ class FrictionCoupling(SmoothSignEffect):
     viscous: Number = 0.0
 
     def check(self, robot: Robot) -> None:
-        """Refuse a joint that does not exist or is coupled with itself."""
         super().check(robot)
         if self.other_joint > robot.joint_count:
             raise self.refused("other_joint", f"is {self.other_joint}, but the arm has {robot.joint_count} joints")

@@ -40,7 +40,6 @@ class FrictionDrift(JointEffect):
     initial_temperature: Number = AMBIENT
 
     def check(self, robot: Robot) -> None:
-        """Refuse a joint without friction."""
         super().check(robot)
         if robot.model.friction is None:
             raise self.refused("joint", "has no friction in the robot file that could drift; state model.friction")

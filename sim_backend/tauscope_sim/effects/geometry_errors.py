@@ -25,7 +25,6 @@ class BaseTilt(Effect):
     about_y: Number = 0.0
 
     def check(self, robot: Robot) -> None:
-        """Refuse a base that is not tilted."""
         super().check(robot)
         if self.about_x == 0.0 and self.about_y == 0.0:
             raise self.refused("about_x", "and about_y are zero; state one of them [rad]")
@@ -49,7 +48,6 @@ class KinematicError(Effect):
     rotation: Vector = Field(default_factory=zero_vector)
 
     def check(self, robot: Robot) -> None:
-        """Refuse a link that does not exist and an error of nothing."""
         super().check(robot)
         if self.link > robot.joint_count:
             raise self.refused("link", f"is {self.link}, but the arm has {robot.joint_count} links")

@@ -23,7 +23,6 @@ class LoadDependentFriction(SmoothSignEffect):
     mu: Positive
 
     def check(self, robot: Robot) -> None:
-        """Refuse friction that would lock the transmission."""
         super().check(robot)
         if self.mu > LARGEST_GAIN:
             raise self.refused("mu", f"is {self.mu:g}: the transmission locks itself; make it at most {LARGEST_GAIN:g}")

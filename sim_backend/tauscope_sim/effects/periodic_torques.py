@@ -24,7 +24,6 @@ class AngleHarmonics(JointEffect):
     angle: Annotated[str, one_of("joint", "motor")] = "joint"
 
     def check(self, robot: Robot) -> None:
-        """Refuse lists that do not match, and a motor's angle without a gear ratio."""
         super().check(robot)
         for key in ("amplitude", "phase"):
             count = len(getattr(self, key))
@@ -36,7 +35,6 @@ class AngleHarmonics(JointEffect):
             raise self.refused("angle", "is motor, but the robot file states no gear_ratio for this joint; state it")
 
     def sine_and_slope(self, robot: Robot) -> tuple[Callable[[float], float], Callable[[float], float]]:
-        """s(q) and ds/dq."""
         ratio = (self.joint_of(robot).gear_ratio or 1.0) if self.angle == "motor" else 1.0
         count = len(self.order)
         amplitude, phase = (value * count if len(value) == 1 else value for value in (self.amplitude, self.phase))
@@ -71,7 +69,6 @@ class TorqueRipple(AngleHarmonics):
     effect_id: ClassVar[str] = "torque_ripple"
 
     def check(self, robot: Robot) -> None:
-        """Refuse a ripple larger than the load."""
         super().check(robot)
         repeats = len(self.order) if len(self.amplitude) == 1 else 1
         total = repeats * sum(abs(amplitude) for amplitude in self.amplitude)

@@ -33,7 +33,6 @@ class PreslidingHysteresis(JointEffect):
     damping: NotNegative = 0.0
 
     def check(self, robot: Robot) -> None:
-        """Refuse a joint without Coulomb friction, and damping of Dahl's bristles."""
         super().check(robot)
         friction = robot.model.friction
         coefficients = friction[self.index] if friction is not None else None

@@ -26,7 +26,6 @@ class SensorEffect(ScenarioEntry):
     """An effect between the arm and the recording."""
 
     def channel(self, joint_count: int) -> Channel:
-        """The effect at work on an arm."""
         raise NotImplementedError
 
 
@@ -84,7 +83,6 @@ class TimeDelay(SensorEffect):
     joint: JointNumber | None = None
 
     def check(self, robot: Robot) -> None:
-        """Refuse a delay that no channel has."""
         super().check(robot)
         if abs(self.delay) > LONGEST_DELAY:
             raise self.refused("delay", f"is {self.delay:g} s; state at most {LONGEST_DELAY:g} s")

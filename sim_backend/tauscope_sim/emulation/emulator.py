@@ -30,7 +30,6 @@ class DeviceClock:
     """
 
     def __init__(self, now_s: float) -> None:
-        """Begin."""
         self.tick = round(now_s / STEP_S)
         self.lost_s = 0.0
 
@@ -60,7 +59,6 @@ class Emulator(ABC):
 
     @property
     def now_s(self) -> float:
-        """Instant up to which the devices have come [s]."""
         return self._clock.now_s
 
     @property
@@ -106,7 +104,6 @@ class Emulator(ABC):
         return None
 
     def inject(self, faults: list[InjectedFault]) -> None:
-        """Plan faults, and carry out those that are due."""
         self.schedule.add(faults)
         self._run_faults()
 
@@ -181,7 +178,6 @@ class PseudoTerminal:
         os.set_blocking(self._near, False)
 
     def fileno(self) -> int:
-        """Descriptor to wait on."""
         return self._near
 
     def read(self) -> bytes | None:
@@ -207,7 +203,6 @@ class PseudoTerminal:
         return struct.unpack(_TERMIOS2, settings)[-1]
 
     def close(self) -> None:
-        """Hang up."""
         os.close(self._near)
         with contextlib.suppress(FileNotFoundError):
             os.unlink(self._link)
@@ -233,12 +228,10 @@ class EmulatorOrder(ABC):
         return f"{type(self).__module__}:{type(self).__qualname__}"
 
     def to_json(self) -> str:
-        """The order as text, which the process is started with."""
         return json.dumps(vars(self), default=asdict)
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """The order in a text."""
         document = json.loads(text)
         return cls(**{key: tuple(value) if isinstance(value, list) else value for key, value in document.items()})
 
