@@ -42,15 +42,11 @@ class Connection:
 
 @dataclass(frozen=True)
 class ArmDescription:
-    """An arm as a driver is told of it.
-
-    `robot`: the whole robot as Tauscope reads it, for a driver that simulates it.
-    `folder`: for files of the driver's own.
-    """
+    """An arm as a driver is told of it."""
 
     joints: tuple[DriveJoint, ...]
-    robot: Any = None
-    folder: Path | None = None
+    robot: Any = None  # the whole robot as Tauscope reads it, for a driver that simulates it
+    folder: Path | None = None  # for files of the driver's own
 
 
 class Driver(ABC):

@@ -47,14 +47,11 @@ class FrameRequest:
 
 @dataclass(frozen=True)
 class PlannedFrame:
-    """A frame that would be sent.
-
-    `wire`: as the bus's own tools write it: bytes in hexadecimal on a serial bus, ``201#0F00`` on CAN.
-    """
+    """A frame that would be sent."""
 
     phase: str
     meaning: str
-    wire: str
+    wire: str  # as the bus's own tools write it: bytes in hexadecimal on a serial bus, ``201#0F00`` on CAN
 
 
 PHASES = ("connect", "enable", "cycle", "stop")  # in the order in which a run goes through them

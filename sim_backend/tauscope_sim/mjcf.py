@@ -50,16 +50,13 @@ def read_chain(
 
 @dataclass(frozen=True)
 class _Joint:
-    """A joint of the compiled model by its index, and what it follows.
-
-    `rest`: its position as the file states the arm [rad or m].
-    """
+    """A joint of the compiled model by its index, and what it follows."""
 
     index: int
     name: str
     kind: int
     body: int
-    rest: float
+    rest: float  # its position as the file states the arm [rad or m]
     master: Master | None
 
     @property

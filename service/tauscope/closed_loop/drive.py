@@ -28,16 +28,14 @@ class RecordedMotion:
 
     `time`: (K,), of the steps [s].
     `position`, `velocity`: (K, n), of the real arm [rad or m, rad/s or m/s].
-    `rows`: (N,), instants of the recording [s].
-    `measured`: (N, n), q at these instants; NaN where it was missed.
     """
 
     name: str
     time: Array
     position: Array
     velocity: Array
-    rows: Array
-    measured: Array
+    rows: Array  # (N,), instants of the recording [s]
+    measured: Array  # (N, n), q at these instants; NaN where it was missed
 
 
 class Drive(Protocol):

@@ -28,18 +28,15 @@ class Term:
     """One parameter.
 
     `start`, `prior_std`: mean and standard error of its prior; infinite without one.
-    `scale`: of its steps.
-    `least`: lower bound.
-    `is_optional`: whether a model does without it: zero then.
     """
 
     name: str
     unit: str
     start: float
-    scale: float
+    scale: float  # of its steps
     prior_std: float = np.inf
-    least: float = -np.inf
-    is_optional: bool = False
+    least: float = -np.inf  # lower bound
+    is_optional: bool = False  # whether a model does without it: zero then
 
 
 class RefinableModel:

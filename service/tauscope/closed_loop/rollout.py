@@ -40,13 +40,10 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """One recording and its simulations.
-
-    `simulated`: dict of str to (N, n), positions by model, from one start [rad or m].
-    """
+    """One recording and its simulations."""
 
     motion: RecordedMotion
-    simulated: dict[str, Array]
+    simulated: dict[str, Array]  # dict of str to (N, n), positions by model, from one start [rad or m]
     entry: RecordingEntry
 
 

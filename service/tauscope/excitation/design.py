@@ -24,11 +24,7 @@ ACTIVE_CLEARANCE_M = 0.005  # clearance from floor or boxes at which they limit 
 
 @dataclass(frozen=True, eq=False)
 class ExcitationDesign:
-    """A designed excitation.
-
-    `history`: every iteration, with the criterion as the optimiser sees it.
-    `seconds`: time that the optimiser took [s].
-    """
+    """A designed excitation."""
 
     trajectory: Trajectory
     series: FourierSeries
@@ -37,12 +33,12 @@ class ExcitationDesign:
     value: float
     condition_number: float
     random_value: float
-    history: tuple[HistoryPart, ...]
+    history: tuple[HistoryPart, ...]  # every iteration, with the criterion as the optimiser sees it
     margins: Margins
     active: tuple[str, ...]
     notes: tuple[str, ...]
     evaluations: int
-    seconds: float
+    seconds: float  # time that the optimiser took [s]
 
 
 def design_excitation(

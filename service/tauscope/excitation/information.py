@@ -180,14 +180,11 @@ class Criterion(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class CriterionValue:
-    """A criterion at one information matrix.
-
-    `gradient`: (p, p), derivative of `cost` by A, symmetric.
-    """
+    """A criterion at one information matrix."""
 
     own: float
     cost: float
-    gradient: Array
+    gradient: Array  # (p, p), derivative of `cost` by A, symmetric
     condition_number: float
 
 

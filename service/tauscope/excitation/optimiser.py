@@ -34,12 +34,9 @@ class OptimiserProgress:
 
 @dataclass(frozen=True)
 class HistoryEntry:
-    """One iteration.
+    """One iteration."""
 
-    `start`: from which start, counted from 1; 0 for the random series.
-    """
-
-    start: int
+    start: int  # from which start, counted from 1; 0 for the random series
     iteration: int
     own: float
     violation: float
@@ -47,16 +44,12 @@ class HistoryEntry:
 
 @dataclass(eq=False)
 class OptimiserResult:
-    """What came of it.
+    """What came of it."""
 
-    `x`: (n, columns), the best feasible vector found.
-    `seconds`: time that it took [s].
-    """
-
-    x: Array
+    x: Array  # (n, columns), the best feasible vector found
     history: list[HistoryEntry]
     evaluations: int
-    seconds: float
+    seconds: float  # time that it took [s]
     random_value: float
 
 

@@ -13,15 +13,12 @@ from tauscope.trajectory.fourier_series import MotionSamples
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """What is minimised.
-
-    `scaling`: (p,), what each column is divided by.
-    """
+    """What is minimised."""
 
     criterion: Criterion
     information_weight: float
     regressor: ExcitationRegressor
-    scaling: Array
+    scaling: Array  # (p,), what each column is divided by
 
 
 @dataclass(frozen=True, eq=False)

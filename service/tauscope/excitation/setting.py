@@ -31,13 +31,11 @@ from tauscope.trajectory.limits import MotionLimits, motion_limits
 class ExcitationOptions:
     """What is wished of an excitation.
 
-    `period_s`: duration of one period [s].
     `noise_std`: (n,), expected torque noise of each joint, which weights its equations [Nm or N]; equal weights where
         None.
-    `torque_offset`: torque kept free besides [Nm or N].
     """
 
-    period_s: float = 10.0
+    period_s: float = 10.0  # duration of one period [s]
     harmonics: int = 5
     periods: int = 5
     criterion: Criterion = Criterion.COND_F
@@ -46,7 +44,7 @@ class ExcitationOptions:
     noise_std: Array | None = None
     limit_fraction: float = 0.95
     torque_margin: float = 0.2
-    torque_offset: float = 0.0
+    torque_offset: float = 0.0  # torque kept free besides [Nm or N]
     workspace: Workspace = field(default_factory=Workspace)
     slow_postures: int = 3
     closing_period: bool = True
@@ -85,17 +83,14 @@ SCALING_STATES = 512  # random states from which `ColumnScaling.TYPICAL` takes t
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """One robot's limits, predictions and spaces.
-
-    `available`: (n,), torque that may be used, infinite where there is no limit [Nm or N].
-    """
+    """One robot's limits, predictions and spaces."""
 
     robot: Robot
     options: ExcitationOptions
     base: BaseParameters
     stated: MotionLimits
     planned: MotionLimits
-    available: Array
+    available: Array  # (n,), torque that may be used, infinite where there is no limit [Nm or N]
     space: SeriesSpace
     states: StateUsage
     feasibility: Feasibility

@@ -37,15 +37,11 @@ class Box:
 
 @dataclass(frozen=True, eq=False)
 class Workspace:
-    """What the arm's joint origins and tool have to keep clear of.
+    """What the arm's joint origins and tool have to keep clear of."""
 
-    `floor_m`: lowest height z in the base frame [m]; None where there is no floor.
-    `tool_m`: (3,), tool point in the last link's frame [m].
-    """
-
-    floor_m: float | None = None
+    floor_m: float | None = None  # lowest height z in the base frame [m]; None where there is no floor
     boxes: tuple[Box, ...] = ()
-    tool_m: Array = field(default_factory=lambda: np.zeros(3))
+    tool_m: Array = field(default_factory=lambda: np.zeros(3))  # (3,), tool point in the last link's frame [m]
 
     def __post_init__(self) -> None:
         """Refuse numbers that are no place."""

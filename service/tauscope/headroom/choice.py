@@ -19,24 +19,18 @@ Folds = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Member:
-    """One black box at its best size, and what its predictions are multiplied by.
-
-    `weight`: 0 where it predicts nothing of motion that it has not learned from.
-    """
+    """One black box at its best size, and what its predictions are multiplied by."""
 
     learner: Learner
     size: float
-    weight: float
+    weight: float  # 0 where it predicts nothing of motion that it has not learned from
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Black boxes whose weighted predictions are added.
+    """Black boxes whose weighted predictions are added."""
 
-    `error`: Σ e² of rows that are predicted from other motion, relative to that of the rows themselves.
-    """
-
-    error: float
+    error: float  # Σ e² of rows that are predicted from other motion, relative to that of the rows themselves
     members: tuple[Member, ...] = ()
 
     def predict(self, inputs: Inputs, target: Array, judged: Inputs) -> Array:

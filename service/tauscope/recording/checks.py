@@ -45,7 +45,6 @@ class JointMeasures:
     """One joint's channels.
 
     `position`, `effort`: (float, float), least and greatest value, NaN where every sample was missed.
-    `first_wrap`: time of the first of them [s].
     `clipped`: tuple of (float, int), levels at which the effort stays, and number of samples.
     """
 
@@ -53,31 +52,24 @@ class JointMeasures:
     effort: tuple[float, float]
     position_step: float | None
     wraps: int
-    first_wrap: float | None
+    first_wrap: float | None  # time of the first of them [s]
     clipped: tuple[tuple[float, int], ...]
 
 
 @dataclass(frozen=True)
 class Gaps:
-    """Steps of the clock beyond 1.9 medians: one lost sample of a regular clock is one.
-
-    `longest`: the longest of them [s], 0 without gaps.
-    `longest_at`: time at which it begins [s].
-    """
+    """Steps of the clock beyond 1.9 medians: one lost sample of a regular clock is one."""
 
     count: int
-    longest: float
-    longest_at: float | None
+    longest: float  # the longest of them [s], 0 without gaps
+    longest_at: float | None  # time at which it begins [s]
 
 
 @dataclass(frozen=True)
 class RowMeasures:
-    """All figures but the gaps.
+    """All figures but the gaps."""
 
-    `duration`: from the first to the last sample [s].
-    """
-
-    duration: float
+    duration: float  # from the first to the last sample [s]
     steps: StepMeasures
     missed: dict[str, int]
     period_lengths: tuple[int, ...]
@@ -231,16 +223,12 @@ class Periods:
 
 @dataclass(frozen=True)
 class RecordingReport:
-    """What `check_recording` found.
-
-    `duration_s`: from the first to the last sample [s].
-    `rate_hz`: 1 / median step [Hz].
-    """
+    """What `check_recording` found."""
 
     name: str
     samples: int
-    duration_s: float
-    rate_hz: float
+    duration_s: float  # from the first to the last sample [s]
+    rate_hz: float  # 1 / median step [Hz]
     steps: StepMeasures
     gaps: Gaps
     effort_kind: EffortKind

@@ -159,15 +159,13 @@ def _reason(error: OSError) -> str:
 class ColumnMapping:
     """A file's columns as they are understood.
 
-    `columns`: column of the file by that of CONTRACT.md, such as ``q1``; only those that were found.
     `units`: unit of ``t``, ``q``, ``qd`` and ``tau``.
-    `is_guessed`: whether words of the column names suggest it, and no reader accepts the file without it.
     """
 
     header: tuple[str, ...]
-    columns: Mapping[str, str]
+    columns: Mapping[str, str]  # column of the file by that of CONTRACT.md, such as ``q1``; only those that were found
     units: Mapping[str, str]
-    is_guessed: bool
+    is_guessed: bool  # whether words of the column names suggest it, and no reader accepts the file without it
 
 
 def find_mapping(path: Path, robot: Robot | None = None, reading: Reading = SI) -> ColumnMapping:

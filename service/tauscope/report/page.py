@@ -29,20 +29,15 @@ class Numbers:
 
 @dataclass(frozen=True)
 class Card:
-    """One thing of several that are ranked.
+    """One thing of several that are ranked."""
 
-    `rank`: from 1.
-    `probability`: from 0 to 1.
-    `facts`: sequence of (str, str), what is known about it.
-    """
-
-    rank: int
+    rank: int  # from 1
     title: str
     place: str
-    probability: float
+    probability: float  # from 0 to 1
     chance: str
     statement: str
-    facts: Sequence[tuple[str, str]]
+    facts: Sequence[tuple[str, str]]  # sequence of (str, str), what is known about it
 
 
 @dataclass(frozen=True)
@@ -84,14 +79,11 @@ class KeyFigure:
 
 @dataclass(frozen=True)
 class Page:
-    """Everything on the page.
-
-    `facts`: that stand below the title, beside the date.
-    """
+    """Everything on the page."""
 
     kind: str
     robot: str
-    facts: Sequence[str]
+    facts: Sequence[str]  # that stand below the title, beside the date
     key_figures: Sequence[KeyFigure]
     sentences: Sequence[str]
     cautions: Sequence[str]

@@ -15,27 +15,21 @@ LIBRARIES = ("tauscope", "numpy", "scipy", "clarabel")  # packages whose version
 
 @dataclass(frozen=True)
 class InputFile:
-    """One file that was read.
-
-    `sha256`: of its bytes, in hexadecimal.
-    """
+    """One file that was read."""
 
     role: str
     path: str
     size_bytes: int
-    sha256: str
+    sha256: str  # of its bytes, in hexadecimal
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a result comes from.
-
-    `versions`: tuple of (str, str), name and version of what computed it.
-    """
+    """Where a result comes from."""
 
     command: tuple[str, ...]
     inputs: tuple[InputFile, ...]
-    versions: tuple[tuple[str, str], ...]
+    versions: tuple[tuple[str, str], ...]  # tuple of (str, str), name and version of what computed it
     created: datetime
 
 

@@ -41,21 +41,15 @@ MOST_PIECES = 8  # pieces of a recording that are conditioned in search of the l
 
 @dataclass(frozen=True, eq=False)
 class TorqueSeries:
-    """One continuous piece of a recording beside what the model says.
-
-    `time`: (N,) [s].
-    `velocity`: (N, n), smoothed q̇ [rad/s or m/s].
-    `measured`: (N, n), measured torque, NaN where none was measured [Nm or N].
-    `predicted`: (N, n), torque of the model [Nm or N].
-    """
+    """One continuous piece of a recording beside what the model says."""
 
     recording: str
     repetitions: int
     rate_hz: float
-    time: Array
-    velocity: Array
-    measured: Array
-    predicted: Array
+    time: Array  # (N,) [s]
+    velocity: Array  # (N, n), smoothed q̇ [rad/s or m/s]
+    measured: Array  # (N, n), measured torque, NaN where none was measured [Nm or N]
+    predicted: Array  # (N, n), torque of the model [Nm or N]
 
     @property
     def residual(self) -> Array:

@@ -16,41 +16,31 @@ EARTH = (9.7, 9.9)  # acceleration of gravity on the ground, with room for altit
 
 @dataclass(frozen=True)
 class JointSummary:
-    """One joint in the report.
+    """One joint in the report."""
 
-    `number`: from 1, base first.
-    `origin`: origin of the link frame at q = 0, in the frame of the link before [m].
-    `mass`: of the link that the joint carries, as the model believes [kg].
-    """
-
-    number: int
+    number: int  # from 1, base first
     name: str
     type: JointType
     limits: JointLimits
     gear_ratio: float | None
     torque_constant: float
     sign: int
-    origin: tuple[float, float, float]
+    origin: tuple[float, float, float]  # origin of the link frame at q = 0, in the frame of the link before [m]
     axis: tuple[float, float, float]
-    mass: float | None
+    mass: float | None  # of the link that the joint carries, as the model believes [kg]
     before: tuple[float, ...]
     after: tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class RobotReport:
-    """A robot file at a glance.
-
-    `joints`: base first.
-    `gravity`: in the base frame [m/s²].
-    `total_mass`: of all moving links, as the model believes [kg]; None without a model.
-    """
+    """A robot file at a glance."""
 
     name: str
     source: str
-    joints: tuple[JointSummary, ...]
-    gravity: tuple[float, float, float]
-    total_mass: float | None
+    joints: tuple[JointSummary, ...]  # base first
+    gravity: tuple[float, float, float]  # in the base frame [m/s²]
+    total_mass: float | None  # of all moving links, as the model believes [kg]; None without a model
     findings: tuple[Finding, ...]
 
 

@@ -25,13 +25,10 @@ Place = tuple[str | int, ...]  # keys and indices that lead from the document's 
 
 @dataclass(frozen=True)
 class YamlContent:
-    """Plain data of a YAML document.
-
-    `lines`: for each entry's place the line, from 1, on which it stands.
-    """
+    """Plain data of a YAML document."""
 
     data: Any
-    lines: dict[Place, int]
+    lines: dict[Place, int]  # for each entry's place the line, from 1, on which it stands
 
 
 class _TooMuchError(Exception):

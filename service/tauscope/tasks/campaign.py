@@ -73,12 +73,9 @@ class Request(CampaignOptions):
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What came of it.
+    """What came of it."""
 
-    `recordings`: the training recording, and the held-out one where there is one.
-    """
-
-    recordings: tuple[Path, ...]
+    recordings: tuple[Path, ...]  # the training recording, and the held-out one where there is one
     identification: identify.Result
     diagnosis: diagnose.Result | None
 

@@ -23,16 +23,13 @@ class MotionLimits:
     """Limits of every joint.
 
     `position_low`, `position_high`: (n,), range of the position [rad or m].
-    `velocity`: (n,), largest speed [rad/s or m/s].
-    `acceleration`: (n,), largest acceleration [rad/s² or m/s²].
-    `torque`: (n,), largest torque, infinite where none is stated [Nm or N].
     """
 
     position_low: Array
     position_high: Array
-    velocity: Array
-    acceleration: Array
-    torque: Array
+    velocity: Array  # (n,), largest speed [rad/s or m/s]
+    acceleration: Array  # (n,), largest acceleration [rad/s² or m/s²]
+    torque: Array  # (n,), largest torque, infinite where none is stated [Nm or N]
     assumed: tuple[str, ...] = ()
 
     @property

@@ -84,12 +84,11 @@ class MoveSegment:
     """A straight minimum-jerk move from posture to posture: q = q_0 + (q_1 - q_0)(10 s³ - 15 s⁴ + 6 s⁵), s = t/T.
 
     `start`, `end`: (n,), postures [rad or m].
-    `duration_s`: T [s].
     """
 
     start: Array
     end: Array
-    duration_s: float
+    duration_s: float  # T [s]
 
     @property
     def joint_count(self) -> int:
@@ -117,13 +116,12 @@ class PathSegment:
     It visits only postures that the series visits: where that keeps clear of obstacles, so does this.
 
     `from_s`, `to_s`: instants of the series at which it begins and ends [s].
-    `duration_s`: how long it takes [s].
     """
 
     series: FourierSeries
     from_s: float
     to_s: float
-    duration_s: float
+    duration_s: float  # how long it takes [s]
 
     @property
     def joint_count(self) -> int:
@@ -151,11 +149,10 @@ class PathSegment:
 class SampledSegment:
     """A motion given by samples, between them the quintic that meets position, velocity and acceleration at both.
 
-    `time`: (K,), instants of the samples, from 0, increasing [s].
     `label`: (K,), index of the repeated excitation period from each sample on, NaN outside; None where there is none.
     """
 
-    time: Array
+    time: Array  # (K,), instants of the samples, from 0, increasing [s]
     motion: MotionSamples
     label: Array | None = None
 

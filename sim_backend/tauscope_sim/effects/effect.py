@@ -86,12 +86,9 @@ class Effect(ScenarioEntry, PhysicalEffect):
 
 
 class JointEffect(Effect):
-    """An effect of one joint.
+    """An effect of one joint."""
 
-    `joint`: its number, counted from 1.
-    """
-
-    joint: JointNumber
+    joint: JointNumber  # its number, counted from 1
 
     @property
     def index(self) -> int:
@@ -105,10 +102,9 @@ class SmoothSignEffect(JointEffect):
     """An effect of one joint in which A(v) = (2/π) arctan(K_v v) stands for the sign of velocity.
 
     `joint`: its number, counted from 1.
-    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
     """
 
-    k_v: Positive | None = None
+    k_v: Positive | None = None  # K_v; that of the joint's friction_shape where None [s/rad or s/m]
 
     def check(self, robot: Robot) -> None:
         super().check(robot)

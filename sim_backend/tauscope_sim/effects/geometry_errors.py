@@ -14,15 +14,11 @@ from tauscope_sim.effects.effect import Effect, JointNumber, zero_vector
 
 
 class BaseTilt(Effect):
-    """g → R_x(α) R_y(β) g.
-
-    `about_x`: α [rad].
-    `about_y`: β [rad].
-    """
+    """g → R_x(α) R_y(β) g."""
 
     effect_id: ClassVar[str] = "base_tilt"
-    about_x: Number = 0.0
-    about_y: Number = 0.0
+    about_x: Number = 0.0  # α [rad]
+    about_y: Number = 0.0  # β [rad]
 
     def check(self, robot: Robot) -> None:
         super().check(robot)
@@ -35,17 +31,12 @@ class BaseTilt(Effect):
 
 
 class KinematicError(Effect):
-    """A displaced link frame.
-
-    `link`: j, counted from 1.
-    `translation`: d [m].
-    `rotation`: r [rad].
-    """
+    """A displaced link frame."""
 
     effect_id: ClassVar[str] = "kinematic_error"
-    link: JointNumber
-    translation: Vector = Field(default_factory=zero_vector)
-    rotation: Vector = Field(default_factory=zero_vector)
+    link: JointNumber  # j, counted from 1
+    translation: Vector = Field(default_factory=zero_vector)  # d [m]
+    rotation: Vector = Field(default_factory=zero_vector)  # r [rad]
 
     def check(self, robot: Robot) -> None:
         super().check(robot)

@@ -14,13 +14,10 @@ from tauscope_sim.plant.term import LARGEST_GAIN, Coordinates, Forces, Moment, S
 
 
 class LoadDependentFriction(SmoothSignEffect):
-    """τ = μ |L| A(v).
-
-    `mu`: μ [Nm/Nm].
-    """
+    """τ = μ |L| A(v)."""
 
     effect_id: ClassVar[str] = "load_dependent_friction"
-    mu: Positive
+    mu: Positive  # μ [Nm/Nm]
 
     def check(self, robot: Robot) -> None:
         super().check(robot)

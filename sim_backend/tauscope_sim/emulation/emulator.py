@@ -209,18 +209,12 @@ class PseudoTerminal:
 
 
 class EmulatorOrder(ABC):
-    """The order that starts an emulator process; subclasses are frozen dataclasses that JSON can hold.
+    """The order that starts an emulator process; subclasses are frozen dataclasses that JSON can hold."""
 
-    `port`: what the master opens.
-    `control`: Unix socket for the test.
-    `stepped`: whether time passes only when a test says so; else it is the machine's.
-    `trace`: file that what the devices do is appended to.
-    """
-
-    port: str
-    control: str
-    stepped: bool
-    trace: str | None
+    port: str  # what the master opens
+    control: str  # Unix socket for the test
+    stepped: bool  # whether time passes only when a test says so; else it is the machine's
+    trace: str | None  # file that what the devices do is appended to
 
     @property
     def kind(self) -> str:

@@ -25,18 +25,13 @@ _ACTIVE = 100.0  # a constraint counts as active where less than this many margi
 
 @dataclass(frozen=True, eq=False)
 class ConsistentParameters:
-    """A full parameter set of a robot that can exist.
-
-    `parameters`: (p,), x: standard parameters of all links, then friction coefficients.
-    `squared_residual`: ‖R x - z‖² [noise variances].
-    `free_squared_residual`: the least that any x, consistent or not, reaches [noise variances].
-    """
+    """A full parameter set of a robot that can exist."""
 
     links: tuple[LinkInertia, ...]
-    parameters: Array
+    parameters: Array  # (p,), x: standard parameters of all links, then friction coefficients
     objective: float
-    squared_residual: float
-    free_squared_residual: float
+    squared_residual: float  # ‖R x - z‖² [noise variances]
+    free_squared_residual: float  # the least that any x, consistent or not, reaches [noise variances]
     prior_squared_distance: float
     status: str
     duality_gap: float
