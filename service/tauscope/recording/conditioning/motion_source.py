@@ -155,8 +155,8 @@ class _Fit:
     delay: float
     delay_std: float
     offset: float  # relative to the rms of the recorded signal
-    misfit: float  # rms of the rest, `motion` that of x
-    motion: float
+    misfit: float  # rms of the rest
+    motion: float  # rms of x
     band_hz: float
 
     @staticmethod
