@@ -12,7 +12,7 @@ from typer import Option
 from tauscope.cli.arguments import RobotFile
 from tauscope.cli.diagnose_command import show_diagnosis
 from tauscope.cli.identify_command import show_identification
-from tauscope.cli.output_files import write_file
+from tauscope.cli.task_run import write_file
 from tauscope.cli.terminal import output, say, show_progress
 from tauscope.errors import ExportError
 from tauscope.runtime.drivers import DEFAULT_BACKEND, driver_names

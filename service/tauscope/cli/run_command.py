@@ -14,7 +14,7 @@ from typer import Option
 
 from tauscope.cli.arguments import RobotFile, name_input
 from tauscope.cli.device_command import show_frames
-from tauscope.cli.output_files import keep_file, require_new
+from tauscope.cli.task_run import keep_file, require_new
 from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
 from tauscope.errors import AcquisitionError, one_line

@@ -4,10 +4,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict, Field
 
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.actuator import Actuator
@@ -41,10 +42,11 @@ class JointType(StrEnum):
 class JointLimits:
     """What a joint may do; None where nothing is stated."""
 
-    position: tuple[float, float] | None = None  # lowest and highest position [rad or m]
-    velocity: float | None = None  # largest speed [rad/s or m/s]
-    acceleration: float | None = None  # largest acceleration [rad/s² or m/s²]
-    torque: float | None = None  # largest torque [Nm] or force [N]
+    __pydantic_config__ = ConfigDict(extra="forbid", json_schema_serialization_defaults_required=True)  # in answers
+    position: Annotated[tuple[float, float] | None, Field(description="lowest and highest position [rad or m]")] = None
+    velocity: Annotated[float | None, Field(description="largest speed [rad/s or m/s]")] = None
+    acceleration: Annotated[float | None, Field(description="largest acceleration [rad/s² or m/s²]")] = None
+    torque: Annotated[float | None, Field(description="largest torque [Nm] or force [N]")] = None
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,7 @@ from tauscope.recording.journal import JournalWriter
 from tauscope.recording.journal_process import FRAME, HEADER, ROW, event_frame, frame
 from tauscope.recording.journal_reading import journal_recording, read_journal
 from tauscope.recording.journal_rows import JournalHeader, journal_row_type
-from tauscope.runtime.processes import child_environment
-from tauscope.runtime.record import JOURNAL_FILE, RECORDING_STEM, RecordingFiles
+from tauscope.runtime.record import JOURNAL_FILE, RECORDING_STEM, RecordingFiles, child_environment
 from tauscope.runtime.states import Stops, raise_if_requested
 
 PIPE_BYTES = 2**20  # room between loop and writer: some seconds of cycles

@@ -3,7 +3,7 @@
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,19 +14,18 @@ import numpy as np
 from tauscope.errors import AcquisitionError, TauscopeError, one_line
 from tauscope.recording.journal_rows import JournalHeader, Phase
 from tauscope.robot import Robot
-from tauscope.runtime.drivers import DEFAULT_BACKEND, Connection
+from tauscope.runtime.drivers import DEFAULT_BACKEND, Connection, make_backend, translate_driver_errors
 from tauscope.runtime.guard import Guard, GuardViolationError
 from tauscope.runtime.loop import Cycles, GuardedArm, ProgressReporter, Report, end_event, state_event
 from tauscope.runtime.options import ORDER_FILE, RELEASE, RunOptions, choose_stop_policy, is_released
 from tauscope.runtime.plan import Plan, make_plan
 from tauscope.runtime.record import JOURNAL_FILE, RUN_FILE, RunProblem, RunRecord, Transition, new_record, write_record
 from tauscope.runtime.recorder import DirectRecorder, Recorder, RecorderProcess, save_recording
-from tauscope.runtime.release import release_settled
 from tauscope.runtime.states import ManualStop, RunState, StopAskedError, Stops, raise_if_requested
 from tauscope.runtime.timing import SIMULATED_TIME, Metronome, real_time
 from tauscope.runtime.torque_control import torque_control
 from tauscope.trajectory import Trajectory
-from tauscope_drivers import ArmState, Backend, ControlMode, DriverError
+from tauscope_drivers import ArmState, Backend, ControlMode, DriverError, StopPolicy
 
 OpenRecorder = Callable[[Path, JournalHeader, Stops, bool], Recorder]
 """Opens a journal: its path, its header, requests to stop, and whether the arm runs in real time."""
@@ -374,3 +373,43 @@ class _DirectKeeper:
 
 def _nobody(event: Any) -> None:
     del event
+
+
+SETTLED_S = 0.5  # time for which every joint has to stand still [s]
+STILL = 1e-3  # most that a joint may move in that time: some counts of an encoder [rad or m]
+LONGEST_S = 5.0  # time after which an arm that does not come to rest stays held [s]
+_LOOK_S = 0.05
+
+
+def release_settled(backend: Backend, state: ArmState) -> ArmState:
+    """Hold an arm that was just stopped until it stands still, then let go; one that moves stays held."""
+    clock = backend.clock
+    begin_ns = since_ns = clock.now_ns()
+    place = state.position
+    while clock.now_ns() - begin_ns < LONGEST_S * 1e9:
+        if state.faults or not np.isfinite(state.position).all():
+            return state
+        if (np.abs(state.position - place) > STILL).any():
+            place, since_ns = state.position, clock.now_ns()
+        if clock.now_ns() - since_ns >= SETTLED_S * 1e9:
+            return backend.stop(StopPolicy.TORQUE_OFF)
+        clock.wait_until_ns(clock.now_ns() + round(_LOOK_S * 1e9))
+        state = backend.stop(StopPolicy.HOLD)
+    return state
+
+
+def release(backend_name: str, robot: Robot, settings: Mapping[str, Any]) -> None:
+    """Take the torque off an arm. Raises AcquisitionError where a drive is not reached, or is under power still."""
+    backend = make_backend(backend_name, robot, settings).backend
+    with translate_driver_errors():
+        backend.connect()
+        try:
+            state = backend.stop(StopPolicy.TORQUE_OFF)
+        finally:
+            backend.disconnect()
+    held = [joint.name for joint, is_held in zip(robot.joints, state.enabled, strict=True) if is_held]
+    if held:
+        raise AcquisitionError(f"{', '.join(held)}: still under power; switch the arm's power off, look at its drives")
+    silent = [fault for fault in state.faults if fault.code == "silent"]
+    if silent:
+        raise AcquisitionError(f"{silent[0]}")

@@ -89,7 +89,7 @@ class Result(TaskResult):
         return Outputs({**documents, "result.json": partial(json_text, self.document), **exports})
 
     def _plots(self) -> str:
-        from tauscope.report.identification_plots import identification_plots
+        from tauscope.report.curves import identification_plots
 
         return json_text(identification_plots(self.identification, self.recordings, self.held_out), None)
 

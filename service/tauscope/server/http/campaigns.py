@@ -44,7 +44,7 @@ from tauscope.server.http.tasks.submission import (
 )
 from tauscope.server.problems import problem_responses
 from tauscope.server.queue.job_folder import JobState
-from tauscope.server.queue.received_robot import read_received_robot
+from tauscope.server.queue.received_files import read_received_robot
 from tauscope.server.queue.task_job import stage_workspace
 from tauscope.tasks.campaign import CampaignOptions
 from tauscope.tasks.run import BackendChoice

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from tauscope.export.model_file import ModelFile
 from tauscope.identification import IdentificationDocument
-from tauscope.report.identification_plots import IdentificationPlots
+from tauscope.report.curves import IdentificationPlots
 from tauscope.server.http.answers import JobAnswer, JobLinks
 from tauscope.server.http.openapi import binary_parts
 from tauscope.server.http.robot_files import EXAMPLE_ROBOT

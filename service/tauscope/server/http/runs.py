@@ -49,8 +49,7 @@ from tauscope.server.http.tasks.submission import (
 )
 from tauscope.server.problems import Problem, ProblemError, make_problem
 from tauscope.server.queue.analyses import ExcitationOrder, ExcitationWorkspace
-from tauscope.server.queue.received_recording import check_trajectory
-from tauscope.server.queue.received_robot import read_received_robot
+from tauscope.server.queue.received_files import check_trajectory, read_received_robot
 from tauscope.server.queue.task_job import stage_workspace, submit_job
 from tauscope.server.store.event_log import EventLog
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
