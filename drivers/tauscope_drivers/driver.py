@@ -42,8 +42,6 @@ class Connection:
 
 @dataclass(frozen=True)
 class ArmDescription:
-    """An arm as a driver is told of it."""
-
     joints: tuple[DriveJoint, ...]
     robot: Any = None  # the whole robot as Tauscope reads it, for a driver that simulates it
     folder: Path | None = None  # for files of the driver's own
@@ -139,8 +137,6 @@ class BusDriver(Driver):
 
 
 class SerialBusDriver(BusDriver):
-    """Servos on a serial bus."""
-
     options = (Option("port", "serial device, in place of the robot file's"), PATIENCE)
     port_help = "serial device"
     bus_options = ("port",)

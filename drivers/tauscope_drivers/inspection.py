@@ -47,8 +47,6 @@ class FrameRequest:
 
 @dataclass(frozen=True)
 class PlannedFrame:
-    """A frame that would be sent."""
-
     phase: str
     meaning: str
     wire: str  # as the bus's own tools write it: bytes in hexadecimal on a serial bus, ``201#0F00`` on CAN

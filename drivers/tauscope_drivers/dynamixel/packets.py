@@ -90,7 +90,6 @@ def encode_write(servo: int, address: int, data: bytes) -> bytes:
 
 
 def encode_sync_read(servos: Sequence[int], address: int, length: int, *, fast: bool = False) -> bytes:
-    """Read the same stretch of many servos."""
     parameters = struct.pack("<HH", address, length) + bytes(servos)
     return encode_instruction(BROADCAST_ID, _FAST_SYNC_READ if fast else _SYNC_READ, parameters)
 

@@ -140,7 +140,6 @@ def read_settings(bus: ServoBus, servo: JointServo) -> dict[str, int]:
 
 
 def read_items(bus: ServoBus, servo: JointServo, names: Iterable[str]) -> dict[str, int]:
-    """Items of a servo by name."""
     wanted = tuple(names)
     try:
         return {

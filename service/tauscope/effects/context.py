@@ -56,7 +56,6 @@ class ArmContext:
         return range(self.robot.joint_count)
 
     def moves(self, joint: int) -> bool:
-        """Whether a joint moves at all."""
         return bool(self.highest[joint] > self.lowest[joint] and self.speed[joint] > 0.0)
 
     def reverses(self, joint: int) -> bool:

@@ -24,8 +24,6 @@ TOLERANCE = 1e-4  # change of the cost, a logarithm, at which a round ends
 
 @dataclass(frozen=True)
 class OptimiserProgress:
-    """Where the optimiser is."""
-
     step: str
     fraction: float
     cost: float
@@ -34,8 +32,6 @@ class OptimiserProgress:
 
 @dataclass(frozen=True)
 class HistoryEntry:
-    """One iteration."""
-
     start: int  # from which start, counted from 1; 0 for the random series
     iteration: int
     own: float
@@ -44,8 +40,6 @@ class HistoryEntry:
 
 @dataclass(eq=False)
 class OptimiserResult:
-    """What came of it."""
-
     x: Array  # (n, columns), the best feasible vector found
     history: list[HistoryEntry]
     evaluations: int
@@ -86,7 +80,6 @@ class _Search:
         return value.cost
 
     def tell(self, step: str, fraction: float, own: float | None = None) -> None:
-        """Report progress."""
         criterion = self.stages.coarse.criterion
         best = np.inf if self.best_value is None else reported_value(criterion, self.best_value.own)
         value = best if own is None else reported_value(criterion, own)

@@ -13,8 +13,6 @@ from tauscope.trajectory.fourier_series import MotionSamples
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """What is minimised."""
-
     criterion: Criterion
     information_weight: float
     regressor: ExcitationRegressor

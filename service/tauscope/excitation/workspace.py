@@ -26,7 +26,6 @@ class Box:
     high: Array
 
     def __post_init__(self) -> None:
-        """Refuse what is no box."""
         shaped = np.shape(self.low) == (3,) and np.shape(self.high) == (3,)
         if not shaped or not np.isfinite([self.low, self.high]).all() or not np.less(self.low, self.high).all():
             raise ExcitationError(

@@ -79,8 +79,6 @@ class KeyFigure:
 
 @dataclass(frozen=True)
 class Page:
-    """Everything on the page."""
-
     kind: str
     robot: str
     facts: Sequence[str]  # that stand below the title, beside the date

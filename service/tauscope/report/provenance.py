@@ -15,8 +15,6 @@ LIBRARIES = ("tauscope", "numpy", "scipy", "clarabel")  # packages whose version
 
 @dataclass(frozen=True)
 class InputFile:
-    """One file that was read."""
-
     role: str
     path: str
     size_bytes: int

@@ -45,7 +45,6 @@ class _BoundedComposer(Composer):
         self.open_nodes = 0
 
     def compose_node(self, parent: Any, index: Any) -> Any:
-        """One node of the document, counted."""
         line = self.parser.peek_event().start_mark.line + 1
         self.entries += 1
         if self.entries > MOST_ENTRIES:
@@ -101,7 +100,6 @@ class _PlainBuilder:
         self.entries = 0
 
     def value(self, node: Any, place: Place, line: int) -> Any:
-        """Plain data of a node."""
         self.entries += 1
         if self.entries > MOST_ENTRIES or len(place) > DEEPEST:
             raise self._error(line, "aliases (*name) expand without end; write the entries out")

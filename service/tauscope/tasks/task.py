@@ -93,7 +93,6 @@ class ReadingOptions(StrictModel):
     @field_validator("decimal", "delimiter")
     @classmethod
     def _check_separator(cls, sign: str | None, info: ValidationInfo) -> str | None:
-        """Signs that can separate."""
         fault = find_separator_fault(**{"decimal": None, "delimiter": None, str(info.field_name): sign})
         if fault is not None:
             raise PydanticCustomError("separator", "{text}", {"text": fault[1]})
@@ -101,7 +100,6 @@ class ReadingOptions(StrictModel):
 
     @property
     def reading(self) -> Reading:
-        """The same for those who read."""
         return Reading(
             self.units or {},
             self.rate_hz,

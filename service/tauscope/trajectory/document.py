@@ -114,7 +114,6 @@ class TrajectoryDocument(TrajectoryPart):
 
 
 def trajectory_document(trajectory: Trajectory) -> TrajectoryDocument:
-    """The document of a trajectory."""
     limits, design = trajectory.limits, trajectory.design
     return TrajectoryDocument(
         robot=trajectory.robot,

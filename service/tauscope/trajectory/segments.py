@@ -21,12 +21,8 @@ PEAK_ACCELERATION = 10.0 / np.sqrt(3.0)
 
 
 class Segment(Protocol):
-    """A piece of a trajectory."""
-
     @property
-    def joint_count(self) -> int:
-        """Number of joints n."""
-        ...
+    def joint_count(self) -> int: ...
 
     @property
     def duration_s(self) -> float:
@@ -58,7 +54,6 @@ class FourierSegment:
 
     @property
     def joint_count(self) -> int:
-        """Number of joints n."""
         return self.series.joint_count
 
     @property
@@ -92,7 +87,6 @@ class MoveSegment:
 
     @property
     def joint_count(self) -> int:
-        """Number of joints n."""
         return len(self.start)
 
     def evaluate(self, time: Array) -> MotionSamples:
@@ -125,7 +119,6 @@ class PathSegment:
 
     @property
     def joint_count(self) -> int:
-        """Number of joints n."""
         return self.series.joint_count
 
     def evaluate(self, time: Array) -> MotionSamples:
@@ -163,7 +156,6 @@ class SampledSegment:
 
     @property
     def joint_count(self) -> int:
-        """Number of joints n."""
         return self.motion.position.shape[1]
 
     @property

@@ -93,7 +93,6 @@ class Trajectory:
 
     @property
     def joint_count(self) -> int:
-        """Number of joints n."""
         return len(self.joints)
 
     @property

@@ -140,9 +140,7 @@ class Port(Protocol):
         """What the master has set, or a rate that is understood where there is none to set [bit/s]."""
         ...
 
-    def fileno(self) -> int:
-        """Descriptor to wait on."""
-        ...
+    def fileno(self) -> int: ...
 
     def read(self) -> bytes | None:
         """What a master sent; None where no master has it open."""
@@ -152,9 +150,7 @@ class Port(Protocol):
         """Send to the master; lost where there is none, or where it reads nothing."""
         ...
 
-    def close(self) -> None:
-        """Hang up."""
-        ...
+    def close(self) -> None: ...
 
 
 _TCGETS2 = 0x802C542A

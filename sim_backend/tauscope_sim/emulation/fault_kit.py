@@ -75,7 +75,6 @@ class FaultSchedule(TimedQueue[InjectedFault]):
     """Faults in the order of their instants."""
 
     def add(self, faults: Iterable[InjectedFault]) -> None:
-        """Plan faults."""
         for fault in faults:
             self.put(fault.at_s, fault)
 

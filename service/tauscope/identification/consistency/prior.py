@@ -36,7 +36,6 @@ class Prior:
 
     @property
     def link_count(self) -> int:
-        """Number of links n."""
         return len(self.masses)
 
     def widen(self, width: float) -> "Prior":

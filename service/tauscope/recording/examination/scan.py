@@ -141,7 +141,6 @@ class _Scan:
                 )
 
     def finish(self, recording: Recording) -> Defects:
-        """Defects of all blocks."""
         defects = self.defects
         for (joint, name), parts in self.found.items():
             rows = np.unique(np.concatenate(parts))
