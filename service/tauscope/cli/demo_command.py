@@ -45,7 +45,7 @@ from tauscope.tasks.campaign import HeldOutMotion
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.diagnose import DiagnosisOptions
 from tauscope.tasks.run import BackendChoice
-from tauscope.tasks.task import LocalFiles
+from tauscope.tasks.task import Files
 from tauscope.trajectory import write_trajectory
 from tauscope_sim.examples import example_robot
 
@@ -153,7 +153,7 @@ def run_motion(folder: Path, trajectory: Path, out: Path, seed: int, told: Told)
         # What the arm weighs is the simulation's secret: nobody may feed it forward.
         options=RunOptions(rate_hz=RATE_HZ, feed_forward=False),
     )
-    result = run.perform(request, LocalFiles({"run": folder}), told)
+    result = run.perform(request, Files({"run": folder}), told)
     if result.record.state is not RunState.FINISHED:
         raise AcquisitionError(explain_unfinished(result.record, None))
     keep_recording(result, out)

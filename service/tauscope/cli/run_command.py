@@ -26,7 +26,7 @@ from tauscope.runtime.options import RunOptions
 from tauscope.runtime.record import RunRecord
 from tauscope.runtime.states import RunState
 from tauscope.tasks import run as task
-from tauscope.tasks.task import LocalFiles
+from tauscope.tasks.task import Files
 
 Trajectory = Annotated[
     Path | None,
@@ -104,7 +104,7 @@ def _run_arm(request: task.Request, asked: Path | None) -> None:
     folder, is_settled = _folder_beside(out), False
     try:
         with show_progress() as told:
-            result = task.perform(request, LocalFiles({"run": folder / "run"}), told)
+            result = task.perform(request, Files({"run": folder / "run"}), told)
         made = keep_recording(result, out)
         journal = None if made else _unsaved_journal(result)
         is_settled = journal is None

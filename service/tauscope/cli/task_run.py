@@ -13,7 +13,7 @@ from tauscope.errors import ExportError, one_line
 from tauscope.export.formats import SUFFIXES, ExportFile, ExportFormat
 from tauscope.files import open_atomically
 from tauscope.robot import Robot, Severity, read_robot
-from tauscope.tasks.task import LocalFiles
+from tauscope.tasks.task import Files
 
 STANDARD_OUTPUT = Path("-")  # stands for standard output where a file to write is asked for
 
@@ -115,7 +115,7 @@ def write_outputs(
     task: ModuleType, request: Any, outputs: Mapping[Path, str], progress: Told
 ) -> tuple[Any, Iterable[Path]]:
     """The result, and the files that were written: all, or none. Raises TauscopeError if one cannot be made."""
-    result = task.perform(request, LocalFiles({name: path for path, name in outputs.items()}), progress)
+    result = task.perform(request, Files({name: path for path, name in outputs.items()}), progress)
     progress("make outputs")
     made = result.outputs
     content = {path: made[name] for path, name in outputs.items() if name in made}

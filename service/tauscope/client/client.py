@@ -13,13 +13,11 @@ from pydantic import TypeAdapter
 
 from tauscope.client.transport import Answer, ApiError, Content, Transport, form_content, json_content
 from tauscope.robot import RobotReport
+from tauscope.server.http.analyses import DiagnosisAnswer, IdentificationAnswer, RolloutAnswer
 from tauscope.server.http.campaigns import CampaignAnswer
-from tauscope.server.http.diagnoses import DiagnosisAnswer
 from tauscope.server.http.excitations import ExcitationAnswer
-from tauscope.server.http.identifications import IdentificationAnswer
 from tauscope.server.http.leases import LeaseAnswer, StopAllAnswer
 from tauscope.server.http.recordings import RecordingAnswer
-from tauscope.server.http.rollouts import RolloutAnswer
 from tauscope.server.http.runs import RunAnswer, StopAnswer
 
 BEATS_A_TTL = 3.0

@@ -1,7 +1,7 @@
 """What all tasks share: how a request names files, how progress is told, and how outputs are made."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
@@ -135,36 +135,23 @@ class Progress(Protocol):
         ...
 
 
-class Files(Protocol):
-    """Where the files of a request lie, and what a result calls them."""
+class Files:
+    """Where the files of a request lie: here by their paths, as on a command line; and what a result calls them."""
+
+    def __init__(self, targets: Mapping[str, Path] = {}) -> None:
+        self._targets = targets
 
     def find(self, role: str, name: str) -> Path:
-        """Where an input lies; raises RecordingError where it is not what was asked for."""
-        ...
-
-    def show(self, path: Path) -> str:
-        """What reports call an input."""
-        ...
-
-    def target(self, output: str) -> Path | None:
-        """Where an output is written; None where it is not wanted."""
-        ...
-
-
-@dataclass(frozen=True)
-class LocalFiles:
-    """Files by their paths, as on a command line."""
-
-    targets: Mapping[str, Path] = field(default_factory=dict)
-
-    def find(self, role: str, name: str) -> Path:
+        """Where an input lies. Raises RecordingError where it is not what was asked for."""
         return find_path(name)
 
     def show(self, path: Path) -> str:
+        """What reports call an input."""
         return str(path)
 
     def target(self, output: str) -> Path | None:
-        return self.targets.get(output)
+        """Where an output is written; None where it is not wanted."""
+        return self._targets.get(output)
 
 
 class Outputs(Mapping[str, bytes]):

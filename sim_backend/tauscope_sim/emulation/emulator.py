@@ -13,7 +13,7 @@ from dataclasses import asdict
 from math import ceil
 from typing import Any, Protocol, Self
 
-from tauscope_sim.emulation.fault_kit import FaultSchedule, InjectedFault, faults_from
+from tauscope_sim.emulation.fault_kit import InjectedFault, TimedQueue, faults_from
 
 STEP_S = 1e-3  # period of the devices' own loops and of the physics [s]
 MOST_STEPS = 10  # steps that are taken in a row while nothing is asked
@@ -55,7 +55,7 @@ class Emulator(ABC):
     def __init__(self, now_s: float) -> None:
         """Everything at rest; the arm stands on a stand until all its devices have had torque once."""
         self._clock = DeviceClock(now_s)
-        self.schedule = FaultSchedule()
+        self.schedule = TimedQueue[InjectedFault]()
 
     @property
     def now_s(self) -> float:
@@ -104,7 +104,8 @@ class Emulator(ABC):
         return None
 
     def inject(self, faults: list[InjectedFault]) -> None:
-        self.schedule.add(faults)
+        for fault in faults:
+            self.schedule.put(fault.at_s, fault)
         self._run_faults()
 
     def _run_faults(self) -> None:
@@ -177,7 +178,6 @@ class PseudoTerminal:
         return self._near
 
     def read(self) -> bytes | None:
-        """What a master sent; None where no master has it open."""
         try:
             return os.read(self._near, 4096)
         except BlockingIOError:
@@ -188,13 +188,11 @@ class PseudoTerminal:
             raise
 
     def write(self, data: bytes) -> None:
-        """Send to the master; lost where there is none, or where it reads nothing."""
         with contextlib.suppress(BlockingIOError, OSError):
             os.write(self._near, data)
 
     @property
     def baud(self) -> int:
-        """What the master has set [bit/s]."""
         settings = fcntl.ioctl(self._near, _TCGETS2, bytes(struct.calcsize(_TERMIOS2)))
         return struct.unpack(_TERMIOS2, settings)[-1]
 

@@ -71,14 +71,6 @@ class TimedQueue(Generic[_Item]):
             yield heapq.heappop(self._queue)[2]
 
 
-class FaultSchedule(TimedQueue[InjectedFault]):
-    """Faults in the order of their instants."""
-
-    def add(self, faults: Iterable[InjectedFault]) -> None:
-        for fault in faults:
-            self.put(fault.at_s, fault)
-
-
 @dataclass
 class AnswerFaults:
     """What is to happen to the next answers of one device; nothing where `kind` is None."""

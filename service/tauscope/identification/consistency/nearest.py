@@ -50,12 +50,7 @@ class ConsistentParameters:
 
 
 def nearest_consistent_parameters(
-    factor: Array,
-    target: Array,
-    prior: Prior,
-    inequalities: LinearInequalities | None = None,
-    *,
-    margin: float = MARGIN,
+    factor: Array, target: Array, prior: Prior, inequalities: LinearInequalities | None = None
 ) -> ConsistentParameters:
     """Nearest x to a weighted least-squares estimate such that every link can exist and G x ≤ h.
 
@@ -70,12 +65,12 @@ def nearest_consistent_parameters(
     """
     inequalities = inequalities or LinearInequalities.none(prior.mean.size)
     _check_input(factor, target, prior, inequalities)
-    program = assemble(factor, target, prior, inequalities, margin=margin)
+    program = assemble(factor, target, prior, inequalities, margin=MARGIN)
     scaled, status, gap = solve(program)
     parameters = scaled * prior.scale
     squared_residual = float(np.sum((factor @ parameters - target) ** 2))
     distance = prior.squared_distance(parameters)
-    felt = program.slacks(scaled) <= _ACTIVE * margin
+    felt = program.slacks(scaled) <= _ACTIVE * MARGIN
     least = program.smallest_eigenvalues(scaled)
     return ConsistentParameters(
         links=tuple(LinkInertia.from_vector(parameters[10 * j : 10 * j + 10]) for j in range(program.link_count)),
@@ -86,7 +81,7 @@ def nearest_consistent_parameters(
         prior_squared_distance=distance,
         status=status,
         duality_gap=gap,
-        active_links=tuple(bool(value <= _ACTIVE * margin) for value in least),
+        active_links=tuple(bool(value <= _ACTIVE * MARGIN) for value in least),
         active_inequalities=tuple(name for name, on in zip(inequalities.names, felt, strict=True) if on),
     )
 

@@ -9,18 +9,16 @@ from fastapi import Depends, FastAPI
 from tauscope.server.auth.gate import AuditedRequests, Gate
 from tauscope.server.control.run_manager import StartControl
 from tauscope.server.http import (
+    analyses,
     campaigns,
-    diagnoses,
     excitations,
     health,
     history,
-    identifications,
     items,
     leases,
     pages,
     recordings,
     robots,
-    rollouts,
     runs,
     schedules,
 )
@@ -36,9 +34,10 @@ from tauscope.server.page.router import router as page
 API_VERSION = "1.23.0"
 """Of the interface, not of the package; a change of tests/server/http/openapi.json goes with a change here."""
 PREFIX = "/api/v1"
-_RESOURCES = (campaigns, excitations, runs, recordings, identifications, diagnoses, rollouts, robots, items, history)
 VERBS = (
-    *(module.router for module in (*_RESOURCES, schedules, leases)),
+    *(module.router for module in (campaigns, excitations, runs, recordings)),
+    *analyses.routers,
+    *(module.router for module in (robots, items, history, schedules, leases)),
     *(recordings.mapping_router, leases.stop_router),
 )
 """Routers of everything that a client may ask for, below `PREFIX`."""

@@ -16,8 +16,8 @@ from tauscope.server.http.answers import After, AnswerModel, PageAnswer
 from tauscope.server.http.bodies import PartRule, ReceivedForm, file_answer, parse_document, receive_form
 from tauscope.server.http.openapi import ROBOT_PARTS, binary_part, file_responses, form_body, refer_to_model
 from tauscope.server.http.reading import READING
-from tauscope.server.http.robot_files import robot_part_rules
 from tauscope.server.http.services import ServicesDep, require_no_evidence
+from tauscope.server.http.tasks.submission import robot_part_rules
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.received_files import (
     Understanding,

@@ -12,15 +12,15 @@ from tauscope.robot import RobotReport
 from tauscope.server.http.bodies import FORM, JSON, media_type, read_document, receive_form, refuse_media_type
 from tauscope.server.http.openapi import ROBOT_PARTS, form_body, json_body
 from tauscope.server.http.reading import READING
-from tauscope.server.http.robot_files import (
+from tauscope.server.http.services import ServicesDep, require_no_identification
+from tauscope.server.http.tasks.router import JobRobotAnswer, describe_robot
+from tauscope.server.http.tasks.submission import (
     EXAMPLE_ROBOT,
     RobotCheckRequest,
     RobotVersionAnswer,
     keep_inline_robot,
     robot_part_rules,
 )
-from tauscope.server.http.services import ServicesDep, require_no_identification
-from tauscope.server.http.tasks.router import JobRobotAnswer, describe_robot
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.received_files import check_received_robot, read_received_robot
 from tauscope.server.store.robots import VERSION_PATTERN

@@ -36,10 +36,10 @@ from tauscope.server.http.bodies import PartRule, file_answer, to_json_text
 from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.leases import permit_of
 from tauscope.server.http.openapi import binary_part, file_responses
-from tauscope.server.http.robot_files import EXAMPLE_ROBOT
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.router import MovingResource
 from tauscope.server.http.tasks.submission import (
+    EXAMPLE_ROBOT,
     BackendRequest,
     Received,
     RobotRequest,
