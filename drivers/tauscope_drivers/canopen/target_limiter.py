@@ -20,10 +20,7 @@ _ARRIVED = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class _Reached:
-    """What a cycle has come to.
-
-    `position`, `velocity`: (n,), targets sent, and how fast a drive in time goes there.
-    """
+    """What a cycle has come to. `position`, `velocity`: (n,), targets sent, and how fast a drive in time goes there."""
 
     position: Array
     velocity: Array

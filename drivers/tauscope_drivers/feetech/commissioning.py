@@ -23,10 +23,7 @@ _TOOL = "with Feetech's FD: Tauscope writes nothing to EEPROM"
 
 @dataclass(frozen=True)
 class ServoTask:
-    """What a servo shall do once it has torque.
-
-    `low`, `high`: range of its goals [counts].
-    """
+    """What a servo shall do once it has torque. `low`, `high`: range of its goals [counts]."""
 
     low: int
     high: int

@@ -21,10 +21,7 @@ TRACE_RADIUS_M = 0.01  # radius of that mass [m]
 
 @dataclass(frozen=True, eq=False)
 class RolloutModel:
-    """One model of the arm.
-
-    `name`: ``stated``, ``identified`` or ``findings``.
-    """
+    """One model of the arm. `name`: ``stated``, ``identified`` or ``findings``."""
 
     name: str
     mjcf: str

@@ -25,10 +25,7 @@ PER_BODY, PER_JOINT = 5, 5
 
 @dataclass(frozen=True)
 class Term:
-    """One parameter.
-
-    `start`, `prior_std`: mean and standard error of its prior; infinite without one.
-    """
+    """One parameter. `start`, `prior_std`: mean and standard error of its prior; infinite without one."""
 
     name: str
     unit: str

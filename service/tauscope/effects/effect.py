@@ -30,10 +30,7 @@ NO_SHAPE = np.zeros((1, 0))  # the grid of an effect without shape parameters
 
 @dataclass(frozen=True)
 class Coefficient:
-    """A linear coefficient of an effect.
-
-    `largest`, `smallest`: magnitudes beyond which there is no such effect.
-    """
+    """A linear coefficient of an effect. `largest`, `smallest`: magnitudes beyond which there is no such effect."""
 
     name: str
     unit: str

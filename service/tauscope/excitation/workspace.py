@@ -17,10 +17,7 @@ STILL_M = 1e-9  # a point that moves less than this is fixed to the base: where 
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """A forbidden box, its sides along the axes of the base frame.
-
-    `low`, `high`: (3,), opposite corners [m].
-    """
+    """A forbidden box, its sides along the axes of the base frame. `low`, `high`: (3,), opposite corners [m]."""
 
     low: Array
     high: Array

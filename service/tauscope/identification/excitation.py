@@ -17,10 +17,7 @@ MOST_SAMPLES = 2048  # samples of one piece of motion, which has up to 32,768, b
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
-    """How the joints move.
-
-    `lowest`, `highest`: (n,), positions [rad or m].
-    """
+    """How the joints move. `lowest`, `highest`: (n,), positions [rad or m]."""
 
     lowest: Array
     highest: Array

@@ -53,7 +53,7 @@ def control(
     keeper.keep(record)
     try:
         task = _task(order, folder, make)
-        run = Run(task, record, Surroundings(folder, stops, keeper, recorder, report))
+        run = Run(task, record, Surroundings(folder, stops, keeper.keep, recorder, report))
     except TauscopeError as error:
         stops.done()
         record = _refuse(record, error)

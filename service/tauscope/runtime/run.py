@@ -6,8 +6,9 @@ import traceback
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -31,13 +32,6 @@ OpenRecorder = Callable[[Path, JournalHeader, Stops, bool], Recorder]
 """Opens a journal: its path, its header, requests to stop, and whether the arm runs in real time."""
 
 
-class Keeper(Protocol):
-    """Takes a run's record whenever it changes."""
-
-    def keep(self, record: RunRecord) -> None:
-        """Keep the newest record; must not take time."""
-
-
 @dataclass(frozen=True, eq=False)
 class RunTask:
     robot: Robot
@@ -50,7 +44,7 @@ class RunTask:
 class Surroundings:
     folder: Path
     stops: Stops
-    keeper: Keeper
+    keep: Callable[[RunRecord], None]  # the newest record, whenever it changes; must not take time
     open_recorder: OpenRecorder
     report: Report
 
@@ -267,7 +261,7 @@ class Run:
 
     def _enter(self, state: RunState, **changes: Any) -> None:
         self.record = self.record.moved(state, **changes)
-        self._around.keeper.keep(self.record)
+        self._around.keep(self.record)
         transition = self.record.history[-1]
         self._tell(state_event(state, transition.at))
         if self._recorder is not None and self._backend is not None and not state.is_end:
@@ -326,10 +320,10 @@ def run_trajectory(
     options = options or RunOptions()
     prepare_folder(folder)
     record = new_record(robot.name, backend_name, options.mode.value)
-    keeper = _DirectKeeper(folder)
-    around = Surroundings(folder, stops or ManualStop(), keeper, open_recorder, report or _nobody)
+    keep = partial(_keep_at_once, folder)
+    around = Surroundings(folder, stops or ManualStop(), keep, open_recorder, report or _nobody)
     run = Run(RunTask(robot, trajectory, options, connect), record, around)
-    keeper.keep(record)
+    keep(record)
     return run.execute()
 
 
@@ -357,18 +351,13 @@ def open_recorder(path: Path, header: JournalHeader, stops: Stops, is_real_time:
     return recorder
 
 
-class _DirectKeeper:
-    """Writes the record at once: in virtual time nobody is late."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def keep(self, record: RunRecord) -> None:
-        try:
-            write_record(self._folder, record)
-        except OSError as error:
-            place = f"{self._folder}: the run's record cannot be written"
-            raise AcquisitionError(f"{place} ({error.strerror or error})") from error
+def _keep_at_once(folder: Path, record: RunRecord) -> None:
+    """Write the record: in virtual time nobody is late."""
+    try:
+        write_record(folder, record)
+    except OSError as error:
+        place = f"{folder}: the run's record cannot be written"
+        raise AcquisitionError(f"{place} ({error.strerror or error})") from error
 
 
 def _nobody(event: Any) -> None:

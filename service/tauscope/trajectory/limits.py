@@ -20,10 +20,7 @@ DEFAULT_ACCELERATION = {JointType.REVOLUTE: 4.0, JointType.PRISMATIC: 1.0}
 
 @dataclass(frozen=True, eq=False)
 class MotionLimits:
-    """Limits of every joint.
-
-    `position_low`, `position_high`: (n,), range of the position [rad or m].
-    """
+    """Limits of every joint. `position_low`, `position_high`: (n,), range of the position [rad or m]."""
 
     position_low: Array
     position_high: Array

@@ -65,10 +65,7 @@ class Motion:
 
 
 class Drives:
-    """Servo and target of all joints.
-
-    `tick_s`: time between two ticks [s].
-    """
+    """Servo and target of all joints. `tick_s`: time between two ticks [s]."""
 
     def __init__(self, robot: Robot, scenario: Scenario, motion: Motion, tick_s: float) -> None:
         self._servo = Servo(robot, InertiaSchedule(robot, scenario.effects), tick_s)

@@ -14,10 +14,7 @@ from tauscope_sim.plant.term import Coordinates, Forces, Moment, Slopes, Term
 
 
 class FrictionCoupling(SmoothSignEffect):
-    """τ_j = f, τ_k = s f with f = c A(v_j + s v_k) + d (v_j + s v_k).
-
-    `joint`: j, counted from 1.
-    """
+    """τ_j = f, τ_k = s f with f = c A(v_j + s v_k) + d (v_j + s v_k). `joint`: j, counted from 1."""
 
     effect_id: ClassVar[str] = "friction_coupling"
     other_joint: JointNumber  # k, counted from 1

@@ -49,10 +49,7 @@ def compliant_transmissions(effects: Sequence[PhysicalEffect], rotor_inertia: Ar
 
 
 class Compliance:
-    """All compliant transmissions of an arm.
-
-    `transmissions`: by joint, counted from 0.
-    """
+    """All compliant transmissions of an arm. `transmissions`: by joint, counted from 0."""
 
     def __init__(self, transmissions: Mapping[int, Transmission], coordinates: Coordinates) -> None:
         self._parts = [(joint, coordinates.motor(joint), transmissions[joint]) for joint in coordinates.compliant]

@@ -175,10 +175,7 @@ class DescribedObject:
 
 @dataclass(frozen=True)
 class DeviceFile:
-    """What a file says of a drive.
-
-    `vendor`, `product`, `revision`: identity; None where it states none.
-    """
+    """What a file says of a drive. `vendor`, `product`, `revision`: identity; None where it states none."""
 
     name: str
     objects: Mapping[tuple[int, int], DescribedObject]  # by index and subindex

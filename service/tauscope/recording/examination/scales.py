@@ -149,10 +149,7 @@ class PositionScale:
 
 @dataclass(frozen=True)
 class EffortScale:
-    """Typical steps of one joint's effort, in its own unit.
-
-    `low`, `high`: 1st and 99th percentile.
-    """
+    """Typical steps of one joint's effort, in its own unit. `low`, `high`: 1st and 99th percentile."""
 
     low: float
     high: float
