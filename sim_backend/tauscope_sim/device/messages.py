@@ -31,7 +31,6 @@ class FrameKind(IntEnum):
     INJECT = 7
     STATUS = 8
     GOODBYE = 9
-    SHUT_DOWN = 10
     PUT_BACK = 11
     WELCOME = 64
     STATE = 65

@@ -223,9 +223,8 @@ class DeviceServer:
                 device.inject(messages.decode_document(Injection, body))
             case messages.FrameKind.PUT_BACK:
                 device.put_back()
-            case messages.FrameKind.GOODBYE | messages.FrameKind.SHUT_DOWN:
+            case messages.FrameKind.GOODBYE:
                 device.stop()
-                self._finished |= kind is messages.FrameKind.SHUT_DOWN
             case messages.FrameKind.READ:
                 pass
             case _:

@@ -244,10 +244,6 @@ class RemoteSimulatedArm:
         """Have the arm carried back to where it began; see `tauscope_sim.device.SimulatedDevice.put_back`."""
         return self._state_after(messages.FrameKind.PUT_BACK)
 
-    def shut_down_device(self) -> None:
-        self._patiently(messages.FrameKind.SHUT_DOWN)
-        self._close()
-
     def _state_after(self, kind: messages.FrameKind, body: bytes = b"") -> ArmState:
         return self._state_of(self._patiently(kind, body))
 
