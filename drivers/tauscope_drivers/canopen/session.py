@@ -11,11 +11,10 @@ import numpy as np
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import NMT_PRE_OPERATIONAL, SYNC_ID, CanBus
-from tauscope_drivers.canopen.bus_budget import largest_rate_hz, rate_limit
 from tauscope_drivers.canopen.configuration import BusConfiguration
 from tauscope_drivers.canopen.emergency import WATCHDOG_CODE
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.process_data import MEASURED_WHERE_THERE, PdoSlots, plan_pdos
+from tauscope_drivers.canopen.process_data import MEASURED_WHERE_THERE, PdoSlots, largest_rate_hz, plan_pdos, rate_limit
 from tauscope_drivers.canopen.state_machine import POWERED, DriveState, Goal, decode_state
 from tauscope_drivers.clock import AnswerTime, Clock
 from tauscope_drivers.errors import Fault

@@ -11,8 +11,7 @@ from tauscope.excitation.optimiser import OptimiserProgress, optimise
 from tauscope.excitation.setting import ExcitationOptions, Setting
 from tauscope.excitation.slow_reversals import SlowPart, slow_part
 from tauscope.robot import Robot
-from tauscope.trajectory.document import trajectory_document
-from tauscope.trajectory.excitation_document import ExcitationDocument, HistoryPart
+from tauscope.trajectory.document import ExcitationDocument, HistoryPart, trajectory_document
 from tauscope.trajectory.fourier_series import FourierSeries
 from tauscope.trajectory.segments import FourierSegment, Segment
 from tauscope.trajectory.trajectory import DesignRecord, Trajectory
