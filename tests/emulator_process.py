@@ -31,7 +31,7 @@ class EmulatorProcess(Generic[_Order]):
         self._received = b""
 
     def __enter__(self) -> Self:
-        command = [sys.executable, "-m", "tauscope_sim.emulation", self.order.kind, self.order.to_json()]
+        command = [sys.executable, "-m", "tauscope_sim.emulation.server", self.order.kind, self.order.to_json()]
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=_environment(), start_new_session=True
         )

@@ -37,21 +37,18 @@ class DriveLimits:
     """What the drives themselves enforce, set before torque is switched on; infinite where there is no limit.
 
     `position_low`, `position_high`: (n,), range of the joint [rad or m].
-    `velocity`: (n,), largest speed [rad/s or m/s].
-    `torque`: (n,), largest torque [Nm or N].
     """
 
     position_low: Array
     position_high: Array
-    velocity: Array
-    torque: Array
+    velocity: Array  # (n,), largest speed [rad/s or m/s]
+    torque: Array  # (n,), largest torque [Nm or N]
 
 
 @dataclass(frozen=True)
 class Capabilities:
     """What a backend can do, known without motion.
 
-    `watchdog_range_s`: shortest and longest time of the device's watchdog [s].
     `policies_by_mode`: ways to stop that the device carries out itself in each mode, where they differ; None where
         every mode has all.
     `remarks`: what the drives do not have, and what is done in place of it; known once the arm is connected.
@@ -61,7 +58,7 @@ class Capabilities:
     modes: frozenset[ControlMode]
     stop_policies: frozenset[StopPolicy]
     largest_rate_hz: float
-    watchdog_range_s: tuple[float, float]
+    watchdog_range_s: tuple[float, float]  # shortest and longest time of the device's watchdog [s]
     takes_feed_forward: bool
     effort_unit: str = "Nm"
     policies_by_mode: Mapping[ControlMode, frozenset[StopPolicy]] | None = None
@@ -78,9 +75,7 @@ class Backend(Protocol):
     """An arm that can be moved: real drives on a bus, or a simulation of them."""
 
     @property
-    def capabilities(self) -> Capabilities:
-        """What it can do."""
-        ...
+    def capabilities(self) -> Capabilities: ...
 
     @property
     def clock(self) -> Clock:

@@ -14,7 +14,6 @@ _KEYS_OF_ANY_BUS = ("stop_policy",)
 class DriveJoint:
     """A joint as a driver sees it.
 
-    `gear_ratio`: motor turns per joint turn.
     `torque_per_unit`: joint torque for one unit that the drive measures, signed as the robot file's ``sign`` and
         ``torque_constant`` are; None where it does not say [Nm or N].
     `torque_limit`, `velocity_limit`: of the joint; None where the robot file states none [Nm or N, rad/s or m/s].
@@ -24,7 +23,7 @@ class DriveJoint:
     name: str
     drive: Mapping[str, Any]
     _: KW_ONLY
-    gear_ratio: float = 1.0
+    gear_ratio: float = 1.0  # motor turns per joint turn
     torque_per_unit: float | None = None
     torque_limit: float | None = None
     velocity_limit: float | None = None

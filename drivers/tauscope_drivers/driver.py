@@ -42,15 +42,9 @@ class Connection:
 
 @dataclass(frozen=True)
 class ArmDescription:
-    """An arm as a driver is told of it.
-
-    `robot`: the whole robot as Tauscope reads it, for a driver that simulates it.
-    `folder`: for files of the driver's own.
-    """
-
     joints: tuple[DriveJoint, ...]
-    robot: Any = None
-    folder: Path | None = None
+    robot: Any = None  # the whole robot as Tauscope reads it, for a driver that simulates it
+    folder: Path | None = None  # for files of the driver's own
 
 
 class Driver(ABC):
@@ -64,7 +58,6 @@ class Driver(ABC):
 
     @property
     def option_names(self) -> tuple[str, ...]:
-        """Names of the options."""
         return tuple(option.name for option in self.options)
 
     @abstractmethod
@@ -144,8 +137,6 @@ class BusDriver(Driver):
 
 
 class SerialBusDriver(BusDriver):
-    """Servos on a serial bus."""
-
     options = (Option("port", "serial device, in place of the robot file's"), PATIENCE)
     port_help = "serial device"
     bus_options = ("port",)

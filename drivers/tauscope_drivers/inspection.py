@@ -10,8 +10,6 @@ from tauscope_drivers.backend import ControlMode, DriveLimits
 
 
 class Severity(StrEnum):
-    """How much a finding matters."""
-
     GOOD = "good"
     WARNING = "warning"
     FAILURE = "failure"
@@ -19,8 +17,6 @@ class Severity(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at."""
-
     severity: Severity
     subject: str
     detail: str
@@ -29,8 +25,6 @@ class Finding:
 
 @dataclass(frozen=True)
 class FoundDevice:
-    """A device that answered on a bus."""
-
     address: int
     bit_rate: int
     model: str
@@ -53,14 +47,9 @@ class FrameRequest:
 
 @dataclass(frozen=True)
 class PlannedFrame:
-    """A frame that would be sent.
-
-    `wire`: as the bus's own tools write it: bytes in hexadecimal on a serial bus, ``201#0F00`` on CAN.
-    """
-
     phase: str
     meaning: str
-    wire: str
+    wire: str  # as the bus's own tools write it: bytes in hexadecimal on a serial bus, ``201#0F00`` on CAN
 
 
 PHASES = ("connect", "enable", "cycle", "stop")  # in the order in which a run goes through them

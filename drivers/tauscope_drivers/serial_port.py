@@ -27,13 +27,9 @@ _FORBIDDEN = "may not be opened", "add your account to the group that owns it (d
 
 
 class SerialPort:
-    """An exclusive serial port.
-
-    `latency_s`: latency timer of the adapter, one USB frame at least [s].
-    """
+    """An exclusive serial port. `latency_s`: latency timer of the adapter, one USB frame at least [s]."""
 
     def __init__(self, path: str, baud: int, slack_s: float = 0.002) -> None:
-        """Nothing is opened yet."""
         self.path = path
         self.baudrate = baud
         self.latency_s = LEAST_LATENCY_S

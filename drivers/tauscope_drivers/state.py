@@ -16,27 +16,21 @@ class ArmState:
 
     A value that was not received in this cycle is NaN, never the one before.
 
-    `time_ns`: instant of the reading by the backend's clock [ns].
-    `position`: (n,), q [rad or m].
-    `velocity`: (n,), q̇ as the drive reports it, NaN where it reports none [rad/s or m/s].
     `effort`: (n,), measured effort as `Capabilities.effort_unit` says: joint torque [Nm or N], or what the drive
         reports instead.
-    `temperature`: (n,), of the motor, NaN where it is not reported [°C].
-    `enabled`: (n,), whether the joint's drive holds or drives the joint.
-    `voltage`: (n,) or None, supply of the drive's bridge; None where the drives report none [V].
     `late_ns`: how much later than the bus takes the answers came: the instant of the reading is not known any better
         [ns].
     """
 
-    time_ns: int
-    position: Array
-    velocity: Array
+    time_ns: int  # instant of the reading by the backend's clock [ns]
+    position: Array  # (n,), q [rad or m]
+    velocity: Array  # (n,), q̇ as the drive reports it, NaN where it reports none [rad/s or m/s]
     effort: Array
-    temperature: Array
-    enabled: NDArray[np.bool_]
+    temperature: Array  # (n,), of the motor, NaN where it is not reported [°C]
+    enabled: NDArray[np.bool_]  # (n,), whether the joint's drive holds or drives the joint
     faults: tuple[Fault, ...] = ()
     late_ns: int = 0
-    voltage: Array | None = None
+    voltage: Array | None = None  # (n,) or None, supply of the drive's bridge; None where the drives report none [V]
 
     @staticmethod
     def unknown(time_ns: int, joint_count: int, faults: tuple[Fault, ...] = ()) -> "ArmState":
@@ -54,10 +48,9 @@ class ArmState:
 class Setpoint:
     """What the drives shall do until the next cycle, in joint units; which field counts is the control mode's matter.
 
-    `position`: (n,), target position in `ControlMode.POSITION` [rad or m].
     `torque`: (n,), target torque in `ControlMode.TORQUE`; feed-forward in `ControlMode.POSITION` where the backend
         takes one, else unused [Nm or N].
     """
 
-    position: Array
+    position: Array  # (n,), target position in `ControlMode.POSITION` [rad or m]
     torque: Array

@@ -57,7 +57,7 @@ class IdentificationResult:
 
     def plot(self) -> "Figure":
         """Measured and predicted torque of every joint, on held-out motion where there is some."""
-        from tauscope.report.series import torque_series
+        from tauscope.report.curves import torque_series
 
         series = torque_series(self.identification, (self.held_out or self.recordings)[0])
         figure, axes = _axes(self.document.joints, "torque [Nm or N]")

@@ -50,26 +50,21 @@ def read_chain(
 
 @dataclass(frozen=True)
 class _Joint:
-    """A joint of the compiled model by its index, and what it follows.
-
-    `rest`: its position as the file states the arm [rad or m].
-    """
+    """A joint of the compiled model by its index, and what it follows."""
 
     index: int
     name: str
     kind: int
     body: int
-    rest: float
+    rest: float  # its position as the file states the arm [rad or m]
     master: Master | None
 
     @property
     def moves(self) -> bool:
-        """Whether it is a hinge or a slide."""
         return self.kind in (HINGE, SLIDE)
 
     @property
     def type(self) -> JointType:
-        """How it moves."""
         return JointType.PRISMATIC if self.kind == SLIDE else JointType.REVOLUTE
 
 
@@ -93,7 +88,6 @@ class _Reader:
                 raise self._error(f"locked: joint {shown(name)} is not in the file; {nearest(name, self._by_name)}")
 
     def chain(self, base: str | None, tip: str | None) -> Chain:
-        """Read the chain between two bodies."""
         first, last = self._ends(base, tip)
         bodies = self._path(first, last)
         path = [joint for body in bodies for joint in self._joints_of(body)]
@@ -149,7 +143,6 @@ class _Reader:
         return self._data.xmat[base].reshape(3, 3).T @ self._model.opt.gravity
 
     def _remark_on_the_rest(self) -> None:
-        """Say which forces of the file the model leaves out."""
         model, left = self._model, []
         if model.opt.density or model.opt.viscosity:
             left.append("drag of the medium (option density, viscosity)")

@@ -36,15 +36,12 @@ MOST_EFFECTS = 200
 
 
 class ScenarioDocument(Document):
-    """The scenario file's keys.
-
-    `command_latency`: [s].
-    """
+    """The scenario file's keys."""
 
     torque_noise_std: NotNegativeNumbers = Field(default_factory=single_zero)
     position_noise_std: NotNegativeNumbers = Field(default_factory=single_zero)
     encoder_step: NotNegativeNumbers = Field(default_factory=single_zero)
-    command_latency: NotNegative = 0.0
+    command_latency: NotNegative = 0.0  # [s]
     seed: Seed = 0
     effects: list[Any] = Field(default_factory=list, max_length=MOST_EFFECTS)
 

@@ -14,7 +14,7 @@ from tauscope.dynamics import torque_regressor
 from tauscope.errors import RecordingError, RobotFileError
 from tauscope.recording import EffortKind, Recording
 from tauscope.recording.examination import examine_recording
-from tauscope.robot import Actuator, LinkInertia, Model, Robot, robot_from_dict, robot_from_yaml, robot_to_dict
+from tauscope.robot import Actuator, LinkInertia, Model, Robot, read_robot, robot_from_dict, robot_to_dict
 
 RATE_HZ = 200.0
 STIFFNESS = (60.0, 25.0)
@@ -143,8 +143,8 @@ def test_dead_band_of_a_feetech_servo() -> None:
     np.testing.assert_array_equal(np.sign(loop.torque(np.array([1e-3, 2e-3]), np.zeros(2))), [0.0, 1.0])
 
 
-def test_robot_file_and_model_file_keep_the_actuator() -> None:
-    text = b"""
+def test_robot_file_and_model_file_keep_the_actuator(tmp_path: Path) -> None:
+    text = """
 name: one
 kinematics: {dh: [{theta: 0, d: 0, a: 0.1, alpha: 0}]}
 joints:
@@ -152,7 +152,9 @@ joints:
     actuator: {kind: position, kp: 400, kd: 0, unit: register, supply_voltage: 7.4, torque_per_volt: 0.0873,
                max_duty: 1.0, delay: null}
 """
-    robot = robot_from_yaml(text)
+    path = tmp_path / "arm.yaml"
+    path.write_text(text)
+    robot = read_robot(path)
     loop = robot.joints[0].actuator
     assert loop is not None
     assert (loop.kind, loop.kp, loop.unit, loop.delay) == ("position", 400.0, "register", None)
@@ -170,10 +172,12 @@ joints:
         ("{kind: position, kp: -1}", "above zero"),
     ],
 )
-def test_refused_actuators_say_the_remedy(entry: str, words: str) -> None:
+def test_refused_actuators_say_the_remedy(entry: str, words: str, tmp_path: Path) -> None:
     text = "name: one\nkinematics: {dh: [{theta: 0, d: 0, a: 0.1, alpha: 0}]}\njoints: [{name: j, actuator: %s}]\n"
+    path = tmp_path / "arm.yaml"
+    path.write_text(text % entry)
     with pytest.raises(RobotFileError, match=words):
-        robot_from_yaml((text % entry).encode())
+        read_robot(path)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from tauscope.cli.output_files import STANDARD_OUTPUT, require_distinct, require_free, write_file
+from tauscope.cli.task_run import STANDARD_OUTPUT, require_distinct, require_free, write_file
 from tauscope.errors import ExportError
 
 

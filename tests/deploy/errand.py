@@ -8,7 +8,7 @@ from pathlib import Path
 from urllib.request import urlopen
 
 from tauscope.client import Client
-from tauscope.server.http.identifications import IdentificationAnswer
+from tauscope.server.http.analyses import IdentificationAnswer
 
 FILES = Path("/errand")
 PAGES = ("", "docs", "docs/errors/recording", "docs/how-to/let-others-in", "healthz", "readyz")

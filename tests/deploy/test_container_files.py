@@ -120,7 +120,7 @@ def test_the_program_understands_how_it_is_started(
     command: list[str], data_folder: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[Settings] = []
-    monkeypatch.setattr("tauscope.server.http.server.serve", lambda settings, _: seen.append(settings))
+    monkeypatch.setattr("tauscope.server.http.app.serve", lambda settings, _: seen.append(settings))
     program, *words = command
     assert program == "tauscope"
     assert main(words) == 0

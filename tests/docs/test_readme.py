@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from shared_data import REPOSITORY
-from tauscope.runtime.processes import child_environment
+from tauscope.runtime.record import child_environment
 
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
 PAGES = sorted(

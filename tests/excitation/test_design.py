@@ -191,7 +191,7 @@ def changed(joint: int, **limits: object) -> Robot:
         (changed(2, velocity=0.0), {}, "joint3: a velocity limit of 0 rad/s allows no motion"),
         (changed(0, acceleration=0.0), {}, "joint1: an acceleration limit of 0 rad/s² allows no motion"),
         (changed(1, position=(-0.4, 0.4), torque=0.5), {}, "joint2: torque limit: at rest the prior model needs"),
-        (changed(1, torque=10.0), {"torque_offset": 9.0}, "joint2: torque limit 10 less the margin leaves -1"),
+        (changed(1, torque=0.0), {}, "joint2: torque limit 0 less the margin leaves 0"),
         (
             limited_paper_arm(),
             {"workspace": Workspace(2.0)},
@@ -219,11 +219,9 @@ def test_what_cannot_be_is_refused_by_name(robot: Robot, options: dict[str, obje
         {"periods": 0},
         {"limit_fraction": 1.5},
         {"torque_margin": 1.0},
-        {"torque_offset": -1.0},
         {"starts": 0},
         {"seed": -1},
         {"slow_postures": -1},
-        {"information_weight": -0.1},
     ],
 )
 def test_wishes_that_mean_nothing(options: dict[str, object]) -> None:

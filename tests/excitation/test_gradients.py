@@ -51,7 +51,7 @@ def problem(robot: Robot, criterion: Criterion, workspace: Workspace | None = No
         space,
         space.grid(SAMPLES),
         space.grid(4 * SAMPLES),
-        Objective(criterion, 0.3, regressor, scaling),
+        Objective(criterion, regressor, scaling),
         KinematicUsage(space, limits),
         StateUsage(torque, obstacles),
     )

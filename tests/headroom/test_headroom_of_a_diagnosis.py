@@ -16,8 +16,7 @@ from tauscope.cli.diagnose_command import show_diagnosis
 from tauscope.diagnosis import Diagnosis, DiagnosisDocument, Verdict, document
 from tauscope.diagnosis.documents.result import HeadroomEntry
 from tauscope.errors import IdentificationError
-from tauscope.headroom.diagnosed_rows import leaves_open, motion_rows
-from tauscope.headroom.entries import headroom_entry
+from tauscope.headroom.entries import headroom_entry, leaves_open, motion_rows
 from tauscope.headroom.floor import NoiseFloor, noise_above_band, noise_between_periods, noise_floors
 from tauscope.headroom.joint_headroom import JointHeadroom
 from tauscope.report.diagnosis_report import diagnosis_report

@@ -8,9 +8,15 @@ import pytest
 from headroom.black_box_rows import Law, motion, recordings, with_torque
 from tauscope.headroom import joint_headroom as joint_headroom_module
 from tauscope.headroom import learners
-from tauscope.headroom.choice import FOLDS, Choice, choose_black_box, fold_numbers
 from tauscope.headroom.entries import REFUTES_FROM
-from tauscope.headroom.joint_headroom import compare_residuals, joint_headroom
+from tauscope.headroom.joint_headroom import (
+    FOLDS,
+    Choice,
+    choose_black_box,
+    compare_residuals,
+    fold_numbers,
+    joint_headroom,
+)
 from tauscope.headroom.learners import LEARNERS, Learner
 from tauscope.headroom.motion_rows import Inputs, MotionRows, joint_inputs, travel_since_reversal
 from tauscope.recording.recording import Array

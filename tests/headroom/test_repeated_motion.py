@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from headroom.black_box_rows import RATE_HZ, motion, with_torque
+from tauscope.headroom.floor import noise_between
 from tauscope.headroom.motion_rows import MotionRows
-from tauscope.headroom.repeated_motion import noise_between
 from tauscope.recording.recording import Array
 
 NOISE = 0.1

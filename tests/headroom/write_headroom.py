@@ -34,7 +34,7 @@ def _rows(folder: Path) -> Iterator[str]:
     from tauscope.diagnosis import diagnose
     from tauscope.errors import TauscopeError
     from tauscope.headroom import measure_headroom
-    from tauscope.headroom.diagnosed_rows import motion_rows
+    from tauscope.headroom.entries import motion_rows
     from tauscope.recording import open_recording
     from tauscope.robot import read_robot
 

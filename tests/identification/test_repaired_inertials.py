@@ -1,6 +1,7 @@
 """Robot files whose inertials no body can have: repaired, said, believed less, and no worse a model for it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from tauscope.excitation.setting import ExcitationOptions
 from tauscope.identification import Identification, document, identify
 from tauscope.identification.consistency import LinearInequalities, nearest_consistent_parameters, plausible_prior
 from tauscope.recording import Recording
-from tauscope.robot import LinkInertia, Robot, find_defect, nearest_body, robot_from_dict, robot_to_dict
+from tauscope.robot import LinkInertia, Robot, find_defect, nearest_body, read_robot, robot_from_dict, robot_to_dict
 
 
 def restated(robot: Robot, link: int, **numbers: object) -> Robot:
@@ -162,13 +163,12 @@ CASES = {
 
 @needs_shared_cases
 @pytest.mark.parametrize("name", CASES)
-def test_a_case_is_identified_and_excited(name: str) -> None:
+def test_a_case_is_identified_and_excited(name: str, tmp_path: Path) -> None:
     file, tip, broken = CASES[name]
-    urdf = (SHARED_CASES / "robots" / file).read_bytes()
-    robot = robot_from_dict(
-        {"name": "arm", "kinematics": {"urdf": {"file": "arm.urdf", "base": "base", "tip": tip}}},
-        urdf_files={"arm.urdf": urdf},
-    )
+    urdf = SHARED_CASES / "robots" / file
+    path = tmp_path / "arm.yaml"
+    path.write_text(f"name: arm\nkinematics: {{urdf: {{file: {urdf}, base: base, tip: {tip}}}}}\n")
+    robot = read_robot(path)
     (warning,) = robot.warnings
     assert f"inertial of link '{broken}': inertia breaks the triangle inequality" in warning.text
     simulated = simulate(robot, seed=2, rate_hz=50.0, periods=2, period_s=6.0)

@@ -27,8 +27,7 @@ from reliability.costly_inputs import (
 from server.queue.paper_files import PAPER_ROBOT
 from tauscope.errors import TauscopeError
 from tauscope.robot import check_robot, read_robot
-from tauscope.server.queue.received_recording import check_kept_recording
-from tauscope.server.queue.received_robot import check_received_robot
+from tauscope.server.queue.received_files import check_kept_recording, check_received_robot
 from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.trajectory import read_trajectory
 

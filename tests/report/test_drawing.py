@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from matplotlib.figure import Figure
 
-from tauscope.report.series import envelope_indices
+from tauscope.report.curves import envelope_indices
+from tauscope.report.figures import worst_part
 from tauscope.report.svg import PREDICTED, draw_svg
-from tauscope.report.torque_figure import worst_part
 
 curves = arrays.arrays(np.float64, st.integers(1, 400), elements=st.floats(-1e6, 1e6) | st.just(np.nan))
 

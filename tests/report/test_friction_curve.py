@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from report.conftest import NOISE_STD, Case
-from tauscope.report.friction_curve import friction_curve
-from tauscope.report.series import torque_series
+from tauscope.report.curves import friction_curve, torque_series
 from tauscope.robot import read_robot
 from tauscope_sim.examples import example_robot
 from tauscope_sim.friction import static_friction_torque

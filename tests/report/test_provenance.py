@@ -10,7 +10,7 @@ from tauscope.errors import RecordingError
 from tauscope.report.provenance import input_files, installed_version
 from tauscope.robot import read_robot
 from tauscope.tasks import identify, rollout
-from tauscope.tasks.task import LocalFiles, record_provenance
+from tauscope.tasks.task import Files, record_provenance
 from tauscope_sim.examples import example_robot
 
 
@@ -22,7 +22,7 @@ def test_every_file_is_hashed(tmp_path: Path) -> None:
     (bag / "data.mcap").write_bytes(b"y")
     robot = replace(read_robot(example_robot("paper_arm")), urdf=recording)
     request = identify.Request(robot="arm.yaml", recordings=(str(recording),), held_out=(str(bag),))
-    made = record_provenance(LocalFiles(), request, robot)
+    made = record_provenance(Files(), request, robot)
     assert [entry.role for entry in made.inputs] == ["robot", "urdf", "recording", "held out", "held out"]
     assert [Path(entry.path).name for entry in made.inputs[3:]] == ["data.mcap", "metadata.yaml"]
     assert made.inputs[2].sha256 == hashlib.sha256(b"t,q1,tau1\n").hexdigest()
@@ -35,7 +35,7 @@ def test_recordings_that_refine_a_model_are_hashed(tmp_path: Path) -> None:
     recording.write_bytes(b"t,q1,qref1\n")
     refining.write_bytes(b"t,q1,qref1,tau1\n")
     request = rollout.Request(robot="arm.yaml", recordings=(str(recording),), refine=(str(refining),))
-    made = record_provenance(LocalFiles(), request, read_robot(example_robot("paper_arm")))
+    made = record_provenance(Files(), request, read_robot(example_robot("paper_arm")))
     assert [entry.role for entry in made.inputs[1:]] == ["recording", "refined by"]
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from robot.robot_texts import ROBOT_YAML, URDF, URDF_ROBOT_YAML, write_robot
 from tauscope.errors import RobotFileError
-from tauscope.robot import Robot, link_placements, read_robot, robot_from_dict, robot_from_yaml, robot_to_dict
+from tauscope.robot import Robot, link_placements, read_robot, robot_from_dict, robot_to_dict
 from tauscope.robot.yaml_text import read_yaml
 
 
@@ -37,24 +37,11 @@ def test_data_of_the_robot_file_give_the_same_robot(tmp_path: Path) -> None:
     _assert_same(read_robot(write_robot(tmp_path, ROBOT_YAML)), robot_from_dict(_data()))
 
 
-def test_urdf_is_taken_from_the_given_files_only(tmp_path: Path) -> None:
-    from_file = read_robot(write_robot(tmp_path, URDF_ROBOT_YAML, URDF))
-    _assert_same(from_file, robot_from_dict(_data(URDF_ROBOT_YAML), urdf_files={"arm.urdf": URDF.encode()}))
+def test_plain_data_open_no_file(tmp_path: Path) -> None:
     data = _data(URDF_ROBOT_YAML)
-    data["kinematics"]["urdf"]["file"] = str(tmp_path / "arm.urdf")
+    data["kinematics"]["urdf"]["file"] = str(write_robot(tmp_path, URDF_ROBOT_YAML, URDF).with_name("arm.urdf"))
     with pytest.raises(RobotFileError, match=r"robot: kinematics\.urdf\.file: .* is not among the given ones"):
         robot_from_dict(data)
-
-
-def test_uploaded_robot_file_opens_no_other_file(tmp_path: Path) -> None:
-    path = write_robot(tmp_path, URDF_ROBOT_YAML, URDF)
-    data = URDF_ROBOT_YAML.encode()
-    _assert_same(read_robot(path), robot_from_yaml(data, "upload", {"arm.urdf": URDF.encode()}))
-    outside = data.replace(b"arm.urdf", str(tmp_path / "arm.urdf").encode())
-    with pytest.raises(RobotFileError, match=r"upload:3: kinematics\.urdf\.file: the file .* is not among the given"):
-        robot_from_yaml(outside, "upload", {"arm.urdf": URDF.encode()})
-    with pytest.raises(RobotFileError, match="larger than 1024 KiB"):
-        robot_from_yaml(b"#" * 2_000_000)
 
 
 def test_segments_are_for_plain_data_and_not_for_the_robot_file(tmp_path: Path) -> None:

@@ -5,6 +5,8 @@ q = m q_master + b, and the torque of a master is Σ m τ over what follows it.
 """
 
 from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pinocchio  # pyright: ignore[reportMissingImports]
@@ -13,7 +15,7 @@ from hypothesis import strategies as st
 
 from tauscope.dynamics import TorqueRegressor, inverse_dynamics, mass_matrix, torque_regressor
 from tauscope.dynamics.regressor_gradient import RegressorGradient
-from tauscope.robot import Robot, robot_from_dict, robot_from_yaml, robot_to_dict
+from tauscope.robot import Robot, read_robot, robot_from_dict, robot_to_dict
 
 MOVING = ("revolute", "continuous", "prismatic")
 
@@ -116,7 +118,10 @@ def make_case(seed: int, steps: int) -> Case:
                     locked[tree.last] = float(rng.uniform(-1, 1))
     stated = ", ".join(f"{name!r}: {value!r}" for name, value in locked.items())
     text = f"name: a\nkinematics: {{urdf: {{file: a.urdf, base: {base!r}, tip: {end!r}}}}}\nlocked: {{{stated}}}\n"
-    robot = robot_from_yaml(text.encode(), "a.yaml", {"a.urdf": tree.document().encode()})
+    with TemporaryDirectory() as folder:
+        (Path(folder) / "a.yaml").write_text(text)
+        (Path(folder) / "a.urdf").write_text(tree.document())
+        robot = read_robot(Path(folder) / "a.yaml")
     return Case(tree, robot, locked, own)
 
 

@@ -26,8 +26,7 @@ from tauscope.recording import read_recording
 from tauscope.recording.journal_reading import read_journal
 from tauscope.robot import read_robot
 from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
-from tauscope.runtime.processes import child_environment
-from tauscope.runtime.record import RunRecord, read_record
+from tauscope.runtime.record import RunRecord, child_environment, read_record
 from tauscope.runtime.run_process import recover_runs
 from tauscope.runtime.states import RunState
 from tauscope.trajectory import write_trajectory

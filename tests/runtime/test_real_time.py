@@ -5,7 +5,7 @@ import subprocess
 import sys
 import threading
 
-from tauscope.runtime.processes import child_environment
+from tauscope.runtime.record import child_environment
 from tauscope.runtime.timing import BESIDE, PRIORITY, real_time
 
 

@@ -13,7 +13,7 @@ from tauscope.errors import AcquisitionError
 from tauscope.recording.journal_process import wait_for_writer
 from tauscope.recording.journal_reading import read_journal
 from tauscope.runtime import recorder as module
-from tauscope.runtime.processes import child_environment
+from tauscope.runtime.record import child_environment
 from tauscope.runtime.recorder import DirectRecorder, RecorderProcess
 from tauscope.runtime.run import open_recorder
 from tauscope.runtime.states import ManualStop, StopAskedError

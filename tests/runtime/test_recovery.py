@@ -14,8 +14,15 @@ from runtime.doubles import PointArm, connection, point_robot, short_motion
 from tauscope.errors import AcquisitionError
 from tauscope.recording import read_recording
 from tauscope.runtime.options import RunOrder, write_order
-from tauscope.runtime.processes import RunLock, child_environment
-from tauscope.runtime.record import ProcessName, RunRecord, read_record, write_process, write_record
+from tauscope.runtime.record import (
+    ProcessName,
+    RunLock,
+    RunRecord,
+    child_environment,
+    read_record,
+    write_process,
+    write_record,
+)
 from tauscope.runtime.run import run_trajectory
 from tauscope.runtime.run_process import recover_runs
 from tauscope.runtime.states import RunState, may_follow
@@ -89,7 +96,7 @@ def test_a_run_whose_owner_lives_is_left_to_its_owner(tmp_path: Path, ended: Pat
 HOLDER = """
 import sys, time
 from pathlib import Path
-from tauscope.runtime.processes import RunLock
+from tauscope.runtime.record import RunLock
 lock = RunLock(Path(sys.argv[1]))
 print("held", flush=True)
 time.sleep(float(sys.argv[2]))

@@ -11,10 +11,9 @@ from typer.main import get_command
 
 from tauscope.cli.program import app
 from tauscope.runtime.options import RunOptions
+from tauscope.server.http.analyses import DIAGNOSES, IDENTIFICATIONS, DiagnosisRequest, IdentificationRequest
 from tauscope.server.http.campaigns import CampaignRequest
-from tauscope.server.http.diagnoses import DIAGNOSES, DiagnosisRequest
 from tauscope.server.http.excitations import ExcitationRequest
-from tauscope.server.http.identifications import IDENTIFICATIONS, IdentificationRequest
 from tauscope.server.http.runs import RunRequest
 from tauscope.server.http.settings import Settings
 from tauscope.server.http.tasks.submission import BackendRequest

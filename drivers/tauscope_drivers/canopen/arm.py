@@ -61,7 +61,6 @@ class CanopenArm:
 
     @property
     def configuration(self) -> BusConfiguration:
-        """Bus and drives."""
         return self._configuration
 
     @property

@@ -72,7 +72,6 @@ class NodeDictionary:
     """The object dictionary of one node, read and written by SDO."""
 
     def __init__(self, client: SdoClient, node_id: int) -> None:
-        """Reach a node; nothing is sent yet."""
         self._client = client
         self.node_id = node_id
 
@@ -187,7 +186,6 @@ class PumpedSdoClient(SdoClient):
     MAX_RETRIES = ATTEMPTS
 
     def __init__(self, pump: Pump, node_id: int) -> None:
-        """Reach a node; nothing is sent yet."""
         super().__init__(0x600 + node_id, 0x580 + node_id, ObjectDictionary())
         self._pump = pump
         self._asked: bytes | None = None
@@ -199,7 +197,6 @@ class PumpedSdoClient(SdoClient):
         super().send_request(request)
 
     def on_response(self, can_id: int, data: bytes, timestamp: float) -> None:
-        """Take a frame of the node."""
         command = data[0] >> 5 if len(data) == 8 else None
         if command is None or self._asked is None:
             return

@@ -11,11 +11,10 @@ import numpy as np
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import NMT_PRE_OPERATIONAL, SYNC_ID, CanBus
-from tauscope_drivers.canopen.bus_budget import largest_rate_hz, rate_limit
 from tauscope_drivers.canopen.configuration import BusConfiguration
 from tauscope_drivers.canopen.emergency import WATCHDOG_CODE
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.process_data import MEASURED_WHERE_THERE, PdoSlots, plan_pdos
+from tauscope_drivers.canopen.process_data import MEASURED_WHERE_THERE, PdoSlots, largest_rate_hz, plan_pdos, rate_limit
 from tauscope_drivers.canopen.state_machine import POWERED, DriveState, Goal, decode_state
 from tauscope_drivers.clock import AnswerTime, Clock
 from tauscope_drivers.errors import Fault
@@ -31,7 +30,6 @@ def arm_faults(nodes: Sequence[DriveNode], caught: Fault | None) -> tuple[Fault,
 
 
 def listed(faults: Sequence[Fault]) -> str:
-    """Faults in one line, for messages."""
     return "; ".join(str(fault) for fault in faults)
 
 
@@ -98,7 +96,6 @@ class Session:
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """What is wrong with the arm."""
         return arm_faults(self.nodes, self.caught)
 
     @property
@@ -122,7 +119,6 @@ class Session:
 
     @property
     def has_braked(self) -> bool:
-        """Whether the targets of `stop_targets` have come to rest."""
         return self.brake is None or self.brake.is_at_rest(self.clock.now_ns())
 
     def stop_targets(self) -> Setpoint:

@@ -20,10 +20,7 @@ _ARRIVED = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class _Reached:
-    """What a cycle has come to.
-
-    `position`, `velocity`: (n,), targets sent, and how fast a drive in time goes there.
-    """
+    """What a cycle has come to. `position`, `velocity`: (n,), targets sent, and how fast a drive in time goes there."""
 
     position: Array
     velocity: Array
@@ -56,7 +53,6 @@ class TargetLimiter:
         self._grid = CycleGrid(cycle_s)
 
     def limited(self, setpoint: Setpoint, now_ns: int) -> Setpoint:
-        """The targets that may be sent now."""
         limits = self._limits
         cycles = self._grid.cycles_until(now_ns)
         if cycles > 0:

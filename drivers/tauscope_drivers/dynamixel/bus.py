@@ -43,7 +43,6 @@ class Turns:
 
     @property
     def complete(self) -> bool:
-        """Whether every servo has answered."""
         return len(self._found) + len(self._contradicted) >= len(self._place)
 
     @property
@@ -57,7 +56,6 @@ class Turns:
         return self._place.keys() - self._heard
 
     def take(self, status: Status) -> None:
-        """Take an answer."""
         servo = status.servo
         place = self._place.get(servo)
         if place is not None:
@@ -121,7 +119,6 @@ class ServoBus(SerialServoBus[Status]):
     """Speaks to the servos of one port; one thread's own."""
 
     def __init__(self, port: SerialPort, clock: Clock | None = None) -> None:
-        """Use a port, open or not yet."""
         super().__init__(port, clock)
         self.discarded_bytes = 0
         self._answered_ns = 0

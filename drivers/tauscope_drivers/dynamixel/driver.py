@@ -8,8 +8,6 @@ from tauscope_drivers.errors import DriverError
 
 
 class DynamixelDriver(SerialBusDriver):
-    """Implements `BusDriver`."""
-
     name = "dynamixel"
     title = "Dynamixel servos"
     options = (
@@ -21,7 +19,6 @@ class DynamixelDriver(SerialBusDriver):
     answering = "Dynamixel servos of protocol 2.0"
 
     def make_backend(self, arm: ArmDescription, settings: Mapping[str, Any]) -> Connection:
-        """The arm in real time."""
         from tauscope_drivers.dynamixel.arm import DynamixelArm
 
         keeps = settings.get("keep_settings", False)

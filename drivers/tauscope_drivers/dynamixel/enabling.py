@@ -18,10 +18,7 @@ from tauscope_drivers.state import Setpoint
 
 @dataclass(frozen=True)
 class Bounds:
-    """Ranges of the goals, in units of the servos, one a joint.
-
-    `low`, `high`: of Goal Position [counts].
-    """
+    """Ranges of the goals, in units of the servos, one a joint. `low`, `high`: of Goal Position [counts]."""
 
     low: tuple[int, ...]
     high: tuple[int, ...]

@@ -114,7 +114,6 @@ class JointServo:
 
     @property
     def servo(self) -> int:
-        """ID."""
         return self.configuration.servo
 
     @property
@@ -124,7 +123,6 @@ class JointServo:
 
     @property
     def label(self) -> str:
-        """What messages call it."""
         return f"joint {self.configuration.joint} (servo {self.servo}, {self.model.label})"
 
 

@@ -29,12 +29,10 @@ class FeetechBus(SerialServoBus[Status]):
     """
 
     def __init__(self, port: SerialPort, clock: Clock | None = None) -> None:
-        """Use a port, open or not yet."""
         super().__init__(port, clock)
         self._owes = False
 
     def ping(self, servo: int) -> bool:
-        """Whether a servo answers."""
         return any(self._ask(servo, packets.encode_ping(servo), 0, PATIENCE_S) for _ in range(ATTEMPTS))
 
     def ping_all(self) -> list[int]:

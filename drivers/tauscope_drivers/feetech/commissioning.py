@@ -23,10 +23,7 @@ _TOOL = "with Feetech's FD: Tauscope writes nothing to EEPROM"
 
 @dataclass(frozen=True)
 class ServoTask:
-    """What a servo shall do once it has torque.
-
-    `low`, `high`: range of its goals [counts].
-    """
+    """What a servo shall do once it has torque. `low`, `high`: range of its goals [counts]."""
 
     low: int
     high: int
@@ -34,7 +31,6 @@ class ServoTask:
     torque: int  # Torque Limit [‰ of full duty]
 
     def bound(self, goal: int) -> int:
-        """A goal within the range."""
         return min(max(goal, self.low), self.high)
 
 

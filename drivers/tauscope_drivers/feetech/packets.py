@@ -25,8 +25,6 @@ _FIXED_BYTES = 4
 
 @dataclass(frozen=True)
 class Status:
-    """An answer."""
-
     servo: int
     alarms: int  # bits of the register Status
     data: bytes
@@ -38,23 +36,19 @@ def checksum(body: bytes | bytearray) -> int:
 
 
 def encode_frame(servo: int, code: int, parameters: bytes = b"") -> bytes:
-    """A frame."""
     body = bytes([servo, len(parameters) + 2, code]) + parameters
     return HEADER + body + bytes([checksum(body)])
 
 
 def encode_ping(servo: int = BROADCAST_ID) -> bytes:
-    """Ask who is there."""
     return encode_frame(servo, _PING)
 
 
 def encode_read(servo: int, address: int, length: int) -> bytes:
-    """Read a stretch of the memory table."""
     return encode_frame(servo, _READ, bytes([address, length]))
 
 
 def encode_write(servo: int, address: int, data: bytes) -> bytes:
-    """Write a stretch of the memory table."""
     return encode_frame(servo, _WRITE, bytes([address]) + data)
 
 
@@ -76,12 +70,9 @@ def encode_sync_write(values: Mapping[int, bytes], address: int) -> bytes:
 
 
 class FeetechParser(FrameParser):
-    """Finds whole frames in what comes from a port."""
-
     header, fixed_bytes = HEADER, _FIXED_BYTES
 
     def __init__(self, longest: int = LONGEST_FRAME) -> None:
-        """Begin with nothing. `longest`: longest frame that can be meant [bytes]."""
         super().__init__(longest)
 
     @override

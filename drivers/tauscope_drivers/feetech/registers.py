@@ -39,8 +39,6 @@ _COARSE_SPEED = 50
 
 @dataclass(frozen=True)
 class Register:
-    """A number in the memory table."""
-
     name: str
     address: int
     size: int = 1
@@ -48,11 +46,9 @@ class Register:
 
     @property
     def end(self) -> int:
-        """Address behind it."""
         return self.address + self.size
 
     def decode(self, data: bytes) -> int:
-        """Number of its bytes."""
         value = int.from_bytes(data, "little")
         if self.sign_bit is None:
             return value
@@ -114,8 +110,6 @@ FIRST_IN_RAM = 40  # what is written from here on is gone with the power; this d
 
 @dataclass(frozen=True)
 class Block:
-    """Neighbouring bytes of the memory table."""
-
     address: int
     length: int
 

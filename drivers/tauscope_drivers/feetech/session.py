@@ -52,7 +52,6 @@ class Health:
     """Alarms and torque of all servos; alarms stay until they are forgotten."""
 
     def __init__(self, count: int) -> None:
-        """Nothing is known yet."""
         self.has_torque = np.zeros(count, dtype=np.bool_)
         self.alarms = [0] * count
         self.starved = False
@@ -60,7 +59,6 @@ class Health:
         self._lost = np.zeros(count, dtype=np.bool_)
 
     def take_targets(self, joint: int, values: Mapping[str, int]) -> None:
-        """Take torque and limits as they were read."""
         self.has_torque[joint] = bool(values["Torque Enable"])
         self._lost[joint] |= any(values[name] != value for name, value in self._expected[joint].items())
 
@@ -73,7 +71,6 @@ class Health:
         return bool(self.has_torque[joint] and not self._lost[joint] and not self.alarms[joint])
 
     def forget(self) -> None:
-        """The operator knows."""
         self.alarms = [0] * len(self.alarms)
         self.starved = False
         self._lost[:] = False
@@ -105,7 +102,6 @@ class Session:
 
     @property
     def identifiers(self) -> list[int]:
-        """IDs, in the order of the joints."""
         return [servo.servo for servo in self.servos]
 
     def read_targets(self, joint: int) -> dict[str, int]:

@@ -25,14 +25,10 @@ SEEN = 3.0
 
 @dataclass(frozen=True)
 class Delay:
-    """Delay of one joint's command.
+    """Delay of one joint's command."""
 
-    `value`: [s].
-    `std`: standard error [s]; None where it is stated.
-    """
-
-    value: float
-    std: float | None = None
+    value: float  # [s]
+    std: float | None = None  # standard error [s]; None where it is stated
 
 
 def shift_command(time: Array, command: Array, delay: float, rate_hz: float | None, at: Array) -> Array:

@@ -12,12 +12,12 @@ from typer import Option
 from tauscope.cli.arguments import RobotFile
 from tauscope.cli.diagnose_command import show_diagnosis
 from tauscope.cli.identify_command import show_identification
-from tauscope.cli.output_files import write_file
+from tauscope.cli.task_run import write_file
 from tauscope.cli.terminal import output, say, show_progress
 from tauscope.errors import ExportError
 from tauscope.runtime.drivers import DEFAULT_BACKEND, driver_names
 from tauscope.tasks import campaign as task
-from tauscope.tasks.task import LocalFiles
+from tauscope.tasks.task import Files
 
 
 def _step(words: str) -> Any:
@@ -60,7 +60,7 @@ def campaign(
     except OSError as error:
         raise ExportError(f"{out}: cannot be made ({error.strerror}); name a new folder") from error
     with show_progress() as progress:
-        result = task.perform(request, LocalFiles({"campaign": out}), progress)
+        result = task.perform(request, Files({"campaign": out}), progress)
         progress("write files")
         outputs = result.outputs
         for name in outputs:

@@ -5,26 +5,27 @@ without one.
 """
 
 import io
+import shutil
 import sys
+import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from rich.console import Console
 from ruamel.yaml import YAML
 from typer import Option
 
-from tauscope.cli.demo_campaign import run_campaign
 from tauscope.cli.demo_page import DATA, LEFT_FOR_S, PORT, PageShown, leave_page, prepare_folder, show_page
 from tauscope.cli.identify_command import show_identification
-from tauscope.cli.output_files import write_file
 from tauscope.cli.run_command import explain_unfinished, keep_recording
-from tauscope.cli.task_run import write_outputs
+from tauscope.cli.task_run import write_file, write_outputs
 from tauscope.cli.terminal import Told, output, say, show_progress, table
 from tauscope.diagnosis import DiagnosisDocument
-from tauscope.errors import AcquisitionError
+from tauscope.errors import AcquisitionError, TauscopeError
 from tauscope.excitation import ExcitationOptions, OptimiserProgress, design_excitation
 from tauscope.export.formats import EXPORT_FILES
 from tauscope.identification import Identification
@@ -33,8 +34,18 @@ from tauscope.report.tables import Table
 from tauscope.robot import Robot, read_robot
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.states import RunState
+from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
+from tauscope.server.http.campaigns import CAMPAIGNS, result_of
+from tauscope.server.http.services import Services, open_services
+from tauscope.server.http.settings import Settings
+from tauscope.server.queue.job_folder import JobState
+from tauscope.server.queue.task_job import stage_workspace
 from tauscope.tasks import identify, run
-from tauscope.tasks.task import LocalFiles
+from tauscope.tasks.campaign import HeldOutMotion
+from tauscope.tasks.design_excitation import ExcitationDesignOptions
+from tauscope.tasks.diagnose import DiagnosisOptions
+from tauscope.tasks.run import BackendChoice
+from tauscope.tasks.task import Files
 from tauscope.trajectory import write_trajectory
 from tauscope_sim.examples import example_robot
 
@@ -142,7 +153,7 @@ def run_motion(folder: Path, trajectory: Path, out: Path, seed: int, told: Told)
         # What the arm weighs is the simulation's secret: nobody may feed it forward.
         options=RunOptions(rate_hz=RATE_HZ, feed_forward=False),
     )
-    result = run.perform(request, LocalFiles({"run": folder}), told)
+    result = run.perform(request, Files({"run": folder}), told)
     if result.record.state is not RunState.FINISHED:
         raise AcquisitionError(explain_unfinished(result.record, None))
     keep_recording(result, out)
@@ -193,3 +204,49 @@ def _show_findings(console: Console, found: DiagnosisDocument) -> None:
         say(finding.statement, console)
     say(f"verdict: {found.verdict}", console)
     console.print()
+
+
+ROOT = "/api/v1"
+POLL_S = 0.2
+MOTION = ExcitationDesignOptions(starts=1, periods=2, slow_postures=1, closing_period=False)
+
+
+def run_campaign(data: Path, robot_file: Path, scenario: Mapping[str, Any], told: Told) -> DiagnosisDocument:
+    """Run a campaign on a simulated arm, and diagnose it. Raises TauscopeError if the campaign does not succeed."""
+    with open_services(Settings(data_folder=data)) as services:
+        identifier = _begin(services, robot_file, scenario)
+        _wait_for_end(services, identifier, told)
+        found = result_of(services, identifier, ROOT).diagnosis
+    if found is None:
+        raise TauscopeError("the demo's campaign made no diagnosis; run the demo again")
+    return found
+
+
+def _begin(services: Services, robot_file: Path, scenario: Mapping[str, Any]) -> str:
+    with stage_workspace(services.campaigns.items, CampaignWorkspace) as workspace:
+        shutil.copy(robot_file, workspace.robot)
+        workspace.write_order(
+            CampaignOrder(
+                robot_file=robot_file.name,
+                robot_name=read_robot(robot_file).name,
+                backend=BackendChoice(name="sim", time="virtual", scenario=dict(scenario)),
+                excitation=MOTION,
+                held_out=HeldOutMotion(periods=1),
+                run=RunOptions(rate_hz=RATE_HZ, feed_forward=False),
+                diagnosis=DiagnosisOptions(),
+            )
+        )
+        return services.campaigns.submit(workspace.folder)
+
+
+def _wait_for_end(services: Services, identifier: str, told: Told) -> None:
+    """Wait as long as it takes: the arm's time is virtual."""
+    while True:
+        answer = CAMPAIGNS.describe(services, identifier, ROOT)
+        if answer.state == "damaged" or JobState(answer.state).is_end:
+            break
+        going = [step.name for step in answer.steps if step.state not in ("waiting", "succeeded", "finished")]
+        told(f"concealed effect: {going[0] if going else 'begin'}", None)
+        time.sleep(POLL_S)
+    if answer.problem is not None:
+        raise TauscopeError(f"the demo's campaign did not succeed: {answer.problem.detail}")

@@ -19,10 +19,10 @@ from typing import IO, cast
 
 import typer
 
-from tauscope.cli.output_files import write_file
 from tauscope.cli.serve_command import run_server
+from tauscope.cli.task_run import write_file
 from tauscope.errors import ExportError, StoreError, TauscopeError
-from tauscope.server.http.server import serve
+from tauscope.server.http.app import serve
 from tauscope.server.http.settings import Settings
 
 MARK = "README.txt"

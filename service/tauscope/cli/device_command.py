@@ -34,7 +34,7 @@ from tauscope.runtime.drivers import (
 )
 from tauscope.runtime.guard import guard_limits
 from tauscope.runtime.options import RunOptions
-from tauscope.runtime.release import release as release_drives
+from tauscope.runtime.run import release as release_drives
 from tauscope.trajectory import read_trajectory
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ import typer
 from typer import Argument, Option
 
 from tauscope.cli.arguments import name_input
-from tauscope.cli.output_files import require_free, write_file
-from tauscope.cli.task_run import parse_export_format
+from tauscope.cli.task_run import parse_export_format, require_free, write_file
 from tauscope.cli.terminal import say
 from tauscope.export.actuators import ActuatorChoice, ActuatorKind, to_isaac_lab
 from tauscope.export.formats import EXPORT_FILES, ExportFormat, make_export

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from typer import Argument, Option
 
 from tauscope.cli.arguments import name_input
-from tauscope.cli.output_files import require_new
+from tauscope.cli.task_run import require_new
 from tauscope.cli.terminal import say, show_progress
 from tauscope.cli.verbs import make_group
 from tauscope.errors import ExportError, IdentificationError

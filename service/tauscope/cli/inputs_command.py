@@ -12,7 +12,7 @@ from typer import Argument, Option
 from tauscope import robot as robots
 from tauscope.cli.arguments import LayoutFields, ReadingFields, RecordingFile, RobotFile, complete_reading, name_input
 from tauscope.cli.device_command import check_drives, require_sound, show_finding
-from tauscope.cli.output_files import write_file
+from tauscope.cli.task_run import write_file
 from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import make_group, make_request
 from tauscope.number_text import ABSENT, counted, given, significant

@@ -12,8 +12,8 @@ from tauscope.cli.verbs import make_group
 from tauscope.errors import StoreError
 from tauscope.number_text import ABSENT, counted, significant
 from tauscope.report.tables import Table
+from tauscope.server.history.drift import parameter_trends
 from tauscope.server.history.model_history import ModelEntry, ModelHistory
-from tauscope.server.history.trend import parameter_trends
 
 RobotName = Annotated[str, Argument(metavar="ROBOT", help="Name of the robot, as in its file.")]
 Identifier = Annotated[str, Argument(metavar="MODEL", help="Identifier of the identification.")]

@@ -126,12 +126,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _show_version(asked: bool) -> None:
     if asked:
-        from importlib.metadata import PackageNotFoundError, version
+        from tauscope.version import tauscope_version
 
-        try:
-            typer.echo(f"tauscope {version('tauscope')}")
-        except PackageNotFoundError:
-            typer.echo("tauscope 0+source")
+        typer.echo(f"tauscope {tauscope_version()}")
         raise typer.Exit
 
 

@@ -14,7 +14,7 @@ from typer import Option
 
 from tauscope.cli.arguments import RobotFile, name_input
 from tauscope.cli.device_command import show_frames
-from tauscope.cli.output_files import keep_file, require_new
+from tauscope.cli.task_run import keep_file, require_new
 from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
 from tauscope.errors import AcquisitionError, one_line
@@ -26,7 +26,7 @@ from tauscope.runtime.options import RunOptions
 from tauscope.runtime.record import RunRecord
 from tauscope.runtime.states import RunState
 from tauscope.tasks import run as task
-from tauscope.tasks.task import LocalFiles
+from tauscope.tasks.task import Files
 
 Trajectory = Annotated[
     Path | None,
@@ -104,7 +104,7 @@ def _run_arm(request: task.Request, asked: Path | None) -> None:
     folder, is_settled = _folder_beside(out), False
     try:
         with show_progress() as told:
-            result = task.perform(request, LocalFiles({"run": folder / "run"}), told)
+            result = task.perform(request, Files({"run": folder / "run"}), told)
         made = keep_recording(result, out)
         journal = None if made else _unsaved_journal(result)
         is_settled = journal is None

@@ -11,7 +11,7 @@ from typer import Option
 from tauscope.cli.access_command import DataFolder
 from tauscope.cli.store_command import DatabaseUrl, Kind
 from tauscope.cli.verbs import OptionsOf
-from tauscope.server.http import server
+from tauscope.server.http import app
 from tauscope.server.http.settings import Settings, default_data_folder
 
 _DIRECT = (
@@ -69,7 +69,7 @@ def run_server(data: Path | None, **choices: Any) -> None:
     except ValidationError as error:
         first = error.errors()[0]
         raise typer.BadParameter(f"{first['loc'][0]}: {first['msg']}") from error
-    server.serve(settings, lambda address: _announce(settings, address))
+    app.serve(settings, lambda address: _announce(settings, address))
 
 
 def _announce(settings: Settings, address: str) -> None:

@@ -11,7 +11,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from tauscope.cli.arguments import name_input
-from tauscope.cli.output_files import require_new
+from tauscope.cli.task_run import require_new
 from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import make_group
 from tauscope.errors import StoreError

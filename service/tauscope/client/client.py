@@ -1,25 +1,77 @@
 """The verbs of the service, one method each; answers are the models that the service itself makes them from."""
 
+import threading
 import time
 import uuid
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import TracebackType
 from typing import Any, TypeVar
 from urllib.parse import quote
 
-from pydantic import BaseModel
+from pydantic import TypeAdapter
 
-from tauscope.client.held_lease import HeldLease
 from tauscope.client.transport import Answer, ApiError, Content, Transport, form_content, json_content
+from tauscope.robot import RobotReport
+from tauscope.server.http.analyses import DiagnosisAnswer, IdentificationAnswer, RolloutAnswer
 from tauscope.server.http.campaigns import CampaignAnswer
-from tauscope.server.http.diagnoses import DiagnosisAnswer
 from tauscope.server.http.excitations import ExcitationAnswer
-from tauscope.server.http.identifications import IdentificationAnswer
 from tauscope.server.http.leases import LeaseAnswer, StopAllAnswer
 from tauscope.server.http.recordings import RecordingAnswer
-from tauscope.server.http.robot_files import RobotReportAnswer
-from tauscope.server.http.rollouts import RolloutAnswer
 from tauscope.server.http.runs import RunAnswer, StopAnswer
+
+BEATS_A_TTL = 3.0
+"""Heartbeats in the time that the lease lasts without one."""
+
+
+class HeldLease:
+    """A lease kept by heartbeats; use it as a context. When the program hangs or dies, the arm stops by itself."""
+
+    def __init__(self, lease: LeaseAnswer, beat: Callable[[], object], release: Callable[[], object]) -> None:
+        self.lease = lease
+        self.lost: str | None = None
+        self._beat, self._release = beat, release
+        self._is_over = threading.Event()
+        self._thread = threading.Thread(target=self._keep, name=lease.id, daemon=True)
+
+    @property
+    def token(self) -> str:
+        """What to send as header ``Lease-Token``."""
+        return self.lease.token or ""
+
+    def require(self) -> None:
+        """Refuse to go on with a lease that was lost. Raises ApiError if it was."""
+        if self.lost is not None:
+            raise ApiError("lease-lost", 409, self.lost)
+
+    def __enter__(self) -> "HeldLease":
+        """Keep the lease from now on."""
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Give the lease back; what still moves by it stops."""
+        self._is_over.set()
+        self._thread.join()
+        if self.lost is None:
+            try:
+                self._release()
+            except ApiError:
+                # It ends by itself; what happened inside the context is more important.
+                return
+
+    def _keep(self) -> None:
+        """Renew the lease until it is over or lost; a beat that got lost on the way is made up for by the next."""
+        while not self._is_over.wait(self.lease.ttl_s / BEATS_A_TTL):
+            try:
+                self._beat()
+            except ApiError as error:
+                if error.problem_code == "lease-lost":
+                    self.lost = error.detail
+                    return
+
 
 PREFIX = "/api/v1"
 ENDS = frozenset(
@@ -33,7 +85,7 @@ POLL_S = 0.2
 SETTLING_S = 10.0
 """How long what has ended may take until its files can be fetched [s]."""
 
-Model = TypeVar("Model", bound=BaseModel)
+Model = TypeVar("Model")
 Followed = TypeVar(
     "Followed", RunAnswer, CampaignAnswer, IdentificationAnswer, DiagnosisAnswer, RolloutAnswer, ExcitationAnswer
 )  # what has a state
@@ -57,10 +109,10 @@ class Client:
             return False
         return True
 
-    def check_robot(self, robot: Path, urdf: Path | None = None) -> RobotReportAnswer:
+    def check_robot(self, robot: Path, urdf: Path | None = None) -> RobotReport:
         """Have a robot file checked."""
         files = [("robot", robot), *([("urdf", urdf)] if urdf else [])]
-        return self._post("robots/check", RobotReportAnswer, form_content(None, files))
+        return self._post("robots/check", RobotReport, form_content(None, files))
 
     def keep_recording(self, recording: Path) -> RecordingAnswer:
         """Send a recording, to be named by later requests."""
@@ -149,7 +201,6 @@ class Client:
         self._transport.send("POST", lease.lease.links.arm, headers=_lease_header(lease))
 
     def stop(self, run: RunAnswer) -> StopAnswer:
-        """Stop a run."""
         return _parse(self._transport.send("POST", run.links.stop), StopAnswer)
 
     def stop_everything(self) -> StopAllAnswer:
@@ -179,7 +230,7 @@ class Client:
 def _parse(answer: Answer, kind: type[Model]) -> Model:
     """An answer as its model; one of a newer service may hold more than we know."""
     try:
-        return kind.model_validate_json(answer.body, extra="ignore")
+        return TypeAdapter(kind).validate_json(answer.body, extra="ignore")
     except ValueError:
         raise ApiError("unknown", answer.status, "the answer is not as documented; are both of one version?") from None
 

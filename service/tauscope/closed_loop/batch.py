@@ -23,7 +23,6 @@ class Variants:
     `rotor`, `stiction`, `viscous`, `offset`: (V, n) [kg m² or kg, Nm or N, Nm s/rad or N s/m, Nm or N].
     `stribeck`, `delta`: (n,), the same in all models.
     `driving`, `braking`: (V, n), as `LoadFriction`.
-    `slope`: (V,), loss of torque per volt with temperature [1/K].
     """
 
     links: Array
@@ -35,7 +34,7 @@ class Variants:
     delta: Array
     driving: Array
     braking: Array
-    slope: Array
+    slope: Array  # (V,), loss of torque per volt with temperature [1/K]
 
 
 def simulate_segments(robot: Robot, loops: Sequence[Actuator], segments: Segments, models: Variants) -> Array:

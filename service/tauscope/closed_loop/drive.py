@@ -28,21 +28,17 @@ class RecordedMotion:
 
     `time`: (K,), of the steps [s].
     `position`, `velocity`: (K, n), of the real arm [rad or m, rad/s or m/s].
-    `rows`: (N,), instants of the recording [s].
-    `measured`: (N, n), q at these instants; NaN where it was missed.
     """
 
     name: str
     time: Array
     position: Array
     velocity: Array
-    rows: Array
-    measured: Array
+    rows: Array  # (N,), instants of the recording [s]
+    measured: Array  # (N, n), q at these instants; NaN where it was missed
 
 
 class Drive(Protocol):
-    """Torque of all joints."""
-
     is_closed: bool
 
     def torque(self, step: int, position: Array, velocity: Array) -> Array:
@@ -51,7 +47,6 @@ class Drive(Protocol):
 
 
 def record_motion(recording: Recording) -> RecordedMotion:
-    """A recording on the steps of a rollout."""
     samples = recording.samples()
     time = np.arange(samples.time[0], samples.time[-1] + 0.5 * STEP_S, STEP_S)
     position = np.stack([_onto(samples.time, column, time) for column in samples.position.T], axis=1)

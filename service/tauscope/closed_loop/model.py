@@ -21,20 +21,14 @@ TRACE_RADIUS_M = 0.01  # radius of that mass [m]
 
 @dataclass(frozen=True, eq=False)
 class RolloutModel:
-    """One model of the arm.
-
-    `name`: ``stated``, ``identified`` or ``findings``.
-    `joints`: names of the driven joints in the MJCF.
-    `inertia`: (n,), of each joint at q = 0 with all that it carries [kg m² or kg].
-    `left_out`: findings that the simulation lacks, each with the reason.
-    """
+    """One model of the arm. `name`: ``stated``, ``identified`` or ``findings``."""
 
     name: str
     mjcf: str
-    joints: tuple[str, ...]
+    joints: tuple[str, ...]  # names of the driven joints in the MJCF
     laws: JointLaws
-    inertia: np.ndarray
-    left_out: tuple[str, ...]
+    inertia: np.ndarray  # (n,), of each joint at q = 0 with all that it carries [kg m² or kg]
+    left_out: tuple[str, ...]  # findings that the simulation lacks, each with the reason
 
 
 def stated_model(robot: Robot) -> ExportModel | None:

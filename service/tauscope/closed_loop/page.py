@@ -13,12 +13,12 @@ from tauscope.closed_loop.tables import (
     summary_table,
 )
 from tauscope.number_text import counted, significant
+from tauscope.report.curves import envelope_indices
+from tauscope.report.figures import plot_envelope
 from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.provenance import Provenance
-from tauscope.report.series import envelope_indices
 from tauscope.report.svg import HELD_OUT, INK, MEASURED, PREDICTED, RESIDUAL, draw_svg
 from tauscope.report.tables import csv_text
-from tauscope.report.torque_figure import plot_envelope
 
 HEIGHT_INCHES = 3.4
 

@@ -25,21 +25,15 @@ PER_BODY, PER_JOINT = 5, 5
 
 @dataclass(frozen=True)
 class Term:
-    """One parameter.
-
-    `start`, `prior_std`: mean and standard error of its prior; infinite without one.
-    `scale`: of its steps.
-    `least`: lower bound.
-    `is_optional`: whether a model does without it: zero then.
-    """
+    """One parameter. `start`, `prior_std`: mean and standard error of its prior; infinite without one."""
 
     name: str
     unit: str
     start: float
-    scale: float
+    scale: float  # of its steps
     prior_std: float = np.inf
-    least: float = -np.inf
-    is_optional: bool = False
+    least: float = -np.inf  # lower bound
+    is_optional: bool = False  # whether a model does without it: zero then
 
 
 class RefinableModel:

@@ -39,14 +39,13 @@ class RefinedTerm:
 class Refined:
     """A refined model.
 
-    `loops`: with torque per volt that falls with temperature, where that was recorded.
     `left_out`: terms that are not significant.
     `before`, `after`: rms position error of the segments over all joints [rad or m].
     """
 
     model: ExportModel
     friction: LoadFriction
-    loops: tuple[Actuator, ...]
+    loops: tuple[Actuator, ...]  # with torque per volt that falls with temperature, where that was recorded
     terms: tuple[RefinedTerm, ...]
     left_out: tuple[str, ...]
     before: float

@@ -40,13 +40,8 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """One recording and its simulations.
-
-    `simulated`: dict of str to (N, n), positions by model, from one start [rad or m].
-    """
-
     motion: RecordedMotion
-    simulated: dict[str, Array]
+    simulated: dict[str, Array]  # dict of str to (N, n), positions by model, from one start [rad or m]
     entry: RecordingEntry
 
 
@@ -63,7 +58,6 @@ class Rollout:
 
     @property
     def document(self) -> RolloutDocument:
-        """The result, typed."""
         loops = [joint.actuator if self.is_closed else None for joint in self.robot.joints]
         return RolloutDocument(
             robot=self.robot.name,

@@ -25,15 +25,13 @@ MOST_SEGMENTS = 120  # segments that are simulated side by side, evenly chosen
 class Segments:
     """Motion and commands of S segments of K steps.
 
-    `position`: (K, n, S), q of the real arm; NaN where it was missed [rad or m].
-    `begin`: (n, S), q̇ at the first step [rad/s or m/s].
     `command`: (K, n, S), of the loops.
     `voltage`, `gain`, `temperature`: (K, n, S), of the loops; temperature is NaN where it was not recorded [V, register
         or Nm/rad, °C].
     """
 
-    position: Array
-    begin: Array
+    position: Array  # (K, n, S), q of the real arm; NaN where it was missed [rad or m]
+    begin: Array  # (n, S), q̇ at the first step [rad/s or m/s]
     command: Array
     voltage: Array
     gain: Array
@@ -41,7 +39,6 @@ class Segments:
 
     @property
     def count(self) -> int:
-        """S."""
         return self.position.shape[2]
 
     @cached_property

@@ -55,21 +55,17 @@ class BaseParameters:
 
     `independent_columns`: (m,) int, j_L: the standard parameter that leads each base parameter, counted over all links
         from 0.
-    `dependent_columns`: (k,) int, j_K: standard parameters that appear in combinations only.
-    `unidentifiable_columns`: (u,) int, standard parameters that no motion of the arm shows.
-    `combination`: (m, k), B, equation (12).
-    `first_links`: first link that each joint moves, from 0.
     """
 
     independent_columns: Columns
-    dependent_columns: Columns
-    unidentifiable_columns: Columns
-    combination: Array
+    dependent_columns: Columns  # (k,) int, j_K: standard parameters that appear in combinations only
+    unidentifiable_columns: Columns  # (u,) int, standard parameters that no motion of the arm shows
+    combination: Array  # (m, k), B, equation (12)
     names: tuple[str, ...]
     expressions: tuple[str, ...]
     terms: tuple[Mapping[str, float], ...]
     unidentifiable: tuple[str, ...]
-    first_links: tuple[int, ...]
+    first_links: tuple[int, ...]  # first link that each joint moves, from 0
 
     def is_independent(self, index: int) -> bool:
         """Whether a base parameter is one standard parameter alone: its row of B is zero.

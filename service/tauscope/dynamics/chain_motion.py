@@ -46,8 +46,6 @@ class LinkMotion(NamedTuple):
     `screw_angular`, `screw_linear`: three (j, N), w_i and v_i of the j joints met so far.
     `angular_velocity`, `angular_acceleration`, `acceleration`: three (N,), ω [rad/s], ω̇ [rad/s²], a [m/s²] of the
         origin, minus gravity.
-    `products`: three (N,), ω_y ω_z, ω_x ω_z, ω_x ω_y [rad²/s²].
-    `field`: three rows of three (N,), M = S(ω̇) + S(ω)² [1/s²].
     """
 
     screw_angular: Vectors
@@ -55,8 +53,8 @@ class LinkMotion(NamedTuple):
     angular_velocity: Vectors
     angular_acceleration: Vectors
     acceleration: Vectors
-    products: Vectors
-    field: tuple[Vectors, Vectors, Vectors]
+    products: Vectors  # three (N,), ω_y ω_z, ω_x ω_z, ω_x ω_y [rad²/s²]
+    field: tuple[Vectors, Vectors, Vectors]  # three rows of three (N,), M = S(ω̇) + S(ω)² [1/s²]
 
 
 class ChainMotion:

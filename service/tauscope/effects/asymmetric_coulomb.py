@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,6 +26,8 @@ class AsymmetricCoulomb(Effect):
     code = "{c[0]} * fabs({step})"
     revealing_motion = "slow oscillation with many reversals, so that rest differs from sliding"
     coefficients = (Coefficient("a", "{tau}"),)
+    friction: ClassVar[str] = "Coulomb"
+    plain: ClassVar[tuple[str, str]] = ("coulomb_friction", "level")  # the same both ways: its effect, and its key
 
     @classmethod
     def can_act(cls, context: ArmContext, joint: int) -> bool:
@@ -34,11 +37,12 @@ class AsymmetricCoulomb(Effect):
         return per_joint_columns(np.abs(signals.step[self.joint])[None, None])
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
-        larger, smaller = ("positive", "negative") if found["a"].value >= 0.0 else ("negative", "positive")
-        size = replace(found["a"], value=2.0 * found["a"].value)
-        return f"Coulomb friction is {size_text(size)} larger in {larger} than in {smaller} direction"
+        half = found[self.coefficients[0].name]
+        larger, smaller = ("positive", "negative") if half.value >= 0.0 else ("negative", "positive")
+        size = replace(half, value=2.0 * half.value)
+        return f"{self.friction} friction is {size_text(size)} larger in {larger} than in {smaller} direction"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """Twice the amplitude in one direction, and that much less Coulomb friction in both."""
-        (level,) = coefficients
-        return [{"amplitude": 2.0 * level}, {"effect": "coulomb_friction", "level": -level}]
+        """Twice the amplitude in one direction, and that much less friction in both."""
+        (half,), (effect, key) = coefficients, self.plain
+        return [{"amplitude": 2.0 * half}, {"effect": effect, key: -half}]

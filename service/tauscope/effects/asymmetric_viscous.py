@@ -1,19 +1,18 @@
 """Viscous friction that differs with the direction of motion."""
 
-from collections.abc import Sequence
-from dataclasses import replace
-
 import numpy as np
 
-from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Sizes, per_joint_columns, size_text
+from tauscope.effects.asymmetric_coulomb import AsymmetricCoulomb
+from tauscope.effects.context import Signals
+from tauscope.effects.effect import Coefficient, per_joint_columns
 from tauscope.recording.recording import Array
-from tauscope.robot import Robot
 
 
-class AsymmetricViscous(Effect):
+class AsymmetricViscous(AsymmetricCoulomb):
     """τ = b |q̇|: viscous friction is larger by b one way and smaller by b the other."""
 
+    has_step = False
+    of_motion_and_step = False
     of_motion_alone = True
     id = "asymmetric_viscous"
     rank = 20
@@ -24,20 +23,8 @@ class AsymmetricViscous(Effect):
     code = "{c[0]} * fabs(v)"
     revealing_motion = "fast motion in both directions"
     coefficients = (Coefficient("b", "{tau} s/{q}"),)
-
-    @classmethod
-    def can_act(cls, context: ArmContext, joint: int) -> bool:
-        return context.reverses(joint)
+    friction = "viscous"
+    plain = ("viscous_friction", "coefficient")
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         return per_joint_columns(np.abs(signals.velocity[self.joint])[None, None])
-
-    def claim(self, found: Sizes, context: ArmContext) -> str:
-        larger, smaller = ("positive", "negative") if found["b"].value >= 0.0 else ("negative", "positive")
-        size = replace(found["b"], value=2.0 * found["b"].value)
-        return f"viscous friction is {size_text(size)} larger in {larger} than in {smaller} direction"
-
-    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
-        """Twice the amplitude in one direction, and that much less viscous friction in both."""
-        (slope,) = coefficients
-        return [{"amplitude": 2.0 * slope}, {"effect": "viscous_friction", "coefficient": -slope}]

@@ -28,7 +28,6 @@ class LastFew(Generic[Key, Made]):
         self._lock = Lock()
 
     def get(self, key: Key, make: Callable[[], Made]) -> Made:
-        """The result of a key."""
         with self._lock:
             if key in self._kept:
                 self._kept[key] = found = self._kept.pop(key)

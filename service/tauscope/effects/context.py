@@ -27,8 +27,6 @@ class ArmContext:
     `load`, `top_torque`: (n,), rms of the fitted rigid-body torque, largest magnitude of the model's torque [Nm or N].
     `inertia`: (n,), mean of every joint's inertia with all that it carries, zero where the fit knows of none [kg m² or
     kg].
-    `durations`: length of every training recording [s].
-    `cutoff_hz`: highest frequency that torque and columns share [Hz].
     `position_std`: (n,) or None, noise of every joint's position, its encoder's steps included [rad or m]; None where
     it is negligible.
     `coldest`, `hottest`: (n,), range of every joint's recorded temperature [°C]; NaN where there is none.
@@ -45,8 +43,8 @@ class ArmContext:
     load: Array
     top_torque: Array
     inertia: Array
-    durations: tuple[float, ...]
-    cutoff_hz: float
+    durations: tuple[float, ...]  # length of every training recording [s]
+    cutoff_hz: float  # highest frequency that torque and columns share [Hz]
     position_std: Array | None = None
     coldest: Array = field(default_factory=lambda: np.zeros(0))
     hottest: Array = field(default_factory=lambda: np.zeros(0))
@@ -58,7 +56,6 @@ class ArmContext:
         return range(self.robot.joint_count)
 
     def moves(self, joint: int) -> bool:
-        """Whether a joint moves at all."""
         return bool(self.highest[joint] > self.lowest[joint] and self.speed[joint] > 0.0)
 
     def reverses(self, joint: int) -> bool:
@@ -80,14 +77,8 @@ class ArmContext:
 class Signals:
     """One piece of conditioned motion at the recorded rate, samples last, with the fitted model's torque.
 
-    `rate_hz`: sampling rate [Hz].
-    `time`: (P, N), instants of every repetition, from the beginning of the recording [s].
     `recording`: index of the recording, from 0; held-out recordings have negative ones.
     `position`, `velocity`, `acceleration`: (n, N), q, q̇, q̈.
-    `load`: (n, N), fitted torque of the rigid body, which the transmission carries [Nm or N].
-    `torque`: (n, N), fitted torque of the whole model [Nm or N].
-    `step`: (n, N), A(K_v q̇), the smooth sign of the velocity.
-    `steepness`: (n,), K_v [s/rad or s/m].
     `bodies`: (10 n,), standard parameters that stand for the fitted base parameters: all that torque along this chain
     needs.
     `links`: (10 n,), standard parameters of the nearest physically consistent links, for another chain or another
@@ -96,16 +87,16 @@ class Signals:
     """
 
     robot: Robot
-    rate_hz: float
-    time: Array
+    rate_hz: float  # sampling rate [Hz]
+    time: Array  # (P, N), instants of every repetition, from the beginning of the recording [s]
     recording: int
     position: Array
     velocity: Array
     acceleration: Array
-    load: Array
-    torque: Array
-    step: Array
-    steepness: Array
+    load: Array  # (n, N), fitted torque of the rigid body, which the transmission carries [Nm or N]
+    torque: Array  # (n, N), fitted torque of the whole model [Nm or N]
+    step: Array  # (n, N), A(K_v q̇), the smooth sign of the velocity
+    steepness: Array  # (n,), K_v [s/rad or s/m]
     bodies: Array
     links: Array
     periodic: bool

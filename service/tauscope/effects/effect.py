@@ -30,18 +30,14 @@ NO_SHAPE = np.zeros((1, 0))  # the grid of an effect without shape parameters
 
 @dataclass(frozen=True)
 class Coefficient:
-    """A linear coefficient of an effect.
-
-    `largest`, `smallest`: magnitudes beyond which there is no such effect.
-    `whole`: value of what is complete, where an estimate stops.
-    """
+    """A linear coefficient of an effect. `largest`, `smallest`: magnitudes beyond which there is no such effect."""
 
     name: str
     unit: str
     positive: bool = False
     largest: float = np.inf
     smallest: float = 0.0
-    whole: float = np.inf
+    whole: float = np.inf  # value of what is complete, where an estimate stops
 
 
 @dataclass(frozen=True)
@@ -91,7 +87,6 @@ def percent_text(value: float) -> str:
 class Effect(ABC):
     """One form of an effect at one place.
 
-    `joint`: None for the whole arm.
     `grid`: (g, k), values of the shape parameters at which the effect is looked for.
     `lower`, `upper`: (k,), bounds of the shape parameters.
 
@@ -134,7 +129,7 @@ class Effect(ABC):
     arguments: ClassVar[frozenset[str] | None] = None
     bends: ClassVar[bool] = False
 
-    joint: int | None
+    joint: int | None  # None for the whole arm
     grid: Array = field(default_factory=lambda: NO_SHAPE)
     lower: Array = field(default_factory=lambda: np.zeros(0))
     upper: Array = field(default_factory=lambda: np.zeros(0))

@@ -27,8 +27,6 @@ class FrictionDrift(Effect):
     f and w are what friction changes by until D under p = 1, however slowly it does: a T far beyond the recordings
     would else leave them open. By the clock p is 1. By heat it is the power that the model's friction dissipates, in
     watts: a joint that rests or creeps cools.
-
-    `duration_s`: D, of the longest recording [s].
     """
 
     has_step = True
@@ -44,7 +42,7 @@ class FrictionDrift(Effect):
     coefficients = (Coefficient("f", "{tau}"), Coefficient("w", "{tau} s/{q}"))
     shapes = (Shape("T", "s", logarithmic=True),)
 
-    duration_s: float = 1.0
+    duration_s: float = 1.0  # D, of the longest recording [s]
     by_heat: bool = False
 
     @classmethod
@@ -95,8 +93,6 @@ class ThermalDrift(FrictionDrift):
     """τ = (f A(q̇) + w q̇) h(ϑ), h = (1 - e^{-r (ϑ - ϑ_0)}) / r, ϑ the temperature that was recorded.
 
     f and w are what friction changes by a kelvin at ϑ_0. Where no temperature is known h is zero.
-
-    `reference_c`: ϑ_0, middle of the temperatures of training [°C].
     """
 
     is_variant = True
@@ -108,7 +104,7 @@ class ThermalDrift(FrictionDrift):
     coefficients = (Coefficient("f", "{tau}/K"), Coefficient("w", "{tau} s/{q}/K"))
     shapes = (Shape("r", "1/K"),)
 
-    reference_c: float = 0.0
+    reference_c: float = 0.0  # ϑ_0, middle of the temperatures of training [°C]
 
     @classmethod
     def of(cls, context: ArmContext, joint: int) -> "ThermalDrift":

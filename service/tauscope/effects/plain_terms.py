@@ -17,10 +17,7 @@ from tauscope.robot import Robot
 
 
 class PlainTerm(Effect):
-    """A term of the nominal model.
-
-    `term` is its name there (`tauscope.identification.structure.JointTerms.names`).
-    """
+    """A term of the nominal model. `term` is its name there (`tauscope.identification.structure.JointTerms.names`)."""
 
     term: ClassVar[str]
     screened = False

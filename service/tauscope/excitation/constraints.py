@@ -28,14 +28,10 @@ RANDOM_STATES = 256  # states looked at for that
 
 @dataclass(frozen=True, eq=False)
 class SmoothMaximum:
-    """Smooth stand-ins of the largest usages.
+    """Smooth stand-ins of the largest usages."""
 
-    `values`: (C,), one a constraint.
-    `jacobian`: (C, n, columns), their derivatives by the vector x.
-    """
-
-    values: Array
-    jacobian: Array
+    values: Array  # (C,), one a constraint
+    jacobian: Array  # (C, n, columns), their derivatives by the vector x
 
 
 class KinematicUsage:
@@ -112,14 +108,10 @@ class KinematicUsage:
 
 @dataclass(frozen=True, eq=False)
 class StateUsage:
-    """Usage of what depends on the whole state: predicted torque and workspace.
+    """Usage of what depends on the whole state: predicted torque and workspace."""
 
-    `torque`: None where there is no prior model or no torque limit.
-    `workspace`: None where nothing is forbidden.
-    """
-
-    torque: TorquePrediction | None
-    workspace: WorkspaceUsage | None
+    torque: TorquePrediction | None  # None where there is no prior model or no torque limit
+    workspace: WorkspaceUsage | None  # None where nothing is forbidden
 
     @property
     def parts(self) -> list[TorquePrediction | WorkspaceUsage]:

@@ -11,8 +11,7 @@ from tauscope.excitation.optimiser import OptimiserProgress, optimise
 from tauscope.excitation.setting import ExcitationOptions, Setting
 from tauscope.excitation.slow_reversals import SlowPart, slow_part
 from tauscope.robot import Robot
-from tauscope.trajectory.document import trajectory_document
-from tauscope.trajectory.excitation_document import ExcitationDocument, HistoryPart
+from tauscope.trajectory.document import ExcitationDocument, HistoryPart, trajectory_document
 from tauscope.trajectory.fourier_series import FourierSeries
 from tauscope.trajectory.segments import FourierSegment, Segment
 from tauscope.trajectory.trajectory import DesignRecord, Trajectory
@@ -24,12 +23,6 @@ ACTIVE_CLEARANCE_M = 0.005  # clearance from floor or boxes at which they limit 
 
 @dataclass(frozen=True, eq=False)
 class ExcitationDesign:
-    """A designed excitation.
-
-    `history`: every iteration, with the criterion as the optimiser sees it.
-    `seconds`: time that the optimiser took [s].
-    """
-
     trajectory: Trajectory
     series: FourierSeries
     periods: int
@@ -37,12 +30,12 @@ class ExcitationDesign:
     value: float
     condition_number: float
     random_value: float
-    history: tuple[HistoryPart, ...]
+    history: tuple[HistoryPart, ...]  # every iteration, with the criterion as the optimiser sees it
     margins: Margins
     active: tuple[str, ...]
     notes: tuple[str, ...]
     evaluations: int
-    seconds: float
+    seconds: float  # time that the optimiser took [s]
 
 
 def design_excitation(
@@ -128,7 +121,6 @@ def _notes(robot: Robot, setting: Setting, slow: SlowPart) -> tuple[str, ...]:
 
 
 def excitation_document(design: ExcitationDesign) -> ExcitationDocument:
-    """The document of a designed excitation."""
     trajectory = trajectory_document(design.trajectory)
     return ExcitationDocument(
         robot=trajectory.robot,

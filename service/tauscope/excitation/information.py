@@ -168,8 +168,6 @@ SINGULAR = 1e-13
 
 
 class Criterion(StrEnum):
-    """What the optimiser minimises."""
-
     COND_F = "cond-f"
     """Cond_F(LᵀL) = ‖LᵀL‖_F ‖(LᵀL)⁻¹‖_F, the seed paper's equation (20)."""
     LOG_DET = "log-det"
@@ -180,14 +178,11 @@ class Criterion(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class CriterionValue:
-    """A criterion at one information matrix.
-
-    `gradient`: (p, p), derivative of `cost` by A, symmetric.
-    """
+    """A criterion at one information matrix."""
 
     own: float
     cost: float
-    gradient: Array
+    gradient: Array  # (p, p), derivative of `cost` by A, symmetric
     condition_number: float
 
 

@@ -24,8 +24,6 @@ TOLERANCE = 1e-4  # change of the cost, a logarithm, at which a round ends
 
 @dataclass(frozen=True)
 class OptimiserProgress:
-    """Where the optimiser is."""
-
     step: str
     fraction: float
     cost: float
@@ -34,12 +32,7 @@ class OptimiserProgress:
 
 @dataclass(frozen=True)
 class HistoryEntry:
-    """One iteration.
-
-    `start`: from which start, counted from 1; 0 for the random series.
-    """
-
-    start: int
+    start: int  # from which start, counted from 1; 0 for the random series
     iteration: int
     own: float
     violation: float
@@ -47,16 +40,10 @@ class HistoryEntry:
 
 @dataclass(eq=False)
 class OptimiserResult:
-    """What came of it.
-
-    `x`: (n, columns), the best feasible vector found.
-    `seconds`: time that it took [s].
-    """
-
-    x: Array
+    x: Array  # (n, columns), the best feasible vector found
     history: list[HistoryEntry]
     evaluations: int
-    seconds: float
+    seconds: float  # time that it took [s]
     random_value: float
 
 
@@ -93,7 +80,6 @@ class _Search:
         return value.cost
 
     def tell(self, step: str, fraction: float, own: float | None = None) -> None:
-        """Report progress."""
         criterion = self.stages.coarse.criterion
         best = np.inf if self.best_value is None else reported_value(criterion, self.best_value.own)
         value = best if own is None else reported_value(criterion, own)

@@ -10,18 +10,14 @@ from tauscope.excitation.series_space import SeriesGrid, SeriesSpace
 from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
 
+INFORMATION_WEIGHT = 0.5  # of -log det beside the other criteria
+
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """What is minimised.
-
-    `scaling`: (p,), what each column is divided by.
-    """
-
     criterion: Criterion
-    information_weight: float
     regressor: ExcitationRegressor
-    scaling: Array
+    scaling: Array  # (p,), what each column is divided by
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +108,6 @@ class ExcitationProblem:
         base = self._regressor.base_regressor(motion)
         rows = self._regressor.rows(motion, base)
         information = self._regressor.information(rows) / self._scaling
-        criterion = criterion_value(self.criterion, information, self._objective.information_weight)
+        criterion = criterion_value(self.criterion, information, INFORMATION_WEIGHT)
         self._last = _Evaluation(x.copy(), motion, base, rows, criterion)
         return self._last

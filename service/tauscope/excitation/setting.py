@@ -17,7 +17,7 @@ from tauscope.excitation.information import (
     reported_value,
 )
 from tauscope.excitation.optimiser import STARTS, Stages
-from tauscope.excitation.problem import ExcitationProblem, Objective
+from tauscope.excitation.problem import INFORMATION_WEIGHT, ExcitationProblem, Objective
 from tauscope.excitation.series_space import SeriesSpace
 from tauscope.excitation.torque_prediction import TorquePrediction
 from tauscope.excitation.workspace import Workspace, WorkspaceUsage
@@ -31,22 +31,18 @@ from tauscope.trajectory.limits import MotionLimits, motion_limits
 class ExcitationOptions:
     """What is wished of an excitation.
 
-    `period_s`: duration of one period [s].
     `noise_std`: (n,), expected torque noise of each joint, which weights its equations [Nm or N]; equal weights where
         None.
-    `torque_offset`: torque kept free besides [Nm or N].
     """
 
-    period_s: float = 10.0
+    period_s: float = 10.0  # duration of one period [s]
     harmonics: int = 5
     periods: int = 5
     criterion: Criterion = Criterion.COND_F
-    information_weight: float = 0.5
     scaling: ColumnScaling = ColumnScaling.NONE
     noise_std: Array | None = None
     limit_fraction: float = 0.95
     torque_margin: float = 0.2
-    torque_offset: float = 0.0
     workspace: Workspace = field(default_factory=Workspace)
     slow_postures: int = 3
     closing_period: bool = True
@@ -59,10 +55,8 @@ class ExcitationOptions:
             "period_s": not (np.isfinite(self.period_s) and self.period_s > 0.0) and "give a positive duration [s]",
             "harmonics": not 2 <= self.harmonics <= 100 and "give 2 to 100",
             "periods": not 1 <= self.periods <= 10_000 and "give 1 or more",
-            "information_weight": not 0.0 <= self.information_weight < np.inf and "give a number of 0 or more",
             "limit_fraction": not 0.0 < self.limit_fraction <= 1.0 and "give a number above 0 and up to 1",
             "torque_margin": not 0.0 <= self.torque_margin < 1.0 and "give a number from 0 to below 1",
-            "torque_offset": not 0.0 <= self.torque_offset < np.inf and "give a torque of 0 or more",
             "slow_postures": not 0 <= self.slow_postures <= 60 and "give 0 to 60",
             "starts": not 1 <= self.starts <= 64 and "give 1 to 64",
             "seed": self.seed < 0 and "give 0 or more",
@@ -85,17 +79,14 @@ SCALING_STATES = 512  # random states from which `ColumnScaling.TYPICAL` takes t
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """One robot's limits, predictions and spaces.
-
-    `available`: (n,), torque that may be used, infinite where there is no limit [Nm or N].
-    """
+    """One robot's limits, predictions and spaces."""
 
     robot: Robot
     options: ExcitationOptions
     base: BaseParameters
     stated: MotionLimits
     planned: MotionLimits
-    available: Array
+    available: Array  # (n,), torque that may be used, infinite where there is no limit [Nm or N]
     space: SeriesSpace
     states: StateUsage
     feasibility: Feasibility
@@ -154,7 +145,7 @@ class Setting:
         )
         if states.torque is not None:
             states = StateUsage(states.torque.seen_by(regressor), states.workspace)
-        objective = Objective(options.criterion, options.information_weight, regressor, scaling)
+        objective = Objective(options.criterion, regressor, scaling)
         fine, kinematics = self.feasibility.grid, self.feasibility.kinematics
         return ExcitationProblem(self.space, grid, fine, objective, kinematics, states)
 
@@ -164,7 +155,7 @@ class Setting:
         regressor = ExcitationRegressor(self.robot, self.base, capacity=samples, noise_std=options.noise_std)
         information = regressor.information(regressor.rows(_instants(series, samples)))
         information /= np.multiply.outer(scaling, scaling)
-        return criterion_value(options.criterion, information, options.information_weight)
+        return criterion_value(options.criterion, information, INFORMATION_WEIGHT)
 
     def _scaling(self) -> Array:
         regressor = ExcitationRegressor(
@@ -182,7 +173,7 @@ def _instants(series: FourierSeries, samples: int) -> MotionSamples:
 
 
 def _available_torque(robot: Robot, stated: MotionLimits, options: ExcitationOptions) -> Array:
-    available = (1.0 - options.torque_margin) * stated.torque - options.torque_offset
+    available = (1.0 - options.torque_margin) * stated.torque
     for joint, limit, value in zip(robot.joints, stated.torque, available, strict=True):
         if not value > 0.0:
             raise ExcitationError(

@@ -17,16 +17,12 @@ STILL_M = 1e-9  # a point that moves less than this is fixed to the base: where 
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """A forbidden box, its sides along the axes of the base frame.
-
-    `low`, `high`: (3,), opposite corners [m].
-    """
+    """A forbidden box, its sides along the axes of the base frame. `low`, `high`: (3,), opposite corners [m]."""
 
     low: Array
     high: Array
 
     def __post_init__(self) -> None:
-        """Refuse what is no box."""
         shaped = np.shape(self.low) == (3,) and np.shape(self.high) == (3,)
         if not shaped or not np.isfinite([self.low, self.high]).all() or not np.less(self.low, self.high).all():
             raise ExcitationError(
@@ -37,15 +33,11 @@ class Box:
 
 @dataclass(frozen=True, eq=False)
 class Workspace:
-    """What the arm's joint origins and tool have to keep clear of.
+    """What the arm's joint origins and tool have to keep clear of."""
 
-    `floor_m`: lowest height z in the base frame [m]; None where there is no floor.
-    `tool_m`: (3,), tool point in the last link's frame [m].
-    """
-
-    floor_m: float | None = None
+    floor_m: float | None = None  # lowest height z in the base frame [m]; None where there is no floor
     boxes: tuple[Box, ...] = ()
-    tool_m: Array = field(default_factory=lambda: np.zeros(3))
+    tool_m: Array = field(default_factory=lambda: np.zeros(3))  # (3,), tool point in the last link's frame [m]
 
     def __post_init__(self) -> None:
         """Refuse numbers that are no place."""

@@ -23,8 +23,6 @@ BANDWIDTH_RAD_S = 2.0 * np.pi * 5.0
 
 
 class ActuatorKind(StrEnum):
-    """Actuators of an exported arm."""
-
     MOTOR = "motor"
     POSITION = "position"
     DCMOTOR = "dcmotor"
@@ -32,15 +30,11 @@ class ActuatorKind(StrEnum):
 
 @dataclass(frozen=True)
 class ActuatorChoice:
-    """Which actuators are written, and gains that go before those of the user's own MJCF.
-
-    `kp`: one for all joints or one a joint [Nm/rad or N/m]; empty where not given.
-    `kv`: likewise [Nm s/rad or N s/m].
-    """
+    """Which actuators are written, and gains that go before those of the user's own MJCF."""
 
     kind: ActuatorKind = ActuatorKind.MOTOR
-    kp: tuple[float, ...] = ()
-    kv: tuple[float, ...] = ()
+    kp: tuple[float, ...] = ()  # one for all joints or one a joint [Nm/rad or N/m]; empty where not given
+    kv: tuple[float, ...] = ()  # likewise [Nm s/rad or N s/m]
 
 
 def actuator_elements(

@@ -18,30 +18,21 @@ from tauscope.robot.messages import shown
 
 @dataclass(frozen=True, eq=False)
 class JointModel:
-    """One joint's part of the model; None leaves what the file says as it is.
-
-    `rotor_inertia`: the motor's inertia reflected to the joint [kg m² or kg].
-    `branch`: the part of the link that the file has on moving joints beside the chain.
-    """
+    """One joint's part of the model; None leaves what the file says as it is."""
 
     link: LinkInertia | None = None
     friction: JointFriction | None = None
-    rotor_inertia: float | None = None
-    branch: LinkInertia | None = None
+    rotor_inertia: float | None = None  # the motor's inertia reflected to the joint [kg m² or kg]
+    branch: LinkInertia | None = None  # the part of the link that the file has on moving joints beside the chain
 
 
 @dataclass(frozen=True, eq=False)
 class CentredInertia:
-    """A link as simulators want it.
+    """A link as simulators want it."""
 
-    `mass`: m [kg].
-    `centre`: (3,), centre of mass in the link frame [m].
-    `inertia`: (3, 3), about the centre of mass, along the axes of the link frame [kg m²].
-    """
-
-    mass: float
-    centre: NDArray[np.float64]
-    inertia: NDArray[np.float64]
+    mass: float  # m [kg]
+    centre: NDArray[np.float64]  # (3,), centre of mass in the link frame [m]
+    inertia: NDArray[np.float64]  # (3, 3), about the centre of mass, along the axes of the link frame [kg m²]
 
     @property
     def full(self) -> NDArray[np.float64]:

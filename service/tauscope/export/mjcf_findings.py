@@ -28,16 +28,12 @@ NEWER = "needs MuJoCo 3.8 or later"
 
 @dataclass
 class JointExtras:
-    """Attributes that findings add to the elements of one joint.
-
-    `dry_friction`: taken off frictionloss, since bristles have it [Nm or N].
-    `passive`: attributes of passive dcmotor elements.
-    """
+    """Attributes that findings add to the elements of one joint."""
 
     attributes: dict[str, str] = field(default_factory=dict)
     damping: tuple[float, float] = (0.0, 0.0)
-    dry_friction: float = 0.0
-    passive: list[str] = field(default_factory=list)
+    dry_friction: float = 0.0  # taken off frictionloss, since bristles have it [Nm or N]
+    passive: list[str] = field(default_factory=list)  # attributes of passive dcmotor elements
     has_offset: bool = False
 
     def friction_attributes(self, label: str, friction: JointFriction) -> dict[str, str]:
@@ -49,24 +45,18 @@ class JointExtras:
 
 @dataclass(frozen=True)
 class MjcfSegment:
-    """What a file says of a segment; one that follows another has no joint of the robot, and no findings.
-
-    `notes`: what is lost of its friction.
-    """
+    """What a file says of a segment; one that follows another has no joint of the robot, and no findings."""
 
     label: str
     model: JointModel
     joint: Joint | None
     extras: JointExtras
-    notes: list[str]
+    notes: list[str]  # what is lost of its friction
 
 
 @dataclass
 class Additions:
-    """Changes that findings make to a file.
-
-    `left`: findings that MuJoCo cannot hold.
-    """
+    """Changes that findings make to a file."""
 
     robot: Robot
     links: list[LinkInertia]
@@ -74,7 +64,7 @@ class Additions:
     joints: list[JointExtras]
     tendons: list[tuple[float, float, Mapping[int, float]]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    left: list[FoundEffect] = field(default_factory=list)
+    left: list[FoundEffect] = field(default_factory=list)  # findings that MuJoCo cannot hold
 
     def segments(self, model: ExportModel) -> Iterator[MjcfSegment]:
         """The segments of the model that these are added to, base first."""

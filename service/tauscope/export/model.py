@@ -30,15 +30,11 @@ from tauscope.version import tauscope_version
 
 @dataclass(frozen=True, eq=False)
 class FoundEffect:
-    """An effect with its values, in the arm's own torque.
-
-    `coefficients`: (c,), linear coefficients.
-    `shape`: (k,), shape parameters.
-    """
+    """An effect with its values, in the arm's own torque."""
 
     effect: Effect
-    coefficients: NDArray[np.float64]
-    shape: NDArray[np.float64]
+    coefficients: NDArray[np.float64]  # (c,), linear coefficients
+    shape: NDArray[np.float64]  # (k,), shape parameters
 
     @property
     def values(self) -> dict[str, float]:
@@ -50,16 +46,13 @@ class FoundEffect:
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a model came from.
-
-    `is_mjcf`: whether the links' frames are bodies of an MJCF.
-    """
+    """Where a model came from."""
 
     sources: tuple[RecordingSource, ...]
     effort_kind: EffortKind
     created: datetime
     urdf: bytes | None = None
-    is_mjcf: bool = False
+    is_mjcf: bool = False  # whether the links' frames are bodies of an MJCF
     version: str = field(default_factory=tauscope_version)
 
 
@@ -69,14 +62,13 @@ class ExportModel:
 
     `links`: one a segment.
     `friction`, `delivered_friction`: one a joint: beside these bodies, and as delivered.
-    `rotor_inertia`: one a joint [kg m² or kg].
     """
 
     robot: Robot
     links: tuple[LinkInertia, ...]
     friction: tuple[JointFriction, ...]
     delivered_friction: tuple[JointFriction, ...]
-    rotor_inertia: tuple[float | None, ...]
+    rotor_inertia: tuple[float | None, ...]  # one a joint [kg m² or kg]
     effects: tuple[FoundEffect, ...]
     origin: Origin
 

@@ -25,8 +25,6 @@ _INERTIA = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 
 
 @dataclass(frozen=True)
 class PatchedUrdf:
-    """A URDF with the identified model in it."""
-
     data: bytes
     notes: tuple[str, ...]
 
@@ -85,7 +83,6 @@ class _Tree:
         self._joints = {joint.attributes.get("name", ""): _joint(joint) for joint in root.named("joint")}
 
     def link(self, name: str) -> Element:
-        """The link element of a name."""
         if name not in self._links:
             raise ExportError(f"{self.label}: link {shown(name)} is not in the file; add it")
         return self._links[name]

@@ -12,17 +12,14 @@ from tauscope.recording.recording import Array
 class MotionRows:
     """Evenly spaced rows of one piece of motion, in the band in which models and torque are compared.
 
-    `recording`: number of the recording.
-    `time`: (M,), since the beginning of the recording [s].
     `progress`: (M,), part of the recording's motion that is over, 0 to 1; alike in every repetition of a motion.
     `position`, `velocity`, `acceleration`, `load`: (n, M), q, q̇, q̈ and the rigid-body torque [SI].
     `torque`, `plain`, `explained`: (n, M), measured, by the nominal model, and by the model with all findings [Nm or
         N].
-    `used`: (n, M), rows that rest on measured torque.
     """
 
-    recording: int
-    time: Array
+    recording: int  # number of the recording
+    time: Array  # (M,), since the beginning of the recording [s]
     progress: Array
     position: Array
     velocity: Array
@@ -31,19 +28,15 @@ class MotionRows:
     torque: Array
     plain: Array
     explained: Array
-    used: NDArray[np.bool_]
+    used: NDArray[np.bool_]  # (n, M), rows that rest on measured torque
 
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """Rows by the columns that a black box learns from.
+    """Rows by the columns that a black box learns from."""
 
-    `columns`: (R, d), those of the joint itself first.
-    `own`: how many these are.
-    """
-
-    columns: Array
-    own: int
+    columns: Array  # (R, d), those of the joint itself first
+    own: int  # how many these are
 
     def at(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> "Inputs":
         """Some of the rows. `rows`: (R,) or (k,) int, mask or places."""

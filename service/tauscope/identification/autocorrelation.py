@@ -71,12 +71,11 @@ class LaggedProducts:
     """Σ e_t e_{t+k} of one stretch of a residual, and how many products that are.
 
     `products`, `counts`: (K + 1,), for the lags k = 0 … K; pairs of which one was not measured are left out of both.
-    `spans`: (K + 1,), pairs that there would be if all had been measured.
     """
 
     products: Array
     counts: Array
-    spans: Array
+    spans: Array  # (K + 1,), pairs that there would be if all had been measured
 
     @staticmethod
     def of(residual: Array, used: NDArray[np.bool_], lags: int = LARGEST_ORDER) -> "LaggedProducts":

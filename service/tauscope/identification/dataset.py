@@ -30,20 +30,15 @@ class PreparedMotion:
 
     `rigid`: tuple of (m_j, N), length n, base regressor L at the recorded rate: of each joint's row the columns of the
     links that it moves.
-    `reduced_rigid`: tuple of (m_j, M), length n, the same in the common band, decimated.
-    `reduced_torque`: (n, M), measured torque in the common band, mean of the repetitions.
-    `used`: (n, M), rows that rest on measured torque.
-    `at_rest`: (n, M), share of each row's samples at which the joint stands still.
-    `rest_variance`: (n,), variance of friction at rest over that of a row's noise.
     """
 
     motion: Motion
     rigid: tuple[Array, ...]
-    reduced_rigid: tuple[Array, ...]
-    reduced_torque: Array
-    used: Mask
-    at_rest: Array
-    rest_variance: Array
+    reduced_rigid: tuple[Array, ...]  # tuple of (m_j, M), length n, the same in the common band, decimated
+    reduced_torque: Array  # (n, M), measured torque in the common band, mean of the repetitions
+    used: Mask  # (n, M), rows that rest on measured torque
+    at_rest: Array  # (n, M), share of each row's samples at which the joint stands still
+    rest_variance: Array  # (n,), variance of friction at rest over that of a row's noise
     recording: int
 
     @property
@@ -124,15 +119,12 @@ class PreparedMotion:
 
 @dataclass(eq=False)
 class Dataset:
-    """All pieces of motion of some recordings, in one band, that can be gone through again and again.
-
-    `cutoff_hz`: the common band; None for no filter.
-    """
+    """All pieces of motion of some recordings, in one band, that can be gone through again and again."""
 
     conditioners: Sequence[Conditioner]
     robot: Robot
     base: BaseParameters
-    cutoff_hz: float | None
+    cutoff_hz: float | None  # the common band; None for no filter
     rest_variance: Array | None = None
     _kept: list[PreparedMotion] | None = field(default=None, repr=False)
     _too_large: bool = field(default=False, repr=False)

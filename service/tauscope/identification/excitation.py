@@ -17,17 +17,12 @@ MOST_SAMPLES = 2048  # samples of one piece of motion, which has up to 32,768, b
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
-    """How the joints move.
-
-    `lowest`, `highest`: (n,), positions [rad or m].
-    `speed`: (n,), top speed, which one sample in a hundred exceeds [rad/s or m/s].
-    `reversals`: (n,) int, how often the joints turn round.
-    """
+    """How the joints move. `lowest`, `highest`: (n,), positions [rad or m]."""
 
     lowest: Array
     highest: Array
-    speed: Array
-    reversals: np.ndarray
+    speed: Array  # (n,), top speed, which one sample in a hundred exceeds [rad/s or m/s]
+    reversals: np.ndarray  # (n,) int, how often the joints turn round
 
 
 def measure_excitation(motions: Iterable[PreparedMotion]) -> Excitation:

@@ -30,18 +30,12 @@ COLLINEAR = 1e-9  # a second column with less than this share of its energy left
 
 @dataclass(frozen=True, eq=False)
 class JointGrid:
-    """One joint's candidate columns after projection: a step of every slope, and v|v| as the last.
+    """One joint's candidate columns after projection: a step of every slope, and v|v| as the last."""
 
-    `slopes`: (g,), candidate constants.
-    `gram`: (g + 1, g + 1), GᵀG of its columns, before projection.
-    `inner`: (z, g + 1), Q_jᵀ G: what the projection takes away.
-    `target`: (g + 1,), Gᵀ y after projection.
-    """
-
-    slopes: Array
-    gram: Array
-    inner: Array
-    target: Array
+    slopes: Array  # (g,), candidate constants
+    gram: Array  # (g + 1, g + 1), GᵀG of its columns, before projection
+    inner: Array  # (z, g + 1), Q_jᵀ G: what the projection takes away
+    target: Array  # (g + 1,), Gᵀ y after projection
 
     @property
     def bend(self) -> int:
@@ -165,13 +159,12 @@ SWEEPS = 4
 class EstimatedShape:
     """Shape constants of one joint.
 
-    `k_v`: slope of the step at zero velocity [s/rad or s/m].
     `delta`: slope of the Stribeck term [s/rad or s/m]; None where the data show no such term.
     `k_v_identifiable`, `delta_identifiable`: False where the data cannot tell the constant.
     `k_v_given`, `delta_given`: True where the robot file states it.
     """
 
-    k_v: float
+    k_v: float  # slope of the step at zero velocity [s/rad or s/m]
     delta: float | None
     k_v_identifiable: bool
     delta_identifiable: bool

@@ -53,58 +53,47 @@ class Options:
     """What a user may ask of an identification.
 
     `cutoff_hz`: band that torque and regressor share [Hz]; None for no filter; chosen from the data by default.
-    `prior`: whether the most probable bodies are delivered, or the free least-squares estimate.
     """
 
     estimator: Estimator = Estimator.WLS
     cutoff_hz: float | Literal["auto"] | None = "auto"
     rotor_inertia: bool = True
-    prior: bool = True
+    prior: bool = True  # whether the most probable bodies are delivered, or the free least-squares estimate
 
 
 @dataclass(frozen=True, eq=False)
 class Identification:
     """A model of the arm with what is known about its uncertainty.
 
-    `parameters`: (p,), the model that is delivered.
-    `free_parameters`: (p,), the LS or WLS estimate, without prior and without bodies.
-    `consistent_parameters`: (p,), the most probable bodies and friction, in the same columns.
-    `constrained`: whether no body can have the free estimate.
-    `price_of_bodies`: (n,), training residual over that of the free estimate.
-    `gravity_scale`: torque of gravity over that of the stated links; None where it cannot be told.
-    `reversed_joints`: joints whose torque fits much better with the other sign, which is not used.
-    `covariance`: (p + s, p + s), of the parameters, and of the logarithms of the estimated shape constants.
     `undetermined`: (p,), parameters about which the recordings say nothing.
     `predicted_train`, `predicted_held_out`: (n,), residual at the recorded rate that noise and covariance lead to
     expect [Nm or N].
-    `extrapolation`: (n,) or None, share of the held-out torque's rms that training leaves uncertain.
-    `uncertainty_growth`: (n,) or None, uncertain torque of held-out motion over that of training.
     """
 
     robot: Robot
     structure: ModelStructure
-    parameters: Array
-    free_parameters: Array
-    consistent_parameters: Array
-    constrained: bool
-    reversed_joints: tuple[int, ...]
-    gravity_scale: float | None
+    parameters: Array  # (p,), the model that is delivered
+    free_parameters: Array  # (p,), the LS or WLS estimate, without prior and without bodies
+    consistent_parameters: Array  # (p,), the most probable bodies and friction, in the same columns
+    constrained: bool  # whether no body can have the free estimate
+    reversed_joints: tuple[int, ...]  # joints whose torque fits much better with the other sign, which is not used
+    gravity_scale: float | None  # torque of gravity over that of the stated links; None where it cannot be told
     posterior: Posterior
-    covariance: Array
+    covariance: Array  # (p + s, p + s), of the parameters, and of the logarithms of the estimated shape constants
     undetermined: np.ndarray
     shapes: tuple[EstimatedShape, ...]
     consistent: ConsistentParameters
     condition_number: float
     residuals: ResidualStatistics
     free_fit: Fit
-    price_of_bodies: Array
+    price_of_bodies: Array  # (n,), training residual over that of the free estimate
     predicted_train: Array
     held_out: Fit | None
     predicted_held_out: Array | None
     excitation: Excitation
     held_out_excitation: Excitation | None
-    extrapolation: Array | None
-    uncertainty_growth: Array | None
+    extrapolation: Array | None  # (n,) or None, share of the held-out torque's rms that training leaves uncertain
+    uncertainty_growth: Array | None  # (n,) or None, uncertain torque of held-out motion over that of training
     cutoff_hz: float | None
     options: Options
     recording_warnings: tuple[ResultWarning, ...]

@@ -59,20 +59,13 @@ class JointFactor:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A least-squares estimate.
+    """A least-squares estimate."""
 
-    `parameters`: (p,), Θ; where a direction has no information, its smallest value.
-    `factor`: (p, p), R of the weighted equations.
-    `target`: (p,), z, so that the criterion is ‖R Θ - z‖² and a constant.
-    `spread`: (p, r), S with S Sᵀ = (Lᵀ W L)⁺, r the rank.
-    `undetermined`: (p,), parameters that take part in a direction without information.
-    """
-
-    parameters: Array
-    factor: Array
-    target: Array
-    spread: Array
-    undetermined: NDArray[np.bool_]
+    parameters: Array  # (p,), Θ; where a direction has no information, its smallest value
+    factor: Array  # (p, p), R of the weighted equations
+    target: Array  # (p,), z, so that the criterion is ‖R Θ - z‖² and a constant
+    spread: Array  # (p, r), S with S Sᵀ = (Lᵀ W L)⁺, r the rank
+    undetermined: NDArray[np.bool_]  # (p,), parameters that take part in a direction without information
 
 
 def factorise(motions: Iterable[PreparedMotion], structure: ModelStructure) -> tuple[JointFactor, ...]:

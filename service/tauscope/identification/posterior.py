@@ -34,8 +34,6 @@ DETERMINED = 0.9  # share of the prior's variance that data take from a paramete
 class Posterior:
     """What prior and data together say of the parameters, before bodies and friction restrict them.
 
-    `doubt`: (p,), deviation from the prior that the data show, in its standard deviations.
-    `noise_std`: (n,), σ_j of a row in the common band.
     `weights`: (n,), 1/(σ_j √ρ_j), by which the joints' equations are multiplied.
     `factor`, `target`: (p, p), (p,), R and z of the data's weighted equations.
     `mean`: (p,), of the posterior, before bodies and friction restrict it.
@@ -43,8 +41,8 @@ class Posterior:
     """
 
     prior: Prior
-    doubt: Array
-    noise_std: Array
+    doubt: Array  # (p,), deviation from the prior that the data show, in its standard deviations
+    noise_std: Array  # (n,), σ_j of a row in the common band
     weights: Array
     factor: Array
     target: Array

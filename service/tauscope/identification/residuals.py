@@ -26,18 +26,12 @@ CLEARLY_MORE = 1.3  # ratio of two estimated powers that is no chance
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """How well a parameter set explains the torque.
+    """How well a parameter set explains the torque."""
 
-    `rms`: (n,), root mean square of the torque residual at the recorded rate, no filter [Nm or N].
-    `band_rms`: (n,), the same in the common band.
-    `moving_rms`: (n,), the same in the common band, of rows in which the joint moves.
-    `torque_rms`: (n,), root mean square of the measured torque in the common band [Nm or N].
-    """
-
-    rms: Array
-    band_rms: Array
-    moving_rms: Array
-    torque_rms: Array
+    rms: Array  # (n,), root mean square of the torque residual at the recorded rate, no filter [Nm or N]
+    band_rms: Array  # (n,), the same in the common band
+    moving_rms: Array  # (n,), the same in the common band, of rows in which the joint moves
+    torque_rms: Array  # (n,), root mean square of the measured torque in the common band [Nm or N]
     relative_error: float
 
 

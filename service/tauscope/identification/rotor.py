@@ -24,12 +24,12 @@ SMALLEST_SHARE = 0.02
 PROBE_STATES = 30
 
 
-def separable_rotors(robot: Robot, base: BaseParameters, seed: int = 0) -> tuple[bool, ...]:
+def separable_rotors(robot: Robot, base: BaseParameters) -> tuple[bool, ...]:
     """Joints whose rotor inertia no combination of link parameters, offsets and viscous friction can imitate.
 
     Returns True where I_a can be told from the links.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     count = robot.joint_count
     states = [scale * rng.standard_normal((PROBE_STATES, count)) for scale in (2.0, 2.0, 4.0)]
     regressor = torque_regressor(robot, *states, columns=np.asarray(base.independent_columns))

@@ -18,14 +18,10 @@ from tauscope.robot import Robot
 
 @dataclass(frozen=True)
 class JointTerms:
-    """Which terms one joint has beside the rigid body, and the shape constants of its friction.
+    """Which terms one joint has beside the rigid body, and the shape constants of its friction."""
 
-    `k_v`: slope of the friction's step at zero velocity [s/rad or s/m].
-    `delta`: slope of the Stribeck term [s/rad or s/m]; None where the joint has no such term.
-    """
-
-    k_v: float
-    delta: float | None = None
+    k_v: float  # slope of the friction's step at zero velocity [s/rad or s/m]
+    delta: float | None = None  # slope of the Stribeck term [s/rad or s/m]; None where the joint has no such term
     rotor: bool = False
 
     @property

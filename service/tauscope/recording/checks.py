@@ -1,12 +1,15 @@
 """What is in a recording, and what about it an engineer should look at before trusting it."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, PlainSerializer
 
 from tauscope.errors import RecordingError
 from tauscope.recording.examination import find_implausible, find_missing_effort, mend_recording
@@ -15,6 +18,7 @@ from tauscope.recording.recording import Array, EffortKind, Recording, Samples
 from tauscope.recording.units import SI, Reading
 from tauscope.robot.messages import Finding, Severity, listed
 from tauscope.robot.robot import Robot
+from tauscope.strict_model import entry
 
 _ROWS_AT_ONCE = 2**15
 _KEPT_STEPS = 10**6
@@ -24,60 +28,47 @@ _STEP_SAMPLES = 30
 _CLIPPED_RUN = 5
 _CLIPPED_SHARE = 0.005
 _CLIPPED_SAMPLES = 10
+Measured = Annotated[float, PlainSerializer(lambda value: None if math.isnan(value) else value, float | None)]
+"""A number; NaN, which JSON does not know, is null there: nothing was measured."""
 
 
-@dataclass(frozen=True)
+@entry
 class StepMeasures:
-    """Steps of the clock; the percentiles are those of at most a million evenly chosen steps.
+    """Steps of the clock [s]; the percentiles are those of at most a million evenly chosen steps."""
 
-    `minimum`, `percentile_1`, `median`, `percentile_99`, `maximum`: length of a step [s].
-    """
-
-    minimum: float
-    percentile_1: float
-    median: float
-    percentile_99: float
-    maximum: float
+    minimum: float = Field(description="shortest")
+    percentile_1: float = Field(description="1 % are shorter")
+    median: float = Field(description="half are shorter")
+    percentile_99: float = Field(description="99 % are shorter")
+    maximum: float = Field(description="longest")
 
 
-@dataclass(frozen=True)
+@entry
 class JointMeasures:
-    """One joint's channels.
+    """One joint's channels."""
 
-    `position`, `effort`: (float, float), least and greatest value, NaN where every sample was missed.
-    `first_wrap`: time of the first of them [s].
-    `clipped`: tuple of (float, int), levels at which the effort stays, and number of samples.
-    """
-
-    position: tuple[float, float]
-    effort: tuple[float, float]
-    position_step: float | None
-    wraps: int
-    first_wrap: float | None
-    clipped: tuple[tuple[float, int], ...]
+    position: tuple[Measured, Measured] = Field(description="least and greatest value [rad or m]; null without samples")
+    effort: tuple[Measured, Measured] = Field(description="least and greatest value [Nm, N or drive units]")
+    position_step: float | None = Field(description="step in multiples of which the position moves [rad or m]")
+    wraps: int = Field(description="jumps of the position by about 2π")
+    first_wrap: float | None = Field(description="time of the first of them [s]")
+    clipped: tuple[tuple[float, int], ...] = Field(description="levels at which the effort stays, and samples there")
 
 
-@dataclass(frozen=True)
+@entry
 class Gaps:
-    """Steps of the clock beyond 1.9 medians: one lost sample of a regular clock is one.
+    """Steps of the clock beyond 1.9 medians: one lost sample of a regular clock is one."""
 
-    `longest`: the longest of them [s], 0 without gaps.
-    `longest_at`: time at which it begins [s].
-    """
-
-    count: int
-    longest: float
-    longest_at: float | None
+    count: int = Field(description="how many")
+    longest: float = Field(description="the longest [s]; 0 without gaps")
+    longest_at: float | None = Field(description="time at which it begins [s]")
 
 
 @dataclass(frozen=True)
 class RowMeasures:
-    """All figures but the gaps.
+    """All figures but the gaps."""
 
-    `duration`: from the first to the last sample [s].
-    """
-
-    duration: float
+    duration: float  # from the first to the last sample [s]
     steps: StepMeasures
     missed: dict[str, int]
     period_lengths: tuple[int, ...]
@@ -220,36 +211,32 @@ def _find_clipped(recording: Recording, least: Array, greatest: Array) -> list[t
 _MEANINGFUL_STEP = 1e-4
 
 
-@dataclass(frozen=True)
+@entry
 class Periods:
     """Repeats of the excitation."""
 
-    count: int
-    shortest: int
-    longest: int
+    count: int = Field(description="how many are marked")
+    shortest: int = Field(description="samples of the shortest")
+    longest: int = Field(description="samples of the longest")
 
 
-@dataclass(frozen=True)
+@entry
 class RecordingReport:
-    """What `check_recording` found.
+    """What `check_recording` found."""
 
-    `duration_s`: from the first to the last sample [s].
-    `rate_hz`: 1 / median step [Hz].
-    """
-
-    name: str
-    samples: int
-    duration_s: float
-    rate_hz: float
-    steps: StepMeasures
-    gaps: Gaps
-    effort_kind: EffortKind
-    columns: tuple[str, ...]
-    ignored_columns: tuple[str, ...]
-    missed: dict[str, int]
-    periods: Periods | None
-    joints: tuple[JointMeasures, ...]
-    findings: tuple[Finding, ...]
+    name: str = Field(description="of the recording")
+    samples: int = Field(description="number of samples")
+    duration_s: float = Field(description="from the first to the last sample [s]")
+    rate_hz: float = Field(description="1 / median step [Hz]")
+    effort_kind: EffortKind = Field(description="torque (tau), or drive units (i)")
+    columns: tuple[str, ...] = Field(description="columns that are read")
+    ignored_columns: tuple[str, ...] = Field(description="columns that nobody reads")
+    missed: dict[str, int] = Field(description="number of NaN in each column that has any")
+    steps: StepMeasures = Field(description="of the clock")
+    gaps: Gaps = Field(description="where the clock skips")
+    periods: Periods | None = Field(description="repeats of the excitation, where they are marked")
+    joints: tuple[JointMeasures, ...] = Field(description="one a joint")
+    findings: tuple[Finding, ...] = Field(description="warnings first")
 
     def require_usable(self) -> None:
         """Refuse a recording that no other verb accepts.

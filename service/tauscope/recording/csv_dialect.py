@@ -120,7 +120,6 @@ class Clock:
 
 
 def is_number(field: bytes) -> bool:
-    """Whether a field is a decimal number."""
     return _NUMBER.fullmatch(field.strip(b" \t")) is not None
 
 

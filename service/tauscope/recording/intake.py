@@ -16,19 +16,12 @@ from tauscope.result_warning import ResultWarning
 
 @dataclass(frozen=True)
 class Choice:
-    """What is wanted of a file.
-
-    `joint_count`: joints that the recording must have; None where any number is welcome.
-    `spool_above_bytes`: size above which the rows go to a temporary file [bytes].
-    `packed_bytes`: size of a log, by which its messages are plausible [bytes]; None where any are.
-    """
-
     file: str
-    joint_count: int | None = None
+    joint_count: int | None = None  # joints that the recording must have; None where any number is welcome
     joint_names: tuple[str, ...] | None = None
-    spool_above_bytes: int = SPOOL_ABOVE_BYTES
+    spool_above_bytes: int = SPOOL_ABOVE_BYTES  # size above which the rows go to a temporary file [bytes]
     reading: Reading = SI
-    packed_bytes: int | None = None
+    packed_bytes: int | None = None  # size of a log, by which its messages are plausible [bytes]; None where any are
 
 
 PAUSE_S = 60.0  # between two episodes [s]: no filter and no fit bridges a gap of this length
@@ -79,7 +72,6 @@ class EpisodeClock:
 
     @property
     def notes(self) -> tuple[ResultWarning, ...]:
-        """A warning where there is more than one episode."""
         if self._count < 2:
             return ()
         text = f"column t: {self._count} episodes, put one after another with a gap of {PAUSE_S:g} s between them"

@@ -228,13 +228,13 @@ _STAMP = struct.Struct("<iI")
 class JointStateEncoder:
     """Writes joint states of the same joints, message after message, into one template."""
 
-    def __init__(self, names: Sequence[str], *, has_velocity: bool = True, has_effort: bool = True) -> None:
+    def __init__(self, names: Sequence[str], *, has_velocity: bool = True) -> None:
         message = bytearray(_ENCAPSULATION + bytes(_STAMP.size))
         _append_string(message, "")
         _append_length(message, len(names))
         for name in names:
             _append_string(message, name)
-        counts = (len(names), len(names) if has_velocity else 0, len(names) if has_effort else 0)
+        counts = (len(names), len(names) if has_velocity else 0, len(names))
         places = [_append_numbers(message, count) for count in counts]
         self._message = message
         self._numbers = [np.frombuffer(message, "<f8", count, at) for count, at in zip(counts, places, strict=True)]

@@ -28,7 +28,6 @@ _READ_BYTES = 2**18
 
 
 def frame(kind: bytes, content: bytes) -> bytes:
-    """One frame."""
     return FRAME.pack(len(content), kind) + content
 
 
@@ -40,10 +39,10 @@ def event_frame(time_ns: int, event: dict[str, Any]) -> bytes:
 class FrameWriter:
     """Turns the bytes of a pipe into a journal."""
 
-    def __init__(self, path: Path, *, synchronise: bool = True) -> None:
+    def __init__(self, path: Path) -> None:
         """Prepare for the first bytes; the journal is created when its header is there."""
         self.writer: JournalWriter | None = None
-        self._path, self._synchronise = path, synchronise
+        self._path = path
         self._pending = b""
 
     def feed(self, data: bytes) -> None:
@@ -62,7 +61,7 @@ class FrameWriter:
             rows = []
             if kind == HEADER:
                 header = JournalHeader.from_dict(json.loads(data[start:stop]))
-                self.writer = JournalWriter(self._path, header, synchronise=self._synchronise)
+                self.writer = JournalWriter(self._path, header, synchronise=True)
             elif self.writer is not None:
                 (time_ns,) = EVENT_TIME.unpack_from(data, start)
                 self.writer.write_event(time_ns, json.loads(data[start + EVENT_TIME.size : stop]))

@@ -22,16 +22,10 @@ LONGEST_HOLD = 1.5  # cycles between two samples of which none was missed betwee
 
 @dataclass(frozen=True, eq=False)
 class Journal:
-    """What a journal holds.
-
-    `rows`: (N,) of `journal_row_type`, the cycles, oldest first.
-    `damage`: why reading stopped before the file's end, None where the file is whole.
-    """
-
     header: JournalHeader
-    rows: NDArray[np.void]
+    rows: NDArray[np.void]  # (N,) of `journal_row_type`, the cycles, oldest first
     events: tuple[dict[str, Any], ...]
-    damage: str | None
+    damage: str | None  # why reading stopped before the file's end, None where the file is whole
 
     @property
     def motion(self) -> NDArray[np.void]:

@@ -23,28 +23,22 @@ class Phase(IntEnum):
 
 @dataclass(frozen=True)
 class JournalHeader:
-    """What all rows of a journal have in common.
-
-    `rate_hz`: cycles a second that were asked for [Hz].
-    `epoch_offset_ns`: to be added to a row's time to make it nanoseconds since 1970 [ns].
-    """
+    """What all rows of a journal have in common."""
 
     robot: str
     joint_names: tuple[str, ...]
-    rate_hz: float
+    rate_hz: float  # cycles a second that were asked for [Hz]
     mode: str
     effort_unit: str
     torque_per_effort: tuple[float, ...]
     has_velocity: bool
-    epoch_offset_ns: int
+    epoch_offset_ns: int  # to be added to a row's time to make it nanoseconds since 1970 [ns]
 
     @property
     def joint_count(self) -> int:
-        """Number of joints n."""
         return len(self.joint_names)
 
     def to_dict(self) -> dict[str, Any]:
-        """The header as plain data."""
         return {"form": JOURNAL_FORM, **asdict(self)}
 
     @staticmethod

@@ -5,6 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pydantic import Field
+
 from tauscope.errors import RecordingError
 from tauscope.recording.column_files import ZIP_MAGIC, read_npz, read_npz_header
 from tauscope.recording.columns import find_layout, is_column, require_joint_count, suggest_layout
@@ -22,6 +24,7 @@ from tauscope.remote_files import copy_locally, find_path, is_folder, knows_rang
 from tauscope.robot.messages import printable
 from tauscope.robot.recording_layout import UNITS
 from tauscope.robot.robot import Robot
+from tauscope.strict_model import entry
 
 
 @dataclass(frozen=True)
@@ -155,19 +158,14 @@ def _reason(error: OSError) -> str:
     return words.get(error.errno or 0, f"cannot be read ({error.strerror or error})")
 
 
-@dataclass(frozen=True)
+@entry
 class ColumnMapping:
-    """A file's columns as they are understood.
+    """A file's columns as they are understood."""
 
-    `columns`: column of the file by that of CONTRACT.md, such as ``q1``; only those that were found.
-    `units`: unit of ``t``, ``q``, ``qd`` and ``tau``.
-    `is_guessed`: whether words of the column names suggest it, and no reader accepts the file without it.
-    """
-
-    header: tuple[str, ...]
-    columns: Mapping[str, str]
-    units: Mapping[str, str]
-    is_guessed: bool
+    header: tuple[str, ...] = Field(description="names of the file's columns; numbers from 1 where it has no names")
+    columns: Mapping[str, str] = Field(description="the file's column for t, q1, tau1, …; only those that were found")
+    units: Mapping[str, str] = Field(description="of t, q, qd and tau")
+    is_guessed: bool = Field(description="whether only the words of the column names suggest it")
 
 
 def find_mapping(path: Path, robot: Robot | None = None, reading: Reading = SI) -> ColumnMapping:

@@ -19,9 +19,7 @@ __all__ = ["Array", "EffortKind", "Recording", "Samples", "Table", "take_command
 class Recording:
     """One continuous motion as it was measured.
 
-    `notes`: warnings without its name.
     `effort_std`: relative standard error of each joint's effort as a whole; empty where it was measured.
-    `is_examined`: whether units and samples were looked at, so that they need not be again.
     """
 
     name: str
@@ -29,9 +27,9 @@ class Recording:
     effort_kind: EffortKind
     table: Table
     ignored_columns: tuple[str, ...] = ()
-    notes: tuple[ResultWarning, ...] = ()
+    notes: tuple[ResultWarning, ...] = ()  # warnings without its name
     effort_std: tuple[float, ...] = ()
-    is_examined: bool = False
+    is_examined: bool = False  # whether units and samples were looked at, so that they need not be again
 
     def __len__(self) -> int:
         """Number of samples N."""

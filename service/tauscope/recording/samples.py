@@ -24,18 +24,15 @@ class EffortKind(StrEnum):
 class Samples:
     """A stretch of a recording as it was measured; NaN marks a sample that was missed.
 
-    `time`: (N,), strictly increasing [s].
-    `position`: (N, n), q [rad or m].
     `effort`: (N, n), τ [Nm or N], or drive units (current), or commanded positions, as `Recording.effort_kind` says,
         sign and constant not yet applied.
     `velocity`, `acceleration`, `reference`, `effort_command`, `temperature`, `link_position`, `voltage`, `gain`: (N,
         n) or None, the optional columns qd, qdd, qref, taucmd, temp, qlink, volt, kp; a joint without such a column is
         NaN.
-    `period`: (N,), index of the repeated excitation period, NaN outside the repeated part.
     """
 
-    time: Array
-    position: Array
+    time: Array  # (N,), strictly increasing [s]
+    position: Array  # (N, n), q [rad or m]
     effort: Array
     velocity: Array | None = None
     acceleration: Array | None = None
@@ -45,7 +42,7 @@ class Samples:
     link_position: Array | None = None
     voltage: Array | None = None
     gain: Array | None = None
-    period: Array | None = None
+    period: Array | None = None  # (N,), index of the repeated excitation period, NaN outside the repeated part
 
     @property
     def complete(self) -> NDArray[np.bool_]:

@@ -26,19 +26,17 @@ class Reading:
     """How a file is to be read.
 
     `units`: unit of ``t``, ``q``, ``qd``, ``tau``, or of one joint's column, ``q3``; SI where none is stated.
-    `rate_hz`: samples a second where t counts samples [Hz].
     `joint_types`: of the robot, where it is known: degrees are of revolute joints only, mm of prismatic ones.
-    `joint_names`: of the robot, where it is known.
     `prefers_torque`: whether currents are of no use, because no torque constant is known.
     `columns`, `decimal`, `delimiter`, `topic`: as in `RecordingLayout`.
     `is_usual`: whether the columns are those of the robot file: recordings that Tauscope made have their own.
     """
 
     units: Mapping[str, str] = field(default_factory=dict)
-    rate_hz: float | None = None
+    rate_hz: float | None = None  # samples a second where t counts samples [Hz]
     trust_units: bool = False
     joint_types: tuple[JointType, ...] | None = None
-    joint_names: tuple[str, ...] | None = None
+    joint_names: tuple[str, ...] | None = None  # of the robot, where it is known
     prefers_torque: bool = False
     columns: Mapping[str, Source] | str | None = None
     decimal: str | None = None
@@ -85,17 +83,12 @@ SI = Reading()  # a file in SI units
 
 @dataclass(frozen=True, eq=False)
 class Conversion:
-    """Turns rows of a file into SI.
+    """Turns rows of a file into SI."""
 
-    `names`: columns after the conversion: torque that is current becomes i1….
-    `factor`: (columns,), multiplies each column.
-    `from_first`: whether time counts from the first row: a large count has no room for small parts of a second.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # columns after the conversion: torque that is current becomes i1…
     effort_kind: EffortKind
-    factor: Array
-    from_first: bool
+    factor: Array  # (columns,), multiplies each column
+    from_first: bool  # whether time counts from the first row: a large count has no room for small parts of a second
 
     @staticmethod
     def design(names: Sequence[str], effort_kind: EffortKind, reading: Reading) -> "Conversion":

@@ -8,7 +8,7 @@ from tauscope.diagnosis.documents.plots import DiagnosisPlots, diagnosis_plots
 from tauscope.diagnosis.documents.result import FindingEntry
 from tauscope.diagnosis.next_experiment import PlannedExperiment
 from tauscope.number_text import chance, counted, significant
-from tauscope.report.figures import difference_figure, heat_map, heat_table, motion_figure, shift_figure
+from tauscope.report.figures import difference_figure, heat_map, heat_table, motion_figure, proof_figure, shift_figure
 from tauscope.report.page import Card, Drawing, Fold, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.provenance import Provenance
 from tauscope.report.tables import (
@@ -20,7 +20,6 @@ from tauscope.report.tables import (
     residual_table,
     shift_table,
 )
-from tauscope.report.torque_figure import proof_figure
 from tauscope.report.words import (
     MOST_FINDINGS,
     constancy_sentence,

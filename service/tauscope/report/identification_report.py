@@ -5,11 +5,10 @@ from collections.abc import Iterator, Sequence
 from tauscope.identification import Identification, IdentificationDocument, document
 from tauscope.number_text import counted, percent, significant
 from tauscope.recording import Recording
-from tauscope.report.figures import friction_figure, parameter_figure, residual_figure
-from tauscope.report.friction_curve import friction_curve
+from tauscope.report.curves import MOST_SERIES, TorqueSeries, friction_curve, torque_series
+from tauscope.report.figures import friction_figure, parameter_figure, residual_figure, torque_columns, torque_figure
 from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.provenance import Provenance
-from tauscope.report.series import MOST_SERIES, TorqueSeries, torque_series
 from tauscope.report.tables import (
     base_parameter_table,
     conditioning_table,
@@ -19,7 +18,6 @@ from tauscope.report.tables import (
     link_table,
     rotor_table,
 )
-from tauscope.report.torque_figure import torque_columns, torque_figure
 from tauscope.report.words import band_words, cautions, fit_sentences, masked_samples, noise_ratio, noise_words
 
 _FRICTION_EQUATION = "τ_f(q̇) = τ_s A(K_v q̇) + τ_sc A(δ q̇) + τ_v q̇ + offset,  A(x) = (2/π) arctan x"

@@ -13,8 +13,6 @@ from tauscope.report.tables import Table, input_table
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure on the page."""
-
     svg: Markup
     label: str
     caption: str
@@ -31,26 +29,19 @@ class Numbers:
 
 @dataclass(frozen=True)
 class Card:
-    """One thing of several that are ranked.
+    """One thing of several that are ranked."""
 
-    `rank`: from 1.
-    `probability`: from 0 to 1.
-    `facts`: sequence of (str, str), what is known about it.
-    """
-
-    rank: int
+    rank: int  # from 1
     title: str
     place: str
-    probability: float
+    probability: float  # from 0 to 1
     chance: str
     statement: str
-    facts: Sequence[tuple[str, str]]
+    facts: Sequence[tuple[str, str]]  # sequence of (str, str), what is known about it
 
 
 @dataclass(frozen=True)
 class Fold:
-    """Cards that are folded away."""
-
     title: str
     cards: Sequence[Card]
 
@@ -71,8 +62,6 @@ class Part:
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the page."""
-
     anchor: str
     title: str
     parts: Sequence[Part]
@@ -90,14 +79,9 @@ class KeyFigure:
 
 @dataclass(frozen=True)
 class Page:
-    """Everything on the page.
-
-    `facts`: that stand below the title, beside the date.
-    """
-
     kind: str
     robot: str
-    facts: Sequence[str]
+    facts: Sequence[str]  # that stand below the title, beside the date
     key_figures: Sequence[KeyFigure]
     sentences: Sequence[str]
     cautions: Sequence[str]
@@ -107,7 +91,6 @@ class Page:
 
     @property
     def subtitle(self) -> str:
-        """The facts and the date."""
         return " · ".join([*self.facts, self.provenance.created.strftime("%Y-%m-%d %H:%M %Z").strip()])
 
     @property
@@ -120,7 +103,6 @@ class Page:
 
     @property
     def footer(self) -> str:
-        """What computed it."""
         return ", ".join(f"{name} {version}" for name, version in self.provenance.versions)
 
 

@@ -15,27 +15,19 @@ LIBRARIES = ("tauscope", "numpy", "scipy", "clarabel")  # packages whose version
 
 @dataclass(frozen=True)
 class InputFile:
-    """One file that was read.
-
-    `sha256`: of its bytes, in hexadecimal.
-    """
-
     role: str
     path: str
     size_bytes: int
-    sha256: str
+    sha256: str  # of its bytes, in hexadecimal
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a result comes from.
-
-    `versions`: tuple of (str, str), name and version of what computed it.
-    """
+    """Where a result comes from."""
 
     command: tuple[str, ...]
     inputs: tuple[InputFile, ...]
-    versions: tuple[tuple[str, str], ...]
+    versions: tuple[tuple[str, str], ...]  # tuple of (str, str), name and version of what computed it
     created: datetime
 
 
@@ -45,7 +37,6 @@ def versions() -> tuple[tuple[str, str], ...]:
 
 
 def installed_version(package: str) -> str:
-    """Version of an installed package."""
     try:
         return version(package)
     except PackageNotFoundError:

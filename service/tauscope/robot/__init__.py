@@ -27,7 +27,7 @@ from tauscope.robot.robot import (
     Robot,
     Segment,
 )
-from tauscope.robot.robot_data import robot_from_dict, robot_from_yaml, robot_to_dict
+from tauscope.robot.robot_data import robot_from_dict, robot_to_dict
 from tauscope.robot.robot_file import layout_from_dict, read_layout, read_robot
 from tauscope.robot.urdf import read_urdf_chain
 
@@ -66,7 +66,6 @@ __all__ = [
     "read_robot",
     "read_urdf_chain",
     "robot_from_dict",
-    "robot_from_yaml",
     "robot_to_dict",
     "standard_segments",
 ]

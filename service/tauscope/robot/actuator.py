@@ -16,16 +16,13 @@ GainUnit = Literal["register", "Nm_per_rad"]
 class Servo:
     """Register conversion of a servo family.
 
-    `duty_per_rad`: duty of the bridge per unit of the P register and rad of position error [1/rad].
-    `max_duty`: largest duty that the firmware gives, 0 to 1.
-    `dead_band`: position error below which the bridge is off [rad].
     `torque_per_volt`: stall torque over supply voltage in the data sheet [Nm/V]; None where the family has several
         motors.
     """
 
-    duty_per_rad: float
-    max_duty: float = 1.0
-    dead_band: float = 0.0
+    duty_per_rad: float  # duty of the bridge per unit of the P register and rad of position error [1/rad]
+    max_duty: float = 1.0  # largest duty that the firmware gives, 0 to 1
+    dead_band: float = 0.0  # position error below which the bridge is off [rad]
     torque_per_volt: float | None = None
 
 
@@ -53,33 +50,24 @@ class Actuator:
     Position: torque = κ clip(kp (qref - q), ±max_duty V) - kd q̇ - κ k_e q̇, in the units of `unit`.
     Velocity: kp acts on q̇ref - q̇.
 
-    `kp`: register value, or Nm/rad, N/m; of a velocity loop Nm s/rad, N s/m.
     `kd`: torque per velocity [Nm s/rad or N s/m]; a register's D has no documented unit and acts as viscous friction.
-    `servo`: register conversion, one of `SERVOS`.
-    `supply_voltage`: of the bridge [V]; a column ``volt`` goes before it.
-    `torque_per_volt`: stall torque per volt across the bridge, κ [Nm/V].
-    `max_duty`: largest share of the supply that the firmware gives, 0 to 1; None: the servo's own.
-    `back_emf`: k_e at the joint [V s/rad].
-    `dead_band`: position error below which the bridge is off [rad]; None: the servo's own.
-    `delay`: from the recorded command to its torque [s]; None: estimated.
-    `rate_hz`: rate at which the loop takes commands [Hz]; None: with every sample.
     `temperature_slope`: relative loss of torque per volt with the recorded temperature, κ / (1 + slope (T - 25 °C))
         [1/K].
     `scale_std`: relative standard error of the torque per position error; None: that of a data sheet, or zero in SI.
     """
 
     kind: ActuatorKind
-    kp: float = 0.0
+    kp: float = 0.0  # register value, or Nm/rad, N/m; of a velocity loop Nm s/rad, N s/m
     kd: float = 0.0
     unit: GainUnit = "Nm_per_rad"
-    servo: str | None = None
-    supply_voltage: float | None = None
-    torque_per_volt: float | None = None
-    max_duty: float | None = None
-    back_emf: float = 0.0
-    dead_band: float | None = None
-    delay: float | None = None
-    rate_hz: float | None = None
+    servo: str | None = None  # register conversion, one of `SERVOS`
+    supply_voltage: float | None = None  # of the bridge [V]; a column ``volt`` goes before it
+    torque_per_volt: float | None = None  # stall torque per volt across the bridge, κ [Nm/V]
+    max_duty: float | None = None  # largest share of the supply that the firmware gives, 0 to 1; None: the servo's own
+    back_emf: float = 0.0  # k_e at the joint [V s/rad]
+    dead_band: float | None = None  # position error below which the bridge is off [rad]; None: the servo's own
+    delay: float | None = None  # from the recorded command to its torque [s]; None: estimated
+    rate_hz: float | None = None  # rate at which the loop takes commands [Hz]; None: with every sample
     temperature_slope: float = 0.0
     scale_std: float | None = None
 
@@ -90,7 +78,6 @@ class Actuator:
 
     @property
     def conversion(self) -> Servo:
-        """Register conversion."""
         return SERVOS[self.servo or ASSUMED_SERVO]
 
     @property

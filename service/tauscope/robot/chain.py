@@ -20,34 +20,26 @@ MOST_NAMES = 4  # names that a note lists
 class Chain:
     """Joints, segments and bodies from the base to the tip.
 
-    `segment_names`: the file's joint of each segment.
-    `segments`: one a joint, and one for each joint that follows another.
     `links`: one a segment, about the link frame; zero for a link without inertia, None where no link has one.
-    `friction`: one a joint; None where no joint states it.
-    `rotor_inertia`: one a joint [kg m² or kg]; None where no joint states it.
-    `link_names`: links of the file that make up each link.
-    `branches`: the part of each link that an export leaves where the file has it.
-    `actuators`: one a joint; None where the file has none.
-    `gravity`: (3,),, in the base frame [m/s²]; None where the file states none.
     """
 
     base: str
     tip: str
     joint_names: tuple[str, ...]
     joint_types: tuple[JointType, ...]
-    segment_names: tuple[str, ...]
-    segments: tuple[Segment, ...]
+    segment_names: tuple[str, ...]  # the file's joint of each segment
+    segments: tuple[Segment, ...]  # one a joint, and one for each joint that follows another
     limits: tuple[JointLimits, ...]
     links: tuple[LinkInertia, ...] | None
-    friction: tuple[FrictionCoefficients, ...] | None
-    rotor_inertia: tuple[float, ...] | None
-    link_names: tuple[tuple[str, ...], ...]
-    branches: tuple[LinkInertia, ...]
-    actuators: tuple[Actuator | None, ...]
+    friction: tuple[FrictionCoefficients, ...] | None  # one a joint; None where no joint states it
+    rotor_inertia: tuple[float, ...] | None  # one a joint [kg m² or kg]; None where no joint states it
+    link_names: tuple[tuple[str, ...], ...]  # links of the file that make up each link
+    branches: tuple[LinkInertia, ...]  # the part of each link that an export leaves where the file has it
+    actuators: tuple[Actuator | None, ...]  # one a joint; None where the file has none
     findings: tuple[Finding, ...]
     repairs: tuple[Repair, ...]
     notes: tuple[ResultWarning, ...] = ()
-    gravity: NDArray[np.float64] | None = None
+    gravity: NDArray[np.float64] | None = None  # (3,), in the base frame [m/s²]; None where the file states none
 
 
 @dataclass(frozen=True)

@@ -1,57 +1,47 @@
 """What can be said about a robot file before any motion: a summary, and everything doubtful in it."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pydantic import Field
 
 from tauscope.robot.kinematics import homogeneous
 from tauscope.robot.messages import Finding, Severity
 from tauscope.robot.robot import Joint, JointLimits, JointType, Robot, Segment
 from tauscope.robot.robot_file import read_robot
+from tauscope.strict_model import entry
 
 EARTH = (9.7, 9.9)  # acceleration of gravity on the ground, with room for altitude and latitude [m/s²]
 
 
-@dataclass(frozen=True)
+@entry
 class JointSummary:
-    """One joint in the report.
+    """One joint in the report."""
 
-    `number`: from 1, base first.
-    `origin`: origin of the link frame at q = 0, in the frame of the link before [m].
-    `mass`: of the link that the joint carries, as the model believes [kg].
-    """
-
-    number: int
-    name: str
-    type: JointType
-    limits: JointLimits
-    gear_ratio: float | None
-    torque_constant: float
-    sign: int
-    origin: tuple[float, float, float]
-    axis: tuple[float, float, float]
-    mass: float | None
-    before: tuple[float, ...]
-    after: tuple[float, ...]
+    number: int = Field(description="from 1, base first")
+    name: str = Field(description="of the joint")
+    type: JointType = Field(description="how it moves")
+    limits: JointLimits = Field(description="what it may do; null where nothing is stated")
+    gear_ratio: float | None = Field(description="motor turns per joint turn")
+    torque_constant: float = Field(description="joint Nm (N) per recorded unit")
+    sign: int = Field(description="-1 where the recorded torque is wired the other way round")
+    origin: tuple[float, float, float] = Field(description="of the link frame at q = 0, in the frame before [m]")
+    axis: tuple[float, float, float] = Field(description="unit vector of the joint axis, in the frame before")
+    mass: float | None = Field(description="of the link that it carries, as the model believes [kg]")
+    before: tuple[float, ...] = Field(description="4 × 4, by rows: link = before's · before · motion about z · after")
+    after: tuple[float, ...] = Field(description="4 × 4 transform, row by row, from the joint to the link frame [m]")
 
 
-@dataclass(frozen=True)
+@entry
 class RobotReport:
-    """A robot file at a glance.
+    """A robot file at a glance."""
 
-    `joints`: base first.
-    `gravity`: in the base frame [m/s²].
-    `total_mass`: of all moving links, as the model believes [kg]; None without a model.
-    """
-
-    name: str
-    source: str
-    joints: tuple[JointSummary, ...]
-    gravity: tuple[float, float, float]
-    total_mass: float | None
-    findings: tuple[Finding, ...]
+    name: str = Field(description="of the robot")
+    gravity: tuple[float, float, float] = Field(description="in the base frame [m/s²]")
+    total_mass: float | None = Field(description="of all moving links, as the model believes [kg]; null without one")
+    joints: tuple[JointSummary, ...] = Field(description="base first")
+    findings: tuple[Finding, ...] = Field(description="warnings first")
 
 
 def check_robot(path: Path | str, *, expands_xacro: bool = True) -> RobotReport:
@@ -65,7 +55,6 @@ def check_robot(path: Path | str, *, expands_xacro: bool = True) -> RobotReport:
     links = robot.model.links
     return RobotReport(
         name=robot.name,
-        source=str(path),
         joints=tuple(
             _summary(number, joint, robot.segments[link], None if links is None else links[link].mass)
             for number, (joint, link) in enumerate(zip(robot.joints, robot.own_links, strict=True), start=1)

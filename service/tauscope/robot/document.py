@@ -74,7 +74,6 @@ class DocumentOrigin:
         return ": ".join(parts)
 
     def error(self, place: Place, text: str) -> RobotFileError:
-        """The error of an entry."""
         return RobotFileError(f"{self.where(place)}: {text}")
 
     def validate(self, kind: type[DocumentType]) -> DocumentType:
@@ -117,31 +116,21 @@ Columns = Annotated[Source, BeforeValidator(check_source)]
 
 
 class DenavitHartenbergRowDocument(Document):
-    """One row of ``dh`` or ``mdh``.
+    """One row of ``dh`` or ``mdh``."""
 
-    `theta`: θ [rad].
-    `d`: along z [m].
-    `a`: along x [m].
-    `alpha`: α [rad].
-    """
-
-    theta: Number
-    d: Number
-    a: Number
-    alpha: Number
+    theta: Number  # θ [rad]
+    d: Number  # along z [m]
+    a: Number  # along x [m]
+    alpha: Number  # α [rad]
     type: Motion = JointType.REVOLUTE
 
 
 class CouplingDocument(Document):
-    """The joint that a segment follows.
+    """The joint that a segment follows."""
 
-    `joint`: index of the joint, from 0.
-    `offset`: position of the segment where the joint is at zero [rad or m].
-    """
-
-    joint: Annotated[int, Field(ge=0, lt=MOST_JOINTS, strict=True)]
+    joint: Annotated[int, Field(ge=0, lt=MOST_JOINTS, strict=True)]  # index of the joint, from 0
     multiplier: Number
-    offset: Number
+    offset: Number  # position of the segment where the joint is at zero [rad or m]
 
 
 class ChainDocument(Document):
@@ -174,61 +163,38 @@ class KinematicsDocument(Document):
 
 
 class LimitsDocument(Document):
-    """What a joint may do.
+    """What a joint may do."""
 
-    `position`: lowest and highest position [rad or m].
-    `velocity`: largest speed [rad/s or m/s].
-    `acceleration`: largest acceleration [rad/s² or m/s²].
-    `torque`: largest torque [Nm] or force [N].
-    """
-
-    position: Range | None = None
-    velocity: Positive | None = None
-    acceleration: Positive | None = None
-    torque: Positive | None = None
+    position: Range | None = None  # lowest and highest position [rad or m]
+    velocity: Positive | None = None  # largest speed [rad/s or m/s]
+    acceleration: Positive | None = None  # largest acceleration [rad/s² or m/s²]
+    torque: Positive | None = None  # largest torque [Nm] or force [N]
 
 
 class FrictionShapeDocument(Document):
-    """Shape constants of the friction curve.
+    """Shape constants of the friction curve."""
 
-    `k_v`: K_v of equation (8) [s/rad or s/m].
-    `delta`: δ of equation (7) [s/rad or s/m].
-    """
-
-    k_v: Positive | None = None
-    delta: Positive | None = None
+    k_v: Positive | None = None  # K_v of equation (8) [s/rad or s/m]
+    delta: Positive | None = None  # δ of equation (7) [s/rad or s/m]
 
 
 class ActuatorDocument(Document):
-    """The drive of a joint, as `Actuator` has it.
-
-    `kp`: of the loop, in `unit`.
-    `kd`: torque per velocity [Nm s/rad or N s/m], or a register value.
-    `supply_voltage`: [V].
-    `torque_per_volt`: [Nm/V or N/V].
-    `max_duty`: share of the supply, 0 to 1.
-    `back_emf`: [V s/rad or V s/m].
-    `dead_band`: [rad or m].
-    `delay`: [s]; None: estimated.
-    `rate_hz`: [Hz].
-    `temperature_slope`: relative loss of torque per volt [1/K].
-    `scale_std`: relative standard error of the torque's scale.
-    """
+    """The drive of a joint, as `Actuator` has it."""
 
     kind: Annotated[ActuatorKind, choice("kind", get_args(ActuatorKind))]
-    kp: Positive | None = None
-    kd: NotNegative = 0.0
+    kp: Positive | None = None  # of the loop, in `unit`
+    kd: NotNegative = 0.0  # torque per velocity [Nm s/rad or N s/m], or a register value
     unit: Annotated[GainUnit | None, choice("unit", get_args(GainUnit))] = None
     servo: Annotated[str | None, choice("servo", SERVOS)] = None
-    supply_voltage: Positive | None = None
-    torque_per_volt: Positive | None = None
-    max_duty: Share | None = None
-    back_emf: NotNegative = 0.0
-    dead_band: NotNegative | None = None
-    delay: NotNegative | None = None
-    rate_hz: Positive | None = None
-    temperature_slope: NotNegative = 0.0
-    scale_std: NotNegative | None = None
+    supply_voltage: Positive | None = None  # [V]
+    torque_per_volt: Positive | None = None  # [Nm/V or N/V]
+    max_duty: Share | None = None  # share of the supply, 0 to 1
+    back_emf: NotNegative = 0.0  # [V s/rad or V s/m]
+    dead_band: NotNegative | None = None  # [rad or m]
+    delay: NotNegative | None = None  # [s]; None: estimated
+    rate_hz: Positive | None = None  # [Hz]
+    temperature_slope: NotNegative = 0.0  # relative loss of torque per volt [1/K]
+    scale_std: NotNegative | None = None  # relative standard error of the torque's scale
 
     @model_validator(mode="after")
     def _check_loop(self) -> Self:
@@ -267,29 +233,19 @@ class InertiaDocument(Document):
 
 
 class LinkDocument(Document):
-    """Inertial parameters of one link.
+    """Inertial parameters of one link."""
 
-    `mass`: m [kg].
-    `first_moment`: m s [kg m].
-    `inertia`: about the link frame's origin [kg m²].
-    """
-
-    mass: Number
-    first_moment: Vector
-    inertia: InertiaDocument
+    mass: Number  # m [kg]
+    first_moment: Vector  # m s [kg m]
+    inertia: InertiaDocument  # about the link frame's origin [kg m²]
 
 
 class FrictionDocument(Document):
-    """Friction coefficients of one joint.
+    """Friction coefficients of one joint."""
 
-    `stiction`: τ_s [Nm or N].
-    `stribeck`: τ_sc [Nm or N].
-    `viscous`: τ_v [Nm s/rad or N s/m].
-    """
-
-    stiction: Number
-    stribeck: Number
-    viscous: Number
+    stiction: Number  # τ_s [Nm or N]
+    stribeck: Number  # τ_sc [Nm or N]
+    viscous: Number  # τ_v [Nm s/rad or N s/m]
 
 
 class ModelDocument(Document):
@@ -304,14 +260,11 @@ class ModelDocument(Document):
 
 
 class RecordingDocument(Document):
-    """How the arm's recordings are written.
-
-    `rate_hz`: samples a second where t counts samples [Hz].
-    """
+    """How the arm's recordings are written."""
 
     columns: dict[Name, Columns] | Name | None = None
     units: dict[Name, Name] = Field(default_factory=dict)
-    rate_hz: Positive | None = None
+    rate_hz: Positive | None = None  # samples a second where t counts samples [Hz]
     decimal: Text | None = None
     delimiter: Text | None = None
     topic: Name | None = None
@@ -331,21 +284,16 @@ class RecordingDocument(Document):
 
     @property
     def layout(self) -> RecordingLayout:
-        """The same for those who read."""
         return RecordingLayout(self.units, self.rate_hz, self.columns, self.decimal, self.delimiter, self.topic)
 
 
 class RobotDocument(Document):
-    """The whole robot file.
-
-    `gravity`: in the base frame [m/s²]; None: the gravity of the MJCF, else [0, 0, -9.81].
-    `locked`: position of joints that do not move [rad or m].
-    """
+    """The whole robot file."""
 
     name: Name
     kinematics: KinematicsDocument
-    gravity: Vector | None = None
-    locked: dict[Name, Number] = Field(default_factory=dict)
+    gravity: Vector | None = None  # in the base frame [m/s²]; None: the gravity of the MJCF, else [0, 0, -9.81]
+    locked: dict[Name, Number] = Field(default_factory=dict)  # position of joints that do not move [rad or m]
     joints: list[JointDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
     model: ModelDocument | None = None
     recording: RecordingDocument | None = None
@@ -367,13 +315,10 @@ class RobotDocument(Document):
 
 
 class PlacementDocument(Document):
-    """A fixed rigid displacement x ↦ R x + p.
-
-    `translation`: p [m].
-    """
+    """A fixed rigid displacement x ↦ R x + p."""
 
     rotation: Rotation
-    translation: Vector
+    translation: Vector  # p [m]
 
 
 class SegmentDocument(Document):

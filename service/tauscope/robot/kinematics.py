@@ -70,18 +70,10 @@ def joint_displacement(kind: JointType, axis: Array, position: float) -> Placeme
 
 @dataclass(frozen=True)
 class DenavitHartenbergRow:
-    """One row of Denavit-Hartenberg parameters.
-
-    `theta`: θ; a revolute joint's position adds to it [rad].
-    `d`: along z; a prismatic joint's position adds to it [m].
-    `a`: along x [m].
-    `alpha`: α, about x [rad].
-    """
-
-    theta: float
-    d: float
-    a: float
-    alpha: float
+    theta: float  # θ; a revolute joint's position adds to it [rad]
+    d: float  # along z; a prismatic joint's position adds to it [m]
+    a: float  # along x [m]
+    alpha: float  # α, about x [rad]
     type: JointType = JointType.REVOLUTE
 
 

@@ -1,10 +1,13 @@
 """Messages about a user's files: findings, and foreign text made fit for one line."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from difflib import get_close_matches
 from enum import StrEnum
 from itertools import islice
+
+from pydantic import Field
+
+from tauscope.strict_model import entry
 
 _LISTED_NAMES = 12
 _LONGEST_NAME = 60
@@ -36,13 +39,13 @@ class Severity(StrEnum):
     INFO = "info"
 
 
-@dataclass(frozen=True)
+@entry
 class Finding:
-    """One remark on a robot."""
+    """One remark on a robot or a recording."""
 
-    severity: Severity
-    where: str
-    text: str
+    severity: Severity = Field(description="warning: may spoil results; info: good to know")
+    where: str = Field(description="file and place, or column, that it is about")
+    text: str = Field(description="what is so, and what to do about it")
 
 
 LONGEST_VALUE = 60

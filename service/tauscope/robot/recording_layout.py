@@ -39,7 +39,6 @@ class RecordingLayout:
     `units`: unit of ``t``, ``q``, ``qd``, ``tau``, or of one joint's column, ``q3``.
     `rate_hz`: samples a second where t counts samples [Hz].
     `decimal`, `delimiter`: None where the file shows them.
-    `topic`: of a log with several topics.
     """
 
     units: Mapping[str, str] = field(default_factory=dict)
@@ -47,7 +46,7 @@ class RecordingLayout:
     columns: Mapping[str, Source] | str | None = None
     decimal: str | None = None
     delimiter: str | None = None
-    topic: str | None = None
+    topic: str | None = None  # of a log with several topics
 
 
 def find_fault(units: Mapping[str, str], rate_hz: float | None) -> tuple[str, str] | None:

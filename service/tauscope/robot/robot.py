@@ -4,10 +4,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict, Field
 
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.actuator import Actuator
@@ -28,88 +29,63 @@ class JointType(StrEnum):
 
     @property
     def unit(self) -> str:
-        """Unit of its position."""
         return "m" if self is JointType.PRISMATIC else "rad"
 
     @property
     def torque_unit(self) -> str:
-        """Unit of what drives it."""
         return "N" if self is JointType.PRISMATIC else "Nm"
 
 
 @dataclass(frozen=True)
 class JointLimits:
-    """What a joint may do; None where nothing is stated.
+    """What a joint may do; None where nothing is stated."""
 
-    `position`: lowest and highest position [rad or m].
-    `velocity`: largest speed [rad/s or m/s].
-    `acceleration`: largest acceleration [rad/s² or m/s²].
-    `torque`: largest torque [Nm] or force [N].
-    """
-
-    position: tuple[float, float] | None = None
-    velocity: float | None = None
-    acceleration: float | None = None
-    torque: float | None = None
+    __pydantic_config__ = ConfigDict(extra="forbid", json_schema_serialization_defaults_required=True)  # in answers
+    position: Annotated[tuple[float, float] | None, Field(description="lowest and highest position [rad or m]")] = None
+    velocity: Annotated[float | None, Field(description="largest speed [rad/s or m/s]")] = None
+    acceleration: Annotated[float | None, Field(description="largest acceleration [rad/s² or m/s²]")] = None
+    torque: Annotated[float | None, Field(description="largest torque [Nm] or force [N]")] = None
 
 
 @dataclass(frozen=True)
 class FrictionShape:
-    """Shape constants of the friction curve (7), (8); None where the data shall tell.
+    """Shape constants of the friction curve (7), (8); None where the data shall tell."""
 
-    `k_v`: steepness K_v of the sign's smooth stand-in, equation (8) [s/rad or s/m].
-    `delta`: steepness δ of the Stribeck part, equation (7) [s/rad or s/m].
-    """
-
-    k_v: float | None = None
-    delta: float | None = None
+    k_v: float | None = None  # steepness K_v of the sign's smooth stand-in, equation (8) [s/rad or s/m]
+    delta: float | None = None  # steepness δ of the Stribeck part, equation (7) [s/rad or s/m]
 
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint: its name, its limits and what turns a recorded drive signal into joint torque.
-
-    `gear_ratio`: motor turns per joint turn; None where not stated.
-    `has_torque_constant`: whether the robot file states the constant; 1 stands where it does not.
-    `actuator`: of the robot file, else of the user's MJCF.
-    """
+    """One joint: its name, its limits and what turns a recorded drive signal into joint torque."""
 
     name: str
     type: JointType = JointType.REVOLUTE
     limits: JointLimits = JointLimits()
-    gear_ratio: float | None = None
+    gear_ratio: float | None = None  # motor turns per joint turn; None where not stated
     torque_constant: float = 1.0
     sign: int = 1
     friction_shape: FrictionShape = FrictionShape()
     drive: Mapping[str, Any] | None = None
-    has_torque_constant: bool = False
-    actuator: Actuator | None = None
+    has_torque_constant: bool = False  # whether the robot file states the constant; 1 stands where it does not
+    actuator: Actuator | None = None  # of the robot file, else of the user's MJCF
 
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """A fixed rigid displacement x ↦ R x + p.
+    """A fixed rigid displacement x ↦ R x + p."""
 
-    `rotation`: (3, 3), R, orthonormal, right-handed.
-    `translation`: (3,), p [m].
-    """
-
-    rotation: Array = field(default_factory=lambda: np.eye(3))
-    translation: Array = field(default_factory=lambda: np.zeros(3))
+    rotation: Array = field(default_factory=lambda: np.eye(3))  # (3, 3), R, orthonormal, right-handed
+    translation: Array = field(default_factory=lambda: np.zeros(3))  # (3,), p [m]
 
 
 @dataclass(frozen=True)
 class Coupling:
-    """A segment that follows a joint: its own position is multiplier · q_joint + offset.
+    """A segment that follows a joint: its own position is multiplier · q_joint + offset."""
 
-    `joint`: index of the joint, from 0.
-    `multiplier`: turn or slide of the segment per turn or slide of the joint.
-    `offset`: position of the segment at q_joint = 0 [rad or m].
-    """
-
-    joint: int
-    multiplier: float = 1.0
-    offset: float = 0.0
+    joint: int  # index of the joint, from 0
+    multiplier: float = 1.0  # turn or slide of the segment per turn or slide of the joint
+    offset: float = 0.0  # position of the segment at q_joint = 0 [rad or m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,14 +95,12 @@ class Segment:
     The joint turns about, or slides along, the z axis between the two placements. Standard DH puts a and α into
     `after`, modified DH into `before`; a URDF puts the axis' orientation into both, so that the link frame stays the
     URDF's own.
-
-    `coupling`: None where the segment is the next joint's own.
     """
 
     type: JointType
     before: Placement
     after: Placement
-    coupling: Coupling | None = None
+    coupling: Coupling | None = None  # None where the segment is the next joint's own
 
 
 def segment_couplings(segments: Iterable[Segment]) -> tuple[Coupling, ...]:
@@ -140,16 +114,11 @@ def segment_couplings(segments: Iterable[Segment]) -> tuple[Coupling, ...]:
 
 @dataclass(frozen=True, eq=False)
 class LinkInertia:
-    """Inertial parameters of one link, in its link frame.
+    """Inertial parameters of one link, in its link frame."""
 
-    `mass`: m [kg].
-    `first_moment`: (3,), m s [kg m].
-    `inertia`: (3, 3), about the link frame's origin, the paper's equation (5) [kg m²].
-    """
-
-    mass: float
-    first_moment: Array
-    inertia: Array
+    mass: float  # m [kg]
+    first_moment: Array  # (3,), m s [kg m]
+    inertia: Array  # (3, 3), about the link frame's origin, the paper's equation (5) [kg m²]
 
     def to_vector(self) -> Array:
         """The ten standard parameters in the order of `STANDARD_PARAMETERS`, shape (10,)."""
@@ -182,55 +151,42 @@ class Repair:
 
 @dataclass(frozen=True)
 class FrictionCoefficients:
-    """Friction of one joint, the seed paper's equation (7).
+    """Friction of one joint, the seed paper's equation (7)."""
 
-    `stiction`: τ_s [Nm or N].
-    `stribeck`: τ_sc, the Coulomb level less the stiction [Nm or N].
-    `viscous`: τ_v [Nm s/rad or N s/m].
-    """
-
-    stiction: float = 0.0
-    stribeck: float = 0.0
-    viscous: float = 0.0
+    stiction: float = 0.0  # τ_s [Nm or N]
+    stribeck: float = 0.0  # τ_sc, the Coulomb level less the stiction [Nm or N]
+    viscous: float = 0.0  # τ_v [Nm s/rad or N s/m]
 
 
 @dataclass(frozen=True)
 class Model:
-    """What the user's simulation believes; None where the robot file says nothing.
+    """What the user's simulation believes; None where the robot file says nothing."""
 
-    `links`: one a segment.
-    `friction`: one a joint.
-    `rotor_inertia`: reflected to the joint, one a joint [kg m² or kg].
-    """
-
-    links: tuple[LinkInertia, ...] | None = None
-    friction: tuple[FrictionCoefficients, ...] | None = None
-    rotor_inertia: tuple[float, ...] | None = None
+    links: tuple[LinkInertia, ...] | None = None  # one a segment
+    friction: tuple[FrictionCoefficients, ...] | None = None  # one a joint
+    rotor_inertia: tuple[float, ...] | None = None  # reflected to the joint, one a joint [kg m² or kg]
 
 
 @dataclass(frozen=True, eq=False)
 class Robot:
     """A robot arm as its robot file describes it.
 
-    `joints`: base first.
-    `segments`: base first; one a joint, and one for each joint that follows another.
     `gravity`: (3,), acceleration of gravity in the base frame [m/s²].
     `segment_names`: joint of the URDF or MJCF that each segment is; empty without such a file, as are the next two.
-    `link_names`: links of that file that make up each link.
     `branches`: the part of each link that an export leaves where the file has it: of a URDF the bodies on joints beside
         the chain, of an MJCF all but the body of the joint.
     """
 
     name: str
-    joints: tuple[Joint, ...]
-    segments: tuple[Segment, ...]
+    joints: tuple[Joint, ...]  # base first
+    segments: tuple[Segment, ...]  # base first; one a joint, and one for each joint that follows another
     gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
     model: Model = Model()
     source: Path | None = None
     urdf: Path | None = None
     mjcf: Path | None = None
     segment_names: tuple[str, ...] = ()
-    link_names: tuple[tuple[str, ...], ...] = ()
+    link_names: tuple[tuple[str, ...], ...] = ()  # links of that file that make up each link
     branches: tuple[LinkInertia, ...] = ()
     findings: tuple[Finding, ...] = ()
     notes: tuple[ResultWarning, ...] = ()
@@ -239,7 +195,6 @@ class Robot:
 
     @property
     def joint_count(self) -> int:
-        """Number of joints n."""
         return len(self.joints)
 
     @property

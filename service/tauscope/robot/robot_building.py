@@ -103,7 +103,6 @@ class _Kinematics:
 
     @property
     def joint_types(self) -> tuple[JointType, ...]:
-        """How each joint moves."""
         moved = [each.joint for each in segment_couplings(self.segments)]
         if self.chain is not None:
             return self.chain.joint_types

@@ -1,40 +1,27 @@
-"""A robot without a file system: from uploaded bytes, to plain data for JSON and back, under one validation."""
+"""A robot as plain data for JSON, and back, under the validation of robot files."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
-from tauscope.errors import RobotFileError
 from tauscope.robot.document import DocumentOrigin, PlainRobotDocument
-from tauscope.robot.messages import nearest, shown
+from tauscope.robot.messages import shown
 from tauscope.robot.robot import Joint, LinkInertia, Model, Placement, Robot, Segment
-from tauscope.robot.robot_building import FileSource, SourceFile, build_robot
-from tauscope.robot.robot_file import parse_robot_file
-from tauscope.robot.xml_text import LARGEST_XML, is_xml
+from tauscope.robot.robot_building import SourceFile, build_robot
 
 
-def robot_from_dict(
-    data: Mapping[str, Any], label: str = "robot", urdf_files: Mapping[str, bytes] | None = None
-) -> Robot:
-    """The robot of plain data: the robot file's form, or that of `robot_to_dict`.
+def robot_from_dict(data: Mapping[str, Any], label: str = "robot") -> Robot:
+    """The robot of plain data: the robot file's form, or that of `robot_to_dict`. No file is opened.
 
-    No file is opened: a URDF that the data name is taken from `urdf_files`. Raises RobotFileError if the data are not
-    valid; one line naming the JSON path and joint.
+    Raises RobotFileError if the data are not valid, or name a file; one line naming the JSON path and joint.
     """
     origin = DocumentOrigin(label, data)
-    document = origin.validate(PlainRobotDocument)
-    return build_robot(document, origin, _find_given(origin, urdf_files or {}))
 
+    def refuse(kind: str, file: str) -> SourceFile:
+        text = f"the file {shown(file)} is not among the given ones; no such file was given"
+        raise origin.error(("kinematics", kind, "file"), text)
 
-def robot_from_yaml(data: bytes, label: str = "robot", urdf_files: Mapping[str, bytes] | None = None) -> Robot:
-    """The robot of an uploaded robot file; as `robot_from_dict` this opens no file.
-
-    Raises RobotFileError if the robot file or its URDF is not valid; one line naming line, place and joint.
-    """
-    document, origin = parse_robot_file(data, label)
-    files = {Path(label).name: data} if is_xml(data) else urdf_files or {}
-    return build_robot(document, origin, _find_given(origin, files))
+    return build_robot(origin.validate(PlainRobotDocument), origin, refuse)
 
 
 def robot_to_dict(robot: Robot) -> dict[str, Any]:
@@ -50,22 +37,6 @@ def robot_to_dict(robot: Robot) -> dict[str, Any]:
     }
     recording = {key: value for key, value in asdict(robot.recording).items() if value} or None
     return {**data, **_drop_none({"model": _model(robot.model) or None, "recording": recording})}
-
-
-def _find_given(origin: DocumentOrigin, files: Mapping[str, bytes]) -> FileSource:
-
-    def look_up(kind: str, file: str) -> SourceFile:
-        if file not in files:
-            hint = nearest(file, files) if files else "no such file was given"
-            text = f"the file {shown(file)} is not among the given ones; {hint}"
-            raise origin.error(("kinematics", kind, "file"), text)
-        data = files[file]
-        if not 0 < len(data) <= LARGEST_XML:
-            limit = LARGEST_XML // 1024
-            raise RobotFileError(f"{file}: must hold 1 byte to {limit} KiB, but holds {len(data)} bytes")
-        return SourceFile(data, file)
-
-    return look_up
 
 
 def _segment(segment: Segment) -> dict[str, Any]:

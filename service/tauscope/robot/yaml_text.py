@@ -25,13 +25,10 @@ Place = tuple[str | int, ...]  # keys and indices that lead from the document's 
 
 @dataclass(frozen=True)
 class YamlContent:
-    """Plain data of a YAML document.
-
-    `lines`: for each entry's place the line, from 1, on which it stands.
-    """
+    """Plain data of a YAML document."""
 
     data: Any
-    lines: dict[Place, int]
+    lines: dict[Place, int]  # for each entry's place the line, from 1, on which it stands
 
 
 class _TooMuchError(Exception):
@@ -48,7 +45,6 @@ class _BoundedComposer(Composer):
         self.open_nodes = 0
 
     def compose_node(self, parent: Any, index: Any) -> Any:
-        """One node of the document, counted."""
         line = self.parser.peek_event().start_mark.line + 1
         self.entries += 1
         if self.entries > MOST_ENTRIES:
@@ -104,7 +100,6 @@ class _PlainBuilder:
         self.entries = 0
 
     def value(self, node: Any, place: Place, line: int) -> Any:
-        """Plain data of a node."""
         self.entries += 1
         if self.entries > MOST_ENTRIES or len(place) > DEEPEST:
             raise self._error(line, "aliases (*name) expand without end; write the entries out")

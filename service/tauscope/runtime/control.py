@@ -17,8 +17,16 @@ from tauscope.robot import read_robot
 from tauscope.runtime.drivers import Connection, make_backend
 from tauscope.runtime.loop import end_event
 from tauscope.runtime.options import RunOrder, read_order
-from tauscope.runtime.processes import RunLock
-from tauscope.runtime.record import FLUSH_S, STOP_FILE, ProcessName, RecordKeeper, RunProblem, RunRecord, read_record
+from tauscope.runtime.record import (
+    FLUSH_S,
+    STOP_FILE,
+    ProcessName,
+    RecordKeeper,
+    RunLock,
+    RunProblem,
+    RunRecord,
+    read_record,
+)
 from tauscope.runtime.run import OpenRecorder, Run, RunTask, Surroundings, open_recorder
 from tauscope.runtime.states import RunState
 from tauscope.runtime.stop_listener import StopListener
@@ -45,7 +53,7 @@ def control(
     keeper.keep(record)
     try:
         task = _task(order, folder, make)
-        run = Run(task, record, Surroundings(folder, stops, keeper, recorder, report))
+        run = Run(task, record, Surroundings(folder, stops, keeper.keep, recorder, report))
     except TauscopeError as error:
         stops.done()
         record = _refuse(record, error)

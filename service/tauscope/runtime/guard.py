@@ -63,24 +63,18 @@ class GuardLimits:
     """Limits of every joint; infinite where there is none.
 
     `position_low`, `position_high`: (n,), range of the targets [rad or m].
-    `velocity`: (n,), largest speed of the targets [rad/s or m/s].
-    `acceleration`: (n,), deceleration on which braking can count [rad/s² or m/s²].
-    `torque`: (n,), largest commanded torque [Nm or N].
-    `following`: (n,), largest distance between target and arm [rad or m].
-    `position_margin`: (n,), how far outside the range the arm itself may be found [rad or m].
-    `temperature_c`: hottest motor [°C].
     """
 
     joints: tuple[str, ...]
     units: tuple[str, ...]
     position_low: Array
     position_high: Array
-    velocity: Array
-    acceleration: Array
-    torque: Array
-    following: Array
-    position_margin: Array
-    temperature_c: float = 80.0
+    velocity: Array  # (n,), largest speed of the targets [rad/s or m/s]
+    acceleration: Array  # (n,), deceleration on which braking can count [rad/s² or m/s²]
+    torque: Array  # (n,), largest commanded torque [Nm or N]
+    following: Array  # (n,), largest distance between target and arm [rad or m]
+    position_margin: Array  # (n,), how far outside the range the arm itself may be found [rad or m]
+    temperature_c: float = 80.0  # hottest motor [°C]
 
     @property
     def drive_limits(self) -> DriveLimits:

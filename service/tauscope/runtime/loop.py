@@ -44,25 +44,19 @@ class GuardedArm:
 
 @dataclass
 class Cycles:
-    """What the loop does to each cycle, and what it keeps of all of them.
-
-    `control`: closes the loop in torque mode; None where the drives do.
-    `worst_following`: (n,), largest distance of arm and target so far [rad or m].
-    `late`: (n,) int64, readings whose instant is not known.
-    `kept`: samples of the motion, with an answer of every joint.
-    """
+    """What the loop does to each cycle, and what it keeps of all of them."""
 
     plan: Plan
     arm: GuardedArm
     metronome: Metronome
     recorder: Recorder
     stops: Stops
-    control: TorqueControl | None
+    control: TorqueControl | None  # closes the loop in torque mode; None where the drives do
     each_cycle: Callable[["Cycles"], None]
     latest_ns: int
-    kept: int = field(init=False, default=0)
-    worst_following: Array = field(init=False)
-    late: NDArray[np.int64] = field(init=False)
+    kept: int = field(init=False, default=0)  # samples of the motion, with an answer of every joint
+    worst_following: Array = field(init=False)  # (n,), largest distance of arm and target so far [rad or m]
+    late: NDArray[np.int64] = field(init=False)  # (n,) int64, readings whose instant is not known
 
     def __post_init__(self) -> None:
         n = self.plan.position.shape[1]

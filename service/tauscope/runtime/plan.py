@@ -66,21 +66,17 @@ _ROUNDING = 1e-9
 class Plan:
     """Targets of every cycle, from where the arm stands to the end of the motion.
 
-    `rate_hz`: cycles a second [Hz].
     `period_ns`: time between cycles [ns].
     `position`, `velocity`: (N, n), targets [rad or m, and per s].
-    `torque`: (N, n), what the model predicts, within the torque limits; zero where there is no model [Nm or N].
-    `period`: (N,), index of the excitation period, NaN outside the repeated part.
-    `phase`: (N,) int64, ramp or motion, as in `tauscope.recording.journal_rows.Phase`.
     """
 
-    rate_hz: float
+    rate_hz: float  # cycles a second [Hz]
     period_ns: int
     position: Array
     velocity: Array
-    torque: Array
-    period: Array
-    phase: NDArray[np.int64]
+    torque: Array  # (N, n), what the model predicts, within the torque limits; zero where there is no model [Nm or N]
+    period: Array  # (N,), index of the excitation period, NaN outside the repeated part
+    phase: NDArray[np.int64]  # (N,) int64, ramp or motion, as in `tauscope.recording.journal_rows.Phase`
     limits: GuardLimits
 
     @property

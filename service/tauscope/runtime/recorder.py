@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,7 @@ from tauscope.recording.journal import JournalWriter
 from tauscope.recording.journal_process import FRAME, HEADER, ROW, event_frame, frame
 from tauscope.recording.journal_reading import journal_recording, read_journal
 from tauscope.recording.journal_rows import JournalHeader, journal_row_type
-from tauscope.runtime.processes import child_environment
-from tauscope.runtime.record import JOURNAL_FILE, RECORDING_STEM, RecordingFiles
+from tauscope.runtime.record import JOURNAL_FILE, RECORDING_STEM, RecordingFiles, child_environment
 from tauscope.runtime.states import Stops, raise_if_requested
 
 PIPE_BYTES = 2**20  # room between loop and writer: some seconds of cycles
@@ -31,24 +30,6 @@ OPENING_S = 20.0  # time that the writer may take to start
 CLOSING_S = 5.0  # time that the writer may take to write what is left
 _LARGEST_FRAME = select.PIPE_BUF
 _ROWS_AT_ONCE = 32
-
-
-class Recorder(Protocol):
-    """Takes the cycles of a run; never holds up the loop that gives them."""
-
-    @property
-    def lost(self) -> int:
-        """Rows that were not taken because the writer was behind."""
-        ...
-
-    def put(self, row: NDArray[np.void]) -> None:
-        """Take a cycle. `row`: (1,) of `journal_row_type`, the cycle; copied."""
-
-    def event(self, time_ns: int, event: Mapping[str, Any]) -> None:
-        """Take an event. `time_ns`: when, by the clock of the rows [ns]."""
-
-    def close(self) -> str | None:
-        """Bring everything to the file; why that did not work, None where it did."""
 
 
 class DirectRecorder:
@@ -63,10 +44,10 @@ class DirectRecorder:
             raise _cannot_open(path, error.strerror) from error
         self._rows = np.empty(_ROWS_AT_ONCE, dtype=journal_row_type(header.joint_count))
         self._count = 0
-        self.lost = 0
+        self.lost = 0  # rows that were not taken because the writer was behind
 
     def put(self, row: NDArray[np.void]) -> None:
-        """Take a cycle. `row`: (1,) of `journal_row_type`, the cycle; copied."""
+        """Take a cycle, and never hold up the loop. `row`: (1,) of `journal_row_type`, the cycle; copied."""
         self._rows[self._count] = row[0]
         self._count += 1
         if self._count == len(self._rows):
@@ -77,6 +58,7 @@ class DirectRecorder:
         self._writer.write_event(time_ns, event)
 
     def close(self) -> str | None:
+        """Bring everything to the file; why that did not work, None where it did."""
         try:
             self._write()
             self._writer.close()
@@ -165,6 +147,9 @@ class RecorderProcess:
             raise AcquisitionError(
                 f"{self._path}: the journal's writer has ended, nothing more is recorded; is the disk full?"
             ) from error
+
+
+Recorder = DirectRecorder | RecorderProcess
 
 
 def _last_answer(said: bytes) -> dict[str, Any]:

@@ -3,40 +3,33 @@
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from tauscope.errors import AcquisitionError, TauscopeError, one_line
 from tauscope.recording.journal_rows import JournalHeader, Phase
 from tauscope.robot import Robot
-from tauscope.runtime.drivers import DEFAULT_BACKEND, Connection
+from tauscope.runtime.drivers import DEFAULT_BACKEND, Connection, make_backend, translate_driver_errors
 from tauscope.runtime.guard import Guard, GuardViolationError
 from tauscope.runtime.loop import Cycles, GuardedArm, ProgressReporter, Report, end_event, state_event
 from tauscope.runtime.options import ORDER_FILE, RELEASE, RunOptions, choose_stop_policy, is_released
 from tauscope.runtime.plan import Plan, make_plan
 from tauscope.runtime.record import JOURNAL_FILE, RUN_FILE, RunProblem, RunRecord, Transition, new_record, write_record
 from tauscope.runtime.recorder import DirectRecorder, Recorder, RecorderProcess, save_recording
-from tauscope.runtime.release import release_settled
 from tauscope.runtime.states import ManualStop, RunState, StopAskedError, Stops, raise_if_requested
 from tauscope.runtime.timing import SIMULATED_TIME, Metronome, real_time
 from tauscope.runtime.torque_control import torque_control
 from tauscope.trajectory import Trajectory
-from tauscope_drivers import ArmState, Backend, ControlMode, DriverError
+from tauscope_drivers import ArmState, Backend, ControlMode, DriverError, StopPolicy
 
 OpenRecorder = Callable[[Path, JournalHeader, Stops, bool], Recorder]
 """Opens a journal: its path, its header, requests to stop, and whether the arm runs in real time."""
-
-
-class Keeper(Protocol):
-    """Takes a run's record whenever it changes."""
-
-    def keep(self, record: RunRecord) -> None:
-        """Keep the newest record; must not take time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +44,7 @@ class RunTask:
 class Surroundings:
     folder: Path
     stops: Stops
-    keeper: Keeper
+    keep: Callable[[RunRecord], None]  # the newest record, whenever it changes; must not take time
     open_recorder: OpenRecorder
     report: Report
 
@@ -268,7 +261,7 @@ class Run:
 
     def _enter(self, state: RunState, **changes: Any) -> None:
         self.record = self.record.moved(state, **changes)
-        self._around.keeper.keep(self.record)
+        self._around.keep(self.record)
         transition = self.record.history[-1]
         self._tell(state_event(state, transition.at))
         if self._recorder is not None and self._backend is not None and not state.is_end:
@@ -327,10 +320,10 @@ def run_trajectory(
     options = options or RunOptions()
     prepare_folder(folder)
     record = new_record(robot.name, backend_name, options.mode.value)
-    keeper = _DirectKeeper(folder)
-    around = Surroundings(folder, stops or ManualStop(), keeper, open_recorder, report or _nobody)
+    keep = partial(_keep_at_once, folder)
+    around = Surroundings(folder, stops or ManualStop(), keep, open_recorder, report or _nobody)
     run = Run(RunTask(robot, trajectory, options, connect), record, around)
-    keeper.keep(record)
+    keep(record)
     return run.execute()
 
 
@@ -358,19 +351,54 @@ def open_recorder(path: Path, header: JournalHeader, stops: Stops, is_real_time:
     return recorder
 
 
-class _DirectKeeper:
-    """Writes the record at once: in virtual time nobody is late."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def keep(self, record: RunRecord) -> None:
-        try:
-            write_record(self._folder, record)
-        except OSError as error:
-            place = f"{self._folder}: the run's record cannot be written"
-            raise AcquisitionError(f"{place} ({error.strerror or error})") from error
+def _keep_at_once(folder: Path, record: RunRecord) -> None:
+    """Write the record: in virtual time nobody is late."""
+    try:
+        write_record(folder, record)
+    except OSError as error:
+        place = f"{folder}: the run's record cannot be written"
+        raise AcquisitionError(f"{place} ({error.strerror or error})") from error
 
 
 def _nobody(event: Any) -> None:
     del event
+
+
+SETTLED_S = 0.5  # time for which every joint has to stand still [s]
+STILL = 1e-3  # most that a joint may move in that time: some counts of an encoder [rad or m]
+LONGEST_S = 5.0  # time after which an arm that does not come to rest stays held [s]
+_LOOK_S = 0.05
+
+
+def release_settled(backend: Backend, state: ArmState) -> ArmState:
+    """Hold an arm that was just stopped until it stands still, then let go; one that moves stays held."""
+    clock = backend.clock
+    begin_ns = since_ns = clock.now_ns()
+    place = state.position
+    while clock.now_ns() - begin_ns < LONGEST_S * 1e9:
+        if state.faults or not np.isfinite(state.position).all():
+            return state
+        if (np.abs(state.position - place) > STILL).any():
+            place, since_ns = state.position, clock.now_ns()
+        if clock.now_ns() - since_ns >= SETTLED_S * 1e9:
+            return backend.stop(StopPolicy.TORQUE_OFF)
+        clock.wait_until_ns(clock.now_ns() + round(_LOOK_S * 1e9))
+        state = backend.stop(StopPolicy.HOLD)
+    return state
+
+
+def release(backend_name: str, robot: Robot, settings: Mapping[str, Any]) -> None:
+    """Take the torque off an arm. Raises AcquisitionError where a drive is not reached, or is under power still."""
+    backend = make_backend(backend_name, robot, settings).backend
+    with translate_driver_errors():
+        backend.connect()
+        try:
+            state = backend.stop(StopPolicy.TORQUE_OFF)
+        finally:
+            backend.disconnect()
+    held = [joint.name for joint, is_held in zip(robot.joints, state.enabled, strict=True) if is_held]
+    if held:
+        raise AcquisitionError(f"{', '.join(held)}: still under power; switch the arm's power off, look at its drives")
+    silent = [fault for fault in state.faults if fault.code == "silent"]
+    if silent:
+        raise AcquisitionError(f"{silent[0]}")

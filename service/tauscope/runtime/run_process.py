@@ -18,7 +18,6 @@ from tauscope.recording.journal_process import wait_for_writer
 from tauscope.robot import Robot
 from tauscope.runtime.loop import Report
 from tauscope.runtime.options import RunOrder, write_order
-from tauscope.runtime.processes import child_environment, wait_for_lock
 from tauscope.runtime.record import (
     JOURNAL_FILE,
     LOG_FILE,
@@ -27,9 +26,11 @@ from tauscope.runtime.record import (
     ProcessName,
     RunProblem,
     RunRecord,
+    child_environment,
     new_record,
     read_process,
     read_record,
+    wait_for_lock,
     write_process,
     write_record,
 )

@@ -46,11 +46,6 @@ def may_follow(before: RunState, after: RunState) -> bool:
     return after in TRANSITIONS[before]
 
 
-def after_stop(state: RunState) -> RunState:
-    """Where a request to stop leads: legal in every state, and without effect on a run that stops or has ended."""
-    return state if state is RunState.STOPPING or state.is_end else RunState.STOPPING
-
-
 class StopSource(StrEnum):
     OPERATOR = "operator"  # a byte on the pipe, the stop file, or a signal
     OWNER_GONE = "owner-gone"  # the process that started the run has died, or is silent while the arm runs in real time

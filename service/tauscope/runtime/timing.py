@@ -32,7 +32,7 @@ SIMULATED_TIME = RealTime(scheduler="virtual time needs none", memory_locked=Fal
 
 
 @contextmanager
-def real_time(priority: int = PRIORITY) -> Iterator[RealTime]:
+def real_time() -> Iterator[RealTime]:
     """Run the calling thread as real-time as the system permits, and as an ordinary one afterwards.
 
     The other threads that there are become real-time too, below it: one that holds the interpreter's lock, and is kept
@@ -42,9 +42,9 @@ def real_time(priority: int = PRIORITY) -> Iterator[RealTime]:
     gc.collect()
     gc.freeze()
     gc.disable()
-    refusal = _enter_real_time(priority)
+    refusal = _enter_real_time()
     try:
-        scheduler = f"fifo {priority}" if refusal is None else f"ordinary: SCHED_FIFO was refused ({refusal})"
+        scheduler = f"fifo {PRIORITY}" if refusal is None else f"ordinary: SCHED_FIFO was refused ({refusal})"
         yield RealTime(scheduler=scheduler, memory_locked=locked, collector_frozen=True)
     finally:
         for thread in _threads():
@@ -55,10 +55,10 @@ def real_time(priority: int = PRIORITY) -> Iterator[RealTime]:
             _library().munlockall()
 
 
-def _enter_real_time(priority: int) -> str | None:
+def _enter_real_time() -> str | None:
     """Ask for SCHED_FIFO, which child processes and new threads do not inherit; why it was refused, None where not."""
     own = threading.get_native_id()
-    priorities = {own: priority} | {thread: priority - BESIDE for thread in _threads() if thread != own}
+    priorities = {own: PRIORITY} | {thread: PRIORITY - BESIDE for thread in _threads() if thread != own}
     try:
         for thread, its_priority in priorities.items():
             _schedule(thread, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, its_priority)

@@ -17,7 +17,7 @@ from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.diagnose import DiagnosisOptions
 from tauscope.tasks.identify import IdentificationOptions
 from tauscope.tasks.run import BackendChoice
-from tauscope.tasks.task import Files, LocalFiles, Outputs, Progress
+from tauscope.tasks.task import Files, Outputs, Progress
 
 
 class HeldOutMotion(StrictModel):
@@ -73,12 +73,7 @@ class Request(CampaignOptions):
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What came of it.
-
-    `recordings`: the training recording, and the held-out one where there is one.
-    """
-
-    recordings: tuple[Path, ...]
+    recordings: tuple[Path, ...]  # the training recording, and the held-out one where there is one
     identification: identify.Result
     diagnosis: diagnose.Result | None
 
@@ -113,11 +108,11 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
         "held_out": () if judge is None else (str(judge),),
     }
     wanted = identify.Request.model_validate({**inputs, "options": request.identification})
-    identified = identify.perform(wanted, LocalFiles(), progress)
+    identified = identify.perform(wanted, Files(), progress)
     diagnosed = None
     if request.diagnosis is not None:
         question = diagnose.Request.model_validate({**inputs, "options": request.diagnosis})
-        diagnosed = diagnose.perform(question, LocalFiles(), progress)
+        diagnosed = diagnose.perform(question, Files(), progress)
     return Result((train,) if judge is None else (train, judge), identified, diagnosed)
 
 
@@ -126,7 +121,7 @@ def _record(request: Request, options: ExcitationDesignOptions, files: Files, pl
     robot, is_held_out = str(files.find("robot", request.robot)), place.name == "held-out"
     design = design_excitation.Request(robot=robot, options=options)
     trajectory, recording = place.with_suffix(".json"), place.with_suffix(".csv")
-    write_atomically(trajectory, design_excitation.perform(design, LocalFiles(), progress).outputs["trajectory.json"])
+    write_atomically(trajectory, design_excitation.perform(design, Files(), progress).outputs["trajectory.json"])
     backend, scenario = backend_of_run(request.backend, held_out=is_held_out), place.with_suffix(".scenario.json")
     if backend.name == "sim":
         content = {"seed": int(is_held_out), **(backend.scenario or {})}
@@ -138,7 +133,7 @@ def _record(request: Request, options: ExcitationDesignOptions, files: Files, pl
         trajectory=str(trajectory),
         options=request.run,
     )
-    result = run.perform(wanted, LocalFiles({"run": place}), progress)
+    result = run.perform(wanted, Files({"run": place}), progress)
     found = result.recording("csv")
     if result.record.state is not RunState.FINISHED or found is None:
         why = result.record.stop if result.record.problem is None else result.record.problem.detail

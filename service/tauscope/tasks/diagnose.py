@@ -93,16 +93,11 @@ class Request(TaskRequest):
 
 @dataclass(frozen=True, eq=False)
 class Result(TaskResult):
-    """What came of it.
-
-    `refusal`: why the next motion cannot be planned within the robot's limits.
-    """
-
     held_out: tuple[Recording, ...]
     diagnosis: Diagnosis
     document: DiagnosisDocument
     planned: PlannedExperiment | None
-    refusal: ExcitationError | None
+    refusal: ExcitationError | None  # why the next motion cannot be planned within the robot's limits
 
     @property
     def outputs(self) -> Outputs:

@@ -77,8 +77,6 @@ class Request(TaskRequest):
 
 @dataclass(frozen=True, eq=False)
 class Result(TaskResult):
-    """What came of it."""
-
     held_out: tuple[Recording, ...]
     identification: Identification
     document: IdentificationDocument
@@ -91,7 +89,7 @@ class Result(TaskResult):
         return Outputs({**documents, "result.json": partial(json_text, self.document), **exports})
 
     def _plots(self) -> str:
-        from tauscope.report.identification_plots import identification_plots
+        from tauscope.report.curves import identification_plots
 
         return json_text(identification_plots(self.identification, self.recordings, self.held_out), None)
 

@@ -63,8 +63,6 @@ class Request(StrictModel):
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What came of it."""
-
     robot: Robot
     record: RunRecord
     folder: Path
@@ -139,7 +137,6 @@ def recording_file(folder: Path, format_: str) -> Path:
 
 
 def _tell(event: Any, progress: Callable[..., None]) -> None:
-    """What the control process says."""
     if event["event"] == "progress":
         step = f"{event['state']}, {event['time_s']:.1f} of {event['duration_s']:.1f} s"
         progress(step, float(event["percent"]), event)

@@ -1,7 +1,7 @@
 """What all tasks share: how a request names files, how progress is told, and how outputs are made."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
@@ -34,7 +34,6 @@ class TaskRequest(StrictModel):
 
     @property
     def command(self) -> tuple[str, ...]:
-        """The command line that does the same."""
         raise NotImplementedError
 
     @property
@@ -94,7 +93,6 @@ class ReadingOptions(StrictModel):
     @field_validator("decimal", "delimiter")
     @classmethod
     def _check_separator(cls, sign: str | None, info: ValidationInfo) -> str | None:
-        """Signs that can separate."""
         fault = find_separator_fault(**{"decimal": None, "delimiter": None, str(info.field_name): sign})
         if fault is not None:
             raise PydanticCustomError("separator", "{text}", {"text": fault[1]})
@@ -102,7 +100,6 @@ class ReadingOptions(StrictModel):
 
     @property
     def reading(self) -> Reading:
-        """The same for those who read."""
         return Reading(
             self.units or {},
             self.rate_hz,
@@ -138,39 +135,23 @@ class Progress(Protocol):
         ...
 
 
-class Files(Protocol):
-    """Where the files of a request lie, and what a result calls them."""
+class Files:
+    """Where the files of a request lie: here by their paths, as on a command line; and what a result calls them."""
+
+    def __init__(self, targets: Mapping[str, Path] = {}) -> None:
+        self._targets = targets
 
     def find(self, role: str, name: str) -> Path:
-        """Where an input lies; raises RecordingError where it is not what was asked for."""
-        ...
-
-    def show(self, path: Path) -> str:
-        """What reports call an input."""
-        ...
-
-    def target(self, output: str) -> Path | None:
-        """Where an output is written; None where it is not wanted."""
-        ...
-
-
-@dataclass(frozen=True)
-class LocalFiles:
-    """Files by their paths, as on a command line."""
-
-    targets: Mapping[str, Path] = field(default_factory=dict)
-
-    def find(self, role: str, name: str) -> Path:
-        """The path itself."""
+        """Where an input lies. Raises RecordingError where it is not what was asked for."""
         return find_path(name)
 
     def show(self, path: Path) -> str:
-        """The path itself."""
+        """What reports call an input."""
         return str(path)
 
     def target(self, output: str) -> Path | None:
         """Where an output is written; None where it is not wanted."""
-        return self.targets.get(output)
+        return self._targets.get(output)
 
 
 class Outputs(Mapping[str, bytes]):
@@ -183,7 +164,6 @@ class Outputs(Mapping[str, bytes]):
         self._make = make
 
     def __getitem__(self, name: str) -> bytes:
-        """Content of an output."""
         made = self._make[name]()
         return made.encode() if isinstance(made, str) else made
 
@@ -192,11 +172,9 @@ class Outputs(Mapping[str, bytes]):
         return name in self._make
 
     def __iter__(self) -> Iterator[str]:
-        """Names of all outputs."""
         return iter(self._make)
 
     def __len__(self) -> int:
-        """How many there are."""
         return len(self._make)
 
 

@@ -10,8 +10,13 @@ from tauscope.robot import Robot
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.messages import shown
 from tauscope.trajectory.csv_format import parse_trajectory_csv, trajectory_csv
-from tauscope.trajectory.document import TrajectoryDocument, trajectory_document, trajectory_of
-from tauscope.trajectory.excitation_document import EXCITATION_SCHEMA, ExcitationDocument
+from tauscope.trajectory.document import (
+    EXCITATION_SCHEMA,
+    ExcitationDocument,
+    TrajectoryDocument,
+    trajectory_document,
+    trajectory_of,
+)
 from tauscope.trajectory.trajectory import Trajectory
 
 LARGEST_FILE = 256 * 2**20

@@ -27,18 +27,13 @@ class MotionSamples:
 class FourierSeries:
     """One finite Fourier series a joint about a centre, M harmonics of ω_f = 2π/T, the seed paper's section 5.2.
 
-        q̇_i(t) = Σ_l a_l cos(ω_f l t) + b_l sin(ω_f l t)
-
-    `period_s`: fundamental period T [s].
-    `centre`: (n,), mean position [rad or m].
-    `cosine`: (n, M), a_l, velocity amplitude of the cosine of harmonic l [rad/s or m/s].
-    `sine`: (n, M), b_l, velocity amplitude of the sine of harmonic l [rad/s or m/s].
+    q̇_i(t) = Σ_l a_l cos(ω_f l t) + b_l sin(ω_f l t)
     """
 
-    period_s: float
-    centre: Array
-    cosine: Array
-    sine: Array
+    period_s: float  # fundamental period T [s]
+    centre: Array  # (n,), mean position [rad or m]
+    cosine: Array  # (n, M), a_l, velocity amplitude of the cosine of harmonic l [rad/s or m/s]
+    sine: Array  # (n, M), b_l, velocity amplitude of the sine of harmonic l [rad/s or m/s]
 
     def __post_init__(self) -> None:
         """Refuse arrays that do not belong together."""
@@ -53,12 +48,10 @@ class FourierSeries:
 
     @property
     def joint_count(self) -> int:
-        """Number of joints n."""
         return len(self.centre)
 
     @property
     def harmonics(self) -> int:
-        """Number of harmonics M."""
         return self.cosine.shape[1]
 
     @property

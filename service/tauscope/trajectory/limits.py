@@ -20,19 +20,13 @@ DEFAULT_ACCELERATION = {JointType.REVOLUTE: 4.0, JointType.PRISMATIC: 1.0}
 
 @dataclass(frozen=True, eq=False)
 class MotionLimits:
-    """Limits of every joint.
-
-    `position_low`, `position_high`: (n,), range of the position [rad or m].
-    `velocity`: (n,), largest speed [rad/s or m/s].
-    `acceleration`: (n,), largest acceleration [rad/s² or m/s²].
-    `torque`: (n,), largest torque, infinite where none is stated [Nm or N].
-    """
+    """Limits of every joint. `position_low`, `position_high`: (n,), range of the position [rad or m]."""
 
     position_low: Array
     position_high: Array
-    velocity: Array
-    acceleration: Array
-    torque: Array
+    velocity: Array  # (n,), largest speed [rad/s or m/s]
+    acceleration: Array  # (n,), largest acceleration [rad/s² or m/s²]
+    torque: Array  # (n,), largest torque, infinite where none is stated [Nm or N]
     assumed: tuple[str, ...] = ()
 
     @property
@@ -62,7 +56,6 @@ class MotionLimits:
         return place, motion.velocity / self.velocity, motion.acceleration / self.acceleration
 
     def random_states(self, count: int, rng: np.random.Generator) -> MotionSamples:
-        """States anywhere within the limits."""
         place, speed, change = (rng.uniform(-1.0, 1.0, (count, len(self.velocity))) for _ in range(3))
         return MotionSamples(self.middle + self.half_range * place, self.velocity * speed, self.acceleration * change)
 

@@ -21,12 +21,8 @@ PEAK_ACCELERATION = 10.0 / np.sqrt(3.0)
 
 
 class Segment(Protocol):
-    """A piece of a trajectory."""
-
     @property
-    def joint_count(self) -> int:
-        """Number of joints n."""
-        ...
+    def joint_count(self) -> int: ...
 
     @property
     def duration_s(self) -> float:
@@ -58,7 +54,6 @@ class FourierSegment:
 
     @property
     def joint_count(self) -> int:
-        """Number of joints n."""
         return self.series.joint_count
 
     @property
@@ -84,16 +79,14 @@ class MoveSegment:
     """A straight minimum-jerk move from posture to posture: q = q_0 + (q_1 - q_0)(10 s³ - 15 s⁴ + 6 s⁵), s = t/T.
 
     `start`, `end`: (n,), postures [rad or m].
-    `duration_s`: T [s].
     """
 
     start: Array
     end: Array
-    duration_s: float
+    duration_s: float  # T [s]
 
     @property
     def joint_count(self) -> int:
-        """Number of joints n."""
         return len(self.start)
 
     def evaluate(self, time: Array) -> MotionSamples:
@@ -117,17 +110,15 @@ class PathSegment:
     It visits only postures that the series visits: where that keeps clear of obstacles, so does this.
 
     `from_s`, `to_s`: instants of the series at which it begins and ends [s].
-    `duration_s`: how long it takes [s].
     """
 
     series: FourierSeries
     from_s: float
     to_s: float
-    duration_s: float
+    duration_s: float  # how long it takes [s]
 
     @property
     def joint_count(self) -> int:
-        """Number of joints n."""
         return self.series.joint_count
 
     def evaluate(self, time: Array) -> MotionSamples:
@@ -151,11 +142,10 @@ class PathSegment:
 class SampledSegment:
     """A motion given by samples, between them the quintic that meets position, velocity and acceleration at both.
 
-    `time`: (K,), instants of the samples, from 0, increasing [s].
     `label`: (K,), index of the repeated excitation period from each sample on, NaN outside; None where there is none.
     """
 
-    time: Array
+    time: Array  # (K,), instants of the samples, from 0, increasing [s]
     motion: MotionSamples
     label: Array | None = None
 
@@ -166,7 +156,6 @@ class SampledSegment:
 
     @property
     def joint_count(self) -> int:
-        """Number of joints n."""
         return self.motion.position.shape[1]
 
     @property

@@ -44,14 +44,13 @@ class TrajectorySamples:
 
     `time`: (N,), instants since the start [s].
     `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈ [rad or m, and per s, per s²].
-    `period`: (N,), index of the repeated excitation period, counted from 0; NaN outside the repeated part.
     """
 
     time: Array
     position: Array
     velocity: Array
     acceleration: Array
-    period: Array
+    period: Array  # (N,), index of the repeated excitation period, counted from 0; NaN outside the repeated part
 
 
 @dataclass(frozen=True)
@@ -71,17 +70,13 @@ class DesignRecord:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """A motion of all joints, piece after piece, twice continuously differentiable, at rest at both ends.
-
-    `limits`: limits that it was made to keep; None where nobody knows.
-    `design`: how it was made; None for a motion from elsewhere.
-    """
+    """A motion of all joints, piece after piece, twice continuously differentiable, at rest at both ends."""
 
     robot: str
     joints: tuple[str, ...]
     segments: tuple[Segment, ...]
-    limits: MotionLimits | None = None
-    design: DesignRecord | None = None
+    limits: MotionLimits | None = None  # limits that it was made to keep; None where nobody knows
+    design: DesignRecord | None = None  # how it was made; None for a motion from elsewhere
 
     def __post_init__(self) -> None:
         """Refuse pieces that do not make one motion of these joints."""
@@ -98,7 +93,6 @@ class Trajectory:
 
     @property
     def joint_count(self) -> int:
-        """Number of joints n."""
         return len(self.joints)
 
     @property

@@ -127,7 +127,6 @@ class DrivenArm:
                 self._targets[kind] = joints, self._target(joints, kind)
 
     def _target(self, joints: list[int], kind: Kind) -> Target:
-        """A target for joints, which begins where their last one was."""
         period = kind[1] / self._period_s or None
         goal, rate, acceleration = self._goal[joints], self._goal_rate[joints], self._acceleration[joints]
         target = Target(goal, rate, acceleration, self._period_s, period)

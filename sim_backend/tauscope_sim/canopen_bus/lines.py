@@ -95,7 +95,6 @@ class CanSocket:
         self._socket.setblocking(False)
 
     def fileno(self) -> int:
-        """Descriptor to wait on."""
         return self._socket.fileno()
 
     def read(self) -> bytes:
@@ -113,7 +112,6 @@ class CanSocket:
                 self._socket.send(data[start : start + _FRAME.size])
 
     def close(self) -> None:
-        """Leave the bus."""
         self._socket.close()
 
 
@@ -129,7 +127,6 @@ class SocketLine:
         return frames, b""
 
     def text(self, frame: Frame) -> bytes:
-        """A frame as the kernel takes it."""
         identifier, payload = frame
         return _FRAME.pack(identifier, len(payload), payload)
 
@@ -165,7 +162,6 @@ class Wire:
                 self.arriving.put(arrival_s, frame)
 
     def occupy(self, frame: Frame, now_s: float) -> None:
-        """Let a frame take its time."""
         self._free_s = max(now_s, self._free_s) + self.duration_s(frame)
 
     def duration_s(self, frame: Frame) -> float:

@@ -24,8 +24,6 @@ class Abort(IntEnum):
 
 
 class AbortError(Exception):
-    """A transfer is refused."""
-
     def __init__(self, code: Abort) -> None:
         super().__init__(code.name)
         self.code = code
@@ -49,8 +47,6 @@ class Entry:
 
 @dataclass
 class ObjectDictionary:
-    """All entries, by index and subindex."""
-
     entries: dict[tuple[int, int], Entry] = field(default_factory=dict)  # of (index, subindex) to Entry
 
     def add(
@@ -69,7 +65,6 @@ class ObjectDictionary:
         return entry
 
     def get(self, index: int, subindex: int = 0) -> int:
-        """Value of an entry."""
         return self._find(index, subindex).value
 
     def put(self, index: int, value: int, subindex: int = 0) -> None:
@@ -179,8 +174,6 @@ _HIGHEST_SYNCHRONOUS = 240
 
 @dataclass(frozen=True)
 class _Pdo:
-    """Where a PDO's identifier, its transmission type and what it holds are written."""
-
     cob_id: Entry
     transmission: Entry
     mapping: int

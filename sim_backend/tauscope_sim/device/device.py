@@ -27,8 +27,6 @@ _TICKS_PER_TEMPERATURE = 64
 
 @dataclass(frozen=True)
 class _Enabling:
-    """What the host left behind when it enabled the arm."""
-
     stop_policy: StopPolicy
     watchdog_ns: int
 
@@ -83,12 +81,10 @@ class SimulatedDevice:
 
     @property
     def activity(self) -> Activity:
-        """What the drives are doing."""
         return self._activity
 
     @property
     def fault_codes(self) -> tuple[str, ...]:
-        """Codes of the latched faults."""
         return tuple(fault.code for fault in self._latch.faults)
 
     @property
@@ -106,7 +102,6 @@ class SimulatedDevice:
             self._tick += 1
 
     def read(self) -> ArmState:
-        """What the drives report now."""
         position, velocity, effort = self._mechanism.reading()
         temperature = self._mechanism.true.temperature
         if self._disturbances.any:

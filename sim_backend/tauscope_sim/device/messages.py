@@ -22,8 +22,6 @@ _HEADER = struct.Struct("<BxxxII")
 
 
 class FrameKind(IntEnum):
-    """What a frame is."""
-
     HELLO = 1
     ENABLE = 2
     EXCHANGE = 3
@@ -33,7 +31,6 @@ class FrameKind(IntEnum):
     INJECT = 7
     STATUS = 8
     GOODBYE = 9
-    SHUT_DOWN = 10
     PUT_BACK = 11
     WELCOME = 64
     STATE = 65
@@ -43,14 +40,11 @@ class FrameKind(IntEnum):
 
 @dataclass(frozen=True)
 class Frame:
-    """One message."""
-
     kind: FrameKind
     sequence: int
     body: bytes = b""
 
     def encode(self) -> bytes:
-        """The frame as it goes over the wire."""
         return _HEADER.pack(self.kind, self.sequence, len(self.body)) + self.body
 
 
@@ -59,8 +53,6 @@ class BrokenFrameError(ValueError):
 
 
 class FrameBuffer:
-    """Cuts a stream of bytes into frames."""
-
     def __init__(self) -> None:
         self._bytes = bytearray()
 
@@ -95,8 +87,6 @@ class BadMessageError(ValueError):
 
 @dataclass(frozen=True)
 class Enabling:
-    """A request to enable."""
-
     mode: ControlMode
     stop_policy: StopPolicy
     watchdog_s: float
@@ -105,8 +95,6 @@ class Enabling:
 
 @dataclass(frozen=True)
 class Refusal:
-    """A `DriverError`."""
-
     kind: DriverErrorKind
     message: str
     faults: tuple[Fault, ...]
@@ -167,7 +155,6 @@ def decode_state(body: bytes) -> ArmState:
 
 
 def encode_error(error: DriverError) -> bytes:
-    """A refusal."""
     return encode_document(Refusal(error.kind, str(error), error.faults))
 
 

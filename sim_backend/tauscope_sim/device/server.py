@@ -48,7 +48,6 @@ class TraceWriter:
         self._write(",".join([str(device.time_ns), device.activity.value, "+".join(device.fault_codes), *numbers]))
 
     def close(self) -> None:
-        """Close the file."""
         os.close(self._file)
 
     def _write(self, line: str) -> None:
@@ -65,8 +64,6 @@ _PEER = struct.Struct("3i")
 
 @dataclass
 class Punctuality:
-    """How well the device kept to the machine's clock."""
-
     overruns: int = 0
     largest_lag_ns: int = 0  # the latest of them [ns]
 
@@ -128,7 +125,6 @@ class DeviceServer:
             select.select(waiting, [], [], remaining * 1e-9)
 
     def _pass(self, now_ns: int) -> None:
-        """Carry the device forward to the present and answer."""
         lag_ns = now_ns - self._device.time_ns
         if self._device.activity is not Activity.BRAKED and lag_ns > LATE_NS:
             self.punctuality.overruns += 1
@@ -207,7 +203,6 @@ class DeviceServer:
         return messages.Frame(kind, frame.sequence, body)
 
     def _carry_out(self, kind: messages.FrameKind, body: bytes) -> tuple[messages.FrameKind, bytes]:
-        """Carry out a request; returns the kind and the body of the reply."""
         device = self._device
         match kind:
             case messages.FrameKind.HELLO:
@@ -228,9 +223,8 @@ class DeviceServer:
                 device.inject(messages.decode_document(Injection, body))
             case messages.FrameKind.PUT_BACK:
                 device.put_back()
-            case messages.FrameKind.GOODBYE | messages.FrameKind.SHUT_DOWN:
+            case messages.FrameKind.GOODBYE:
                 device.stop()
-                self._finished |= kind is messages.FrameKind.SHUT_DOWN
             case messages.FrameKind.READ:
                 pass
             case _:

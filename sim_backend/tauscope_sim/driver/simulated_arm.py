@@ -23,7 +23,6 @@ class VirtualClock:
         self._advance = advance
 
     def now_ns(self) -> int:
-        """The present instant [ns]."""
         return self._now_ns
 
     def wait_until_ns(self, deadline_ns: int) -> int:
@@ -56,12 +55,10 @@ class SimulatedArm:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What it can do."""
         return self.device.capabilities
 
     @property
     def clock(self) -> Clock:
-        """Virtual time."""
         return self._clock
 
     def connect(self) -> ArmState:
@@ -72,7 +69,6 @@ class SimulatedArm:
         return self.device.read()
 
     def acknowledge_faults(self) -> ArmState:
-        """Clear the latched faults; see `drivers.Backend`."""
         self._require_connection()
         self.device.acknowledge_faults()
         return self.device.read()
@@ -95,7 +91,6 @@ class SimulatedArm:
         return self.device.read()
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
-        """Write the setpoints, read the arm; see `drivers.Backend`."""
         self._require_connection()
         self.device.command(setpoint, self._clock.now_ns())
         return self.device.read()

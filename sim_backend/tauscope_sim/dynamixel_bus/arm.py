@@ -9,6 +9,7 @@ from tauscope.robot.robot import Array
 from tauscope_sim.dynamixel_bus.servo import Demand
 
 BANDWIDTH_HZ = 8.0  # of the pendulums' position loops [Hz]
+INERTIA, DAMPING = 0.05, 0.05  # J [kg m²] and b [Nm s/rad] of every pendulum
 
 
 class Pendulums:
@@ -18,28 +19,18 @@ class Pendulums:
     τ = J ω² (q_g − q) + 2 J ω (q̇_g − q̇).
     """
 
-    def __init__(
-        self, position: ArrayLike, *, inertia: float = 0.05, damping: float = 0.05, weight: float = 0.5
-    ) -> None:
-        """Place them at rest.
-
-        `position`: (n,), where they stand [rad].
-        `inertia`: J [kg m²].
-        `damping`: b [Nm s/rad].
-        `weight`: m g l [Nm].
-        """
+    def __init__(self, position: ArrayLike, *, weight: float = 0.5) -> None:
+        """Place them at rest. `position`: (n,), where they stand [rad]; `weight`: m g l [Nm]."""
         self._position = np.array(position, dtype=np.float64)
         self._velocity = np.zeros_like(self._position)
-        self._inertia, self._damping, self._weight = inertia, damping, weight
+        self._weight = weight
 
     @property
     def joint_count(self) -> int:
-        """Number of joints n."""
         return self._position.size
 
     @property
     def motion(self) -> tuple[Array, Array]:
-        """Position and velocity."""
         return self._position.copy(), self._velocity.copy()
 
     def torque(self, demands: Sequence[Demand]) -> Array:
@@ -51,12 +42,12 @@ class Pendulums:
             if demand.tracks:
                 error = demand.position - self._position[joint]
                 error_rate = demand.speed - self._velocity[joint]
-                wanted = self._inertia * omega * (omega * error + 2.0 * error_rate)
+                wanted = INERTIA * omega * (omega * error + 2.0 * error_rate)
             torque[joint] = max(-demand.cap, min(demand.cap, wanted))
         return torque
 
     def advance(self, torque: Array, duration_s: float) -> None:
         """Move on under a constant torque, by the semi-implicit Euler method. `torque`: (n,) [Nm]."""
-        load = self._damping * self._velocity + self._weight * np.sin(self._position)
-        self._velocity += duration_s * (torque - load) / self._inertia
+        load = DAMPING * self._velocity + self._weight * np.sin(self._position)
+        self._velocity += duration_s * (torque - load) / INERTIA
         self._position += duration_s * self._velocity

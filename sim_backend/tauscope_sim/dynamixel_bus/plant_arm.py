@@ -33,7 +33,6 @@ class PlantArm:
 
     @property
     def joint_count(self) -> int:
-        """Number of joints n."""
         return self._plant.joint_count
 
     @property

@@ -118,8 +118,6 @@ _FILTERED_STEPS = 5
 
 
 class EmulatedServo:
-    """A servo on the bus and at its joint."""
-
     alarms: ClassVar[Mapping[FaultKind, int]] = {
         FaultKind.OVER_TEMPERATURE: OVERHEATING,
         FaultKind.OVERLOAD: OVERLOAD,
@@ -140,7 +138,6 @@ class EmulatedServo:
 
     @property
     def servo(self) -> int:
-        """ID."""
         return self.specification.servo
 
     @property
@@ -151,7 +148,6 @@ class EmulatedServo:
 
     @property
     def has_torque(self) -> bool:
-        """Whether it drives or holds its joint."""
         return bool(self.memory.get("Torque Enable"))
 
     @property

@@ -14,20 +14,14 @@ from tauscope_sim.plant.term import Coordinates, Term
 
 
 class Payload(Effect):
-    """A body fixed to the last link.
-
-    `mass`: m [kg].
-    `offset`: r [m].
-    `moments`: diagonal of I [kg m²].
-    """
+    """A body fixed to the last link."""
 
     effect_id: ClassVar[str] = "payload"
-    mass: Positive
-    offset: Vector = Field(default_factory=zero_vector)
-    moments: Vector = Field(default_factory=zero_vector)
+    mass: Positive  # m [kg]
+    offset: Vector = Field(default_factory=zero_vector)  # r [m]
+    moments: Vector = Field(default_factory=zero_vector)  # diagonal of I [kg m²]
 
     def check(self, robot: Robot) -> None:
-        """Refuse moments of inertia that no body has."""
         super().check(robot)
         if min(self.moments) < 0.0 or 2.0 * max(self.moments) > sum(self.moments) * (1.0 + 1e-9):
             raise self.refused("moments", "no body has these: none may be negative or exceed the sum of the others")
@@ -52,16 +46,13 @@ class PayloadChange(Payload):
     `mass`: m [kg].
     `offset`: r [m].
     `moments`: diagonal of I [kg m²].
-    `start`: when it is picked up; zero or less: it is there from the beginning [s].
-    `end`: when it is dropped; never where None [s].
     """
 
     effect_id: ClassVar[str] = "payload_change"
-    start: Number = 0.0
-    end: Positive | None = None
+    start: Number = 0.0  # when it is picked up; zero or less: it is there from the beginning [s]
+    end: Positive | None = None  # when it is dropped; never where None [s]
 
     def check(self, robot: Robot) -> None:
-        """Refuse a payload that never changes."""
         super().check(robot)
         if self.end is None and self.start <= 0.0:
             raise self.refused("start", "is missing: without start and end nothing changes; state one, or use payload")
@@ -87,13 +78,10 @@ class _Change(Term):
 
 
 class RotorInertia(JointEffect):
-    """τ = J q̈.
-
-    `inertia`: J, the rotor's inertia times the square of the gear ratio [kg m² or kg].
-    """
+    """τ = J q̈."""
 
     effect_id: ClassVar[str] = "rotor_inertia"
-    inertia: Positive
+    inertia: Positive  # J, the rotor's inertia times the square of the gear ratio [kg m² or kg]
 
     def added_rotor_inertia(self, robot: Robot) -> Array:
         inertia = np.zeros(robot.joint_count)

@@ -59,12 +59,10 @@ def one_of(*words: str) -> Any:
 
 
 def zero_vector() -> list[float]:
-    """Three zeros."""
     return [0.0, 0.0, 0.0]
 
 
 def single_zero() -> list[float]:
-    """A zero for all."""
     return [0.0]
 
 
@@ -80,7 +78,6 @@ class ScenarioEntry(Document):
             raise self.refused("joint", f"is {joint}, but the arm has {robot.joint_count} joints")
 
     def refused(self, key: str, text: str) -> ScenarioError:
-        """The error of one key."""
         return ScenarioError(f"{self.effect_id}.{key}: {text}")
 
 
@@ -89,20 +86,15 @@ class Effect(ScenarioEntry, PhysicalEffect):
 
 
 class JointEffect(Effect):
-    """An effect of one joint.
+    """An effect of one joint."""
 
-    `joint`: its number, counted from 1.
-    """
-
-    joint: JointNumber
+    joint: JointNumber  # its number, counted from 1
 
     @property
     def index(self) -> int:
-        """The joint counted from 0."""
         return self.joint - 1
 
     def joint_of(self, robot: Robot) -> Joint:
-        """The joint that it concerns."""
         return robot.joints[self.index]
 
 
@@ -110,13 +102,11 @@ class SmoothSignEffect(JointEffect):
     """An effect of one joint in which A(v) = (2/π) arctan(K_v v) stands for the sign of velocity.
 
     `joint`: its number, counted from 1.
-    `k_v`: K_v; that of the joint's friction_shape where None [s/rad or s/m].
     """
 
-    k_v: Positive | None = None
+    k_v: Positive | None = None  # K_v; that of the joint's friction_shape where None [s/rad or s/m]
 
     def check(self, robot: Robot) -> None:
-        """Refuse a joint that does not exist or has no K_v."""
         super().check(robot)
         self.steepness(robot)
 
@@ -146,11 +136,9 @@ class JointLaw(JointEffect):
     side: ClassVar[Side] = Side.MOTOR
 
     def law(self, robot: Robot) -> Law:
-        """τ(q, v) and its derivatives."""
         raise NotImplementedError
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The law as a term of the equations of motion."""
         place = self.index if self.side is Side.LINK else coordinates.motor(self.index)
         return (_LawTerm(self.index, place, self.side, self.law(robot)),)
 

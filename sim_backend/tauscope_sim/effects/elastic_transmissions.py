@@ -9,17 +9,12 @@ from tauscope_sim.plant.term import Transmission
 
 
 class JointElasticity(JointEffect):
-    """T = K (θ - q) + D (θ̇ - q̇).
-
-    `stiffness`: K [Nm/rad or N/m].
-    `damping`: D [Nm s/rad or N s/m].
-    `rotor_inertia`: J [kg m² or kg].
-    """
+    """T = K (θ - q) + D (θ̇ - q̇)."""
 
     effect_id: ClassVar[str] = "joint_elasticity"
-    stiffness: Positive
-    damping: NotNegative = 0.0
-    rotor_inertia: Positive
+    stiffness: Positive  # K [Nm/rad or N/m]
+    damping: NotNegative = 0.0  # D [Nm s/rad or N s/m]
+    rotor_inertia: Positive  # J [kg m² or kg]
 
     def transmission(self) -> Transmission:
         return self
@@ -35,19 +30,13 @@ class JointElasticity(JointEffect):
 
 
 class Backlash(JointEffect):
-    """T = k x max(0, 1 + c sgn(x) δ̇) beyond a dead zone.
-
-    `gap`: b, total lost motion [rad or m].
-    `contact_stiffness`: k, of teeth and transmission together [Nm/rad or N/m].
-    `contact_damping`: c [s/rad or s/m].
-    `rotor_inertia`: reflected inertia of the motor [kg m² or kg].
-    """
+    """T = k x max(0, 1 + c sgn(x) δ̇) beyond a dead zone."""
 
     effect_id: ClassVar[str] = "backlash"
-    gap: Positive
-    contact_stiffness: Positive
-    contact_damping: NotNegative = 10.0
-    rotor_inertia: Positive
+    gap: Positive  # b, total lost motion [rad or m]
+    contact_stiffness: Positive  # k, of teeth and transmission together [Nm/rad or N/m]
+    contact_damping: NotNegative = 10.0  # c [s/rad or s/m]
+    rotor_inertia: Positive  # reflected inertia of the motor [kg m² or kg]
 
     def transmission(self) -> Transmission:
         return self

@@ -21,27 +21,18 @@ from tauscope_sim.plant.term import Coordinates, Forces, Moment, Term
 
 
 class ExternalContact(Effect):
-    """Force at the tool, or torque at one joint, while t₀ ≤ t < t₀ + T.
-
-    `force`: F [N].
-    `offset`: contact point in the last link's frame [m].
-    `joint`: joint, counted from 1.
-    `torque`: c [Nm or N].
-    `start`: t₀ [s].
-    `duration`: T [s].
-    """
+    """Force at the tool, or torque at one joint, while t₀ ≤ t < t₀ + T."""
 
     effect_id: ClassVar[str] = "external_contact"
-    force: Vector | None = None
-    offset: Vector = Field(default_factory=zero_vector)
-    joint: JointNumber | None = None
-    torque: Number | None = None
-    start: NotNegative
-    duration: Positive
+    force: Vector | None = None  # F [N]
+    offset: Vector = Field(default_factory=zero_vector)  # contact point in the last link's frame [m]
+    joint: JointNumber | None = None  # joint, counted from 1
+    torque: Number | None = None  # c [Nm or N]
+    start: NotNegative  # t₀ [s]
+    duration: Positive  # T [s]
     profile: Annotated[str, one_of("half_sine", "rectangular")] = "half_sine"
 
     def check(self, robot: Robot) -> None:
-        """Refuse anything but a force, or a joint and a torque."""
         super().check(robot)
         if self.force is not None and (self.joint is not None or self.torque is not None):
             raise self.refused(

@@ -14,22 +14,15 @@ from tauscope_sim.plant.term import Coordinates, Forces, Moment, Slopes, Term
 
 
 class FrictionCoupling(SmoothSignEffect):
-    """τ_j = f, τ_k = s f with f = c A(v_j + s v_k) + d (v_j + s v_k).
-
-    `joint`: j, counted from 1.
-    `other_joint`: k, counted from 1.
-    `coulomb`: c [Nm or N].
-    `viscous`: d [Nm s/rad or N s/m].
-    """
+    """τ_j = f, τ_k = s f with f = c A(v_j + s v_k) + d (v_j + s v_k). `joint`: j, counted from 1."""
 
     effect_id: ClassVar[str] = "friction_coupling"
-    other_joint: JointNumber
+    other_joint: JointNumber  # k, counted from 1
     of: Annotated[str, one_of("sum", "difference")] = "sum"
-    coulomb: Number = 0.0
-    viscous: Number = 0.0
+    coulomb: Number = 0.0  # c [Nm or N]
+    viscous: Number = 0.0  # d [Nm s/rad or N s/m]
 
     def check(self, robot: Robot) -> None:
-        """Refuse a joint that does not exist or is coupled with itself."""
         super().check(robot)
         if self.other_joint > robot.joint_count:
             raise self.refused("other_joint", f"is {self.other_joint}, but the arm has {robot.joint_count} joints")

@@ -23,24 +23,16 @@ LARGEST_EXPONENT = 20.0  # beyond any oil: keeps nonsense coefficients from over
 
 
 class FrictionDrift(JointEffect):
-    """Static friction times e^{c ϑ}, with ϑ from dissipated heat.
-
-    `thermal_resistance`: R [K/W].
-    `time_constant`: T [s].
-    `coulomb_per_kelvin`: c_c [1/K].
-    `viscous_per_kelvin`: c_v [1/K].
-    `initial_temperature`: of the joint when the arm is placed [°C].
-    """
+    """Static friction times e^{c ϑ}, with ϑ from dissipated heat."""
 
     effect_id: ClassVar[str] = "friction_drift"
-    thermal_resistance: Positive
-    time_constant: Positive
-    coulomb_per_kelvin: Number = 0.0
-    viscous_per_kelvin: Number = 0.0
-    initial_temperature: Number = AMBIENT
+    thermal_resistance: Positive  # R [K/W]
+    time_constant: Positive  # T [s]
+    coulomb_per_kelvin: Number = 0.0  # c_c [1/K]
+    viscous_per_kelvin: Number = 0.0  # c_v [1/K]
+    initial_temperature: Number = AMBIENT  # of the joint when the arm is placed [°C]
 
     def check(self, robot: Robot) -> None:
-        """Refuse a joint without friction."""
         super().check(robot)
         if robot.model.friction is None:
             raise self.refused("joint", "has no friction in the robot file that could drift; state model.friction")

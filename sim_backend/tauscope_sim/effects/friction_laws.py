@@ -10,13 +10,10 @@ from tauscope_sim.friction import smooth_sign, smooth_sign_slope
 
 
 class CoulombFriction(FrictionLaw):
-    """τ = c A(v).
-
-    `level`: c [Nm or N].
-    """
+    """τ = c A(v)."""
 
     effect_id: ClassVar[str] = "coulomb_friction"
-    level: Number
+    level: Number  # c [Nm or N]
 
     def law(self, robot: Robot) -> Law:
         c, k_v = self.level, self.steepness(robot)
@@ -24,29 +21,22 @@ class CoulombFriction(FrictionLaw):
 
 
 class ViscousFriction(JointLaw):
-    """τ = c v.
-
-    `coefficient`: c [Nm s/rad or N s/m].
-    """
+    """τ = c v."""
 
     effect_id: ClassVar[str] = "viscous_friction"
     side: ClassVar[Side] = Side.FRICTION
-    coefficient: Number
+    coefficient: Number  # c [Nm s/rad or N s/m]
 
     def law(self, robot: Robot) -> Law:
         return (lambda q, v: self.coefficient * v), (lambda q, v: (0.0, self.coefficient))
 
 
 class StribeckFriction(FrictionLaw):
-    """τ = c A(v) exp(-(|v|/v_s)^α).
-
-    `amplitude`: c [Nm or N].
-    `velocity`: v_s [rad/s or m/s].
-    """
+    """τ = c A(v) exp(-(|v|/v_s)^α)."""
 
     effect_id: ClassVar[str] = "stribeck_friction"
-    amplitude: Number
-    velocity: Positive
+    amplitude: Number  # c [Nm or N]
+    velocity: Positive  # v_s [rad/s or m/s]
     exponent: Exponent = 2.0
 
     def law(self, robot: Robot) -> Law:
@@ -65,13 +55,10 @@ class StribeckFriction(FrictionLaw):
 
 
 class AsymmetricCoulomb(FrictionLaw):
-    """τ = c A(v) for v > 0, else 0.
-
-    `amplitude`: c: friction of positive motion less that of negative motion [Nm or N].
-    """
+    """τ = c A(v) for v > 0, else 0."""
 
     effect_id: ClassVar[str] = "asymmetric_coulomb"
-    amplitude: Number
+    amplitude: Number  # c: friction of positive motion less that of negative motion [Nm or N]
 
     def law(self, robot: Robot) -> Law:
         c, k_v = self.amplitude, self.steepness(robot)
@@ -82,14 +69,11 @@ class AsymmetricCoulomb(FrictionLaw):
 
 
 class AsymmetricViscous(JointLaw):
-    """τ = c max(v, 0).
-
-    `amplitude`: c: coefficient of positive motion less that of negative motion [Nm s/rad or N s/m].
-    """
+    """τ = c max(v, 0)."""
 
     effect_id: ClassVar[str] = "asymmetric_viscous"
     side: ClassVar[Side] = Side.FRICTION
-    amplitude: Number
+    amplitude: Number  # c: coefficient of positive motion less that of negative motion [Nm s/rad or N s/m]
 
     def law(self, robot: Robot) -> Law:
         return (lambda q, v: self.amplitude * max(v, 0.0), lambda q, v: (0.0, self.amplitude if v > 0.0 else 0.0))
@@ -99,14 +83,11 @@ LEAST_SPEED = 1e-3  # below this the slope of a root is taken as here: it has no
 
 
 class NonlinearViscous(JointLaw):
-    """τ = c sgn(v) |v|^p.
-
-    `amplitude`: c, friction at 1 rad/s or 1 m/s [Nm or N].
-    """
+    """τ = c sgn(v) |v|^p."""
 
     effect_id: ClassVar[str] = "nonlinear_viscous"
     side: ClassVar[Side] = Side.FRICTION
-    amplitude: Number
+    amplitude: Number  # c, friction at 1 rad/s or 1 m/s [Nm or N]
     exponent: Exponent
 
     def law(self, robot: Robot) -> Law:
@@ -118,16 +99,12 @@ class NonlinearViscous(JointLaw):
 
 
 class PositionDependentFriction(FrictionLaw):
-    """τ = c A(v) sin(k q + φ).
-
-    `amplitude`: c [Nm or N].
-    `phase`: φ [rad].
-    """
+    """τ = c A(v) sin(k q + φ)."""
 
     effect_id: ClassVar[str] = "position_dependent_friction"
-    amplitude: Number
+    amplitude: Number  # c [Nm or N]
     order: Positive = 1.0
-    phase: Number = 0.0
+    phase: Number = 0.0  # φ [rad]
 
     def law(self, robot: Robot) -> Law:
         c, k_v = self.amplitude, self.steepness(robot)

@@ -14,18 +14,13 @@ from tauscope_sim.effects.effect import Effect, JointNumber, zero_vector
 
 
 class BaseTilt(Effect):
-    """g → R_x(α) R_y(β) g.
-
-    `about_x`: α [rad].
-    `about_y`: β [rad].
-    """
+    """g → R_x(α) R_y(β) g."""
 
     effect_id: ClassVar[str] = "base_tilt"
-    about_x: Number = 0.0
-    about_y: Number = 0.0
+    about_x: Number = 0.0  # α [rad]
+    about_y: Number = 0.0  # β [rad]
 
     def check(self, robot: Robot) -> None:
-        """Refuse a base that is not tilted."""
         super().check(robot)
         if self.about_x == 0.0 and self.about_y == 0.0:
             raise self.refused("about_x", "and about_y are zero; state one of them [rad]")
@@ -36,20 +31,14 @@ class BaseTilt(Effect):
 
 
 class KinematicError(Effect):
-    """A displaced link frame.
-
-    `link`: j, counted from 1.
-    `translation`: d [m].
-    `rotation`: r [rad].
-    """
+    """A displaced link frame."""
 
     effect_id: ClassVar[str] = "kinematic_error"
-    link: JointNumber
-    translation: Vector = Field(default_factory=zero_vector)
-    rotation: Vector = Field(default_factory=zero_vector)
+    link: JointNumber  # j, counted from 1
+    translation: Vector = Field(default_factory=zero_vector)  # d [m]
+    rotation: Vector = Field(default_factory=zero_vector)  # r [rad]
 
     def check(self, robot: Robot) -> None:
-        """Refuse a link that does not exist and an error of nothing."""
         super().check(robot)
         if self.link > robot.joint_count:
             raise self.refused("link", f"is {self.link}, but the arm has {robot.joint_count} links")

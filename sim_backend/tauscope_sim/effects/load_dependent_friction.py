@@ -14,16 +14,12 @@ from tauscope_sim.plant.term import LARGEST_GAIN, Coordinates, Forces, Moment, S
 
 
 class LoadDependentFriction(SmoothSignEffect):
-    """τ = μ |L| A(v).
-
-    `mu`: μ [Nm/Nm].
-    """
+    """τ = μ |L| A(v)."""
 
     effect_id: ClassVar[str] = "load_dependent_friction"
-    mu: Positive
+    mu: Positive  # μ [Nm/Nm]
 
     def check(self, robot: Robot) -> None:
-        """Refuse friction that would lock the transmission."""
         super().check(robot)
         if self.mu > LARGEST_GAIN:
             raise self.refused("mu", f"is {self.mu:g}: the transmission locks itself; make it at most {LARGEST_GAIN:g}")

@@ -13,18 +13,14 @@ from tauscope_sim.plant.term import LARGEST_GAIN, Coordinates, Forces, Moment, S
 
 
 class AngleHarmonics(JointEffect):
-    """s(q) = Σ a_i sin(k_i q' + φ_i), with q' = q, or gear ratio × q where it is periodic in the motor's angle.
-
-    `phase`: φ_i, a number or one an order [rad].
-    """
+    """s(q) = Σ a_i sin(k_i q' + φ_i), with q' = q, or gear ratio × q where it is periodic in the motor's angle."""
 
     amplitude: Numbers
     order: Numbers
-    phase: Numbers = Field(default_factory=single_zero)
+    phase: Numbers = Field(default_factory=single_zero)  # φ_i, a number or one an order [rad]
     angle: Annotated[str, one_of("joint", "motor")] = "joint"
 
     def check(self, robot: Robot) -> None:
-        """Refuse lists that do not match, and a motor's angle without a gear ratio."""
         super().check(robot)
         for key in ("amplitude", "phase"):
             count = len(getattr(self, key))
@@ -36,7 +32,6 @@ class AngleHarmonics(JointEffect):
             raise self.refused("angle", "is motor, but the robot file states no gear_ratio for this joint; state it")
 
     def sine_and_slope(self, robot: Robot) -> tuple[Callable[[float], float], Callable[[float], float]]:
-        """s(q) and ds/dq."""
         ratio = (self.joint_of(robot).gear_ratio or 1.0) if self.angle == "motor" else 1.0
         count = len(self.order)
         amplitude, phase = (value * count if len(value) == 1 else value for value in (self.amplitude, self.phase))
@@ -71,7 +66,6 @@ class TorqueRipple(AngleHarmonics):
     effect_id: ClassVar[str] = "torque_ripple"
 
     def check(self, robot: Robot) -> None:
-        """Refuse a ripple larger than the load."""
         super().check(robot)
         repeats = len(self.order) if len(self.amplitude) == 1 else 1
         total = repeats * sum(abs(amplitude) for amplitude in self.amplitude)
@@ -97,16 +91,12 @@ class _Ripple(Term):
 
 
 class JointSpring(JointLaw):
-    """τ = k (q - q₀), between two links: the transmission carries it.
-
-    `stiffness`: k [Nm/rad or N/m].
-    `rest`: q₀, where the spring is slack [rad or m].
-    """
+    """τ = k (q - q₀), between two links: the transmission carries it."""
 
     effect_id: ClassVar[str] = "joint_spring"
     side: ClassVar[Side] = Side.LINK
-    stiffness: Number
-    rest: Number = 0.0
+    stiffness: Number  # k [Nm/rad or N/m]
+    rest: Number = 0.0  # q₀, where the spring is slack [rad or m]
 
     def law(self, robot: Robot) -> Law:
         return (lambda q, v: self.stiffness * (q - self.rest)), (lambda q, v: (self.stiffness, 0.0))
@@ -116,16 +106,12 @@ LEAST_STRETCH = 1e-6  # below this the slope of a root is taken as here [rad or 
 
 
 class CableForce(JointLaw):
-    """τ = ±k max(±(q - q_c), 0)^p, between two links: the transmission carries it.
-
-    `stiffness`: k [Nm/rad^p or N/m^p].
-    `angle`: q_c, where it begins [rad or m].
-    """
+    """τ = ±k max(±(q - q_c), 0)^p, between two links: the transmission carries it."""
 
     effect_id: ClassVar[str] = "cable_force"
     side: ClassVar[Side] = Side.LINK
-    stiffness: Positive
-    angle: Number
+    stiffness: Positive  # k [Nm/rad^p or N/m^p]
+    angle: Number  # q_c, where it begins [rad or m]
     side_of_angle: Annotated[str, one_of("above", "below")] = "above"
     exponent: Exponent = 1.5
 
@@ -146,13 +132,10 @@ class CableForce(JointLaw):
 
 
 class TorqueOffset(JointLaw):
-    """τ = c.
-
-    `torque`: c [Nm or N].
-    """
+    """τ = c."""
 
     effect_id: ClassVar[str] = "torque_offset"
-    torque: Number
+    torque: Number  # c [Nm or N]
 
     def law(self, robot: Robot) -> Law:
         return (lambda q, v: self.torque), (lambda q, v: (0.0, 0.0))

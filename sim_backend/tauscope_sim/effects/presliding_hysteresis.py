@@ -21,19 +21,14 @@ from tauscope_sim.plant.term import Coordinates, Forces, Moment, Slopes, Term
 
 
 class PreslidingHysteresis(JointEffect):
-    """Dahl's or the LuGre model in place of the joint's Coulomb friction.
-
-    `distance`: x_s, over which friction builds up [rad or m].
-    `damping`: σ₁ of the LuGre model [Nm s/rad or N s/m].
-    """
+    """Dahl's or the LuGre model in place of the joint's Coulomb friction."""
 
     effect_id: ClassVar[str] = "presliding_hysteresis"
-    distance: Positive
+    distance: Positive  # x_s, over which friction builds up [rad or m]
     bristles: Annotated[str, one_of("dahl", "lugre")] = "dahl"
-    damping: NotNegative = 0.0
+    damping: NotNegative = 0.0  # σ₁ of the LuGre model [Nm s/rad or N s/m]
 
     def check(self, robot: Robot) -> None:
-        """Refuse a joint without Coulomb friction, and damping of Dahl's bristles."""
         super().check(robot)
         friction = robot.model.friction
         coefficients = friction[self.index] if friction is not None else None

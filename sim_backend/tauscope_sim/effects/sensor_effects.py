@@ -26,7 +26,6 @@ class SensorEffect(ScenarioEntry):
     """An effect between the arm and the recording."""
 
     def channel(self, joint_count: int) -> Channel:
-        """The effect at work on an arm."""
         raise NotImplementedError
 
 
@@ -54,14 +53,11 @@ class _Recorded:
 
 
 class TorqueSaturation(SensorEffect):
-    """τ_recorded = c tanh(τ/c), or τ clipped to ±c.
-
-    `level`: c [Nm or N].
-    """
+    """τ_recorded = c tanh(τ/c), or τ clipped to ±c."""
 
     effect_id: ClassVar[str] = "torque_saturation"
     joint: JointNumber
-    level: Positive
+    level: Positive  # c [Nm or N]
     shape: Annotated[str, one_of("compression", "clip")] = "compression"
 
     def channel(self, joint_count: int) -> Channel:
@@ -73,18 +69,13 @@ LONGEST_DELAY = 1.0  # what is late by more is no delay of a channel [s]
 
 
 class TimeDelay(SensorEffect):
-    """τ_recorded(t) = τ(t - d).
-
-    `delay`: d, by which torque is late relative to position; negative: position is late [s].
-    `joint`: its number, counted from 1; all joints where None.
-    """
+    """τ_recorded(t) = τ(t - d)."""
 
     effect_id: ClassVar[str] = "time_delay"
-    delay: Nonzero
-    joint: JointNumber | None = None
+    delay: Nonzero  # d, by which torque is late relative to position; negative: position is late [s]
+    joint: JointNumber | None = None  # its number, counted from 1; all joints where None
 
     def check(self, robot: Robot) -> None:
-        """Refuse a delay that no channel has."""
         super().check(robot)
         if abs(self.delay) > LONGEST_DELAY:
             raise self.refused("delay", f"is {self.delay:g} s; state at most {LONGEST_DELAY:g} s")

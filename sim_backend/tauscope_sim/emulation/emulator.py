@@ -13,7 +13,7 @@ from dataclasses import asdict
 from math import ceil
 from typing import Any, Protocol, Self
 
-from tauscope_sim.emulation.fault_kit import FaultSchedule, InjectedFault, faults_from
+from tauscope_sim.emulation.fault_kit import InjectedFault, TimedQueue, faults_from
 
 STEP_S = 1e-3  # period of the devices' own loops and of the physics [s]
 MOST_STEPS = 10  # steps that are taken in a row while nothing is asked
@@ -30,7 +30,6 @@ class DeviceClock:
     """
 
     def __init__(self, now_s: float) -> None:
-        """Begin."""
         self.tick = round(now_s / STEP_S)
         self.lost_s = 0.0
 
@@ -56,11 +55,10 @@ class Emulator(ABC):
     def __init__(self, now_s: float) -> None:
         """Everything at rest; the arm stands on a stand until all its devices have had torque once."""
         self._clock = DeviceClock(now_s)
-        self.schedule = FaultSchedule()
+        self.schedule = TimedQueue[InjectedFault]()
 
     @property
     def now_s(self) -> float:
-        """Instant up to which the devices have come [s]."""
         return self._clock.now_s
 
     @property
@@ -106,8 +104,8 @@ class Emulator(ABC):
         return None
 
     def inject(self, faults: list[InjectedFault]) -> None:
-        """Plan faults, and carry out those that are due."""
-        self.schedule.add(faults)
+        for fault in faults:
+            self.schedule.put(fault.at_s, fault)
         self._run_faults()
 
     def _run_faults(self) -> None:
@@ -143,9 +141,7 @@ class Port(Protocol):
         """What the master has set, or a rate that is understood where there is none to set [bit/s]."""
         ...
 
-    def fileno(self) -> int:
-        """Descriptor to wait on."""
-        ...
+    def fileno(self) -> int: ...
 
     def read(self) -> bytes | None:
         """What a master sent; None where no master has it open."""
@@ -155,9 +151,7 @@ class Port(Protocol):
         """Send to the master; lost where there is none, or where it reads nothing."""
         ...
 
-    def close(self) -> None:
-        """Hang up."""
-        ...
+    def close(self) -> None: ...
 
 
 _TCGETS2 = 0x802C542A
@@ -181,11 +175,9 @@ class PseudoTerminal:
         os.set_blocking(self._near, False)
 
     def fileno(self) -> int:
-        """Descriptor to wait on."""
         return self._near
 
     def read(self) -> bytes | None:
-        """What a master sent; None where no master has it open."""
         try:
             return os.read(self._near, 4096)
         except BlockingIOError:
@@ -196,36 +188,27 @@ class PseudoTerminal:
             raise
 
     def write(self, data: bytes) -> None:
-        """Send to the master; lost where there is none, or where it reads nothing."""
         with contextlib.suppress(BlockingIOError, OSError):
             os.write(self._near, data)
 
     @property
     def baud(self) -> int:
-        """What the master has set [bit/s]."""
         settings = fcntl.ioctl(self._near, _TCGETS2, bytes(struct.calcsize(_TERMIOS2)))
         return struct.unpack(_TERMIOS2, settings)[-1]
 
     def close(self) -> None:
-        """Hang up."""
         os.close(self._near)
         with contextlib.suppress(FileNotFoundError):
             os.unlink(self._link)
 
 
 class EmulatorOrder(ABC):
-    """The order that starts an emulator process; subclasses are frozen dataclasses that JSON can hold.
+    """The order that starts an emulator process; subclasses are frozen dataclasses that JSON can hold."""
 
-    `port`: what the master opens.
-    `control`: Unix socket for the test.
-    `stepped`: whether time passes only when a test says so; else it is the machine's.
-    `trace`: file that what the devices do is appended to.
-    """
-
-    port: str
-    control: str
-    stepped: bool
-    trace: str | None
+    port: str  # what the master opens
+    control: str  # Unix socket for the test
+    stepped: bool  # whether time passes only when a test says so; else it is the machine's
+    trace: str | None  # file that what the devices do is appended to
 
     @property
     def kind(self) -> str:
@@ -233,12 +216,10 @@ class EmulatorOrder(ABC):
         return f"{type(self).__module__}:{type(self).__qualname__}"
 
     def to_json(self) -> str:
-        """The order as text, which the process is started with."""
         return json.dumps(vars(self), default=asdict)
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """The order in a text."""
         document = json.loads(text)
         return cls(**{key: tuple(value) if isinstance(value, list) else value for key, value in document.items()})
 

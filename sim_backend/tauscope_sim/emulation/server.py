@@ -1,4 +1,7 @@
-"""An emulator as a process: a port for the master, a socket for the test, a trace of what was done."""
+"""An emulator as a process: a port for the master, a socket for the test, a trace of what was done.
+
+``python -m tauscope_sim.emulation.server MODULE:ORDER JSON``, until standard input ends.
+"""
 
 import contextlib
 import json
@@ -8,6 +11,7 @@ import socket
 import sys
 import threading
 import time
+from importlib import import_module
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -45,7 +49,6 @@ class Arrivals:
         os.close(self._end)
 
     def fileno(self) -> int:
-        """Descriptor to wait on."""
         return self._wake
 
     def take(self) -> tuple[list[tuple[bytes, int]], int]:
@@ -96,7 +99,6 @@ class EmulatorServer:
         self._master_is_there = True
 
     def run(self) -> None:
-        """Serve."""
         take_precedence()
         try:
             with self._arrivals or contextlib.nullcontext():
@@ -222,3 +224,8 @@ def _listen(path: str) -> socket.socket:
     listener.listen(1)
     listener.setblocking(False)
     return listener
+
+
+if __name__ == "__main__":
+    module, _, name = sys.argv[1].partition(":")
+    EmulatorServer(getattr(import_module(module), name).from_json(sys.argv[2])).run()

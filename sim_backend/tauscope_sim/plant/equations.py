@@ -49,10 +49,7 @@ def compliant_transmissions(effects: Sequence[PhysicalEffect], rotor_inertia: Ar
 
 
 class Compliance:
-    """All compliant transmissions of an arm.
-
-    `transmissions`: by joint, counted from 0.
-    """
+    """All compliant transmissions of an arm. `transmissions`: by joint, counted from 0."""
 
     def __init__(self, transmissions: Mapping[int, Transmission], coordinates: Coordinates) -> None:
         self._parts = [(joint, coordinates.motor(joint), transmissions[joint]) for joint in coordinates.compliant]
@@ -120,14 +117,12 @@ class StaticFriction(Term):
         ]
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add τ_f."""
         velocity, friction = moment.velocity, forces.friction
         for joint, place, stiction, k_v, stribeck, delta, viscous in self._laws:
             v = velocity[place]
             friction[joint] += stiction * atan(k_v * v) + stribeck * atan(delta * v) + viscous * v
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        """Add dτ_f/dv."""
         for _, place, stiction, k_v, stribeck, delta, viscous in self._laws:
             x, y = k_v * moment.velocity[place], delta * moment.velocity[place]
             slope = stiction * k_v / (1.0 + x * x) + stribeck * delta / (1.0 + y * y) + viscous

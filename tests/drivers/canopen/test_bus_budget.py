@@ -2,7 +2,7 @@
 
 import pytest
 
-from tauscope_drivers.canopen.bus_budget import cycle_bits, frame_bits, largest_rate_hz, rate_limit
+from tauscope_drivers.canopen.process_data import cycle_bits, frame_bits, largest_rate_hz, rate_limit
 
 TORQUE_CYCLE = (4, 8, 4)
 

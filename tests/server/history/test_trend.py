@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
-from tauscope.server.history.trend import TrendPoint, fit_trend
+from tauscope.server.history.drift import TrendPoint, fit_trend
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 

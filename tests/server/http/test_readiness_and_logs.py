@@ -15,7 +15,7 @@ from starlette.testclient import TestClient
 
 from server.http.problem_check import assert_problem
 from tauscope.server.http import Settings, readiness
-from tauscope.server.http.server import log_as_json
+from tauscope.server.http.app import log_as_json
 from tauscope.server.http.services import Services
 
 

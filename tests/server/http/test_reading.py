@@ -44,7 +44,7 @@ def request_of(name: str, *, is_gone: bool = False) -> Request:
 
 
 def test_a_process_that_reads_files_begins_without_the_rest_of_the_service() -> None:
-    loaded = packages_of("tauscope.server.queue.received_robot, tauscope.server.queue.received_recording")
+    loaded = packages_of("tauscope.server.queue.received_files, tauscope.server.queue.received_files")
     assert not {"fastapi", "starlette", "sqlalchemy", "scipy"} & loaded
 
 

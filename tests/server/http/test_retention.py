@@ -62,7 +62,7 @@ def test_nothing_goes_where_nobody_asked_for_it(data: Path) -> None:
 
 def test_the_words_of_the_command(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[Settings] = []
-    monkeypatch.setattr("tauscope.server.http.server.serve", lambda settings, _: seen.append(settings))
+    monkeypatch.setattr("tauscope.server.http.app.serve", lambda settings, _: seen.append(settings))
     words = ["serve", "--data", str(data), "--prune-older-than", "90", "--prune-kind", "run", "--prune-recordings"]
     assert main(words) == 0
     found = (seen[0].prune_older_than_days, seen[0].prune_kinds, seen[0].prune_recordings)

@@ -11,7 +11,7 @@ from starlette.testclient import TestClient
 from server.http.motions import QUICK_DESIGN
 from server.http.problem_check import assert_problem
 from tauscope.errors import RobotFileError
-from tauscope.server.queue.received_robot import check_received_robot, read_received_robot
+from tauscope.server.queue.received_files import check_received_robot, read_received_robot
 
 CHECK = "/api/v1/robots/check"
 URDF = (

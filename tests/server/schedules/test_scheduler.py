@@ -11,10 +11,11 @@ import pytest
 from tauscope.errors import NotFoundError, StoreError, TauscopeError
 from tauscope.server.control.leases import BusyError, LeasedError
 from tauscope.server.schedules.definition import ScheduleDefinition
-from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry, ScheduleRepository
+from tauscope.server.schedules.repository import FiringEntry, ScheduleRepository
 from tauscope.server.schedules.scheduler import FOLDER, NothingToDoError, Repeater, Scheduler
 from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index
+from tauscope.server.store.database.tables import Schedule
 
 START = datetime(2026, 11, 2, 12, 0, tzinfo=UTC)
 
@@ -41,7 +42,7 @@ class Starts:
         self.going_on: set[tuple[str, str]] = set()
         self.hindrance: Callable[[], None] = lambda: None
 
-    def start(self, entry: ScheduleEntry, since: datetime | None) -> tuple[str, str]:
+    def start(self, entry: Schedule, since: datetime | None) -> tuple[str, str]:
         self.hindrance()
         self.started.append(entry.name)
         return "campaign", f"item-{len(self.started)}"
@@ -50,10 +51,18 @@ class Starts:
         return (kind, identifier) in self.going_on
 
 
-def schedule(name: str = "nightly", site: str | None = "here", **changes: Any) -> ScheduleEntry:
+def schedule(name: str = "nightly", site: str | None = "here", **changes: Any) -> Schedule:
     made = ScheduleDefinition.model_validate({"kind": "campaign", "every_s": 3600, **changes})
     due = made.next_after(START, START)
-    return ScheduleEntry(name, site, made.model_dump(mode="json"), {"robot_name": "arm"}, {}, START, due)
+    return Schedule(
+        name=name,
+        site=site,
+        definition=made.model_dump(mode="json"),
+        order={"robot_name": "arm"},
+        files={},
+        created=START,
+        next_due=due,
+    )
 
 
 class Service:

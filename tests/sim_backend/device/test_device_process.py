@@ -171,7 +171,8 @@ def test_it_ends_when_it_is_asked_to(tmp_path: Path) -> None:
         arm = RemoteSimulatedArm(device.socket, 3)
         arm.connect()
         assert arm.status()["activity"] == "braked"
-        arm.shut_down_device()
+        arm.disconnect()
+        device.process.terminate()
         assert device.process.wait(PATIENCE_S) == 0
         assert not device.socket.exists()
         with pytest.raises(DriverError) as caught:

@@ -268,7 +268,7 @@ def test_latched_servo_in_current_mode_exerts_nothing() -> None:
 def test_overload_sets_the_alert_bit_and_lets_go_until_a_restart() -> None:
     master = Master(1)
     master.prepare()
-    master.emulator.schedule.add([InjectedFault(FaultKind.OVERLOAD, 1)])
+    master.emulator.schedule.put(0.0, InjectedFault(FaultKind.OVERLOAD, 1))
     master.wait(0.002)
     (status,) = master.ask(packets.encode_read(1, HARDWARE_ERROR, 1))
     assert status.alert
@@ -283,14 +283,15 @@ def test_overload_sets_the_alert_bit_and_lets_go_until_a_restart() -> None:
 def test_over_temperature_is_shown_and_shuts_down() -> None:
     master = Master(1)
     master.prepare()
-    master.emulator.schedule.add([InjectedFault(FaultKind.OVER_TEMPERATURE, 1)])
+    master.emulator.schedule.put(0.0, InjectedFault(FaultKind.OVER_TEMPERATURE, 1))
     master.wait(0.002)
     assert master.read(1, HARDWARE_ERROR) == 4
     assert master.read(1, TEMPERATURE) > 80
 
 
 def inject(master: Master, kind: FaultKind, **fault: float) -> None:
-    master.emulator.schedule.add([InjectedFault(kind, 2, **fault)])  # pyright: ignore[reportArgumentType]
+    injected = InjectedFault(kind, 2, **fault)  # pyright: ignore[reportArgumentType]
+    master.emulator.schedule.put(injected.at_s, injected)
     master.wait(0.002)
 
 

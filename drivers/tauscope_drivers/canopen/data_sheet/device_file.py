@@ -158,8 +158,6 @@ _LONGEST_NAME = 60
 
 @dataclass(frozen=True)
 class DescribedObject:
-    """One entry of the object dictionary as a file describes it."""
-
     name: str
     index: int
     subindex: int
@@ -172,16 +170,12 @@ class DescribedObject:
 
     @property
     def type_name(self) -> str:
-        """Name of its data type."""
         return TYPE_NAMES.get(self.data_type, f"data type 0x{self.data_type:02X}")
 
 
 @dataclass(frozen=True)
 class DeviceFile:
-    """What a file says of a drive.
-
-    `vendor`, `product`, `revision`: identity; None where it states none.
-    """
+    """What a file says of a drive. `vendor`, `product`, `revision`: identity; None where it states none."""
 
     name: str
     objects: Mapping[tuple[int, int], DescribedObject]  # by index and subindex
@@ -192,7 +186,6 @@ class DeviceFile:
 
 
 def read_device_file(path: Path, node_id: int) -> DeviceFile:
-    """Read a file. Raises DataSheetError where it cannot be read, or is no such file."""
     sections = read_sections(_content(path))
     entries = {(entry.index, entry.subindex): entry for entry in _describe_all(sections, node_id)}
     device = sections.get("DeviceInfo", {})
@@ -301,8 +294,6 @@ _LINE = re.compile(r"node.?id|baud|bit.?rate", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Setting:
-    """A value for a drive."""
-
     entry: DriveObject
     data: bytes
     text: str

@@ -94,29 +94,20 @@ class JointFriction:
     """Friction of one joint and the constant beside it, equations (7), (8).
 
     `stiction`, `stribeck`: τ_s, τ_sc [Nm or N]; their sum is the Coulomb level at speed.
-    `viscous`: τ_v [Nm s/rad or N s/m].
-    `offset`: constant torque [Nm or N].
-    `k_v`: K_v, slope of the smooth sign [s/rad or s/m].
-    `delta`: δ, shape of the Stribeck effect [s/rad or s/m]; None where the joint has none.
     """
 
     stiction: float
     stribeck: float
-    viscous: float
-    offset: float
-    k_v: float
-    delta: float | None = None
+    viscous: float  # τ_v [Nm s/rad or N s/m]
+    offset: float  # constant torque [Nm or N]
+    k_v: float  # K_v, slope of the smooth sign [s/rad or s/m]
+    delta: float | None = None  # δ, shape of the Stribeck effect [s/rad or s/m]; None where the joint has none
 
 
 @dataclass(frozen=True)
 class JointCompensation:
-    """One joint of a compensation model.
-
-    `type`: revolute (rad, Nm) or prismatic (m, N).
-    """
-
     name: str
-    type: JointType
+    type: JointType  # revolute (rad, Nm) or prismatic (m, N)
     friction: JointFriction
     units: DriveUnits = UNKNOWN_UNITS
 

@@ -36,14 +36,9 @@ COEFFICIENTS = ("stiction", "stribeck", "viscous", "offset", "k_v", "delta")
 
 @dataclass(frozen=True)
 class UnitFunction:
-    """A function that gives the friction in one unit.
-
-    `torque_per_unit`: what one unit means at each joint [Nm or N].
-    """
-
     suffix: str
     meaning: str
-    torque_per_unit: tuple[float, ...]
+    torque_per_unit: tuple[float, ...]  # what one unit means at each joint [Nm or N]
 
 
 def unit_functions(model: CompensationModel) -> tuple[tuple[UnitFunction, ...], tuple[str, ...]]:

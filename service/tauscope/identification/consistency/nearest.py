@@ -25,18 +25,13 @@ _ACTIVE = 100.0  # a constraint counts as active where less than this many margi
 
 @dataclass(frozen=True, eq=False)
 class ConsistentParameters:
-    """A full parameter set of a robot that can exist.
-
-    `parameters`: (p,), x: standard parameters of all links, then friction coefficients.
-    `squared_residual`: ‖R x - z‖² [noise variances].
-    `free_squared_residual`: the least that any x, consistent or not, reaches [noise variances].
-    """
+    """A full parameter set of a robot that can exist."""
 
     links: tuple[LinkInertia, ...]
-    parameters: Array
+    parameters: Array  # (p,), x: standard parameters of all links, then friction coefficients
     objective: float
-    squared_residual: float
-    free_squared_residual: float
+    squared_residual: float  # ‖R x - z‖² [noise variances]
+    free_squared_residual: float  # the least that any x, consistent or not, reaches [noise variances]
     prior_squared_distance: float
     status: str
     duality_gap: float
@@ -55,12 +50,7 @@ class ConsistentParameters:
 
 
 def nearest_consistent_parameters(
-    factor: Array,
-    target: Array,
-    prior: Prior,
-    inequalities: LinearInequalities | None = None,
-    *,
-    margin: float = MARGIN,
+    factor: Array, target: Array, prior: Prior, inequalities: LinearInequalities | None = None
 ) -> ConsistentParameters:
     """Nearest x to a weighted least-squares estimate such that every link can exist and G x ≤ h.
 
@@ -75,12 +65,12 @@ def nearest_consistent_parameters(
     """
     inequalities = inequalities or LinearInequalities.none(prior.mean.size)
     _check_input(factor, target, prior, inequalities)
-    program = assemble(factor, target, prior, inequalities, margin=margin)
+    program = assemble(factor, target, prior, inequalities, margin=MARGIN)
     scaled, status, gap = solve(program)
     parameters = scaled * prior.scale
     squared_residual = float(np.sum((factor @ parameters - target) ** 2))
     distance = prior.squared_distance(parameters)
-    felt = program.slacks(scaled) <= _ACTIVE * margin
+    felt = program.slacks(scaled) <= _ACTIVE * MARGIN
     least = program.smallest_eigenvalues(scaled)
     return ConsistentParameters(
         links=tuple(LinkInertia.from_vector(parameters[10 * j : 10 * j + 10]) for j in range(program.link_count)),
@@ -91,7 +81,7 @@ def nearest_consistent_parameters(
         prior_squared_distance=distance,
         status=status,
         duality_gap=gap,
-        active_links=tuple(bool(value <= _ACTIVE * margin) for value in least),
+        active_links=tuple(bool(value <= _ACTIVE * MARGIN) for value in least),
         active_inequalities=tuple(name for name, on in zip(inequalities.names, felt, strict=True) if on),
     )
 

@@ -27,22 +27,15 @@ _SMALLEST_LENGTH = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """A normal distribution of all parameters: ‖W (x - μ)‖² is χ² of as many degrees of freedom.
+    """A normal distribution of all parameters: ‖W (x - μ)‖² is χ² of as many degrees of freedom."""
 
-    `mean`: (p,), μ: standard parameters of all links, then friction coefficients.
-    `root`: (p, p), W.
-    `scale`: (p,), expected magnitudes, positive; the conic program is scaled by them.
-    `masses`: (n,), mass that each link may be expected to have [kg].
-    """
-
-    mean: Array
-    root: Array
-    scale: Array
-    masses: Array
+    mean: Array  # (p,), μ: standard parameters of all links, then friction coefficients
+    root: Array  # (p, p), W
+    scale: Array  # (p,), expected magnitudes, positive; the conic program is scaled by them
+    masses: Array  # (n,), mass that each link may be expected to have [kg]
 
     @property
     def link_count(self) -> int:
-        """Number of links n."""
         return len(self.masses)
 
     def widen(self, width: float) -> "Prior":

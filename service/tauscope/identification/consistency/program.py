@@ -37,18 +37,12 @@ _EXACT = 1e-9  # largest violation of a scaled constraint in a result
 
 @dataclass(frozen=True, eq=False)
 class ConicProgram:
-    """Minimise ½ ‖T u - c‖² subject to A u + s = b, s in the non-negative orthant and one 4x4 PSD cone a link.
+    """Minimise ½ ‖T u - c‖² subject to A u + s = b, s in the non-negative orthant and one 4x4 PSD cone a link."""
 
-    `triangle`: (p, p), T.
-    `centre`: (p,), c.
-    `matrix`: (k + 10 n, p), A, the k inequalities first, each of unit length.
-    `bound`: (k + 10 n,), b.
-    """
-
-    triangle: Array
-    centre: Array
-    matrix: Array
-    bound: Array
+    triangle: Array  # (p, p), T
+    centre: Array  # (p,), c
+    matrix: Array  # (k + 10 n, p), A, the k inequalities first, each of unit length
+    bound: Array  # (k + 10 n,), b
     names: tuple[str, ...]
     margin: float
     link_count: int

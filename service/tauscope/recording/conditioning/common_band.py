@@ -25,12 +25,9 @@ BLOCK_VALUES = 1 << 19  # numbers in the intermediate result of a decimation: bo
 
 
 class BandFilter(ABC):
-    """A linear filter with decimation along the last axis, the same for torque and regressor.
+    """A linear filter with decimation along the last axis, the same for torque and regressor."""
 
-    `rate_hz`: sampling rate of what comes out [Hz].
-    """
-
-    rate_hz: float
+    rate_hz: float  # sampling rate of what comes out [Hz]
 
     @abstractmethod
     def reduce(self, values: Array) -> Array:
@@ -67,13 +64,11 @@ class AllPass(BandFilter):
 class Decimator(BandFilter):
     """Linear-phase low-pass (Kaiser window) evaluated only at every `factor`-th sample.
 
-    `kernel`: (K,), symmetric impulse response of unit sum; K is a multiple of `factor`.
-
     Written as one matrix product per group of signals: with X the signal in blocks of D samples,
     y[m] = Σ_b (X H)[m+b, b], H the kernel in K/D columns. That is several times quicker than a convolution.
     """
 
-    kernel: Array
+    kernel: Array  # (K,), symmetric impulse response of unit sum; K is a multiple of `factor`
     factor: int
     rate_hz: float
 

@@ -24,9 +24,6 @@ class Motion:
 
     `time`: (N,) [s]; of the first period where periods were averaged.
     `position`, `velocity`, `acceleration`: (N, n), smoothed q, q̇, q̈ at the recorded rate.
-    `torque`: (P, N, n), measured joint torque of every repetition; P = 1 where nothing was averaged.
-    `measured`: (P, N, n), where that torque was measured and not filled in.
-    `rate_hz`: sampling rate of all of these [Hz].
     `period`: (N,), progress through the repeated excitation, where it is known and not averaged: index of the period
         plus the part of it that is over.
     `scatter`: (n,), standard deviation of the positions from period to period [rad or m]; None where nothing was
@@ -37,9 +34,9 @@ class Motion:
     position: Array
     velocity: Array
     acceleration: Array
-    torque: Array
-    measured: Mask
-    rate_hz: float
+    torque: Array  # (P, N, n), measured joint torque of every repetition; P = 1 where nothing was averaged
+    measured: Mask  # (P, N, n), where that torque was measured and not filled in
+    rate_hz: float  # sampling rate of all of these [Hz]
     band: BandFilter
     period: Array | None = None
     own: slice = field(default_factory=lambda: slice(None))
@@ -64,13 +61,12 @@ class Motion:
 class Trim:
     """The band of one recording's transient motion, and the samples that it costs.
 
-    `cutoff_hz`: of the band [Hz]; None where it is open.
     `state_hz`: float or (n,), cut-off of the motion's own smoothing, of each joint if they differ [Hz]; the sampling
         rate where nothing is smoothed.
     """
 
     band: AllPass | Decimator
-    cutoff_hz: float | None
+    cutoff_hz: float | None  # of the band [Hz]; None where it is open
     state_hz: float | Array
     margin: int
 

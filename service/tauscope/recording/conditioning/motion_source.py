@@ -64,13 +64,12 @@ class MotionSource:
     """What every joint's motion is made from, and the band that it stands.
 
     `velocity`, `acceleration`: (n,), whether the recorded signal is used for q̇, for q̈.
-    `limits_hz`: (n,), widest band in which q̈ keeps to `NOISE_SHARE`; infinite where it does everywhere.
     `quieter_from_hz`: (n,), band from which on the recorded velocity is the quieter source; infinite where it never is.
     """
 
     velocity: np.ndarray
     acceleration: np.ndarray
-    limits_hz: Array
+    limits_hz: Array  # (n,), widest band in which q̈ keeps to `NOISE_SHARE`; infinite where it does everywhere
     quieter_from_hz: Array | None = None
 
     def in_band(self, cutoff_hz: float | None) -> "MotionSource":
@@ -149,17 +148,15 @@ class _Fit:
     """A recorded signal as x_recorded = g x - d ẋ + offset, x by the positions, in their band.
 
     `delay`, `delay_std`: d and its standard error [s].
-    `offset`: relative to the rms of the recorded signal.
-    `misfit`: rms of the rest, `motion` that of x.
     """
 
     gain: float
     gain_std: float
     delay: float
     delay_std: float
-    offset: float
-    misfit: float
-    motion: float
+    offset: float  # relative to the rms of the recorded signal
+    misfit: float  # rms of the rest
+    motion: float  # rms of x
     band_hz: float
 
     @staticmethod

@@ -37,33 +37,25 @@ DIFFERENCE_ORDER = 2
 class PositionNoise:
     """Noise of the measured positions.
 
-    `density`: (n,), one-sided spectral density S_n [rad²/Hz or m²/Hz].
     `limit_hz`: widest band in which the q̈ that is used keeps to `NOISE_SHARE`; None where the whole spectrum does.
     `joint_limits_hz`: (n,), the same joint by joint; infinite where the whole spectrum does, or where the joint stands
         still.
-    `step`: (n,), step that the encoder rounds to [rad or m]; zero where it shows none.
     """
 
-    density: Array
+    density: Array  # (n,), one-sided spectral density S_n [rad²/Hz or m²/Hz]
     limit_hz: float | None
     joint_limits_hz: Array
-    step: Array
+    step: Array  # (n,), step that the encoder rounds to [rad or m]; zero where it shows none
 
 
 @dataclass(frozen=True, eq=False)
 class AccelerationSpectrum:
-    """Spectrum of q̈ from some signal, and the noise in it.
+    """Spectrum of q̈ from some signal, and the noise in it."""
 
-    `frequency`: (F,) [Hz].
-    `power`: (F, n), one-sided spectral density of q̈, with its noise.
-    `gain`: (F,), squared gain from the signal's noise to that of q̈.
-    `density`: (n,), one-sided spectral density of the signal's noise.
-    """
-
-    frequency: Array
-    power: Array
-    gain: Array
-    density: Array
+    frequency: Array  # (F,) [Hz]
+    power: Array  # (F, n), one-sided spectral density of q̈, with its noise
+    gain: Array  # (F,), squared gain from the signal's noise to that of q̈
+    density: Array  # (n,), one-sided spectral density of the signal's noise
 
     def widest_band(self, rate_hz: float) -> Array:
         """Widest band in which noise keeps to `NOISE_SHARE` of q̈, (n,) [Hz]; infinite where it does everywhere.

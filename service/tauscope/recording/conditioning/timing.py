@@ -27,12 +27,9 @@ WHOLE_PERIOD = 1e-6  # part of a period that rounding may take from the last one
 
 @dataclass(frozen=True)
 class PeriodRun:
-    """Consecutive periods of one length.
+    """Consecutive periods of one length."""
 
-    `rows`: (int, int), rows of the stretch in which it lies.
-    """
-
-    rows: tuple[int, int]
+    rows: tuple[int, int]  # rows of the stretch in which it lies
     start_s: float
     stop_s: float
     length_s: float
@@ -76,16 +73,11 @@ class PeriodRun:
 
 @dataclass(frozen=True, eq=False)
 class PeriodLabels:
-    """Column `period` of a recording, kept as its steps.
+    """Column `period` of a recording, kept as its steps."""
 
-    `time`: (K,), instants at which the label changes, the first sample's own first [s].
-    `label`: (K,), the label from then on; NaN outside the repeated part.
-    `row`: (K,) int, rows at which it changes.
-    """
-
-    time: Array
-    label: Array
-    row: NDArray[np.int_]
+    time: Array  # (K,), instants at which the label changes, the first sample's own first [s]
+    label: Array  # (K,), the label from then on; NaN outside the repeated part
+    row: NDArray[np.int_]  # (K,) int, rows at which it changes
 
     def runs(self, rows: tuple[int, int], begin_s: float, end_s: float, interval_s: float) -> Iterator[PeriodRun]:
         """The runs of periods of equal length within one stretch of a recording.

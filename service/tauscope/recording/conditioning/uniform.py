@@ -31,7 +31,6 @@ class Stretch:
     """Uniformly sampled motion without a long gap.
 
     `position`, `torque`: (N, n), q [rad or m] and joint torque τ [Nm or N]; finite everywhere.
-    `measured`: (N, n), False where a joint's torque was filled in and must not be counted.
     `period`: (N,), progress through the repeated excitation: index of the period plus the part of it that is over; NaN
         outside.
     `velocity`, `acceleration`: (N, n), recorded qd, qdd where there are such columns; a joint of which more than single
@@ -42,7 +41,7 @@ class Stretch:
     rate_hz: float
     position: Array
     torque: Array
-    measured: Mask
+    measured: Mask  # (N, n), False where a joint's torque was filled in and must not be counted
     period: Array | None
     resampled: bool
     velocity: Array | None = None
@@ -51,14 +50,10 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Where the samples lie on a uniform grid.
+    """Where the samples lie on a uniform grid."""
 
-    `index`: (N,) int, grid point of every sample.
-    `start_s`: instant of grid point 0, relative to the first sample [s].
-    """
-
-    index: NDArray[np.int_]
-    start_s: float
+    index: NDArray[np.int_]  # (N,) int, grid point of every sample
+    start_s: float  # instant of grid point 0, relative to the first sample [s]
     rate_hz: float
 
 

@@ -21,16 +21,14 @@ class ColumnEdit:
 
     `blank`: (k, 2) int64, rows start:stop that were never measured: NaN; ascending, disjoint.
     `jumps`: (m,) int64, rows from which on the column is off by a constant.
-    `offsets`: (m,), that constant: subtracted [rad or m].
     `hold`: rows for which the source holds a value: those in between are on a straight line from one value to the next.
-    `fill`: missed rows up to which a straight line is drawn.
     """
 
     blank: Rows = field(default_factory=lambda: NO_ROWS)
     jumps: Numbers = field(default_factory=lambda: NO_NUMBERS)
-    offsets: Array = field(default_factory=lambda: np.empty(0))
+    offsets: Array = field(default_factory=lambda: np.empty(0))  # (m,), that constant: subtracted [rad or m]
     hold: int = 0
-    fill: int = 0
+    fill: int = 0  # missed rows up to which a straight line is drawn
 
 
 class EditedTable:

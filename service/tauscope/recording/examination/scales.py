@@ -26,7 +26,6 @@ class Sketch:
 
     @staticmethod
     def of(recording: Recording) -> "Sketch":
-        """The windows of a recording."""
         count = len(recording)
         if count <= WINDOWS * WINDOW_ROWS:
             return Sketch((recording.samples(),))
@@ -138,41 +137,30 @@ NEIGHBOURS = 3  # rows on either side that a row is judged by
 class PositionScale:
     """Typical steps of one joint's position.
 
-    `step`: encoder's step, or the least noise [rad or m].
-    `move`: 95th percentile of the change from row to row, while the joint moves [rad or m].
     `surprise`: 90th percentile of the change beyond what the neighbours foretell, while the joint moves [rad or m].
-    `hold`: rows for which the source holds a value; 1 where it does not.
     """
 
     is_wrapped: bool
-    step: float
-    move: float
+    step: float  # encoder's step, or the least noise [rad or m]
+    move: float  # 95th percentile of the change from row to row, while the joint moves [rad or m]
     surprise: float
-    hold: int
+    hold: int  # rows for which the source holds a value; 1 where it does not
 
 
 @dataclass(frozen=True)
 class EffortScale:
-    """Typical steps of one joint's effort, in its own unit.
-
-    `low`, `high`: 1st and 99th percentile.
-    `span`: from the 5th to the 95th percentile.
-    `change`: 90th percentile of the change from row to row.
-    `surprise`: 95th percentile of the distance beyond the range of the neighbours.
-    `run`: 99th percentile of the rows for which a value is repeated.
-    """
+    """Typical steps of one joint's effort, in its own unit. `low`, `high`: 1st and 99th percentile."""
 
     low: float
     high: float
-    span: float
-    change: float
-    surprise: float
-    run: int
+    span: float  # from the 5th to the 95th percentile
+    change: float  # 90th percentile of the change from row to row
+    surprise: float  # 95th percentile of the distance beyond the range of the neighbours
+    run: int  # 99th percentile of the rows for which a value is repeated
     hold: int
 
 
 def measure_positions(sketch: Sketch, types: list[JointType]) -> list[PositionScale]:
-    """Scales of every joint's position."""
     scales = []
     for joint, kind in enumerate(types):
         pieces = [

@@ -69,15 +69,11 @@ class JointDefects:
 
 @dataclass(eq=False)
 class Defects:
-    """Defects of a recording's samples.
-
-    `bunched`: (m,) int64, rows whose stamp is that of a neighbour.
-    `alternate`: whether positions and efforts come in rows of their own.
-    """
+    """Defects of a recording's samples."""
 
     joints: list[JointDefects]
-    alternate: bool
-    bunched: Numbers = field(default_factory=lambda: NO_NUMBERS)
+    alternate: bool  # whether positions and efforts come in rows of their own
+    bunched: Numbers = field(default_factory=lambda: NO_NUMBERS)  # (m,) int64, rows whose stamp is that of a neighbour
 
 
 def find_defects(recording: Recording, types: list[JointType]) -> Defects:
@@ -145,7 +141,6 @@ class _Scan:
                 )
 
     def finish(self, recording: Recording) -> Defects:
-        """Defects of all blocks."""
         defects = self.defects
         for (joint, name), parts in self.found.items():
             rows = np.unique(np.concatenate(parts))

@@ -98,18 +98,12 @@ LONGEST_NAME = 200
 
 @dataclass(frozen=True)
 class Family:
-    """Columns of one quantity, one a joint.
+    """Columns of one quantity, one a joint."""
 
-    `template`: name of the columns with a placeholder for the joint.
-    `columns`: columns in the order of the joints: by number, of the robot, or of the file.
-    `is_regular`: whether the template gives the columns; zeros in front of a number it does not.
-    `is_guessed`: whether the joints' names are any part of the columns' names.
-    """
-
-    template: str
-    columns: tuple[str, ...]
-    is_regular: bool = True
-    is_guessed: bool = False
+    template: str  # name of the columns with a placeholder for the joint
+    columns: tuple[str, ...]  # columns in the order of the joints: by number, of the robot, or of the file
+    is_regular: bool = True  # whether the template gives the columns; zeros in front of a number it does not
+    is_guessed: bool = False  # whether the joints' names are any part of the columns' names
 
     @property
     def words(self) -> tuple[str, ...]:

@@ -9,11 +9,10 @@ class Preset:
     """How one tool names its columns.
 
     `columns`: by group of CONTRACT.md, ends of the columns' names without the joint, their words joined by ``_``.
-    `units`: as in a robot file.
     """
 
     columns: Mapping[str, tuple[str, ...]]
-    units: Mapping[str, str]
+    units: Mapping[str, str]  # as in a robot file
 
 
 def _preset(units: Mapping[str, str] | None = None, **ends: str) -> Preset:

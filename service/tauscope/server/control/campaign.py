@@ -15,7 +15,7 @@ from pydantic import Field
 from tauscope.errors import NotFoundError, TauscopeError
 from tauscope.runtime.record import RunRecord
 from tauscope.runtime.states import RunState
-from tauscope.server.control.leases import FREE, BusyError, Permit
+from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.control.run import (
     RunRequestRecord,
     RunWorkspace,
@@ -313,6 +313,8 @@ def _run_problem(identifier: str, record: RunRecord | None) -> JobProblem:
 
 
 class CampaignManager(Manager[CampaignRunner]):
+    noun = "campaign"
+
     def __init__(self, items: ItemStore, dependencies: CampaignDependencies) -> None:
         """Continue the analysis of campaigns that recorded all motions; the others become interrupted."""
         super().__init__(items)
@@ -326,20 +328,12 @@ class CampaignManager(Manager[CampaignRunner]):
         order = workspace.read_order()
         if order is None:
             raise TauscopeError("the campaign's order.json is missing or damaged; hand the campaign in again")
+        workspace.write_record(JobRecord(state=JobState.QUEUED, created=self.items.clock()))
         claim = order.backend.device(order.robot_name), f"campaign {staged_identifier(staged)}"
+        claims = self._dependencies.runs.claims
         with self._lock:
-            if self._is_closed:
-                raise BusyError("the service is ending; hand the campaign in when it is up again")
-            self._dependencies.runs.claims.take(*claim)
-            try:
-                permit.require()
-                workspace.write_record(JobRecord(state=JobState.QUEUED, created=self.items.clock()))
-                identifier = self.items.publish(staged)
-            except BaseException:
-                self._dependencies.runs.claims.release(*claim)
-                raise
+            identifier = self._publish(staged, claims, claim, permit)
             workspace = CampaignWorkspace(self.items.folder(identifier))
-            claims = self._dependencies.runs.claims
             runner = CampaignRunner(workspace, order, self._dependencies, lambda: claims.release(*claim), permit)
             self._supervise(identifier, runner)
         return identifier

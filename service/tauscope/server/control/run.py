@@ -34,7 +34,7 @@ from tauscope.server.queue.task_job import TaskWorkspace
 from tauscope.strict_model import StrictModel
 from tauscope.tasks import run
 from tauscope.tasks.run import BackendChoice, recording_file
-from tauscope.tasks.task import LocalFiles
+from tauscope.tasks.task import Files
 
 
 class RunRequestRecord(StrictModel):
@@ -139,7 +139,7 @@ def start_control(workspace: RunWorkspace, report: Report, *, sim_socket: Path |
         options=order.options,
     )
     return run.start(
-        request, LocalFiles(), trajectory, workspace.control, report, sim_socket=sim_socket, beats_by_itself=False
+        request, Files(), trajectory, workspace.control, report, sim_socket=sim_socket, beats_by_itself=False
     )
 
 

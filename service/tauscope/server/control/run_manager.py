@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from tauscope.errors import TauscopeError
 from tauscope.runtime.loop import Report
@@ -40,6 +40,8 @@ S = TypeVar("S", bound=Supervisor)
 
 class Manager(Generic[S]):
     """Active items, each with a thread, and the folders of all items. Every method may be called from any thread."""
+
+    noun: ClassVar[str]
 
     def __init__(self, items: ItemStore) -> None:
         self.items = items
@@ -89,6 +91,21 @@ class Manager(Generic[S]):
             self.begin_close()
         for _, thread in self._active.values():
             thread.join(CLOSE_TIMEOUT_S)
+
+    def _publish(self, staged: Path, claims: DeviceClaims, claim: tuple[str, str] | None, permit: Permit) -> str:
+        """Make a staged folder an item that has its arm; the caller has the lock. Raises BusyError or LeaseError."""
+        if self._is_closed:
+            raise BusyError(f"the service is ending; hand the {self.noun} in when it is up again")
+        if claim is not None:
+            claims.take(*claim)
+        try:
+            # Only now: whoever leases an arm looks at the claims after the lease is written.
+            permit.require()
+            return self.items.publish(staged)
+        except BaseException:
+            if claim is not None:
+                claims.release(*claim)
+            raise
 
     def _supervise(self, identifier: str, supervisor: S, then: Callable[[], None] = lambda: None) -> None:
         def run() -> None:
@@ -243,6 +260,8 @@ class RunSupervisor:
 
 
 class RunManager(Manager[RunSupervisor]):
+    noun = "run"
+
     def __init__(
         self,
         items: ItemStore,
@@ -268,17 +287,7 @@ class RunManager(Manager[RunSupervisor]):
         workspace.create(request)
         claim = None if holder is not None else (request.device, f"run {staged_identifier(staged)}")
         with self._lock:
-            if self._is_closed:
-                raise BusyError("the service is ending; hand the run in when it is up again")
-            if claim is not None:
-                self.claims.take(*claim)
-            try:
-                # Only now: whoever leases an arm looks at the claims after the lease is written.
-                permit.require()
-                identifier = self.items.publish(staged)
-            except BaseException:
-                self._release(claim)
-                raise
+            identifier = self._publish(staged, self.claims, claim, permit)
             workspace = RunWorkspace(self.items.folder(identifier))
             supervisor = RunSupervisor(workspace, self._start, motion, self._is_alive, permit)
             self._supervise(identifier, supervisor, lambda: self._end_supervised(workspace, claim))
@@ -309,11 +318,8 @@ class RunManager(Manager[RunSupervisor]):
         except Exception:
             _log.exception("run %s could not be put in order", workspace.folder.name)
         finally:
-            self._release(claim)
-
-    def _release(self, claim: tuple[str, str] | None) -> None:
-        if claim is not None:
-            self.claims.release(*claim)
+            if claim is not None:
+                self.claims.release(*claim)
 
     def _conclude(self, workspace: RunWorkspace) -> None:
         """Keep the recording of a run that has ended among the recordings, and tell the end; done once."""

@@ -121,14 +121,14 @@ class ModelHistory:
         with self._database.reading() as session:
             return [_entry(model) for model in session.scalars(query)]
 
-    def documents(self, robot: str, since: datetime | None = None) -> list[tuple[ModelEntry, IdentificationDocument]]:
+    def documents(self, robot: str) -> list[tuple[str, datetime, IdentificationDocument]]:
         """Models that were ever active, the oldest first. Raises NotFoundError if there is no such robot."""
         query = select(Model).options(undefer(Model.document)).where(Model.state.in_(("active", "kept")))
-        if since is not None:
-            query = query.where(Model.created >= since)
         with self._database.reading() as session:
             models = session.scalars(query.where(Model.robot == _robot(session, robot)).order_by(Model.created))
-            return [(_entry(each), IdentificationDocument.model_validate(each.document)) for each in models]
+            return [
+                (each.identifier, each.created, IdentificationDocument.model_validate(each.document)) for each in models
+            ]
 
     def policy(self, robot: str) -> ModelPolicy:
         """The bounds for a robot. Raises NotFoundError if there is no such robot."""

@@ -1,11 +1,10 @@
 """What answers, and the routes of items, have in common."""
 
-import math
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
 from fastapi import Path, Query, Request
-from pydantic import BeforeValidator, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from tauscope.server.problems import Problem, ProblemError, make_problem
 from tauscope.server.queue.job_folder import JobProblem, JobState, Workspace
@@ -28,12 +27,6 @@ class PageAnswer(AnswerModel):
     next: str | None = Field(default=None, description="to be given as `after` for the next page; null: it is the last")
 
 
-def _no_nan(value: Any) -> Any:
-    """JSON knows no NaN: what was not measured is null."""
-    return None if isinstance(value, float) and math.isnan(value) else value
-
-
-Measured = Annotated[float | None, BeforeValidator(_no_nan)]  # A number, or null where there was nothing to measure
 Identifier = Annotated[str, Path(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])]
 Limit = Annotated[int, Query(ge=1, le=1000, description="most entries of the list")]
 After = Annotated[str | None, Query(max_length=255, description="`next` of the page before; null: the first page")]

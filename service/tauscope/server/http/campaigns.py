@@ -15,6 +15,7 @@ from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
 from tauscope.server.control.campaign import CampaignLinks, CampaignManager, CampaignOrder, CampaignWorkspace
 from tauscope.server.control.run import RunWorkspace
+from tauscope.server.http.analyses import DIAGNOSES, IDENTIFICATIONS
 from tauscope.server.http.answers import (
     ENDINGS,
     AnswerModel,
@@ -27,15 +28,13 @@ from tauscope.server.http.answers import (
     require_document,
     require_success,
 )
-from tauscope.server.http.diagnoses import DIAGNOSES
 from tauscope.server.http.excitations import EXCITATIONS
-from tauscope.server.http.identifications import IDENTIFICATIONS
 from tauscope.server.http.leases import permit_of
-from tauscope.server.http.robot_files import EXAMPLE_ROBOT
 from tauscope.server.http.runs import RUNS
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.router import MovingResource
 from tauscope.server.http.tasks.submission import (
+    EXAMPLE_ROBOT,
     BackendRequest,
     RobotRequest,
     choose_backend,
@@ -44,7 +43,7 @@ from tauscope.server.http.tasks.submission import (
 )
 from tauscope.server.problems import problem_responses
 from tauscope.server.queue.job_folder import JobState
-from tauscope.server.queue.received_robot import read_received_robot
+from tauscope.server.queue.received_files import read_received_robot
 from tauscope.server.queue.task_job import stage_workspace
 from tauscope.tasks.campaign import CampaignOptions
 from tauscope.tasks.run import BackendChoice

@@ -11,11 +11,10 @@ from starlette.concurrency import run_in_threadpool
 from tauscope.server.http.answers import ENDINGS, Identifier, JobAnswer, JobLinks, require_document
 from tauscope.server.http.openapi import file_responses
 from tauscope.server.http.reading import READING
-from tauscope.server.http.robot_files import EXAMPLE_ROBOT
 from tauscope.server.http.services import ServicesDep
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import JobDocument
-from tauscope.server.http.tasks.submission import RobotRequest
+from tauscope.server.http.tasks.submission import EXAMPLE_ROBOT, RobotRequest
 from tauscope.server.queue.analyses import ExcitationWorkspace, write_trajectory_piece
 from tauscope.server.queue.job_folder import read_bytes
 from tauscope.tasks.design_excitation import ExcitationDesignOptions

@@ -10,11 +10,10 @@ from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
-from tauscope.server.history.drift import Drift, find_largest_by_joint
+from tauscope.server.history.drift import Drift, ParameterTrend, find_largest_by_joint, parameter_trends
 from tauscope.server.history.gates import Gate, ModelPolicy
 from tauscope.server.history.model_history import ModelEntry, ModelEventEntry
 from tauscope.server.history.model_judgement import compare_models
-from tauscope.server.history.trend import ParameterTrend, parameter_trends
 from tauscope.server.http.answers import AnswerModel, Identifier, Limit, collection
 from tauscope.server.http.bodies import read_document
 from tauscope.server.http.openapi import json_request

@@ -7,8 +7,8 @@ from fastapi import APIRouter, Query
 from pydantic import AwareDatetime, Field
 
 from tauscope.server.http.answers import AnswerModel, Limit
-from tauscope.server.http.robot_files import RobotVersionAnswer
 from tauscope.server.http.services import ServicesDep
+from tauscope.server.http.tasks.submission import RobotVersionAnswer
 from tauscope.server.problems import problem_responses
 from tauscope.server.store.data_folder import FOLDERS, ItemKind
 from tauscope.server.store.database.index import ItemEntry, ItemQuery, RobotEntry

@@ -11,16 +11,21 @@ from fastapi.responses import FileResponse
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.recording import EffortKind
-from tauscope.server.http.answers import After, AnswerModel, Measured, PageAnswer
+from tauscope.recording import RecordingReport
+from tauscope.server.http.answers import After, AnswerModel, PageAnswer
 from tauscope.server.http.bodies import PartRule, ReceivedForm, file_answer, parse_document, receive_form
 from tauscope.server.http.openapi import ROBOT_PARTS, binary_part, file_responses, form_body, refer_to_model
 from tauscope.server.http.reading import READING
-from tauscope.server.http.robot_files import FindingAnswer, robot_part_rules
 from tauscope.server.http.services import ServicesDep, require_no_evidence
+from tauscope.server.http.tasks.submission import robot_part_rules
 from tauscope.server.problems import ProblemError, problem_responses
-from tauscope.server.queue.received_recording import check_kept_recording, read_kept_samples, understand_recording
-from tauscope.server.queue.received_robot import read_received_robot
+from tauscope.server.queue.received_files import (
+    Understanding,
+    check_kept_recording,
+    read_kept_samples,
+    read_received_robot,
+    understand_recording,
+)
 from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import StoredRecording
 from tauscope.tasks.task import ReadingOptions
@@ -38,72 +43,8 @@ class RecordingListAnswer(PageAnswer):
     recordings: list[RecordingAnswer] = Field(description="by name")
 
 
-class StepsAnswer(AnswerModel):
-    """Steps of the clock [s]."""
-
-    minimum: float = Field(description="shortest")
-    percentile_1: float = Field(description="1 % are shorter")
-    median: float = Field(description="half are shorter")
-    percentile_99: float = Field(description="99 % are shorter")
-    maximum: float = Field(description="longest")
-
-
-class GapsAnswer(AnswerModel):
-    """Steps of the clock beyond 1.9 medians."""
-
-    count: int = Field(description="how many")
-    longest: float = Field(description="the longest [s]; 0 without gaps")
-    longest_at: float | None = Field(description="time at which it begins [s]")
-
-
-class PeriodsAnswer(AnswerModel):
-    count: int = Field(description="how many are marked")
-    shortest: int = Field(description="samples of the shortest")
-    longest: int = Field(description="samples of the longest")
-
-
-class ChannelsAnswer(AnswerModel):
-    position: tuple[Measured, Measured] = Field(description="least and greatest value [rad or m]; null without samples")
-    effort: tuple[Measured, Measured] = Field(description="least and greatest value [Nm, N or drive units]")
-    position_step: float | None = Field(description="step in multiples of which the position moves [rad or m]")
-    wraps: int = Field(description="jumps of the position by about 2π")
-    first_wrap: Measured = Field(description="time of the first of them [s]")
-    clipped: tuple[tuple[float, int], ...] = Field(description="levels at which the effort stays, and samples there")
-
-
-class RecordingReportAnswer(AnswerModel):
-    name: str = Field(description="of the recording")
-    samples: int = Field(description="number of samples")
-    duration_s: float = Field(description="from the first to the last sample [s]")
-    rate_hz: float = Field(description="1 / median step [Hz]")
-    effort_kind: EffortKind = Field(description="torque (tau), or drive units (i)")
-    columns: tuple[str, ...] = Field(description="columns that are read")
-    ignored_columns: tuple[str, ...] = Field(description="columns that nobody reads")
-    missed: dict[str, int] = Field(description="number of NaN in each column that has any")
-    steps: StepsAnswer = Field(description="of the clock")
-    gaps: GapsAnswer = Field(description="where the clock skips")
-    periods: PeriodsAnswer | None = Field(description="repeats of the excitation, where they are marked")
-    joints: tuple[ChannelsAnswer, ...] = Field(description="one a joint")
-    findings: tuple[FindingAnswer, ...] = Field(description="warnings first")
-
-
 class ReadingRequest(ReadingOptions):
     """How a recording is to be read."""
-
-
-class MappingAnswer(AnswerModel):
-    header: tuple[str, ...] = Field(description="names of the file's columns; numbers from 1 where it has no names")
-    columns: dict[str, str] = Field(description="the file's column for t, q1, tau1, …; only those that were found")
-    units: dict[str, str] = Field(description="of t, q, qd and tau")
-    is_guessed: bool = Field(description="whether only the words of the column names suggest it")
-
-
-class UnderstandingAnswer(AnswerModel):
-    """How a recording is understood; nothing of it is kept."""
-
-    mapping: MappingAnswer | None = Field(description="its columns and units; null for a log, which names its joints")
-    report: RecordingReportAnswer | None = Field(description="what it holds, read so; null where it is refused")
-    problem: str | None = Field(description="why it is refused, and what to do")
 
 
 router = APIRouter(prefix="/recordings", tags=["recordings"])
@@ -157,11 +98,10 @@ def get_recording(name: Name, services: ServicesDep) -> RecordingAnswer:
 )
 async def report_on_recording(
     request: Request, name: Name, services: ServicesDep, joint_count: JointCount = None
-) -> RecordingReportAnswer:
+) -> RecordingReport:
     """What it holds, and what to look at before trusting it."""
     path = await run_in_threadpool(services.recordings.path, name)
-    report = await services.reading.call(request, check_kept_recording, path, joint_count)
-    return RecordingReportAnswer.model_validate(report)
+    return await services.reading.call(request, check_kept_recording, path, joint_count)
 
 
 @router.get(
@@ -233,7 +173,7 @@ _MAPPING_BODY = form_body(
     responses=problem_responses("bad-request", "limit-exceeded", "media-type", "robot-file", *READING),
     openapi_extra={"requestBody": {"required": True, "content": _MAPPING_BODY}},
 )
-async def check_sent_recording(request: Request, services: ServicesDep) -> UnderstandingAnswer:
+async def check_sent_recording(request: Request, services: ServicesDep) -> Understanding:
     """Its columns and units as they are understood, and what it holds when it is read so; nothing is kept."""
     async with contextmanager_in_threadpool(services.recordings.stage()) as folder:
         settings, robots = services.settings, FilePath(folder) / "robot"
@@ -247,8 +187,7 @@ async def check_sent_recording(request: Request, services: ServicesDep) -> Under
         file, robot_file = _require_file(form), form.file("robot")
         options = parse_document(form.texts.get("request", b"{}"), ReadingRequest, within="part request")
         robot = robot_file and await run_in_threadpool(read_received_robot, robots, robot_file.name)
-        found = await services.reading.call(request, understand_recording, file.path, robot, options.reading)
-        return UnderstandingAnswer.model_validate(found)
+        return await services.reading.call(request, understand_recording, file.path, robot, options.reading)
 
 
 def _require_file(form: ReceivedForm) -> KeptFile:

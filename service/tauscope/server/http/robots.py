@@ -8,21 +8,21 @@ from fastapi import APIRouter, Path, Request, Response
 from fastapi.concurrency import contextmanager_in_threadpool
 from starlette.concurrency import run_in_threadpool
 
+from tauscope.robot import RobotReport
 from tauscope.server.http.bodies import FORM, JSON, media_type, read_document, receive_form, refuse_media_type
 from tauscope.server.http.openapi import ROBOT_PARTS, form_body, json_body
 from tauscope.server.http.reading import READING
-from tauscope.server.http.robot_files import (
+from tauscope.server.http.services import ServicesDep, require_no_identification
+from tauscope.server.http.tasks.router import JobRobotAnswer, describe_robot
+from tauscope.server.http.tasks.submission import (
     EXAMPLE_ROBOT,
     RobotCheckRequest,
-    RobotReportAnswer,
     RobotVersionAnswer,
     keep_inline_robot,
     robot_part_rules,
 )
-from tauscope.server.http.services import ServicesDep, require_no_identification
-from tauscope.server.http.tasks.router import JobRobotAnswer, describe_robot
 from tauscope.server.problems import ProblemError, problem_responses
-from tauscope.server.queue.received_robot import check_received_robot, read_received_robot
+from tauscope.server.queue.received_files import check_received_robot, read_received_robot
 from tauscope.server.store.robots import VERSION_PATTERN
 
 router = APIRouter(prefix="/robots", tags=["robots"])
@@ -35,16 +35,16 @@ _BODY = {
 @router.post(
     "/check",
     summary="Check a robot file",
-    response_model=RobotReportAnswer,
+    response_model=RobotReport,
     responses=problem_responses("bad-request", "media-type", "robot-file", *READING),
     openapi_extra={"requestBody": {"required": True, "content": _BODY}},
 )
-async def check_robot_file(request: Request, services: ServicesDep) -> RobotReportAnswer:
+async def check_robot_file(request: Request, services: ServicesDep) -> RobotReport:
     """Summary and findings; nothing is kept. A model that no rigid body can have is among the findings."""
     async with contextmanager_in_threadpool(TemporaryDirectory(prefix="tauscope-robot-")) as name:
         folder = FilePath(name)
         file_name = await _receive_robot(request, services, folder)
-        return RobotReportAnswer.of(await services.reading.call(request, check_received_robot, folder, file_name))
+        return await services.reading.call(request, check_received_robot, folder, file_name)
 
 
 Version = Annotated[str, Path(description="version of the robot", pattern=VERSION_PATTERN)]

@@ -36,10 +36,10 @@ from tauscope.server.http.bodies import PartRule, file_answer, to_json_text
 from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.leases import permit_of
 from tauscope.server.http.openapi import binary_part, file_responses
-from tauscope.server.http.robot_files import EXAMPLE_ROBOT
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.router import MovingResource
 from tauscope.server.http.tasks.submission import (
+    EXAMPLE_ROBOT,
     BackendRequest,
     Received,
     RobotRequest,
@@ -49,8 +49,7 @@ from tauscope.server.http.tasks.submission import (
 )
 from tauscope.server.problems import Problem, ProblemError, make_problem
 from tauscope.server.queue.analyses import ExcitationOrder, ExcitationWorkspace
-from tauscope.server.queue.received_recording import check_trajectory
-from tauscope.server.queue.received_robot import read_received_robot
+from tauscope.server.queue.received_files import check_trajectory, read_received_robot
 from tauscope.server.queue.task_job import stage_workspace, submit_job
 from tauscope.server.store.event_log import EventLog
 from tauscope.tasks.design_excitation import ExcitationDesignOptions

@@ -14,9 +14,10 @@ from tauscope.server.http.openapi import json_request
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.problems import problem_responses
 from tauscope.server.schedules.definition import ScheduleDefinition
-from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry
+from tauscope.server.schedules.repository import FiringEntry
 from tauscope.server.schedules.scheduler import make_schedule, read_definition
 from tauscope.server.store.data_folder import FOLDERS, utc_now
+from tauscope.server.store.database.tables import Schedule
 from tauscope.strict_model import StrictModel
 
 
@@ -144,14 +145,14 @@ async def run_schedule(request: Request, name: Name, services: ServicesDep) -> F
     return _firing(await run_in_threadpool(services.schedules.fire_now, name))
 
 
-def _put(name: str, body: ScheduleRequest, services: Services) -> ScheduleEntry:
+def _put(name: str, body: ScheduleRequest, services: Services) -> Schedule:
     scheduler = services.schedules
     site = None if body.anywhere else scheduler.repository.site
     scheduler.repository.put(make_schedule(name, body.like, body.definition, scheduler.repeater, site, utc_now()))
     return scheduler.repository.find(name)
 
 
-def _answer(entry: ScheduleEntry, path: str) -> ScheduleAnswer:
+def _answer(entry: Schedule, path: str) -> ScheduleAnswer:
     robot = entry.order.get("robot_name")
     return ScheduleAnswer.describe(
         entry,

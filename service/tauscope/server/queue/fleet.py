@@ -16,7 +16,7 @@ from tauscope.robot.messages import shown
 from tauscope.server.queue.cluster_executor import ClusterUnavailableError
 from tauscope.server.store.files import FILE_NAME_RULE, is_file_name
 from tauscope.tasks import diagnose, identify
-from tauscope.tasks.task import LocalFiles
+from tauscope.tasks.task import Files
 
 COLUMNS = ("name", "robot", "recordings", "held_out")
 SEPARATOR = ";"
@@ -108,7 +108,7 @@ def _perform(task: ModuleType, entry: FleetEntry, folder: Path) -> FleetResult:
             recordings=tuple(map(str, entry.recordings)),
             held_out=tuple(map(str, entry.held_out)),
         )
-        result = task.perform(request, LocalFiles(), lambda *_: None)
+        result = task.perform(request, Files(), lambda *_: None)
         write_atomically(folder / f"{entry.name}.json", result.outputs["result.json"])
         return FleetResult(entry, _figures(result.document), None)
     except TauscopeError as error:

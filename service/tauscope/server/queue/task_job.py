@@ -29,7 +29,7 @@ from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.files import hash_file
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.strict_model import StrictModel
-from tauscope.tasks.task import ROLES
+from tauscope.tasks.task import ROLES, Files
 
 TRAJECTORY, SAVED_MODEL = "trajectory.json", "against"
 
@@ -121,13 +121,15 @@ class TaskWorkspace(Workspace[Order]):
             write_atomically(self.exports / "refused.json", json.dumps(refused, indent=1).encode())
 
 
-class JobFiles:
+class JobFiles(Files):
     """Files of a request in a job's folder, or among the recordings of the server with the bytes that were ordered."""
 
     def __init__(self, workspace: TaskWorkspace[Any], order: TaskOrder, server_recordings: Path) -> None:
         self._workspace, self._order, self._server_recordings = workspace, order, server_recordings
+        super().__init__()
         self._checked: set[Path] = set()
 
+    @override
     def find(self, role: str, name: str) -> Path:
         """Where an input lies. Raises RecordingError if a recording was changed since the job was handed in."""
         if role in ("robot", "model"):
@@ -142,10 +144,12 @@ class JobFiles:
         self._checked.add(path)
         return path
 
+    @override
     def show(self, path: Path) -> str:
         """The bare name: reports tell no path of the server."""
         return path.name
 
+    @override
     def target(self, output: str) -> Path | None:
         """The bare name of the trajectory, by which a result refers to it."""
         return Path(output) if output == TRAJECTORY else None

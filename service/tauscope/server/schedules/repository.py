@@ -1,6 +1,5 @@
 """The schedule repository: one service alone claims a firing, however many share the database."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -14,19 +13,6 @@ from tauscope.server.store.database.database import Database, read_row
 from tauscope.server.store.database.tables import Firing, Item, Schedule
 
 UNDECIDED = ("asked", "claimed")  # states of a firing that will become another one
-
-
-@dataclass(frozen=True)
-class ScheduleEntry:
-    """`site`: of the data folder whose service does it; None for whichever comes first."""
-
-    name: str
-    site: str | None
-    definition: Mapping[str, Any]
-    order: Mapping[str, Any]
-    files: Mapping[str, str]
-    created: datetime
-    next_due: datetime | None
 
 
 @dataclass(frozen=True)
@@ -68,48 +54,46 @@ class ScheduleRepository:
     def __init__(self, database: Database, site: str, boot: str) -> None:
         self._database, self.site, self._boot = database, site, boot
 
-    def put(self, entry: ScheduleEntry) -> None:
+    def put(self, schedule: Schedule) -> None:
         """Set a schedule up, or replace one of the same name; its firings stay."""
         with self._database.writing() as session:
-            row = session.scalar(select(Schedule).where(Schedule.name == entry.name))
-            if row is None:
-                row = Schedule(name=entry.name, created=entry.created)
-                session.add(row)
-            row.site, row.next_due = entry.site, entry.next_due
-            row.definition, row.order, row.files = dict(entry.definition), dict(entry.order), dict(entry.files)
+            known = session.scalar(select(Schedule).where(Schedule.name == schedule.name))
+            if known is not None:
+                schedule.id, schedule.created = known.id, known.created
+            session.merge(schedule)
 
     def remove(self, name: str) -> None:
         """Remove a schedule and its firings; what they started stays. Raises NotFoundError if there is none."""
         with self._database.writing() as session:
             session.execute(delete(Schedule).where(Schedule.id == _schedule(session, name).id))
 
-    def find(self, name: str) -> ScheduleEntry:
+    def find(self, name: str) -> Schedule:
         """A schedule. Raises NotFoundError if there is none."""
         with self._database.reading() as session:
-            return read_row(ScheduleEntry, _schedule(session, name))
+            return _schedule(session, name)
 
-    def schedules(self) -> list[ScheduleEntry]:
+    def schedules(self) -> list[Schedule]:
         with self._database.reading() as session:
-            return [read_row(ScheduleEntry, row) for row in session.scalars(select(Schedule).order_by(Schedule.name))]
+            return list(session.scalars(select(Schedule).order_by(Schedule.name)))
 
-    def due(self, now: datetime) -> list[ScheduleEntry]:
+    def due(self, now: datetime) -> list[Schedule]:
         """Schedules that this site may do and that are due, the longest first."""
         query = select(Schedule).where(Schedule.next_due <= now, self._is_mine()).order_by(Schedule.next_due)
         with self._database.reading() as session:
-            return [read_row(ScheduleEntry, row) for row in session.scalars(query)]
+            return list(session.scalars(query))
 
-    def claim(self, entry: ScheduleEntry, next_due: datetime | None, now: datetime) -> int | None:
+    def claim(self, schedule: Schedule, next_due: datetime | None, now: datetime) -> int | None:
         """Number of the firing of a due schedule; None where another service has it, or it was changed."""
         with self._database.writing() as session:
             moved = session.execute(
                 update(Schedule)
-                .where(Schedule.name == entry.name, Schedule.next_due == entry.next_due)
+                .where(Schedule.name == schedule.name, Schedule.next_due == schedule.next_due)
                 .values(next_due=next_due)
                 .returning(Schedule.id)
             ).scalar_one_or_none()
             if moved is None:
                 return None
-            firing = Firing(schedule_id=moved, due=entry.next_due, is_asked=False, state="claimed")
+            firing = Firing(schedule_id=moved, due=schedule.next_due, is_asked=False, state="claimed")
             firing.claimed, firing.site, firing.boot = now, self.site, self._boot
             session.add(firing)
             session.flush()
@@ -123,7 +107,7 @@ class ScheduleRepository:
             session.flush()
             return firing.id
 
-    def claim_asked(self, now: datetime, number: int | None = None) -> tuple[int, ScheduleEntry] | None:
+    def claim_asked(self, now: datetime, number: int | None = None) -> tuple[int, Schedule] | None:
         """Number and schedule of a firing that was asked for and is taken now; None where there is none."""
         query = select(Firing).join(Schedule).where(Firing.state == "asked", self._is_mine()).order_by(Firing.id)
         if number is not None:
@@ -133,7 +117,7 @@ class ScheduleRepository:
             if firing is None:
                 return None
             firing.state, firing.claimed, firing.site, firing.boot = "claimed", now, self.site, self._boot
-            return firing.id, read_row(ScheduleEntry, firing.schedule)
+            return firing.id, firing.schedule
 
     def withdraw(self, number: int) -> bool:
         """Take back what was asked for; False where somebody has taken it on."""

@@ -21,8 +21,9 @@ from tauscope.server.queue.job_folder import Workspace, without_folders
 from tauscope.server.queue.queue import QueueFullError
 from tauscope.server.queue.task_job import OrderedRecording, order_kept, stage_workspace, submit_job
 from tauscope.server.schedules.definition import RecordingChoice, ScheduleDefinition
-from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry, ScheduleRepository
+from tauscope.server.schedules.repository import FiringEntry, ScheduleRepository
 from tauscope.server.store.data_folder import ItemStore, utc_now
+from tauscope.server.store.database.tables import Schedule
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.run import BackendChoice
@@ -40,7 +41,7 @@ class Repeater:
     campaigns: CampaignManager
     permit_for: Callable[[str], Permit] = field(default_factory=lambda: lambda _device: FREE)
 
-    def start(self, entry: ScheduleEntry, since: datetime | None) -> tuple[str, str]:
+    def start(self, entry: Schedule, since: datetime | None) -> tuple[str, str]:
         """Start it; returns kind and identifier. Raises NothingToDoError without a new recording, or TauscopeError."""
         definition = ScheduleDefinition.model_validate(dict(entry.definition), strict=False)
         if definition.kind == "campaign":
@@ -61,14 +62,14 @@ class Repeater:
             return self.campaigns.items
         return (self.dependencies.identifications if kind == "identification" else self.dependencies.diagnoses).items
 
-    def _campaign(self, entry: ScheduleEntry) -> str:
+    def _campaign(self, entry: Schedule) -> str:
         order = _order(entry, CampaignOrder)
         with stage_workspace(self.campaigns.items, CampaignWorkspace) as workspace:
             write_robot(workspace.robot, entry)
             workspace.write_order(order)
             return self.campaigns.submit(workspace.folder, self.permit_for(order.backend.device(order.robot_name)))
 
-    def _analyse(self, kind: str, entry: ScheduleEntry, recordings: Mapping[str, tuple[OrderedRecording, ...]]) -> str:
+    def _analyse(self, kind: str, entry: Schedule, recordings: Mapping[str, tuple[OrderedRecording, ...]]) -> str:
         is_diagnosis = kind == "diagnosis"
         order = _order(entry, DiagnosisOrder if is_diagnosis else IdentificationOrder).model_copy(update=recordings)
         job = self.dependencies.diagnoses if is_diagnosis else self.dependencies.identifications
@@ -90,18 +91,18 @@ def newest_recordings(
     return order_kept(store, names[: choice.train]), order_kept(store, names[choice.train :])
 
 
-def write_robot(folder: Path, entry: ScheduleEntry) -> None:
+def write_robot(folder: Path, entry: Schedule) -> None:
     for name, text in entry.files.items():
         (folder / name).write_text(text, encoding="utf-8")
 
 
-def _order(entry: ScheduleEntry, kind: type[Order]) -> Order:
+def _order(entry: Schedule, kind: type[Order]) -> Order:
     return kind.model_validate(dict(entry.order), strict=False)
 
 
 def make_schedule(
     name: str, like: str, definition: ScheduleDefinition, repeater: Repeater, site: str | None, now: datetime
-) -> ScheduleEntry:
+) -> Schedule:
     """Repeat an item, at any `site` where None. Raises NotFoundError if it is missing or damaged."""
     workspace = WORKSPACES[definition.kind](repeater.items(definition.kind).folder(like))
     order = workspace.read_order()
@@ -117,7 +118,15 @@ def make_schedule(
         text = f"{definition.kind} {like}: its robot file is missing or damaged; name another one"
         raise NotFoundError(text) from None
     due = definition.next_after(now, now)
-    return ScheduleEntry(name, site, definition.model_dump(mode="json"), plain, files, now, due)
+    return Schedule(
+        name=name,
+        site=site,
+        definition=definition.model_dump(mode="json"),
+        order=plain,
+        files=files,
+        created=now,
+        next_due=due,
+    )
 
 
 FOLDER = "interlocks"
@@ -201,7 +210,7 @@ class Scheduler:
             self._fire(*claimed, lateness=None)
         return self.repository.firing(number)
 
-    def _fire(self, number: int, entry: ScheduleEntry, lateness: timedelta | None) -> None:
+    def _fire(self, number: int, entry: Schedule, lateness: timedelta | None) -> None:
         try:
             outcome = self._outcome(entry, read_definition(entry), lateness)
         except Exception as error:
@@ -218,7 +227,7 @@ class Scheduler:
             self.repository.finish(number, *outcome)
             self._unwritten.pop(number, None)
 
-    def _outcome(self, entry: ScheduleEntry, definition: ScheduleDefinition, lateness: timedelta | None) -> _Outcome:
+    def _outcome(self, entry: Schedule, definition: ScheduleDefinition, lateness: timedelta | None) -> _Outcome:
         if lateness is not None and self._is_too_late(entry, definition, lateness):
             minutes = lateness.total_seconds() / 60
             return "missed", f"no service looked at it until {minutes:.0f} minutes later; it is due again", None
@@ -234,7 +243,7 @@ class Scheduler:
         except TauscopeError as error:
             return "failed", without_folders(str(error), self._data_folder), None
 
-    def _is_too_late(self, entry: ScheduleEntry, definition: ScheduleDefinition, lateness: timedelta) -> bool:
+    def _is_too_late(self, entry: Schedule, definition: ScheduleDefinition, lateness: timedelta) -> bool:
         """Whether no time at which it was due is near enough; of several that were missed the last one counts."""
         grace, now = timedelta(seconds=definition.grace_s), self._clock()
         if lateness <= grace:
@@ -242,7 +251,7 @@ class Scheduler:
         latest = definition.next_after(now - grace, entry.created)
         return latest is None or latest > now
 
-    def _find_obstacle(self, entry: ScheduleEntry, definition: ScheduleDefinition) -> str | None:
+    def _find_obstacle(self, entry: Schedule, definition: ScheduleDefinition) -> str | None:
         window = definition.window
         if window is not None and not definition.is_open(self._clock()):
             days = ", ".join(window.days)
@@ -262,7 +271,7 @@ class Scheduler:
         return firing.item_state is not None and not firing.is_final
 
 
-def read_definition(entry: ScheduleEntry) -> ScheduleDefinition:
+def read_definition(entry: Schedule) -> ScheduleDefinition:
     return ScheduleDefinition.model_validate(dict(entry.definition), strict=False)
 
 

@@ -5,7 +5,6 @@ import json
 import re
 import shutil
 import tempfile
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
@@ -32,9 +31,9 @@ class RobotVersion:
 
 
 class RobotStore:
-    def __init__(self, root: Path, clock: Callable[[], datetime] = utc_now) -> None:
+    def __init__(self, root: Path) -> None:
         """Open the store; its folder is made where it is missing, and what a crash left half made goes."""
-        self._root, self._clock = root, clock
+        self._root = root
         root.mkdir(parents=True, exist_ok=True)
         for entry in root.glob(f"{_STAGED}*"):
             self.discard(entry)
@@ -46,7 +45,7 @@ class RobotStore:
 
     def keep(self, staged: Path, robot_file: str, name: str) -> tuple[RobotVersion, bool]:
         """Keep staged files. Returns (RobotVersion,), whether it is new; else the same content was kept before."""
-        robot = RobotVersion(hash_robot(staged, robot_file), name, robot_file, self._clock())
+        robot = RobotVersion(hash_robot(staged, robot_file), name, robot_file, utc_now())
         record = {"form": "tauscope.robot/1", "name": name, "robot_file": robot_file}
         write_atomically(staged.parent / _RECORD, json.dumps({**record, "created": robot.created.isoformat()}).encode())
         with suppress(NotFoundError):  # also where what is kept has lost its record: that is replaced

@@ -25,7 +25,7 @@ from tauscope.server.http.tasks.submission import Received, keep_robot, receive_
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.job_folder import JobState
 from tauscope.server.queue.queue import JobKind
-from tauscope.server.queue.received_robot import read_received_robot
+from tauscope.server.queue.received_files import read_received_robot
 from tauscope.server.queue.task_job import OrderedRecording, TaskWorkspace, stage_workspace
 from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.files import KeptFile

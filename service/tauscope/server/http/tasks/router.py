@@ -14,6 +14,7 @@ from typing_extensions import override
 
 from tauscope.errors import ExportError, NotFoundError
 from tauscope.export.formats import ExportFile, ExportFormat
+from tauscope.robot import RobotReport
 from tauscope.robot.messages import nearest, shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
@@ -33,7 +34,6 @@ from tauscope.server.http.answers import (
 from tauscope.server.http.leases import NO_BODY, LeaseToken
 from tauscope.server.http.openapi import Examples, file_contents
 from tauscope.server.http.reading import READING
-from tauscope.server.http.robot_files import RobotReportAnswer
 from tauscope.server.http.services import Services, ServicesDep, require_no_model
 from tauscope.server.http.tasks.event_feeds import EventSource
 from tauscope.server.http.tasks.events import add_events_route
@@ -41,7 +41,7 @@ from tauscope.server.http.tasks.submission import RobotRequest, request_body
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.job_folder import JobFolder
 from tauscope.server.queue.queue import JobKind
-from tauscope.server.queue.received_robot import check_received_robot
+from tauscope.server.queue.received_files import check_received_robot
 from tauscope.server.store.data_folder import ItemStore
 
 HTML = "text/html"
@@ -55,7 +55,7 @@ class RobotFileAnswer(AnswerModel):
 
 
 class JobRobotAnswer(AnswerModel):
-    report: RobotReportAnswer = Field(description="the robot at a glance")
+    report: RobotReport = Field(description="the robot at a glance")
     robot_file: str = Field(description="which of the files is the robot file")
     files: list[RobotFileAnswer] = Field(description="robot file and URDF as they were sent")
 
@@ -352,7 +352,7 @@ def add_export_route(
 async def describe_robot(request: Request, services: Services, folder: FilePath, robot_file: str) -> JobRobotAnswer:
     report = await services.reading.call(request, check_received_robot, folder, robot_file)
     files = await run_in_threadpool(_read_files, folder)
-    return JobRobotAnswer(report=RobotReportAnswer.of(report), robot_file=robot_file, files=files)
+    return JobRobotAnswer(report=report, robot_file=robot_file, files=files)
 
 
 def _lease_header(_lease: LeaseToken = None) -> None:

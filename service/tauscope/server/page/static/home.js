@@ -1,8 +1,7 @@
 // Home: drop a robot file and recordings, see them as they are understood, mend them, and read the verdict.
 
-import { getJson, post } from "./api.js";
+import { fetchRaw, getJson, post } from "./api.js";
 import { cautions, explained, h, moment, named, number, percent, render, section, state, verdict } from "./dom.js";
-import { droppedFiles, exampleFiles, sortFiles } from "./dropped.js";
 
 const MOST_ROBOTS = 12;
 const OPTIONS = /; read it with --units.*|,? or go on with --trust-units.*/; // the page has buttons for these options
@@ -254,3 +253,44 @@ const unitsOf = (joints) => (joints.every(isPrismatic) ? PRISMATIC : joints.some
 function asTorque(columns) {
   return Object.fromEntries(Object.entries(columns).map(([target, name]) => [target.replace(/^i(?=\d)/, "tau"), name]));
 }
+
+// Files that were dropped or chosen, or those of the example: which is the robot, which are recordings.
+
+const RECORDING = /\.(csv|tsv|txt|parquet|mcap|db3|bag|npz)$/i;
+const DESCRIPTION = /\.(urdf|xml|mjcf|xacro)$/i;
+const MAPPING = /\.(ya?ml|json)$/i;
+
+async function droppedFiles(transfer) {
+  const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
+  return entries.length ? (await Promise.all(entries.map(filesOf))).flat() : [...transfer.files];
+}
+
+async function filesOf(entry) {
+  if (entry.isFile) return [await new Promise((done, failed) => { entry.file(done, failed); })];
+  const reader = entry.createReader();
+  const inside = [];
+  for (;;) { // a reader gives a hundred entries at a time
+    const some = await new Promise((done, failed) => { reader.readEntries(done, failed); });
+    if (!some.length) break;
+    inside.push(...some);
+  }
+  return (await Promise.all(inside.map(filesOf))).flat();
+}
+
+async function sortFiles(files) {
+  const shown = files.filter((file) => !file.name.startsWith("."));
+  const recordings = shown.filter((file) => RECORDING.test(file.name)).sort((a, b) => a.name.localeCompare(b.name, "en", { numeric: true }));
+  const descriptions = shown.filter((file) => DESCRIPTION.test(file.name));
+  const robots = [];
+  for (const file of shown.filter((each) => MAPPING.test(each.name))) {
+    const text = await file.text();
+    if (/["']?kinematics["']?\s*:/.test(text)) robots.push({ file, text });
+  }
+  const [first] = robots;
+  const robot = first ? [first.file, descriptions.find((file) => first.text.includes(file.name))].filter(Boolean) : descriptions.slice(0, 1);
+  return { robot, recordings, unused: shown.filter((file) => !robot.includes(file) && !recordings.includes(file)) };
+}
+
+const EXAMPLE = ["example-arm.yaml", "example-train.csv", "example-held-out.csv"];
+
+const exampleFiles = () => Promise.all(EXAMPLE.map(async (name) => new File([await (await fetchRaw(`/example/${name}`)).blob()], name)));

@@ -144,7 +144,7 @@ class Database:
     @contextmanager
     def reading(self) -> Iterator[Session]:
         """A transaction that reads. Raises StoreError if the database does not answer."""
-        with self._own_words(), Session(self.engine) as session, session.begin():
+        with self._own_words(), Session(self.engine, expire_on_commit=False) as session, session.begin():
             yield session
 
     @contextmanager

@@ -1,16 +1,19 @@
-"""Diagnoses: requests, answers and what is special about this resource."""
+"""Identifications, diagnoses and rollouts: requests, answers and what is special about these resources."""
 
 from typing import Any
 
 from pydantic import Field
 
+from tauscope.closed_loop import RolloutDocument
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.plots import DiagnosisPlots
 from tauscope.diagnosis.extended_model import LARGEST_FILE
+from tauscope.errors import NotFoundError
 from tauscope.export.model_file import ModelFile
+from tauscope.identification import IdentificationDocument
+from tauscope.report.curves import IdentificationPlots
 from tauscope.server.http.answers import JobAnswer, JobLinks, require_document
 from tauscope.server.http.openapi import binary_part, binary_parts
-from tauscope.server.http.robot_files import EXAMPLE_ROBOT
 from tauscope.server.http.services import Services
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import (
@@ -21,6 +24,7 @@ from tauscope.server.http.tasks.router import (
     text_document,
 )
 from tauscope.server.http.tasks.submission import (
+    EXAMPLE_ROBOT,
     MODEL_FILE,
     RECORDINGS_EXAMPLE,
     Names,
@@ -29,10 +33,83 @@ from tauscope.server.http.tasks.submission import (
     keep_model,
 )
 from tauscope.server.problems import ProblemError
-from tauscope.server.queue.analyses import DiagnosisWorkspace
+from tauscope.server.queue.analyses import DiagnosisWorkspace, IdentificationWorkspace, RolloutWorkspace
 from tauscope.server.queue.task_job import SAVED_MODEL, TRAJECTORY, OrderedRecording
 from tauscope.tasks.diagnose import DiagnosisOptions
+from tauscope.tasks.identify import IdentificationOptions
+from tauscope.tasks.task import ReadingOptions
 from tauscope.trajectory.document import TrajectoryDocument
+
+
+class IdentificationRequest(RecordingsRequest):
+    """What is to be identified."""
+
+    recordings: Names | None = Field(
+        default=None,
+        description="names of the recordings that the model is made from: files of this form, or on the server;"
+        " null: all files sent as part `recordings`",
+    )
+    held_out: Names | None = Field(default=None, description="recordings that judge it; null: every part `held_out`")
+    options: IdentificationOptions = Field(default=IdentificationOptions(), description="how it is identified")
+
+
+IDENTIFICATION_EXAMPLES: dict[str, tuple[str, Any]] = {
+    "server": RECORDINGS_EXAMPLE,
+    "options": (
+        "Ordinary least squares without a filter",
+        {
+            "robot": EXAMPLE_ROBOT,
+            "recordings": ["monday.csv"],
+            "options": {"estimator": "ls", "cutoff_hz": None, "rotor_inertia": False},
+        },
+    ),
+}
+
+
+class LinksAnswer(JobLinks):
+    plots: str | None = Field(default=None, description="data of its figures, once it succeeded")
+    report: str | None = Field(default=None, description="its report as a page, once it succeeded")
+    model: str | None = Field(default=None, description="the identified model, once it succeeded")
+    exports: dict[str, str] = Field(default={}, description="its exports by format, once it succeeded")
+
+
+class IdentificationAnswer(JobAnswer):
+    recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what the model is made from")
+    held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what it is judged by")
+    options: IdentificationOptions | None = Field(default=None, description="how it is identified")
+    refused_exports: dict[str, str] = Field(default={}, description="reason by format that cannot hold this model")
+    links: LinksAnswer = Field(description="where to go on")
+
+
+IDENTIFICATIONS = QueuedTask(
+    noun="an identification",
+    plural="identifications",
+    kind=lambda services: services.identifications,
+    workspace=IdentificationWorkspace,
+    models=(IdentificationRequest, IdentificationAnswer),
+    examples=IDENTIFICATION_EXAMPLES,
+    summary="Hand in an identification",
+    words="The robot is checked at once, recordings are read by the job: follow `Location` until it has ended.",
+    parts={
+        "recordings": binary_parts("recordings that the model is made from"),
+        "held_out": binary_parts("recordings that it is judged by"),
+    },
+    work_problems=("robot-file", "recording", "recording-mismatch", "identification", "invalid-request"),
+    documents=(
+        result_document("an identification", "identify", IdentificationDocument),
+        plots_document("the identification", IdentificationPlots, "torque over time, friction over velocity"),
+        JobDocument(
+            "model",
+            MODEL_FILE,
+            "Fetch the model",
+            "The identified model, for a rollout.",
+            {"model": ModelFile, "description": "the same document as `tauscope identify --model`"},
+            missing="an earlier version identified this and kept no model; hand it in again",
+        ),
+        report_document("identify"),
+    ),
+    export_words="The identified model for a controller (json, yaml, c, python) or a simulator (urdf, mjcf).",
+)
 
 
 class DiagnosisRequest(RecordingsRequest):
@@ -53,7 +130,7 @@ class DiagnosisRequest(RecordingsRequest):
     options: DiagnosisOptions = Field(default=DiagnosisOptions(), description="how it is diagnosed")
 
 
-EXAMPLES: dict[str, tuple[str, Any]] = {
+DIAGNOSIS_EXAMPLES: dict[str, tuple[str, Any]] = {
     "server": RECORDINGS_EXAMPLE,
     "simulation": (
         "What your own simulation has wrong, and what it lacks",
@@ -98,7 +175,9 @@ class DiagnosisAnswer(JobAnswer):
 YAML = "text/yaml"  # an alias of application/yaml (RFC 9512), which generators of clients do not read
 
 
-def place_model(received: Received[DiagnosisRequest], services: Services, workspace: Any) -> dict[str, str | None]:
+def place_earlier_model(
+    received: Received[DiagnosisRequest], services: Services, workspace: Any
+) -> dict[str, str | None]:
     """Put the model into its place. Raises ProblemError if it came twice or is not `against`, or NotFoundError."""
     document, file = received.document, received.form.file("model")
     against, has_simulated = document.options.against, bool(received.form.files.get("simulated") or document.simulated)
@@ -121,7 +200,7 @@ DIAGNOSES = QueuedTask(
     kind=lambda services: services.diagnoses,
     workspace=DiagnosisWorkspace,
     models=(DiagnosisRequest, DiagnosisAnswer),
-    examples=EXAMPLES,
+    examples=DIAGNOSIS_EXAMPLES,
     summary="Hand in a diagnosis",
     words="The robot is checked at once, recordings are read by the job: follow `Location` until it has ended.",
     parts={
@@ -130,7 +209,7 @@ DIAGNOSES = QueuedTask(
         "simulated": binary_parts("recordings made in your own simulator"),
         "model": binary_part("a model that an earlier diagnosis saved, to compare with"),
     },
-    further=place_model,
+    further=place_earlier_model,
     further_parts={"model": (SAVED_MODEL, LARGEST_FILE)},
     work_problems=("robot-file", "recording", "recording-mismatch", "identification", "excitation", "invalid-request"),
     documents=(
@@ -172,4 +251,79 @@ DIAGNOSES = QueuedTask(
     export_words="Compensation code of the model with all findings (c, python).",
 )
 
-router = DIAGNOSES.router()
+
+class RolloutRequest(RecordingsRequest):
+    """What is to be rolled out."""
+
+    recordings: Names | None = Field(
+        default=None,
+        description="names of recordings with commands, or with torque: files of this form, or on the server; null: all"
+        " files sent as part `recordings`",
+    )
+    refine: Names | None = Field(
+        default=None,
+        description="names of recordings with commands by which the model is refined; null: all files sent as part"
+        " `refine`",
+    )
+    model: str | dict[str, Any] | None = Field(
+        default=None,
+        description="model to roll out without and with its findings: a model document, or the identifier of an"
+        " identification or a diagnosis that succeeded; in a form, the part `model` may hold the file instead",
+    )
+    options: ReadingOptions = Field(default=ReadingOptions(), description="how the recordings are read")
+
+
+ROLLOUT_EXAMPLES: dict[str, tuple[str, Any]] = {
+    "identified": (
+        "A recording on the server, and the model of an identification",
+        {"robot": EXAMPLE_ROBOT, "recordings": ["wednesday.mcap"], "model": "20261103T101502Z-1f2e3d4c"},
+    )
+}
+
+
+class RolloutLinksAnswer(JobLinks):
+    report: str | None = Field(default=None, description="its report as a page, once it succeeded")
+
+
+class RolloutAnswer(JobAnswer):
+    recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what is rolled out")
+    refine: tuple[OrderedRecording, ...] = Field(default=(), description="what the model is refined by")
+    options: ReadingOptions | None = Field(default=None, description="how the recordings are read")
+    links: RolloutLinksAnswer = Field(description="where to go on")
+
+
+def place_rolled_model(received: Received[RolloutRequest], services: Services, workspace: Any) -> dict[str, str | None]:
+    """Put the model into its place. Raises ProblemError if it came twice, NotFoundError if it is unknown."""
+
+    def read(identifier: str) -> bytes:
+        try:
+            found = IDENTIFICATIONS.finished(services, identifier)
+        except NotFoundError:
+            found = DIAGNOSES.finished(services, identifier)
+        return require_document(found.read_output(MODEL_FILE), identifier)
+
+    return {"model": keep_model(received.document.model, received.form.file("model"), workspace, read)}
+
+
+ROLLOUTS = QueuedTask(
+    noun="a rollout",
+    plural="rollouts",
+    kind=lambda services: services.rollouts,
+    workspace=RolloutWorkspace,
+    models=(RolloutRequest, RolloutAnswer),
+    examples=ROLLOUT_EXAMPLES,
+    summary="Hand in a rollout",
+    words="The robot is checked at once, MuJoCo gets the commands of the recordings in the job: follow `Location` until"
+    " it has ended.",
+    parts={
+        "recordings": binary_parts("recordings with commands, or with torque"),
+        "refine": binary_parts("recordings with commands by which the model is refined"),
+        "model": binary_part("a model that identify or diagnose saved"),
+    },
+    further=place_rolled_model,
+    further_parts={"model": (SAVED_MODEL, LARGEST_FILE)},
+    work_problems=("robot-file", "recording", "recording-mismatch", "identification", "export", "invalid-request"),
+    documents=(result_document("a rollout", "rollout", RolloutDocument), report_document("rollout")),
+)
+
+routers = tuple(task.router() for task in (IDENTIFICATIONS, DIAGNOSES, ROLLOUTS))

@@ -1,11 +1,19 @@
-"""Robot files that strangers sent, as a reading process reads them: never leading out of their own folder."""
+"""Files that strangers sent, as a reading process reads them: named by bare names, never leading elsewhere."""
 
+import json
 import math
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tauscope.errors import RobotFileError
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from tauscope.errors import RecordingError, RobotFileError
+from tauscope.recording import ColumnMapping, Reading, RecordingReport, check_recording, find_mapping, read_recording
+from tauscope.recording.recording import Array
 from tauscope.robot import Robot, RobotReport, check_robot, read_robot
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.messages import shown
@@ -13,7 +21,9 @@ from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.urdf_element import local_name
 from tauscope.robot.xml_text import LARGEST_XML, is_xml, parse_xml
 from tauscope.robot.yaml_text import read_yaml
-from tauscope.server.queue.job_folder import without_folders
+from tauscope.server.queue.job_folder import hide_folders, without_folders
+from tauscope.strict_model import entry
+from tauscope.trajectory import read_trajectory
 
 FOLDERS = frozenset({"assetdir", "meshdir", "texturedir"})  # attributes of an MJCF that name a folder
 _MOST_BODIES = 1000
@@ -38,7 +48,7 @@ def check_received_robot(folder: Path, file_name: str) -> RobotReport:
     except RobotFileError as error:
         raise type(error)(_word_for_user(str(error), folder)) from None
     findings = (replace(finding, where=_word_for_user(finding.where, folder)) for finding in report.findings)
-    return replace(report, source=file_name, findings=tuple(findings))
+    return replace(report, findings=tuple(findings))
 
 
 def _confine_files(folder: Path, file_name: str) -> None:
@@ -97,3 +107,70 @@ def _multiply(text: str) -> float:
 def _word_for_user(text: str, folder: Path) -> str:
     """A message without the server's folder; an inline robot has no file and no lines."""
     return without_folders(text, folder).replace(f"{INLINE_NAME}:1: ", "robot: ").replace(f"{INLINE_NAME}: ", "robot: ")
+
+
+def check_trajectory(folder: Path, robot_file: Path) -> None:
+    """Read a trajectory as a worker does. Raises ExcitationError if it is not valid, or not for this arm."""
+    (path,) = folder.iterdir()
+    with hide_folders(folder, robot_file.parent):
+        read_trajectory(path, read_robot(robot_file))
+
+
+def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport:
+    """Report on a recording. Raises RecordingError, whose message calls the file by its name alone."""
+    with hide_folders(path.parent):
+        return replace(check_recording(path, joint_count), name=path.name)
+
+
+@entry
+class Understanding:
+    """How a recording is understood; nothing of it is kept."""
+
+    mapping: ColumnMapping | None = Field(description="its columns and units; null for a log, which names its joints")
+    report: RecordingReport | None = Field(description="what it holds, read so; null where it is refused")
+    problem: str | None = Field(description="why it is refused, and what to do")
+
+
+def understand_recording(path: Path, robot: Robot | None, reading: Reading) -> Understanding:
+    """Find columns and units, guessed ones too, and report what a file holds when it is read so."""
+    mapping = None
+    with suppress(RecordingError):  # a log, or a file that the check refuses, too
+        mapping = find_mapping(path, robot, reading)
+    if mapping is not None and mapping.is_guessed and reading.columns is None:
+        reading = replace(reading, columns=mapping.columns, units={**mapping.units, **reading.units})
+    try:
+        report = check_recording(path, None, robot, reading)
+    except RecordingError as error:
+        return Understanding(mapping, None, without_folders(str(error), path.parent))
+    return Understanding(mapping, replace(report, name=path.name), None)
+
+
+def read_kept_samples(path: Path, most: int) -> bytes:
+    """Samples of a plot, thinned to extremes: header length (4 bytes), JSON header, columns of 32-bit floats."""
+    with hide_folders(path.parent):
+        recording = read_recording(path)
+    samples = recording.samples()
+    effort = recording.effort_kind.value
+    values = np.hstack([samples.position, samples.effort])
+    kept = _choose_rows(values, most)
+    joints = range(1, recording.joint_count + 1)
+    header = {
+        "columns": ["t", *(f"q{j}" for j in joints), *(f"{effort}{j}" for j in joints)],
+        "joint_count": recording.joint_count,
+        "effort": effort,
+        "samples": len(samples.time),
+        "shown": len(kept),
+    }
+    text = json.dumps(header).encode()
+    text += b" " * (-len(text) % 4)
+    columns = np.vstack([samples.time[kept] - samples.time[0], values[kept].T]).astype("<f4")
+    return len(text).to_bytes(4, "little") + text + columns.tobytes()
+
+
+def _choose_rows(values: Array, most: int) -> NDArray[np.intp]:
+    from tauscope.report.curves import envelope_indices  # loads all of an identification, for plots only
+
+    if len(values) <= most:
+        return np.arange(len(values))
+    share = max(most // values.shape[1], 2)
+    return np.unique(np.concatenate([envelope_indices(column, share) for column in values.T]))
