@@ -122,7 +122,7 @@ class Search:
         while weighed:
             weighed = {each: found.refuse(refused) for each, found in weighed.items()}
             behind = [each for each, found in weighed.items() if found.is_behind]
-            own = next(iter(stale), None)
+            own: Place | None = next(iter(stale), None)
             if behind and exchanges < most:
                 own = max(behind, key=lambda each: weighed[each].lead)
             if own is None:
