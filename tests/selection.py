@@ -77,7 +77,7 @@ SITTING_S = 4 * 3600
 """Longest time over which the commits of one landing are made [s]."""
 
 OPTION = "--changed-only"
-MARKS = ("slow", "system", "realtime")
+MARKS = ("slow", "system", "realtime", "proof")
 
 
 def select_tests(changed: Iterable[str]) -> set[str] | None:
