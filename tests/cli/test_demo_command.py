@@ -39,7 +39,8 @@ Run = Callable[..., Ended]
 
 
 def in_whole_demo(test: Callable[..., None]) -> Callable[..., None]:
-    return pytest.mark.slow(pytest.mark.timeout(1800)(test))
+    """A whole proof: the check of a change has `make demo` run to its end, and browser/test_story.py find its spring."""
+    return pytest.mark.proof(pytest.mark.timeout(1800)(test))
 
 
 @pytest.fixture(scope="module")
