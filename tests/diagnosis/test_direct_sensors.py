@@ -28,12 +28,12 @@ def diagnosed(entry: dict[str, Any], warmer: dict[str, Any], torque_noise: float
     return document(diagnose(paper_robot(), train, held_out))
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.parametrize(
     ("entry", "name", "true"),
     [
         pytest.param(ELASTIC, "c", 1.0 / 3000.0, id="compliance"),
-        pytest.param(PLAY, "b", 0.004, id="play", marks=pytest.mark.proof),
+        pytest.param(PLAY, "b", 0.004, id="play"),
     ],
 )
 def test_a_transmission_is_measured_by_the_link_s_encoder(entry: dict[str, Any], name: str, true: float) -> None:
