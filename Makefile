@@ -59,11 +59,11 @@ test: $(INSTALLED) ## the quick tests
 
 # The limit ends what hangs, and no test that a busy machine makes slow: one diagnosis of half a minute has taken five.
 # Exit status 5: no test was selected, which is right where the change needs none.
-test-slow: $(INSTALLED) ## tests against the clock, of seconds each, or of a program of the host; CHANGED=1: those that the change needs
+test-slow: $(INSTALLED) ## tests of seconds, against the clock, or with a program of the host; CHANGED=1: those that the change needs
 	$(BY_THE_CLOCK) -n 2 -m "realtime and not proof" $(SELECTED) $(PYTEST_FLAGS) || $(NONE_NEEDED)
 	$(SLOWLY) -m "(slow or system) and not realtime and not proof" $(SELECTED) $(PYTEST_FLAGS) || $(NONE_NEEDED)
 
-test-proof: $(INSTALLED) ## whole proofs, of minutes each: real arms in full, series of sound arms, a hundred kills
+test-proof: $(INSTALLED) ## whole proofs, hours in all: real arms in full, series of sound arms, hundreds of kills, the image
 	$(BY_THE_CLOCK) -m "realtime and proof" $(PYTEST_FLAGS)
 	$(SLOWLY) -m "proof and not realtime" $(PYTEST_FLAGS)
 
