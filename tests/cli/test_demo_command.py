@@ -39,7 +39,7 @@ Run = Callable[..., Ended]
 
 
 def in_whole_demo(test: Callable[..., None]) -> Callable[..., None]:
-    """A whole proof: the check of a change has `make demo` run to its end, and browser/test_story.py find its spring."""
+    """A whole proof, whose guards are `make demo`, run by the check of a change, and tests/browser/test_story.py."""
     return pytest.mark.proof(pytest.mark.timeout(1800)(test))
 
 

@@ -85,7 +85,7 @@ def within(found: tuple[float, float], truth: float, relative: float = 0.03) -> 
     return abs(found[0] - truth) < 4.0 * found[1] + relative * abs(truth)
 
 
-@pytest.mark.slow  # tests/diagnosis/test_outside.py is the quick one
+@pytest.mark.proof  # tests/diagnosis/test_outside.py is the quick one
 def test_a_mass_that_is_picked_up_is_named_with_its_size_and_instant() -> None:
     found = told(picked_up)
     assert [(finding.effect, finding.joint) for finding in found.findings] == [("payload_change", None)]
