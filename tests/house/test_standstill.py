@@ -1,7 +1,7 @@
 """A test against the clock is run again only where the machine stood still under it."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import pytest
@@ -42,12 +42,13 @@ def outcomes(
     test: str,
     *,
     step_s: float = machine_speed.QUICK_ENOUGH_S,
-    taken_s: Sequence[float] = (0.0, 0.0),
+    **seconds: Sequence[float],
 ) -> Any:
-    """What is said of a test where a step of the physics takes so long, and so much is taken in its two runs."""
-    readings = itertools.accumulate(itertools.chain.from_iterable((0.0, each) for each in taken_s))
+    """What is said of a test where a step of the physics takes so long; `seconds` are what was lost in its two runs."""
     monkeypatch.setattr(machine_speed, "physics_step_s", lambda: step_s)
-    monkeypatch.setattr(machine_speed, "taken_s", lambda: next(readings))
+    for name, lost in {"taken_s": (0.0, 0.0), "waited_s": (0.0, 0.0), **seconds}.items():
+        readings = itertools.accumulate(itertools.chain.from_iterable((0.0, each) for each in lost))
+        monkeypatch.setattr(machine_speed, name, readings.__next__)
     monkeypatch.setattr(standstill, "STANDSTILL_S", 0.2)  # no busy machine stands still for so long by itself
     pytester.makeini("[pytest]\nmarkers = realtime\n")
     pytester.makepyfile(test)
@@ -71,11 +72,12 @@ def test_a_failure_is_expected_of_a_machine_that_is_too_slow(
     assert outcomes(pytester, monkeypatch, test, step_s=1.01 * machine_speed.QUICK_ENOUGH_S) == {"xfailed": 1}
 
 
+@pytest.mark.parametrize("by", ["taken_s", "waited_s"])
 def test_a_machine_whose_time_is_taken_is_given_another_run(
-    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, by: str
 ) -> None:
     test = FAILS_AT_FIRST.format(microseconds=0)
-    assert outcomes(pytester, monkeypatch, test, taken_s=(60.0, 0.0)) == {"passed": 1, "rerun": 1}
+    assert outcomes(pytester, monkeypatch, test, **{by: (60.0, 0.0)}) == {"passed": 1, "rerun": 1}
 
 
 @pytest.mark.parametrize(("microseconds", "taken_s", "outcome"), [
@@ -95,9 +97,10 @@ def test_what_never_had_the_machine_has_not_failed(
     assert outcomes(pytester, monkeypatch, test, taken_s=taken_s) == outcome
 
 
-def test_what_was_taken_only_grows() -> None:
-    before = machine_speed.taken_s()
-    assert 0.0 <= before <= machine_speed.taken_s()
+@pytest.mark.parametrize("lost_s", [machine_speed.taken_s, machine_speed.waited_s])
+def test_what_was_lost_only_grows(lost_s: Callable[[], float]) -> None:
+    before = lost_s()
+    assert 0.0 <= before <= lost_s()
 
 
 def test_the_machine_s_speed_is_that_of_the_physics() -> None:
