@@ -13,7 +13,7 @@ T = TypeVar("T")
 KILLS = int(os.environ.get("TAUSCOPE_KILLS", "100"))
 """In a whole series, which begins with the same ones as a short one."""
 
-SERIES = pytest.mark.parametrize("times", [2, pytest.param(KILLS, marks=pytest.mark.proof)])
+SERIES = pytest.mark.parametrize("times", [3, pytest.param(KILLS, marks=pytest.mark.proof)])
 
 
 def killed_often(kill: Callable[[], T | None], times: int) -> list[T]:
