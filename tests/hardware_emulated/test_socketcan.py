@@ -74,8 +74,8 @@ def results(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     path = tmp_path_factory.mktemp("sessions") / "results.jsonl"
     told = {"TAUSCOPE_SOCKETCAN": INTERFACE, "VM_TIMEOUT": "2400", "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
     tests = (each for each in request.session.items if isinstance(each, pytest.Function) and each.path == request.path)
-    names = [test.callspec.params["name"] for test in tests]
-    asked = json.dumps({name: asdict(DISTURBANCES[name]) for name in names})
+    names = {test.callspec.params["name"] for test in tests}
+    asked = json.dumps({name: asdict(each) for name, each in DISTURBANCES.items() if name in names})
     done = subprocess.run(
         [TOOL, sys.executable, SESSIONS, asked, path],
         cwd=REPOSITORY,
