@@ -188,7 +188,7 @@ def worn(identification: Identification, tmp_path_factory: pytest.TempPathFactor
     return Worn(scenario, old, before, plan_experiment(before))
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.timeout(1800)
 def test_what_the_recordings_leave_open_is_said_and_a_motion_planned_that_separates_it(worn: Worn) -> None:
     """Beside the friction curve's flanks, asymmetric friction is all but a constant."""
