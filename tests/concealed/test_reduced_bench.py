@@ -62,12 +62,10 @@ def test_poor_encoders_make_nothing_of_nothing(noise: dict[str, Any]) -> None:
     assert [found.findings for found in verdicts] == [[]] * 3
 
 
-PAIRS = [
-    (("joint_spring", 2), ("cogging", 2), 1),
-    pytest.param(("cogging", 1), ("torque_saturation", 0), 10, marks=pytest.mark.proof),
-]
+PAIRS = [(("joint_spring", 2), ("cogging", 2), 1), (("cogging", 1), ("torque_saturation", 0), 10)]
 
 
+@pytest.mark.proof
 @pytest.mark.parametrize(("first", "second", "draw"), PAIRS)
 def test_two_effects_at_once_are_both_named(first: tuple[str, int], second: tuple[str, int], draw: int) -> None:
     trial = several_trial("paper", [first, second], 40.0, motion_seed=draw % 4, seed=4000 + draw)

@@ -203,7 +203,7 @@ def test_play_is_named_where_a_spring_explains_a_part_beside_larger_bristles() -
     }
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_a_spring_stays_a_spring() -> None:
     """Teeth with a vanishing gap are one, too, with a damping to choose: they have to explain clearly more."""
     spring = {"effect": "joint_elasticity", "joint": 1, "stiffness": 2600.0, "damping": 5.2, "rotor_inertia": 0.004}

@@ -120,9 +120,9 @@ def test_parameters_are_found_within_their_errors(name: str, tmp_path: Path) -> 
     assert len(found.base_parameters) >= 3 * len(arm["joints"])
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.timeout(1200)
-@pytest.mark.parametrize("lateness_ns", [LITTLE_LATE_NS, pytest.param(LATE_NS, marks=pytest.mark.proof)])
+@pytest.mark.parametrize("lateness_ns", [LITTLE_LATE_NS, LATE_NS])
 def test_a_host_that_is_late_shifts_no_parameter(lateness_ns: float, tmp_path: Path) -> None:
     arm = three_joints()
     late = partial(LateClock, lateness_ns=lateness_ns)
