@@ -16,7 +16,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo page prove test test-slow test-all bench lint format lock clean
+.PHONY: help venv demo page prove test test-slow test-proof test-all bench lint format lock clean
 
 help: ## say what there is
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
@@ -50,6 +50,8 @@ page: $(DEMO) ## the page at http://127.0.0.1:8000 with what `make demo` has mad
 # A file is one process's: its tests share what they have built. Tests often wait: a third process fills two cores.
 BY_FILE := --dist loadfile --no-loadscope-reorder
 SELECTED = $(if $(CHANGED),--changed-only)
+BY_THE_CLOCK = $(BIN)/pytest $(BY_FILE) --reruns 4 --only-rerun MachineStoodStill
+SLOWLY = $(BIN)/pytest $(BY_FILE) -n 3 --timeout 1800
 NONE_NEEDED = test $$? -eq 5 -a -n "$(CHANGED)"
 
 test: $(INSTALLED) ## the quick tests
@@ -57,11 +59,15 @@ test: $(INSTALLED) ## the quick tests
 
 # The limit ends what hangs, and no test that a busy machine makes slow: one diagnosis of half a minute has taken five.
 # Exit status 5: no test was selected, which is right where the change needs none.
-test-slow: $(INSTALLED) ## the tests that take long or need something of the host; CHANGED=1: those that the change needs
-	$(BIN)/pytest -m realtime --reruns 4 --only-rerun MachineStoodStill $(SELECTED) $(PYTEST_FLAGS) || $(NONE_NEEDED)
-	$(BIN)/pytest $(BY_FILE) -n 3 --timeout 1800 -m "(slow or system) and not realtime" $(SELECTED) $(PYTEST_FLAGS) || $(NONE_NEEDED)
+test-slow: $(INSTALLED) ## tests of seconds, against the clock, or with a program of the host; CHANGED=1: those that the change needs
+	$(BY_THE_CLOCK) -n 2 -m "realtime and not proof" $(SELECTED) $(PYTEST_FLAGS) || $(NONE_NEEDED)
+	$(SLOWLY) -m "(slow or system) and not realtime and not proof" $(SELECTED) $(PYTEST_FLAGS) || $(NONE_NEEDED)
 
-test-all: test test-slow ## every test
+test-proof: $(INSTALLED) ## whole proofs, hours in all: real arms in full, series of sound arms, hundreds of kills, the image
+	$(BY_THE_CLOCK) -m "realtime and proof" $(PYTEST_FLAGS)
+	$(SLOWLY) -m "proof and not realtime" $(PYTEST_FLAGS)
+
+test-all: test test-slow test-proof ## every test: quick, slow and proof
 
 bench: $(INSTALLED) ## time and memory; leave the machine alone meanwhile
 	@set -e; for script in tests/benchmarks/benchmark_*.py; do echo "== $$script"; $(BIN)/python $$script; done

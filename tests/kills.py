@@ -11,9 +11,12 @@ from standstill import STANDSTILL_S, Onlooker
 T = TypeVar("T")
 
 KILLS = int(os.environ.get("TAUSCOPE_KILLS", "100"))
+"""In a whole series, which begins with the same ones as a short one."""
+
+SERIES = pytest.mark.parametrize("times", [3, pytest.param(KILLS, marks=pytest.mark.proof)])
 
 
-def killed_often(kill: Callable[[], T | None], times: int = KILLS) -> list[T]:
+def killed_often(kill: Callable[[], T | None], times: int) -> list[T]:
     """What each of so many kills says.
 
     One that comes too late (None) says nothing, nor does one that fails while the machine stands still, whose devices

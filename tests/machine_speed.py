@@ -21,6 +21,9 @@ against the clock had to be run again; with a seventh (0.12 ms) 1 of 90; with a 
 STEP_S = 5e-4
 STEPS = 1600
 
+WAITED_EVERY_S = 2.0
+"""Between two instants at which the kernel counts what waited [s]."""
+
 
 @cache
 def _plant() -> Plant:
@@ -36,6 +39,14 @@ def physics_step_s() -> float:
     for _ in range(STEPS):
         plant.advance(torque, STEP_S)
     return (time.perf_counter() - begin) / STEPS
+
+
+def waited_s() -> float:
+    """Time in which some program waited for a processor, as the kernel counts it; zero where it does not [s]."""
+    try:
+        return int(Path("/proc/pressure/cpu").read_text(encoding="ascii").split()[4].removeprefix("total=")) * 1e-6
+    except OSError:
+        return 0.0
 
 
 def taken_s() -> float:

@@ -15,6 +15,7 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 
 EMULATORS = ("tests/drivers", "tests/hardware_emulated", "tests/sim_backend")
 KILLS = ("tests/runtime", "tests/hardware_emulated")
+CAMPAIGNS = tuple(f"tests/hardware_emulated/test_{bus}_campaign.py" for bus in ("canopen", "dynamixel", "feetech"))
 SERVICE = ("tests/server", "tests/reliability", "tests/browser", "tests/client")
 QUICK_PROOF = (
     "tests/docs/test_readme.py",
@@ -34,7 +35,7 @@ NEEDED: dict[str, tuple[str, ...]] = {
     "service/tauscope/recording/": ("tests/recording", "tests/identification"),
     "service/tauscope/dynamics/": ("tests/identification", "tests/diagnosis"),
     "service/tauscope/actuation/": ("tests/actuation",),
-    "service/tauscope/trajectory/": ("tests/excitation", "tests/hardware_emulated"),
+    "service/tauscope/trajectory/": ("tests/excitation", *CAMPAIGNS),
     "service/tauscope/excitation/": ("tests/excitation", "tests/diagnosis/test_next_experiment.py"),
     "service/tauscope/identification/": ("tests/identification", "tests/diagnosis", *QUICK_PROOF),
     "service/tauscope/effects/": ("tests/effects", "tests/diagnosis", *QUICK_PROOF),
@@ -77,7 +78,7 @@ SITTING_S = 4 * 3600
 """Longest time over which the commits of one landing are made [s]."""
 
 OPTION = "--changed-only"
-MARKS = ("slow", "system", "realtime")
+MARKS = ("slow", "system", "realtime", "proof")
 
 
 def select_tests(changed: Iterable[str]) -> set[str] | None:

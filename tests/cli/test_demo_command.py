@@ -39,7 +39,8 @@ Run = Callable[..., Ended]
 
 
 def in_whole_demo(test: Callable[..., None]) -> Callable[..., None]:
-    return pytest.mark.slow(pytest.mark.timeout(1800)(test))
+    """A whole proof, whose guards are `make demo`, run by the check of a change, and tests/browser/test_story.py."""
+    return pytest.mark.proof(pytest.mark.timeout(1800)(test))
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,7 @@
-"""A few trials of each kind, on the arm's motion under its own drives: fixed seeds of the development range."""
+"""A few trials of each kind, on the arm's motion under its own drives: fixed seeds of the development range.
+
+What is not a whole proof here is the quick proof: one to three trials of each kind.
+"""
 
 from typing import Any
 
@@ -35,6 +38,7 @@ def outcome(effect: str, joint: int, wanted: float, seed: int) -> Score:
     return scored(trial, *diagnosed(trial))
 
 
+@pytest.mark.proof
 def test_nothing_is_named_where_nothing_is_concealed() -> None:
     trials = [null_trial("paper", motion, 100 * motion + seed) for motion in (0, 1) for seed in range(4)]
     trials += [null_trial("paper", 0, 50 + seed, states_periods=False) for seed in range(2)]
@@ -44,9 +48,9 @@ def test_nothing_is_named_where_nothing_is_concealed() -> None:
 
 
 POOR = [
-    {"position_std": 2e-4},
-    {"encoder_step": 5e-4},
-    {"encoder_step": 1e-3},
+    pytest.param({"position_std": 2e-4}, marks=pytest.mark.proof),
+    pytest.param({"encoder_step": 5e-4}, marks=pytest.mark.proof),
+    pytest.param({"encoder_step": 1e-3}, marks=pytest.mark.proof),
     {"encoder_step": 2.0 * np.pi / 4096},
 ]
 
@@ -61,6 +65,7 @@ def test_poor_encoders_make_nothing_of_nothing(noise: dict[str, Any]) -> None:
 PAIRS = [(("joint_spring", 2), ("cogging", 2), 1), (("cogging", 1), ("torque_saturation", 0), 10)]
 
 
+@pytest.mark.proof
 @pytest.mark.parametrize(("first", "second", "draw"), PAIRS)
 def test_two_effects_at_once_are_both_named(first: tuple[str, int], second: tuple[str, int], draw: int) -> None:
     trial = several_trial("paper", [first, second], 40.0, motion_seed=draw % 4, seed=4000 + draw)
@@ -76,7 +81,12 @@ def test_motion_that_predicts_nothing_is_not_called_consistent() -> None:
     assert found.verdict != "consistent"
 
 
-@pytest.mark.parametrize("effect", AT_40)
+QUICK = {"cogging", "time_delay"}
+
+
+@pytest.mark.parametrize(
+    "effect", [each if each in QUICK else pytest.param(each, marks=pytest.mark.proof) for each in AT_40]
+)
 def test_a_strong_effect_is_named_at_its_joint(effect: str) -> None:
     score = outcome(effect, AT_40[effect], 40.0, list(AT_40).index(effect))
     assert score.named, score.told
@@ -85,12 +95,14 @@ def test_a_strong_effect_is_named_at_its_joint(effect: str) -> None:
     assert score.verdict in {"explained", "partly_explained"}
 
 
+@pytest.mark.proof
 def test_most_effects_of_moderate_strength_are_named() -> None:
     scores = [outcome(effect, AT_40[effect], 15.0, 30 + place) for place, effect in enumerate(list(AT_40)[::2])]
     assert sum(score.named for score in scores) >= len(scores) - 1
     assert sum(bool(score.extra) for score in scores) <= 1
 
 
+@pytest.mark.proof
 def test_nine_of_ten_weak_effects_are_detected() -> None:
     scores = [outcome(effect, joint, 8.0, 900 + place) for place, (effect, joint) in enumerate(AT_40.items())]
     missed = [
@@ -99,7 +111,14 @@ def test_nine_of_ten_weak_effects_are_detected() -> None:
     assert len(missed) <= 0.1 * len(scores), missed
 
 
-@pytest.mark.parametrize(("law", "joint"), [("vibration", 1), ("slipstream", 0), ("bump", 2)])
+@pytest.mark.parametrize(
+    ("law", "joint"),
+    [
+        pytest.param("vibration", 1, marks=pytest.mark.proof),
+        pytest.param("slipstream", 0, marks=pytest.mark.proof),
+        ("bump", 2),
+    ],
+)
 def test_what_no_catalogue_has_is_located_and_not_explained_away(law: str, joint: int) -> None:
     found, _ = diagnosed(unknown_trial("paper", law, joint, 40.0, motion_seed=joint % 2, seed=60 + joint))
     assert found.verdict in {"unexplained", "partly_explained"}

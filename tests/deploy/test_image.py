@@ -31,7 +31,7 @@ IMAGE = "localhost/tauscope"
 PACKAGES = "ca-certificates,python3-venv,python-is-python3"
 
 pytestmark = [
-    pytest.mark.slow,
+    pytest.mark.proof,  # test_container_files.py is the quick guard
     pytest.mark.system,
     pytest.mark.timeout(2400),  # the first of them builds everything for the others
     pytest.mark.skipif(bool(absent()), reason=absent()),

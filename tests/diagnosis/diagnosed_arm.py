@@ -43,8 +43,8 @@ def recordings(seeds: tuple[int, ...], effect: EffectTorque | None, rng: np.rand
 
 
 def few_or_all(*ids: str) -> list[ParameterSet]:
-    """What `only_effects` takes: a few effects in a quick test, and all in a slow one."""
-    return [pytest.param(ids, id="few effects"), pytest.param(None, id="whole catalogue", marks=pytest.mark.slow)]
+    """What `only_effects` takes: a few effects in a quick test, and all in a whole proof."""
+    return [pytest.param(ids, id="few effects"), pytest.param(None, id="whole catalogue", marks=pytest.mark.proof)]
 
 
 @contextmanager

@@ -29,7 +29,11 @@ def constant(arm: SimulatedArm, _: Array) -> Array:
 
 
 @pytest.mark.parametrize(
-    ("effect", "name"), [(one_way, "asymmetric_coulomb"), (constant, "torque_offset")], ids=["one way", "constant"]
+    ("effect", "name"),
+    [
+        pytest.param(one_way, "asymmetric_coulomb", id="one way"),
+        pytest.param(constant, "torque_offset", id="constant", marks=pytest.mark.proof),
+    ],
 )
 def test_the_likelier_of_the_two_is_the_finding(effect: EffectTorque, name: str) -> None:
     found = diagnose(stating_friction(), recordings((1, 2), effect, np.random.default_rng(3)))
@@ -44,6 +48,7 @@ def test_the_likelier_of_the_two_is_the_finding(effect: EffectTorque, name: str)
     assert size.value == pytest.approx(0.9, abs=2.0 * size.std)
 
 
+@pytest.mark.proof
 def test_the_constant_of_a_spring_is_the_springs_own() -> None:
     """A spring at rest at 0.8 rad pushes at zero; nothing else may take that push for itself."""
 

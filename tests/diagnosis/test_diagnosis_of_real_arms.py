@@ -36,7 +36,7 @@ def values(found: DiagnosisDocument, effect: str) -> dict[str, float]:
     return {entry.name: entry.value for entry in finding.parameters}
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_the_worn_screw_of_emps_and_its_late_force_are_named() -> None:
     found = told("emps")
     assert {finding.effect for finding in found.findings} >= {"asymmetric_viscous", "time_delay"}
@@ -45,7 +45,7 @@ def test_the_worn_screw_of_emps_and_its_late_force_are_named() -> None:
     assert -1.2e-3 < values(found, "time_delay")["d"] < -0.6e-3
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_emps_is_predicted_better_than_by_the_readme() -> None:
     found = told("emps")
     assert found.fit.held_out is not None
@@ -76,7 +76,7 @@ def test_a_bare_motor_is_predicted_as_by_forty_harmonics() -> None:
     assert found.fit.held_out.rms_after[0] < 0.105  # [A], by the README
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_load_dependent_friction_of_the_double_pendulum_is_named() -> None:
     """Its curators' own finding."""
     found = told("double-pendulum")
@@ -87,7 +87,7 @@ def test_load_dependent_friction_of_the_double_pendulum_is_named() -> None:
     assert all(after < 0.9 * before for before, after in pairs)
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_the_coupled_wrist_of_the_tx40_is_named_first() -> None:
     found = told("staubli-tx40")
     first = found.findings[0]
@@ -101,7 +101,7 @@ def test_the_coupled_wrist_of_the_tx40_is_named_first() -> None:
     assert found.fit.held_out.rms_after[4] < 0.4 * found.fit.held_out.rms_before[4]
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.xfail(reason="14.4 %: a drift at joint_1, which is found first, hides what joint_4 lacks")
 def test_the_tx40_is_predicted_far_better_than_by_the_plain_model() -> None:
     """In its README's band: 21.1 % by the plain model, 13.9 % with the wrist's friction and rotors coupled."""
@@ -109,7 +109,7 @@ def test_the_tx40_is_predicted_far_better_than_by_the_plain_model() -> None:
     assert relative_error(found, recordings("staubli-tx40", "held-out"), 30.0) < 0.143
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_what_training_leaves_open_leaves_the_verdict_open_and_predicts_no_joint_worse() -> None:
     """The LWR4+ excited poorly: it is told what training lacks, whatever held-out motion shows beside."""
     found = told("kuka-lwr4")
@@ -128,7 +128,7 @@ def test_what_training_leaves_open_leaves_the_verdict_open_and_predicts_no_joint
     assert relative_error(diagnosed("kuka-lwr4"), recordings("kuka-lwr4", "held-out"), 8.0) < 0.035
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.xfail(
     strict=True, reason="held-out motion shows cogging and bristles at two joints that training leaves open"
 )

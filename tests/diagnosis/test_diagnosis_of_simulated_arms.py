@@ -125,8 +125,8 @@ CASES: dict[str, tuple[EffectTorque, str, str, dict[str, float]]] = {
     "wrist": (wrist, "friction_coupling", "joint3", {"f": 0.6}),
 }
 
-QUICK = {"spring"}
-EVERY_CASE = [pytest.param(case, marks=() if case in QUICK else pytest.mark.slow) for case in CASES]
+MARKS = {"spring": (), "turned round": pytest.mark.slow, "filtered": pytest.mark.slow}
+EVERY_CASE = [pytest.param(case, marks=MARKS.get(case, pytest.mark.proof)) for case in CASES]
 
 OTHERS: dict[str, EffectTorque] = {"unknown": unknown, "bent": bent, "hardening": hardening, "balanced": balanced}
 
@@ -180,7 +180,7 @@ def test_the_mismatch_is_located_before_it_is_named(case: str) -> None:
     assert {entry.joint for entry in told(case).mismatch if entry.significant} >= strongest
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.proof) for seed in (1, 2))])
 def test_nothing_is_named_where_nothing_is_missing(seed: int) -> None:
     found = diagnosed(None, seed)
     assert found.verdict is Verdict.CONSISTENT
@@ -214,7 +214,7 @@ def test_what_could_have_been_seen_is_told_and_what_could_not() -> None:
     assert sizes["rotor_inertia", "joint1"].minimum is None
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_an_effect_outside_the_catalogue_is_never_explained_away() -> None:
     found = told("unknown")
     assert found.verdict in {"unexplained", "partly_explained"}
@@ -225,14 +225,14 @@ def test_an_effect_outside_the_catalogue_is_never_explained_away() -> None:
         assert ("unknown", "joint2") in [(finding.effect, finding.joint) for finding in found.findings]
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_what_a_formula_leaves_of_its_effect_is_no_second_effect() -> None:
     found = told("bent")
     assert [(finding.effect, finding.joint) for finding in found.findings] == [("load_dependent_friction", "joint2")]
     assert found.verdict == "partly_explained"
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_what_a_curve_leaves_gets_a_name_only_where_held_out_motion_is_predicted_better() -> None:
     """The spring of a cube is first; what it leaves is a wave of long period to all that these motions show."""
     found, plain = told("hardening"), told(None)
@@ -247,7 +247,7 @@ def test_what_a_curve_leaves_gets_a_name_only_where_held_out_motion_is_predicted
         assert each.held_out_change.relative[2] < 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_a_spring_that_carries_more_than_was_measured_is_one_and_what_it_had_hidden_is_found_too() -> None:
     found = {(finding.effect, finding.joint): finding.parameters for finding in told("balanced").findings}
     assert list(found) == [("joint_spring", "joint2"), ("cogging", "joint2")]
@@ -259,7 +259,7 @@ def test_a_spring_that_carries_more_than_was_measured_is_one_and_what_it_had_hid
     assert amplitude.value == pytest.approx(1.0, abs=4.0 * amplitude.std)
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_the_parameters_that_had_hidden_an_effect_are_told() -> None:
     shifts = {entry.parameter for entry in told("load").parameter_shifts}
     assert shifts & {"stiction joint2", "viscous joint2"}
@@ -276,9 +276,13 @@ def test_the_document_is_the_contracts() -> None:
     assert '"schema":"tauscope.diagnosis/1"' in text
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("seed", "train", "held_out"), [(1000, (10, 11), (70,)), (1028, (29, 30), (89,)), (1033, (30, 31), ())]
+    ("seed", "train", "held_out"),
+    [
+        pytest.param(1000, (10, 11), (70,), marks=pytest.mark.proof),
+        pytest.param(1028, (29, 30), (89,), marks=pytest.mark.proof),
+        pytest.param(1033, (30, 31), (), marks=pytest.mark.slow),
+    ],
 )
 def test_noise_of_the_positions_is_no_elasticity_that_resonates_within_the_band(
     seed: int, train: tuple[int, ...], held_out: tuple[int, ...]
@@ -293,7 +297,7 @@ def test_noise_of_the_positions_is_no_elasticity_that_resonates_within_the_band(
     assert not found.findings
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.timeout(3600)
 def test_at_most_one_null_data_set_in_fifty_names_anything() -> None:
     def findings(seed: int) -> tuple[Finding, ...]:

@@ -28,11 +28,13 @@ def diagnosed(entry: dict[str, Any], warmer: dict[str, Any], torque_noise: float
     return document(diagnose(paper_robot(), train, held_out))
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.parametrize(
     ("entry", "name", "true"),
-    [(ELASTIC, "c", 1.0 / 3000.0), (PLAY, "b", 0.004)],
-    ids=["compliance", "play"],
+    [
+        pytest.param(ELASTIC, "c", 1.0 / 3000.0, id="compliance"),
+        pytest.param(PLAY, "b", 0.004, id="play"),
+    ],
 )
 def test_a_transmission_is_measured_by_the_link_s_encoder(entry: dict[str, Any], name: str, true: float) -> None:
     found = {each.effect: each for each in diagnosed(entry, entry).findings}
@@ -43,7 +45,7 @@ def test_a_transmission_is_measured_by_the_link_s_encoder(entry: dict[str, Any],
     assert not {"joint_elasticity", "backlash"} & set(found) - {entry["effect"]}
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_friction_that_cools_off_is_named_with_the_recorded_temperature() -> None:
     found = diagnosed(WARM, {**WARM, "initial_temperature": 45.0}, torque_noise=0.1)
     drift = next(each for each in found.findings if each.effect == "friction_drift")

@@ -188,7 +188,7 @@ def worn(identification: Identification, tmp_path_factory: pytest.TempPathFactor
     return Worn(scenario, old, before, plan_experiment(before))
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.timeout(1800)
 def test_what_the_recordings_leave_open_is_said_and_a_motion_planned_that_separates_it(worn: Worn) -> None:
     """Beside the friction curve's flanks, asymmetric friction is all but a constant."""
@@ -199,7 +199,7 @@ def test_what_the_recordings_leave_open_is_said_and_a_motion_planned_that_separa
     assert worn.planned.before**2 < SETTLING <= worn.planned.after**2
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.timeout(1800)
 @pytest.mark.xfail(strict=True, reason="the search counts rows near rest for less than the plan does")
 def test_a_run_of_what_is_planned_settles_what_the_recordings_left_open(worn: Worn, tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ def carrying(seed: int, until_s: float, rng: np.random.Generator) -> Recording:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("held_out_until_s", [NEVER, ALWAYS])
+@pytest.mark.parametrize("held_out_until_s", [NEVER, pytest.param(ALWAYS, marks=pytest.mark.proof)])
 def test_held_out_motion_is_predicted_with_the_load_that_it_has(held_out_until_s: float) -> None:
     """The same training recordings both times: they alone cannot say which body the nominal parameters are of."""
     rng = np.random.default_rng(7)

@@ -31,7 +31,7 @@ def cable(arm: SimulatedArm, rigid: Array) -> Array:
     return at_joint(2, 12.0 * np.maximum(arm.exact.exact.position[:, 2] + 0.41, 0.0) ** 1.5)
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_a_cable_is_told_with_its_exponent_wherever_it_sets_in() -> None:
     """The square from another onset comes nearer than it on the grid, and leaves offsets that are not there."""
     rng = np.random.default_rng(5)

@@ -85,7 +85,7 @@ def within(found: tuple[float, float], truth: float, relative: float = 0.03) -> 
     return abs(found[0] - truth) < 4.0 * found[1] + relative * abs(truth)
 
 
-@pytest.mark.slow  # tests/diagnosis/test_outside.py is the quick one
+@pytest.mark.proof  # tests/diagnosis/test_outside.py is the quick one
 def test_a_mass_that_is_picked_up_is_named_with_its_size_and_instant() -> None:
     found = told(picked_up)
     assert [(finding.effect, finding.joint) for finding in found.findings] == [("payload_change", None)]
@@ -99,7 +99,7 @@ def test_a_mass_that_is_picked_up_is_named_with_its_size_and_instant() -> None:
     assert found.findings[0].confirmed
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.parametrize(("extra", "said"), [(dropped_each_time, "dropped at 12.1"), (between_recordings, "motion-3")])
 def test_a_mass_that_changes_otherwise_is_named_too(extra: Extra, said: str) -> None:
     found = told(extra)
@@ -108,7 +108,7 @@ def test_a_mass_that_changes_otherwise_is_named_too(extra: Extra, said: str) -> 
     assert said in found.findings[0].statement
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_a_contact_is_named_with_joint_size_and_window() -> None:
     found = told(bumped)
     assert [(finding.effect, finding.joint) for finding in found.findings] == [("external_contact", "joint2")]
@@ -118,7 +118,7 @@ def test_a_contact_is_named_with_joint_size_and_window() -> None:
     assert within(values["t_1"], 7.9)
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_a_short_push_that_rises_and_falls_is_told_from_one_that_is_there_at_once() -> None:
     """On a grid of windows either may come nearer to it."""
     found = told(nudged)
@@ -138,7 +138,7 @@ def test_a_constant_is_found_beside_friction_that_does_not_declare_it() -> None:
     assert found.headline.startswith("The torque has an offset of +0.")
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_friction_that_a_constant_nearly_imitates_is_in_the_set() -> None:
     found = told(one_sided)
     assert len(found.findings) == 1
@@ -148,7 +148,7 @@ def test_friction_that_a_constant_nearly_imitates_is_in_the_set() -> None:
     assert len(names) <= 3
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_a_wrong_length_is_measured() -> None:
     """Upper arm 30 mm longer than in the file: torque of one arm less that of the other."""
     found = told(longer)
@@ -158,7 +158,7 @@ def test_a_wrong_length_is_measured() -> None:
     assert within(size["d"], LONGER)
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_what_no_motion_shows_is_listed_as_not_visible_and_the_rest_with_its_size() -> None:
     found = told(None)
     assert not found.findings

@@ -155,7 +155,7 @@ def test_play_between_springy_teeth_is_named() -> None:
     assert found[0].parameters[0].value == pytest.approx(0.88e-3, rel=0.2)
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.parametrize(
     ("arm", "joint", "gap", "motion_seed", "seed"),
     [("seven", 5, 0.0356, 5602, 14000008), ("paper", 1, 1.15e-3, 5203, 13000035)],
@@ -172,7 +172,7 @@ def test_play_whose_bounces_no_model_foresees_is_named_and_its_gap_told(
     assert abs(told.value - gap) < 2.0 * told.std < 0.6 * gap
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.parametrize(
     ("joint", "gap", "seed"),
     [
@@ -190,7 +190,7 @@ def test_play_is_named_where_a_spring_explains_a_part_and_where_bounces_leave_so
     assert [(each.effect, each.joint) for each in found] == [("backlash", f"joint{joint}")]
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_play_is_named_where_a_spring_explains_a_part_beside_larger_bristles() -> None:
     """In the place of both it is no match for them, and in that of the spring alone it is."""
     play = {"effect": "backlash", "joint": 6, "gap": 0.0422, "contact_stiffness": 1e4, "rotor_inertia": 0.004}
@@ -203,7 +203,7 @@ def test_play_is_named_where_a_spring_explains_a_part_beside_larger_bristles() -
     }
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_a_spring_stays_a_spring() -> None:
     """Teeth with a vanishing gap are one, too, with a damping to choose: they have to explain clearly more."""
     spring = {"effect": "joint_elasticity", "joint": 1, "stiffness": 2600.0, "damping": 5.2, "rotor_inertia": 0.004}

@@ -49,6 +49,7 @@ def test_positions_and_commands_bring_the_simulated_arm_to_the_real_one(capsys: 
     assert "the mean error falls" in capsys.readouterr().out
 
 
+@pytest.mark.proof
 def test_the_campaign_decides_what_was_open() -> None:
     findings = run("campaign")["diagnosis"].document.findings
     assert [(finding.effect, finding.joint) for finding in findings] == [("joint_spring", "shoulder")]

@@ -57,7 +57,7 @@ def test_random_limits_hold_at_every_instant(**drawn: Any) -> None:
     check_random_limits(**drawn)
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 @given(**LIMITS)
 def test_many_random_limits_hold_at_every_instant(**drawn: Any) -> None:

@@ -29,7 +29,8 @@ FAULTS: dict[FaultKind, dict[str, Any]] = {
     FaultKind.POWER_DIP: {"seconds": 0.3},
 }
 HARDWARE = {FaultKind.OVERLOAD: "overload", FaultKind.OVER_TEMPERATURE: "over-temperature"}
-PHASES = ("connect", "enable", "run", "stop")
+PHASES = ["run", *(pytest.param(phase, marks=pytest.mark.proof) for phase in ("connect", "enable", "stop"))]
+"""All of them in the drives' own time: test_canopen_fault_table.py."""
 
 
 @dataclass(frozen=True)

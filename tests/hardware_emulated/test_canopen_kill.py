@@ -16,7 +16,7 @@ from arm_rigs import START
 from emulator_process import EmulatorProcess
 from hardware_emulated.canopen_rig import ANSWER_PATIENCE_S
 from hardware_emulated.canopen_robot import RATED_TORQUE_MNM, drive_joints, write_canopen_robot
-from kills import killed_often
+from kills import SERIES, killed_often
 from runtime.control_runs import wait_for
 from runtime.doubles import short_motion
 from tauscope.robot import read_robot
@@ -145,7 +145,8 @@ def refuse_until_acknowledged(site: Site) -> None:
 @pytest.mark.realtime
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
-def test_a_hundred_times_each(site: Site, how: signal.Signals) -> None:
+@SERIES
+def test_at_any_instant(site: Site, how: signal.Signals, times: int) -> None:
     rng = np.random.default_rng([3, how])
-    states = killed_often(lambda: kill_once(site, how, rng))
+    states = killed_often(lambda: kill_once(site, how, rng), times)
     assert states.count("running") >= len(states) // 2, states

@@ -189,7 +189,7 @@ def test_dead_or_frozen_host(three: Bench, how: signal.Signals) -> None:
     hit(three, how, 0.3)
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
 def test_dead_or_frozen_host_at_random_instants(three: Bench, how: signal.Signals) -> None:

@@ -19,7 +19,7 @@ from emulator_process import EmulatorProcess
 from hardware_emulated.campaign_arms import three_joints
 from hardware_emulated.servo_bench import SLACK_S, Bench
 from hardware_emulated.servo_kinds import DYNAMIXEL, FEETECH, ServoKind
-from kills import killed_often
+from kills import KILLS, killed_often
 from tauscope.excitation import ExcitationOptions, design_excitation
 from tauscope.robot import Robot, read_robot
 from tauscope.runtime.drivers import find_driver, to_drive_joints
@@ -159,10 +159,10 @@ def test_killed_or_frozen_control_process(site: Site, how: signal.Signals) -> No
     assert hit(site, how, np.random.default_rng([1, how])) is not None
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
-def test_a_hundred_times_each(site: Site, how: signal.Signals) -> None:
+def test_at_any_instant(site: Site, how: signal.Signals) -> None:
     rng = np.random.default_rng([2, how])
-    states = killed_often(lambda: hit(site, how, rng))
+    states = killed_often(lambda: hit(site, how, rng), KILLS)
     assert states.count("running") >= len(states) // 2, states

@@ -87,7 +87,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Result]:
 
 
 @pytest.mark.system
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.timeout(3000)
 @pytest.mark.parametrize("name", list(DISTURBANCES))
 def test_the_conformance_suite_passes(results: dict[str, Result], name: str) -> None:

@@ -64,7 +64,7 @@ def test_a_hidden_law_is_predicted_near_its_true_share(law: Law) -> None:
 
 
 @pytest.mark.usefixtures("small")
-@pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, 50), marks=pytest.mark.slow)], ids=len)
+@pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, 50), marks=pytest.mark.proof)], ids=len)
 def test_noise_is_never_predicted(seeds: range) -> None:
     for seed in seeds:
         training, held_out = recordings(nothing, NOISE, seed, count=1, duration_s=12.0)

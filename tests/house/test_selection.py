@@ -12,6 +12,7 @@ from shared_data import REPOSITORY
 SLOW = re.compile(rf"mark\.(?:{'|'.join(MARKS)})\b")
 NO_SLOW_TEST = {
     "tests/databases.py",  # marks a fixture of tests/server
+    "tests/kills.py",  # marks series in other files
     "tests/house/test_standstill.py",  # writes tests with marks, and runs them
     "tests/house/test_selection.py",
 }

@@ -138,8 +138,8 @@ def z_scores(result: Identification, robot: Robot, rotors: Sequence[float] | Non
 
 
 def runs(few: int, many: int) -> pytest.MarkDecorator:
-    """The number of runs that differ by their noise: few in a quick test, many in a slow one."""
-    return pytest.mark.parametrize("runs", [few, pytest.param(many, marks=pytest.mark.slow)])
+    """The number of runs that differ by their noise: few in a quick test, many in a whole proof."""
+    return pytest.mark.parametrize("runs", [few, pytest.param(many, marks=pytest.mark.proof)])
 
 
 def rms(values: Array) -> float:

@@ -98,7 +98,7 @@ def test_a_mutated_recording(tmp_path_factory: pytest.TempPathFactory, steps: li
     check(tmp_path_factory.getbasetemp(), steps)
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.timeout(1800)
 @settings(max_examples=2000)
 @given(steps=STEPS)

@@ -155,7 +155,7 @@ def monte_carlo(arm: SimulatedArm, runs: int) -> MonteCarlo:
     return MonteCarlo(truth, bound, least_squares, rows=rows, **{key: np.array(v) for key, v in found.items()})
 
 
-@pytest.fixture(scope="module", params=[30, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.fixture(scope="module", params=[30, pytest.param(200, marks=pytest.mark.proof)])
 def experiment(request: pytest.FixtureRequest, paper_arm: SimulatedArm) -> MonteCarlo:
     return monte_carlo(paper_arm, request.param)
 

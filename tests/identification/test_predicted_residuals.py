@@ -34,7 +34,7 @@ def test_poor_motion_gives_no_nonsense(seed: int, kind: str, tmp_path: Path) -> 
         assert min(entry.stiction, entry.viscous, entry.stiction + entry.stribeck) >= 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_two_hundred_poor_arms(tmp_path: Path) -> None:
     """Where one parameter decides over a joint, a third of all such residuals is under half of what is expected."""
     kinds = list(MOTIONS)

@@ -175,7 +175,7 @@ def test_mutated_csv(data):
     csv_is_read_right_or_refused(data)
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @settings(max_examples=2000)
 @given(mutated_csv())
 def test_many_mutated_csv(data):
@@ -226,7 +226,7 @@ def test_recovery_of_mutated_mcap(data):
     recovery_keeps_a_prefix(data)
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @settings(max_examples=2000)
 @given(mutated_bytes(MCAP))
 def test_many_mutated_mcap(data):
@@ -262,7 +262,7 @@ def test_mutated_parquet(data):
     read_in_a_folder("file.parquet", data.draw(mutated_bytes(sound_parquet())))
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @settings(max_examples=2000)
 @given(st.data())
 def test_many_mutated_parquet(data):
@@ -282,7 +282,7 @@ def test_mutated_database(data):
     read_in_a_folder("file.db3", data)
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @settings(max_examples=2000)
 @given(mutated_bytes(DATABASE))
 def test_many_mutated_database(data):

@@ -174,7 +174,7 @@ def test_what_a_reader_must_know_stands_first(found: Diagnosis, told: DiagnosisD
         assert not any(words in each for each in doubts(told))
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @needs_shared_data
 def test_a_page_of_seven_joints_is_below_three_megabytes() -> None:
     folder = SHARED_DATA / "franka-panda"

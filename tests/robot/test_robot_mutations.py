@@ -163,7 +163,7 @@ def test_damaged_urdf_is_refused_or_sound(folder: Path, data: bytes) -> None:
     _assert_sound_or_refused(write_robot(folder, URDF_ROBOT_YAML, data))
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.timeout(1200)
 @THOROUGH
 @given(data=mutated(ROBOT_YAML, YAML_PIECES))
@@ -171,7 +171,7 @@ def test_damaged_robot_file_is_refused_or_sound_thoroughly(folder: Path, data: b
     _assert_sound_or_refused(write_robot(folder, data))
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.timeout(1200)
 @THOROUGH
 @given(data=mutated(URDF, URDF_PIECES))

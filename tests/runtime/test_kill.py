@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from device_trace import DeviceTrace, read_trace
-from kills import killed_often
+from kills import SERIES, killed_often
 from runtime.control_runs import wait_for
 from runtime.doubles import point_robot, short_motion
 from shared_data import REPOSITORY
@@ -251,7 +251,8 @@ def test_the_arm_stops_and_the_run_is_interrupted(site: Site, victim: str, how: 
 @pytest.mark.realtime
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize(("victim", "how"), CASES)
-def test_a_hundred_times_each(site: Site, victim: str, how: signal.Signals) -> None:
+@SERIES
+def test_at_any_instant(site: Site, victim: str, how: signal.Signals, times: int) -> None:
     rng = np.random.default_rng([2, CASES.index((victim, how))])
-    states = killed_often(lambda: kill_once(site, victim, how, rng))
+    states = killed_often(lambda: kill_once(site, victim, how, rng), times)
     assert states.count("state running") >= len(states) // 2, states

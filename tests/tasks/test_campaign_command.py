@@ -14,7 +14,7 @@ QUICK = {"starts": 1, "periods": 2, "slow_postures": 1, "closing_period": False}
 SCENARIO = {"effects": [{"effect": "joint_spring", "joint": 1, "stiffness": 0.6}], "torque_noise_std": [0.5, 0.3, 0.7]}
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_motions_recordings_and_results_are_kept(tmp_path: Path) -> None:
     out = tmp_path / "campaign"
     words = ["campaign", str(example_robot("paper_arm")), "--out", str(out), "--diagnosis", "{}"]

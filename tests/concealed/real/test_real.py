@@ -95,7 +95,7 @@ def test_right_answers_are_effects_and_joints_that_exist(name: str) -> None:
 
 
 @needs_shared_data
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.timeout(1200)
 def test_a_delay_concealed_in_a_real_recording_is_found() -> None:
     told = real_outcome("emps-later")

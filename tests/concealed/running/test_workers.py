@@ -49,7 +49,7 @@ def cluster() -> Iterator[str]:
         local.close()
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.timeout(1200)
 @pytest.mark.filterwarnings("ignore")
 def test_a_dask_cluster_makes_the_same_trials(cluster: str, tmp_path: Path) -> None:

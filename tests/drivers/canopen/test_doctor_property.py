@@ -16,7 +16,7 @@ from tauscope_drivers.limits import stated_limits
 from tauscope_sim.canopen_bus.drive import EmulatedDrive
 
 FEW, MANY = 40, 1000
-"""Devices of the quick suite, and of the slow one: with the servos' as many, 2,000."""
+"""Devices of the quick suite, and of the whole proof: with the servos' as many, 2,000."""
 
 HIDDEN = (
     *(0x100C, 0x1016, 0x1017, 0x6007, 0x603F, 0x605A, 0x605E, 0x6061, 0x606C, 0x6071, 0x6072, 0x6075, 0x6076, 0x6077),
@@ -113,6 +113,6 @@ def test_a_green_doctor_means_that_a_run_starts(tmp_path: Path, monkeypatch: pyt
     require_true(tmp_path, range(FEW), monkeypatch)
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_a_green_doctor_means_that_a_run_starts_on_many(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     require_true(tmp_path, range(FEW, FEW + MANY), monkeypatch)

@@ -13,7 +13,7 @@ from tauscope_drivers.inspection import Finding, Severity
 from tauscope_sim.dynamixel_bus import ServoSpecification
 
 FEW, MANY = 200, 1000
-"""Devices of the quick suite, and of the slow one: with the drives' as many, 2,000."""
+"""Devices of the quick suite, and of the whole proof: with the drives' as many, 2,000."""
 
 MODELS = (1020, 1020, 1020, 1020, 1120, 1060, 1200, 2020, 4030)
 SETTINGS = {
@@ -93,7 +93,7 @@ def test_a_green_doctor_means_that_a_run_starts() -> None:
     require_true(range(FEW))
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_a_green_doctor_means_that_a_run_starts_on_many() -> None:
     require_true(range(FEW, FEW + MANY))
 

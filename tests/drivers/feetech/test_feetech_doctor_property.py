@@ -11,7 +11,7 @@ from tauscope_drivers.feetech.doctor import examine
 from tauscope_drivers.inspection import Finding, Severity
 
 FEW, MANY = 200, 1000
-"""Arms of the quick suite, and of the slow one."""
+"""Arms of the quick suite, and of the whole proof."""
 
 SETTINGS = {
     "model": (777, 2825, 1029),
@@ -93,7 +93,7 @@ def test_doctor_is_green_where_a_run_starts_and_only_there() -> None:
     require_true(range(FEW))
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_doctor_is_green_where_a_run_starts_and_only_there_over_many() -> None:
     require_true(range(FEW, FEW + MANY))
 

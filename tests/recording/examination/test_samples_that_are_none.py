@@ -102,7 +102,7 @@ def test_a_damage_is_named_wherever_it_is(damage: Damage, seed: int) -> None:
     assert DAMAGES[damage] in codes
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.timeout(1800)
 @settings(max_examples=1000, deadline=None)
 @given(damages=st.lists(st.sampled_from(list(DAMAGES)), min_size=1, max_size=2), seed=st.integers(0, 2**31))

@@ -16,7 +16,7 @@ from server.queue.waiting import wait_until
 from shared_data import REPOSITORY
 from tauscope.trajectory import MoveSegment, Trajectory, trajectory_json
 
-pytestmark = [pytest.mark.slow, pytest.mark.realtime]
+pytestmark = pytest.mark.realtime
 
 BEFORE = ("created", "connecting", "enabling", "ramping")
 HOLDER = """

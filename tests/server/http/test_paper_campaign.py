@@ -18,7 +18,7 @@ from tauscope.robot.robot import STANDARD_PARAMETERS
 NOISE_STD = [0.5, 0.3, 0.7]
 CAMPAIGNS, RUNS = "/api/v1/campaigns", "/api/v1/runs"
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
+pytestmark = [pytest.mark.proof, pytest.mark.timeout(1200)]
 
 
 def until_it_ends(client: httpx2.Client, events: str) -> dict[str, Any]:
@@ -56,7 +56,9 @@ def identified(client: httpx2.Client, campaign: dict[str, Any], **changes: Any) 
     """Another identification from the same recording."""
     robot = YAML(typ="safe").load(PAPER_ROBOT)
     body = {"robot": robot, "recordings": [link.rsplit("/", 1)[1] for link in campaign["links"]["recordings"]]}
-    job = client.post(IDENTIFICATIONS, json={**body, **changes}).json()
+    answer = client.post(IDENTIFICATIONS, json={**body, **changes})
+    assert answer.status_code == 202, answer.text
+    job = answer.json()
     assert until_it_ends(client, job["links"]["events"])["state"] == "succeeded"
     return client.get(f"{job['links']['self']}/result").json()
 
