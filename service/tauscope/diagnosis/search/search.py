@@ -162,13 +162,18 @@ class Search:
         return CATALOGUED if at.model.terms[weighed.places[0]].effect.is_expected else 0.0
 
     def _try_rival(self, at: Hypothesis, weighed: Weighed) -> Hypothesis | None:
-        """The hypothesis with the best rival in the place of an effect, where that is more probable."""
+        """The hypothesis with the best rival in the place of an effect, where that is more probable.
+
+        Training alone, too, has to predict their joints no worse with it.
+        """
         rival, own = weighed.rivals[0].term.effect, at.model.terms[weighed.places[0]].effect
+        touched = {*rival.touched(len(at.scales)), *own.touched(len(at.scales))}
         proposal = next(each for each in weighed.proposals if each.term.effect is rival)
         step, found = self._try(weighed.without, proposal, weighed.proposals)
-        gained = self._compare(at, found, {*rival.touched(len(at.scales)), *own.touched(len(at.scales))})
+        gained = self._compare(at, found, touched)
         gained += self._prior_odds(rival, 0.0) - self._prior_odds(own, 0.0) - (CATALOGUED if rival is own else 0.0)
-        return found if step.is_confirmed and gained > 0.0 else None
+        told = 0.0 if self.held_out is None else self.held_out.trained_change(at, found).log_odds(sorted(touched))
+        return found if step.is_confirmed and gained > 0.0 and told >= 0.0 else None
 
     def _compare(self, at: Hypothesis, found: Hypothesis, touched: Collection[int]) -> float:
         """Log Bayes factor of a second hypothesis; what both predict alike of held-out motion says nothing."""
