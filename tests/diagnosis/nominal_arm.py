@@ -23,7 +23,7 @@ def _record() -> list[Recording]:
 
 
 @cache
-def identified() -> Identification:
+def identify_arm() -> Identification:
     """What the motion's recording says of the arm."""
     return identify(paper_robot(), _record())
 
@@ -31,7 +31,7 @@ def identified() -> Identification:
 @cache
 def nominal_rows() -> tuple[Observations, ExtendedModel]:
     """Rows of one motion, whitened by what its two periods differ by."""
-    identification = identified()
+    identification = identify_arm()
     robot, model = identification.robot, delivered_model(identification)
     surveyed = [Conditioner.survey(each, robot) for each in _record()]
     bare = Observations.prepare(surveyed, robot, identification.structure.base, CUTOFF_HZ, model.steepness)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from diagnosis.evidence.test_linear_model import problem
-from diagnosis.nominal_arm import identified, nominal_rows
+from diagnosis.nominal_arm import identify_arm, nominal_rows
 from tauscope.diagnosis.evidence.linear_model import LinearModel
 from tauscope.diagnosis.evidence.rows import EvidenceRows
 from tauscope.diagnosis.fitting.fit import stepped
@@ -54,7 +54,7 @@ def test_what_stays_within_its_bounds_is_not_touched(seed: int) -> None:
 
 def test_a_bound_changes_the_step_and_not_how_probable_the_parameters_are(monkeypatch: pytest.MonkeyPatch) -> None:
     observations, model = nominal_rows()
-    laboratory = Laboratory(EvidenceRows.prepare(observations, model), Prior.of(identified(), model), repeated=True)
+    laboratory = Laboratory(EvidenceRows.prepare(observations, model), Prior.of(identify_arm(), model), repeated=True)
     start = laboratory.start(model)
     friction, size = Term(LoadDependentFriction(1), np.zeros(0), np.array([0.1])), np.array([0.1])
     moved = with_terms(start.model, [friction])

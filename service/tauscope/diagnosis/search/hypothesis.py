@@ -66,7 +66,7 @@ class Hypothesis:
 
     `sizes`: tuple of (c,), standard deviation believed of every term's coefficients.
     `linear`: about the model, coefficients that would pass a bound held there.
-    `free`: the same with none held.
+    `free`: what is believed, with none held.
     `scales`: one entry a joint.
     `dependence`: κ of every joint.
     """
@@ -95,7 +95,7 @@ class Hypothesis:
         others = slice(len(self.bodies.mean), None)
         off = self.free.mean[others]
         believed = self.bodies.energy + float(off @ self.free.precision[others, others] @ off)
-        pairs = zip(self.free.joints, self.scales, strict=True)
+        pairs = zip(self.linear.joints, self.scales, strict=True)
         return believed + sum(float(own.weighted(scales).products[0, 0]) for own, scales in pairs)
 
 
