@@ -75,7 +75,9 @@ class Backend(Protocol):
     """An arm that can be moved: real drives on a bus, or a simulation of them."""
 
     @property
-    def capabilities(self) -> Capabilities: ...
+    def capabilities(self) -> Capabilities:
+        """What it can do."""
+        ...
 
     @property
     def clock(self) -> Clock:

@@ -41,7 +41,10 @@ class Clock(Protocol):
 
 
 class MonotonicClock:
+    """The machine's monotonic clock."""
+
     def now_ns(self) -> int:
+        """The present instant [ns]."""
         return time.monotonic_ns()
 
     def wait_until_ns(self, deadline_ns: int) -> int:

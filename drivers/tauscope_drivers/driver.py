@@ -42,6 +42,8 @@ class Connection:
 
 @dataclass(frozen=True)
 class ArmDescription:
+    """An arm as a driver is told of it."""
+
     joints: tuple[DriveJoint, ...]
     robot: Any = None  # the whole robot as Tauscope reads it, for a driver that simulates it
     folder: Path | None = None  # for files of the driver's own
@@ -58,6 +60,7 @@ class Driver(ABC):
 
     @property
     def option_names(self) -> tuple[str, ...]:
+        """Names of the options."""
         return tuple(option.name for option in self.options)
 
     @abstractmethod
@@ -137,6 +140,8 @@ class BusDriver(Driver):
 
 
 class SerialBusDriver(BusDriver):
+    """Servos on a serial bus."""
+
     options = (Option("port", "serial device, in place of the robot file's"), PATIENCE)
     port_help = "serial device"
     bus_options = ("port",)

@@ -7,6 +7,8 @@ from typing import Self
 
 @dataclass(frozen=True)
 class Fault:
+    """A fault that a drive or the bus reports, decoded."""
+
     code: str
     joint: int | None  # joint number, counted from 1; None where it concerns the whole arm
     detail: str

@@ -10,6 +10,8 @@ from tauscope_drivers.backend import ControlMode, DriveLimits
 
 
 class Severity(StrEnum):
+    """How much a finding matters."""
+
     GOOD = "good"
     WARNING = "warning"
     FAILURE = "failure"
@@ -17,6 +19,8 @@ class Severity(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
+    """One thing that was looked at."""
+
     severity: Severity
     subject: str
     detail: str
@@ -25,6 +29,8 @@ class Finding:
 
 @dataclass(frozen=True)
 class FoundDevice:
+    """A device that answered on a bus."""
+
     address: int
     bit_rate: int
     model: str
@@ -47,6 +53,8 @@ class FrameRequest:
 
 @dataclass(frozen=True)
 class PlannedFrame:
+    """A frame that would be sent."""
+
     phase: str
     meaning: str
     wire: str  # as the bus's own tools write it: bytes in hexadecimal on a serial bus, ``201#0F00`` on CAN

@@ -42,48 +42,72 @@ class TauscopeError(Exception):
 
 
 class RobotFileError(TauscopeError, ValueError):
+    """The robot file, or the URDF that it names, cannot be read or is not valid."""
+
     code = "robot-file"
 
 
 class RecordingError(TauscopeError, ValueError):
+    """The recording cannot be read or is not valid."""
+
     code = "recording"
 
 
 class RecordingMismatchError(RecordingError):
+    """The recording is sound but belongs to another robot: its number of joints differs."""
+
     code = "recording-mismatch"
 
 
 class IdentificationError(TauscopeError, ValueError):
+    """The recordings cannot answer the question: too short, too poor, or without motion."""
+
     code = "identification"
 
 
 class ExportError(TauscopeError, ValueError):
+    """A model cannot be written in the format that was asked for."""
+
     code = "export"
 
 
 class ExcitationError(TauscopeError, ValueError):
+    """No motion keeps the limits, or a trajectory file is not valid."""
+
     code = "excitation"
 
 
 class ScenarioError(TauscopeError, ValueError):
+    """The scenario of the simulated arm cannot be read or is not valid."""
+
     code = "scenario"
 
 
 class AcquisitionError(TauscopeError, RuntimeError):
+    """A run cannot start, or ended before its time."""
+
     code = "acquisition"
 
 
 class StoreError(TauscopeError, RuntimeError):
+    """The database or the data folder cannot be used: unreachable, damaged, locked, or of a newer form."""
+
     code = "store"
 
 
 class NotFoundError(TauscopeError, LookupError):
+    """Nothing of that name is kept here."""
+
     code = "not-found"
 
 
 class LimitExceededError(TauscopeError, ValueError):
+    """An upload or a request is larger than this service accepts."""
+
     code = "limit-exceeded"
 
 
 class MissingExtraError(TauscopeError, ImportError):
+    """An optional dependency is not installed; the message names the extra to install."""
+
     code = "missing-extra"

@@ -61,6 +61,7 @@ class CanopenArm:
 
     @property
     def configuration(self) -> BusConfiguration:
+        """Bus and drives."""
         return self._configuration
 
     @property

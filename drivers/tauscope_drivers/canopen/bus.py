@@ -72,9 +72,11 @@ class CanBus:
         self._network.bus = self._bus
 
     def subscribe(self, identifier: int, handler: FrameHandler) -> None:
+        """Hand all frames of an identifier to a handler."""
         self._handlers[identifier] = handler
 
     def add_node(self, node_id: int) -> NodeDictionary:
+        """The object dictionary of a node."""
         client = PumpedSdoClient(self, node_id)
         client.network = self._network
         self.subscribe(client.tx_cobid, lambda identifier, data: client.on_response(identifier, data, 0.0))
@@ -167,9 +169,11 @@ class CanBus:
         return any(answer != _BOOT_UP for answer in answers)
 
     def command_nodes(self, command: int, node_id: int = 0) -> None:
+        """Send a network-management command."""
         self.send(NMT_ID, bytes([command, node_id]))
 
     def close(self) -> None:
+        """Let go of the bus."""
         self._heartbeat_period_ns = 0
         self._bus.shutdown()
         self._release()

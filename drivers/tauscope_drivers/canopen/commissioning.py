@@ -273,6 +273,7 @@ def _map(node: DriveNode, places: process_data.PdoParameters, wanted: list[int])
 
 
 def read_mapping(node: DriveNode, places: process_data.PdoParameters) -> list[int]:
+    """Mapping that a drive has."""
     count = min(node.dictionary.read_optional(places.count) or 0, _LONGEST_MAPPING)
     return [node.dictionary.read(replace(places.count, subindex=number, bits=32)) for number in range(1, count + 1)]
 

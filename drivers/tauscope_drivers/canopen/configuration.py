@@ -91,6 +91,7 @@ def require_targets(configuration: BusConfiguration, mode: ControlMode) -> None:
 
 
 def read_node(joint: drive_block.DriveJoint) -> NodeConfiguration:
+    """The drive of a joint. Raises DriverError ``refused`` as `read_configuration`."""
     counts_per_turn = drive_block.read_positive(joint, "counts_per_turn")
     if counts_per_turn is None:
         raise drive_block.refusal(joint, "counts_per_turn", "is missing; give the position counts of a motor turn")

@@ -10,6 +10,8 @@ from tauscope_drivers.inspection import Finding, FoundDevice
 
 
 class CanopenDriver(BusDriver):
+    """Implements `BusDriver`."""
+
     name = "canopen"
     title = "CANopen drives"
     options = (
@@ -26,11 +28,13 @@ class CanopenDriver(BusDriver):
     bus_options = ("interface", "channel")
 
     def make_backend(self, arm: ArmDescription, settings: Mapping[str, Any]) -> Connection:
+        """The arm in real time."""
         from tauscope_drivers.canopen.arm import CanopenArm
 
         return Connection(CanopenArm(arm.joints, patience_s=self.read_patience_s(settings)), is_real_time=True)
 
     def list_adapters(self) -> list[Finding]:
+        """CAN interfaces of this machine."""
         return self.load("doctor").can_interfaces()
 
     def check_blocks(self, joints: Sequence[DriveJoint]) -> list[Finding]:

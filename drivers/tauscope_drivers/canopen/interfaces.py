@@ -85,6 +85,7 @@ class BusClaim:
         self._socket.listen(1)
 
     def release(self) -> None:
+        """Let another process have it."""
         self._socket.close()
 
 

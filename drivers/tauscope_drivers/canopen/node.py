@@ -122,6 +122,7 @@ class DriveNode:
 
     @property
     def has_answered(self) -> bool:
+        """Whether all of its frames came in this cycle."""
         return all(pdo.layout.objects[0] in self.values for pdo in self.plan.sent)
 
     def has(self, entry: DriveObject) -> bool:
@@ -129,12 +130,14 @@ class DriveNode:
         return entry in self.present
 
     def plan_for(self, mode: ControlMode) -> process_data.PdoPlan:
+        """Its PDOs for a mode."""
         number = self.mode_numbers.get(mode, next(iter(TARGETS[mode])))
         return process_data.plan_pdos(
             self.slots, TARGETS[mode][number], [one for one in process_data.MEASURED_WHERE_THERE if self.has(one)]
         )
 
     def use_plan(self, plan: process_data.PdoPlan) -> None:
+        """Listen to the frames of a plan from now on."""
         self.plan = plan
         for pdo in plan.sent:
             identifier = pdo.direction.identifier(pdo.number, self.configuration.node_id)
@@ -237,6 +240,7 @@ class DriveNode:
 
     @property
     def place(self) -> str:
+        """Joint and node, for messages."""
         return f"joint {self.joint} (node {self.configuration.node_id})"
 
     def _decode_measurements(self) -> Measurement:

@@ -8,6 +8,8 @@ from tauscope_drivers.backend import ControlMode
 
 @dataclass(frozen=True)
 class DriveObject:
+    """One entry of the object dictionary."""
+
     name: str
     index: int
     subindex: int

@@ -106,6 +106,8 @@ _KNOWN = {
 
 @dataclass(frozen=True)
 class PdoSlot:
+    """A PDO that a drive has."""
+
     number: int  # from 0
     fixed: tuple[DriveObject, ...] | None = None  # its objects, where its mapping cannot be written; None where it can
     entries: int = 8  # most objects that it takes
@@ -113,6 +115,8 @@ class PdoSlot:
 
 @dataclass(frozen=True)
 class Pdo:
+    """A PDO as it is used."""
+
     direction: PdoDirection
     number: int
     layout: PdoLayout

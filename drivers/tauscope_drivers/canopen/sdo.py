@@ -197,6 +197,7 @@ class PumpedSdoClient(SdoClient):
         super().send_request(request)
 
     def on_response(self, can_id: int, data: bytes, timestamp: float) -> None:
+        """Take a frame of the node."""
         command = data[0] >> 5 if len(data) == 8 else None
         if command is None or self._asked is None:
             return

@@ -30,6 +30,7 @@ def arm_faults(nodes: Sequence[DriveNode], caught: Fault | None) -> tuple[Fault,
 
 
 def listed(faults: Sequence[Fault]) -> str:
+    """Faults in one line, for messages."""
     return "; ".join(str(fault) for fault in faults)
 
 
@@ -96,6 +97,7 @@ class Session:
 
     @property
     def faults(self) -> tuple[Fault, ...]:
+        """What is wrong with the arm."""
         return arm_faults(self.nodes, self.caught)
 
     @property
@@ -119,6 +121,7 @@ class Session:
 
     @property
     def has_braked(self) -> bool:
+        """Whether the targets of `stop_targets` have come to rest."""
         return self.brake is None or self.brake.is_at_rest(self.clock.now_ns())
 
     def stop_targets(self) -> Setpoint:

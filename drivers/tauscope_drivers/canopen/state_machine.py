@@ -7,6 +7,8 @@ from enum import StrEnum
 
 
 class DriveState(StrEnum):
+    """State of a drive, as its statusword tells it."""
+
     NOT_READY = "not ready to switch on"
     SWITCH_ON_DISABLED = "switch on disabled"
     READY = "ready to switch on"

@@ -53,6 +53,7 @@ class TargetLimiter:
         self._grid = CycleGrid(cycle_s)
 
     def limited(self, setpoint: Setpoint, now_ns: int) -> Setpoint:
+        """The targets that may be sent now."""
         limits = self._limits
         cycles = self._grid.cycles_until(now_ns)
         if cycles > 0:

@@ -15,6 +15,8 @@ _LARGEST_NM = 100.0  # no motor of an arm has more at its shaft, also without a 
 
 @dataclass(frozen=True)
 class RatedTorque:
+    """A motor's rated torque."""
+
     nm: float  # at the motor shaft [Nm]
     remark: str = ""  # why another unit than the standard's is taken; empty where it is the standard's
 

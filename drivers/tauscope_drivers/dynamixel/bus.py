@@ -43,6 +43,7 @@ class Turns:
 
     @property
     def complete(self) -> bool:
+        """Whether every servo has answered."""
         return len(self._found) + len(self._contradicted) >= len(self._place)
 
     @property
@@ -56,6 +57,7 @@ class Turns:
         return self._place.keys() - self._heard
 
     def take(self, status: Status) -> None:
+        """Take an answer."""
         servo = status.servo
         place = self._place.get(servo)
         if place is not None:

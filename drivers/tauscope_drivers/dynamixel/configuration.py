@@ -31,6 +31,7 @@ class ServoConfiguration:
 
 
 def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration[ServoConfiguration]:
+    """Bus and servos of an arm; see `read_bus`."""
     return read_bus(joints, _read_servo, keys=_KEYS, bauds=(9_600, 10_500_000), device="/dev/ttyUSB0")
 
 

@@ -107,15 +107,19 @@ BYTES_BEFORE_STATE = 3  # bytes of other items right before that block, on every
 
 @dataclass(frozen=True)
 class Item:
+    """An entry of a control table."""
+
     name: str
     address: int
     size: int  # [bytes]
     signed: bool
 
     def encode(self, value: int) -> bytes:
+        """Its bytes."""
         return value.to_bytes(self.size, "little", signed=self.signed)
 
     def decode(self, block: bytes, start: int) -> int:
+        """Its value in a block of bytes."""
         offset = self.address - start
         return int.from_bytes(block[offset : offset + self.size], "little", signed=self.signed)
 
@@ -142,6 +146,8 @@ class Block:
 
 @dataclass(frozen=True)
 class ServoModel:
+    """A model of servo."""
+
     number: int
     name: str
     family: FamilyFacts
@@ -174,10 +180,12 @@ class ServoModel:
 
     @property
     def error_item(self) -> Item:
+        """Where hardware errors stand."""
         return self.items.get("Hardware Error Status") or self.items["Error Code"]
 
     @property
     def state_block(self) -> Block:
+        """Current, velocity and position."""
         return _block([self.items[name] for name in STATE_ITEMS])
 
     @property

@@ -8,6 +8,8 @@ from tauscope_drivers.errors import DriverError
 
 
 class DynamixelDriver(SerialBusDriver):
+    """Implements `BusDriver`."""
+
     name = "dynamixel"
     title = "Dynamixel servos"
     options = (
@@ -19,6 +21,7 @@ class DynamixelDriver(SerialBusDriver):
     answering = "Dynamixel servos of protocol 2.0"
 
     def make_backend(self, arm: ArmDescription, settings: Mapping[str, Any]) -> Connection:
+        """The arm in real time."""
         from tauscope_drivers.dynamixel.arm import DynamixelArm
 
         keeps = settings.get("keep_settings", False)

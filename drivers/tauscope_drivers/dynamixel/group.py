@@ -64,6 +64,7 @@ class ServoGroup:
             self._bus.sync_write(items, values)
 
     def read(self, patience_s: float = 0.0) -> GroupReading:
+        """State of all servos."""
         fast = self.fast and self._plain_cycles == 0
         self._plain_cycles = max(0, self._plain_cycles - 1)
         answers = self._read_all(fast=fast, patience_s=patience_s)

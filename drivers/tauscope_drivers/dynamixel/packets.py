@@ -30,12 +30,15 @@ _STUFFED, _PLAIN = b"\xff\xff\xfd\xfd", b"\xff\xff\xfd"
 
 @dataclass(frozen=True)
 class Status:
+    """A status packet."""
+
     servo: int
     error: int
     data: bytes
 
     @property
     def alert(self) -> bool:
+        """Whether the servo has a hardware error."""
         return bool(self.error & ALERT)
 
     @property
@@ -73,6 +76,7 @@ def encode_instruction(servo: int, instruction: int, parameters: bytes = b"") ->
 
 
 def encode_ping(servo: int = BROADCAST_ID) -> bytes:
+    """Ask who is there."""
     return encode_instruction(servo, _PING)
 
 
@@ -82,14 +86,17 @@ def encode_clear_error(servo: int) -> bytes:
 
 
 def encode_read(servo: int, address: int, length: int) -> bytes:
+    """Read a stretch of a control table."""
     return encode_instruction(servo, _READ, struct.pack("<HH", address, length))
 
 
 def encode_write(servo: int, address: int, data: bytes) -> bytes:
+    """Write a stretch of a control table."""
     return encode_instruction(servo, _WRITE, struct.pack("<H", address) + data)
 
 
 def encode_sync_read(servos: Sequence[int], address: int, length: int, *, fast: bool = False) -> bytes:
+    """Read the same stretch of many servos."""
     parameters = struct.pack("<HH", address, length) + bytes(servos)
     return encode_instruction(BROADCAST_ID, _FAST_SYNC_READ if fast else _SYNC_READ, parameters)
 

@@ -30,6 +30,8 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class RegisterWrite:
+    """A value for an item of a servo."""
+
     item: Item
     value: int
     reason: str
@@ -47,6 +49,7 @@ class ServoTask:
 
 
 def operating_mode(servo: JointServo, mode: ControlMode) -> int:
+    """Operating Mode of a servo for a way of control."""
     return CURRENT_MODE if mode is ControlMode.TORQUE else servo.model.family.position_mode
 
 

@@ -114,6 +114,7 @@ class JointServo:
 
     @property
     def servo(self) -> int:
+        """ID."""
         return self.configuration.servo
 
     @property
@@ -123,6 +124,7 @@ class JointServo:
 
     @property
     def label(self) -> str:
+        """What messages call it."""
         return f"joint {self.configuration.joint} (servo {self.servo}, {self.model.label})"
 
 

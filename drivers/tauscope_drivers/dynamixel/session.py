@@ -28,6 +28,8 @@ ELECTRONIC_GEAR = ("Electronic GearRatio Numerator", "Electronic GearRatio Denom
 
 @dataclass
 class Session:
+    """An arm's servos, reached."""
+
     bus: ServoBus
     servos: tuple[JointServo, ...]
     settings: list[dict[str, int]]
@@ -89,6 +91,7 @@ class Session:
         return self.health.has_torque & ~(self.health.is_latched & in_current_mode)
 
     def read_health(self) -> None:
+        """Read the health of all servos, all of it."""
         for joint, servo in enumerate(self.servos):
             for block in servo.model.health_blocks:
                 self.health.take(joint, self.bus.read_block(servo.servo, block))
@@ -140,6 +143,7 @@ def read_settings(bus: ServoBus, servo: JointServo) -> dict[str, int]:
 
 
 def read_items(bus: ServoBus, servo: JointServo, names: Iterable[str]) -> dict[str, int]:
+    """Items of a servo by name."""
     wanted = tuple(names)
     try:
         return {

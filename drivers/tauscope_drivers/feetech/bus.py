@@ -33,6 +33,7 @@ class FeetechBus(SerialServoBus[Status]):
         self._owes = False
 
     def ping(self, servo: int) -> bool:
+        """Whether a servo answers."""
         return any(self._ask(servo, packets.encode_ping(servo), 0, PATIENCE_S) for _ in range(ATTEMPTS))
 
     def ping_all(self) -> list[int]:

@@ -31,6 +31,7 @@ class ServoTask:
     torque: int  # Torque Limit [‰ of full duty]
 
     def bound(self, goal: int) -> int:
+        """A goal within the range."""
         return min(max(goal, self.low), self.high)
 
 

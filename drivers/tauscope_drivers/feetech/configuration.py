@@ -27,6 +27,7 @@ class ServoConfiguration:
 
 
 def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration[ServoConfiguration]:
+    """Bus and servos of an arm; see `read_bus`."""
     return read_bus(joints, _read_servo, keys=_KEYS, bauds=(19_200, 1_000_000), device="/dev/ttyACM0")
 
 

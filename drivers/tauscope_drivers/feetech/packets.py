@@ -25,6 +25,8 @@ _FIXED_BYTES = 4
 
 @dataclass(frozen=True)
 class Status:
+    """An answer."""
+
     servo: int
     alarms: int  # bits of the register Status
     data: bytes
@@ -36,19 +38,23 @@ def checksum(body: bytes | bytearray) -> int:
 
 
 def encode_frame(servo: int, code: int, parameters: bytes = b"") -> bytes:
+    """A frame."""
     body = bytes([servo, len(parameters) + 2, code]) + parameters
     return HEADER + body + bytes([checksum(body)])
 
 
 def encode_ping(servo: int = BROADCAST_ID) -> bytes:
+    """Ask who is there."""
     return encode_frame(servo, _PING)
 
 
 def encode_read(servo: int, address: int, length: int) -> bytes:
+    """Read a stretch of the memory table."""
     return encode_frame(servo, _READ, bytes([address, length]))
 
 
 def encode_write(servo: int, address: int, data: bytes) -> bytes:
+    """Write a stretch of the memory table."""
     return encode_frame(servo, _WRITE, bytes([address]) + data)
 
 
@@ -70,6 +76,8 @@ def encode_sync_write(values: Mapping[int, bytes], address: int) -> bytes:
 
 
 class FeetechParser(FrameParser):
+    """Finds whole frames in what comes from a port."""
+
     header, fixed_bytes = HEADER, _FIXED_BYTES
 
     def __init__(self, longest: int = LONGEST_FRAME) -> None:

@@ -39,6 +39,8 @@ _COARSE_SPEED = 50
 
 @dataclass(frozen=True)
 class Register:
+    """A number in the memory table."""
+
     name: str
     address: int
     size: int = 1
@@ -46,9 +48,11 @@ class Register:
 
     @property
     def end(self) -> int:
+        """Address behind it."""
         return self.address + self.size
 
     def decode(self, data: bytes) -> int:
+        """Number of its bytes."""
         value = int.from_bytes(data, "little")
         if self.sign_bit is None:
             return value
@@ -110,6 +114,8 @@ FIRST_IN_RAM = 40  # what is written from here on is gone with the power; this d
 
 @dataclass(frozen=True)
 class Block:
+    """Neighbouring bytes of the memory table."""
+
     address: int
     length: int
 

@@ -11,16 +11,20 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class JointServo:
+    """A servo that a robot file speaks of."""
+
     number: int  # of the joint, from 1
     configuration: ServoConfiguration
     counts_per_speed_unit: int = 1  # one unit of Present Speed and Goal Speed [counts/s]
 
     @property
     def servo(self) -> int:
+        """ID."""
         return self.configuration.servo
 
     @property
     def label(self) -> str:
+        """Name in messages."""
         return f"joint {self.configuration.joint} (servo {self.servo})"
 
     @property

@@ -59,6 +59,7 @@ class Health:
         self._lost = np.zeros(count, dtype=np.bool_)
 
     def take_targets(self, joint: int, values: Mapping[str, int]) -> None:
+        """Take torque and limits as they were read."""
         self.has_torque[joint] = bool(values["Torque Enable"])
         self._lost[joint] |= any(values[name] != value for name, value in self._expected[joint].items())
 
@@ -71,6 +72,7 @@ class Health:
         return bool(self.has_torque[joint] and not self._lost[joint] and not self.alarms[joint])
 
     def forget(self) -> None:
+        """The operator knows."""
         self.alarms = [0] * len(self.alarms)
         self.starved = False
         self._lost[:] = False
@@ -102,6 +104,7 @@ class Session:
 
     @property
     def identifiers(self) -> list[int]:
+        """IDs, in the order of the joints."""
         return [servo.servo for servo in self.servos]
 
     def read_targets(self, joint: int) -> dict[str, int]:

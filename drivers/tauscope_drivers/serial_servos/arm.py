@@ -42,6 +42,7 @@ class SerialServoArm(ABC, Generic[_Session]):
 
     @property
     def clock(self) -> Clock:
+        """The machine's monotonic clock, where no other was given."""
         return self._clock
 
     def require_rate(self, rate_hz: float) -> None:

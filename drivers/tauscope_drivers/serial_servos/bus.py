@@ -18,6 +18,8 @@ SHORTEST_RETURN_DELAY_S = 2e-6  # of a servo whose Return Delay Time is 0 [s]
 
 @dataclass(frozen=True)
 class CycleTraffic:
+    """What goes over the bus in one cycle."""
+
     servos: int
     bytes: int  # without stuffing; `answers`: packets that wait for a return delay; `reads`: that wait for the adapter
     answers: int
@@ -27,6 +29,8 @@ class CycleTraffic:
 
 @dataclass(frozen=True)
 class BusTiming:
+    """How fast a bus is."""
+
     baud: float
     return_delay_s: float  # largest Return Delay Time of the servos [s]
     latency_s: float  # latency timer of the adapter; 0 on a plain serial line [s]
@@ -81,6 +85,8 @@ _Status = TypeVar("_Status")
 
 @dataclass(frozen=True)
 class Answers(Generic[_Status]):
+    """Answers to one question to many servos."""
+
     asked_ns: int  # instant at which the question had left [ns, by the bus' clock]
     late_ns: int  # how much later than usual the last answer came [ns]
     statuses: dict[int, _Status]  # by ID

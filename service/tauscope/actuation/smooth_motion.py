@@ -42,6 +42,7 @@ class SmoothMotion:
 
     @staticmethod
     def of(recording: Recording) -> "SmoothMotion":
+        """The motion of a recording."""
         samples = recording.samples(0, MOST_ROWS)
         rate = 1.0 / float(np.median(np.diff(samples.time)))
         band = min(BAND_HZ, 0.2 * rate)

@@ -201,6 +201,7 @@ class Client:
         self._transport.send("POST", lease.lease.links.arm, headers=_lease_header(lease))
 
     def stop(self, run: RunAnswer) -> StopAnswer:
+        """Stop a run."""
         return _parse(self._transport.send("POST", run.links.stop), StopAnswer)
 
     def stop_everything(self) -> StopAllAnswer:

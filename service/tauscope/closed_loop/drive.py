@@ -39,6 +39,8 @@ class RecordedMotion:
 
 
 class Drive(Protocol):
+    """Torque of all joints."""
+
     is_closed: bool
 
     def torque(self, step: int, position: Array, velocity: Array) -> Array:
@@ -47,6 +49,7 @@ class Drive(Protocol):
 
 
 def record_motion(recording: Recording) -> RecordedMotion:
+    """A recording on the steps of a rollout."""
     samples = recording.samples()
     time = np.arange(samples.time[0], samples.time[-1] + 0.5 * STEP_S, STEP_S)
     position = np.stack([_onto(samples.time, column, time) for column in samples.position.T], axis=1)

@@ -22,6 +22,8 @@ RELAXED = 0.5
 
 @dataclass(frozen=True, eq=False)
 class LoadFriction:
+    """Coefficients of all joints."""
+
     driving: Array  # (n,) or (n, 1, V), μ_d [1/Nm or 1/N]
     braking: Array  # (n,) or (n, 1, V), μ_b [1]
 

@@ -40,6 +40,8 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class Trace:
+    """One recording and its simulations."""
+
     motion: RecordedMotion
     simulated: dict[str, Array]  # dict of str to (N, n), positions by model, from one start [rad or m]
     entry: RecordingEntry
@@ -58,6 +60,7 @@ class Rollout:
 
     @property
     def document(self) -> RolloutDocument:
+        """The result, typed."""
         loops = [joint.actuator if self.is_closed else None for joint in self.robot.joints]
         return RolloutDocument(
             robot=self.robot.name,

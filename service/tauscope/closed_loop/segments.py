@@ -39,6 +39,7 @@ class Segments:
 
     @property
     def count(self) -> int:
+        """S."""
         return self.position.shape[2]
 
     @cached_property

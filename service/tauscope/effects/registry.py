@@ -34,6 +34,7 @@ def catalogue() -> tuple[type[Effect], ...]:
 
 
 def effect_class(effect_id: str) -> type[Effect]:
+    """The class of an id of the catalogue."""
     return next(effect for effect in catalogue() if effect.id == effect_id)
 
 

@@ -23,6 +23,8 @@ ACTIVE_CLEARANCE_M = 0.005  # clearance from floor or boxes at which they limit 
 
 @dataclass(frozen=True, eq=False)
 class ExcitationDesign:
+    """A designed excitation."""
+
     trajectory: Trajectory
     series: FourierSeries
     periods: int
@@ -121,6 +123,7 @@ def _notes(robot: Robot, setting: Setting, slow: SlowPart) -> tuple[str, ...]:
 
 
 def excitation_document(design: ExcitationDesign) -> ExcitationDocument:
+    """The document of a designed excitation."""
     trajectory = trajectory_document(design.trajectory)
     return ExcitationDocument(
         robot=trajectory.robot,

@@ -168,6 +168,8 @@ SINGULAR = 1e-13
 
 
 class Criterion(StrEnum):
+    """What the optimiser minimises."""
+
     COND_F = "cond-f"
     """Cond_F(LᵀL) = ‖LᵀL‖_F ‖(LᵀL)⁻¹‖_F, the seed paper's equation (20)."""
     LOG_DET = "log-det"

@@ -24,6 +24,8 @@ TOLERANCE = 1e-4  # change of the cost, a logarithm, at which a round ends
 
 @dataclass(frozen=True)
 class OptimiserProgress:
+    """Where the optimiser is."""
+
     step: str
     fraction: float
     cost: float
@@ -32,6 +34,8 @@ class OptimiserProgress:
 
 @dataclass(frozen=True)
 class HistoryEntry:
+    """One iteration."""
+
     start: int  # from which start, counted from 1; 0 for the random series
     iteration: int
     own: float
@@ -40,6 +44,8 @@ class HistoryEntry:
 
 @dataclass(eq=False)
 class OptimiserResult:
+    """What came of it."""
+
     x: Array  # (n, columns), the best feasible vector found
     history: list[HistoryEntry]
     evaluations: int

@@ -15,6 +15,8 @@ INFORMATION_WEIGHT = 0.5  # of -log det beside the other criteria
 
 @dataclass(frozen=True, eq=False)
 class Objective:
+    """What is minimised."""
+
     criterion: Criterion
     regressor: ExcitationRegressor
     scaling: Array  # (p,), what each column is divided by

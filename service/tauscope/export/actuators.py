@@ -23,6 +23,8 @@ BANDWIDTH_RAD_S = 2.0 * np.pi * 5.0
 
 
 class ActuatorKind(StrEnum):
+    """Actuators of an exported arm."""
+
     MOTOR = "motor"
     POSITION = "position"
     DCMOTOR = "dcmotor"

@@ -25,6 +25,8 @@ _INERTIA = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 
 
 @dataclass(frozen=True)
 class PatchedUrdf:
+    """A URDF with the identified model in it."""
+
     data: bytes
     notes: tuple[str, ...]
 

@@ -23,6 +23,7 @@ class FullParameters:
 
     @staticmethod
     def of(structure: ModelStructure) -> "FullParameters":
+        """Those of a model."""
         base, standard = structure.base, 10 * structure.robot.link_count
         own = structure.size - structure.base_count
         full = np.zeros((structure.size, standard + own))

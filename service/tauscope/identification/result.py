@@ -191,6 +191,7 @@ _COEFFICIENTS = ("stiction", "stribeck", "viscous", "offset")
 
 
 def document(identification: Identification) -> IdentificationDocument:
+    """The document of an identification."""
     result = identification
     names = [f"{name}{link + 1}" for link in range(result.robot.link_count) for name in STANDARD_PARAMETERS]
     return IdentificationDocument(

@@ -39,6 +39,7 @@ def identification_warnings(result: Identification) -> list[ResultWarning]:
 
 
 def robot_warnings(robot: Robot) -> list[ResultWarning]:
+    """Warnings of what the robot file states, and what is believed instead."""
     far = [
         ResultWarning(
             code="repaired-inertial",

@@ -120,6 +120,7 @@ class Clock:
 
 
 def is_number(field: bytes) -> bool:
+    """Whether a field is a decimal number."""
     return _NUMBER.fullmatch(field.strip(b" \t")) is not None
 
 

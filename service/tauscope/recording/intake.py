@@ -16,6 +16,8 @@ from tauscope.result_warning import ResultWarning
 
 @dataclass(frozen=True)
 class Choice:
+    """What is wanted of a file."""
+
     file: str
     joint_count: int | None = None  # joints that the recording must have; None where any number is welcome
     joint_names: tuple[str, ...] | None = None
@@ -72,6 +74,7 @@ class EpisodeClock:
 
     @property
     def notes(self) -> tuple[ResultWarning, ...]:
+        """A warning where there is more than one episode."""
         if self._count < 2:
             return ()
         text = f"column t: {self._count} episodes, put one after another with a gap of {PAUSE_S:g} s between them"

@@ -28,6 +28,7 @@ _READ_BYTES = 2**18
 
 
 def frame(kind: bytes, content: bytes) -> bytes:
+    """One frame."""
     return FRAME.pack(len(content), kind) + content
 
 

@@ -22,6 +22,8 @@ LONGEST_HOLD = 1.5  # cycles between two samples of which none was missed betwee
 
 @dataclass(frozen=True, eq=False)
 class Journal:
+    """What a journal holds."""
+
     header: JournalHeader
     rows: NDArray[np.void]  # (N,) of `journal_row_type`, the cycles, oldest first
     events: tuple[dict[str, Any], ...]

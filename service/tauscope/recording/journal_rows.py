@@ -36,9 +36,11 @@ class JournalHeader:
 
     @property
     def joint_count(self) -> int:
+        """Number of joints n."""
         return len(self.joint_names)
 
     def to_dict(self) -> dict[str, Any]:
+        """The header as plain data."""
         return {"form": JOURNAL_FORM, **asdict(self)}
 
     @staticmethod

@@ -17,6 +17,8 @@ _FIRST_ROWS = 4096
 
 
 class MemoryTable:
+    """Rows in memory."""
+
     def __init__(self, names: tuple[str, ...], data: Array) -> None:
         """Keep `data` as it is, without a copy. `data`: (N, columns), the rows; made read-only."""
         self.names = names

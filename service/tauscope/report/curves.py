@@ -108,6 +108,7 @@ class FrictionCurve:
 
     @property
     def columns(self) -> dict[str, list[float]]:
+        """The curve as columns: velocity, friction, standard error."""
         values = {"velocity": self.velocity, "friction": self.torque, "standard_error": self.std}
         return {name: each.tolist() for name, each in values.items()}
 
@@ -214,6 +215,7 @@ class IdentificationPlots(ResultModel):
 def identification_plots(
     identification: Identification, recordings: Sequence[Recording], held_out: Sequence[Recording]
 ) -> IdentificationPlots:
+    """What an identification is drawn from."""
     series = [torque_series(identification, recording) for recording in recordings[:MOST_SERIES]]
     shown = torque_series(identification, held_out[0]) if held_out else series[0]
     names = [joint.name for joint in identification.robot.joints]

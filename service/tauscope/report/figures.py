@@ -35,6 +35,7 @@ _MOST_LETTERS = 16
 
 
 def heat_map(histograms: Sequence[ResidualHistogram], joints: Sequence[str], *, after: bool) -> Markup:
+    """Draw the map."""
     height = _TOP + _ROW * len(joints) + _LEGEND
     group = (_WIDTH - _LABELS - _GAP * (len(VARIABLES) - 1)) / len(VARIABLES)
     parts = [f'<svg class="heat" viewBox="0 0 {_WIDTH:g} {height:g}">']
@@ -58,6 +59,7 @@ def heat_map(histograms: Sequence[ResidualHistogram], joints: Sequence[str], *, 
 
 
 def heat_table(histograms: Sequence[ResidualHistogram]) -> Table:
+    """The numbers of both maps."""
     rows = [
         (each.joint, each.variable, *(significant(number, 3) for number in cell), significant(each.noise, 3))
         for each in histograms
@@ -154,6 +156,7 @@ RESIDUAL_ROW_INCHES = 0.24
 
 
 def residual_figure(name: str, document: IdentificationDocument) -> Markup:
+    """Draw every joint's residual as a multiple of its noise."""
     fits = {"own recordings": (document.fit.train, PREDICTED, "o")}
     if document.fit.held_out is not None:
         fits["held out"] = (document.fit.held_out, HELD_OUT, "D")
@@ -219,6 +222,7 @@ MOTION_ROW_INCHES = 0.55
 
 
 def motion_figure(name: str, trajectory: Trajectory, joints: list[str]) -> Markup:
+    """Draw every joint's position over time."""
     sampled = trajectory.evaluate(np.linspace(0.0, trajectory.duration_s, MOST_SAMPLES))
 
     def draw(figure: Figure) -> None:

@@ -13,6 +13,8 @@ from tauscope.report.tables import Table, input_table
 
 @dataclass(frozen=True)
 class Drawing:
+    """A figure on the page."""
+
     svg: Markup
     label: str
     caption: str
@@ -42,6 +44,8 @@ class Card:
 
 @dataclass(frozen=True)
 class Fold:
+    """Cards that are folded away."""
+
     title: str
     cards: Sequence[Card]
 
@@ -62,6 +66,8 @@ class Part:
 
 @dataclass(frozen=True)
 class Section:
+    """A section of the page."""
+
     anchor: str
     title: str
     parts: Sequence[Part]
@@ -79,6 +85,8 @@ class KeyFigure:
 
 @dataclass(frozen=True)
 class Page:
+    """Everything on the page."""
+
     kind: str
     robot: str
     facts: Sequence[str]  # that stand below the title, beside the date
@@ -91,6 +99,7 @@ class Page:
 
     @property
     def subtitle(self) -> str:
+        """The facts and the date."""
         return " · ".join([*self.facts, self.provenance.created.strftime("%Y-%m-%d %H:%M %Z").strip()])
 
     @property
@@ -103,6 +112,7 @@ class Page:
 
     @property
     def footer(self) -> str:
+        """What computed it."""
         return ", ".join(f"{name} {version}" for name, version in self.provenance.versions)
 
 

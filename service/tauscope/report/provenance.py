@@ -15,6 +15,8 @@ LIBRARIES = ("tauscope", "numpy", "scipy", "clarabel")  # packages whose version
 
 @dataclass(frozen=True)
 class InputFile:
+    """One file that was read."""
+
     role: str
     path: str
     size_bytes: int
@@ -37,6 +39,7 @@ def versions() -> tuple[tuple[str, str], ...]:
 
 
 def installed_version(package: str) -> str:
+    """Version of an installed package."""
     try:
         return version(package)
     except PackageNotFoundError:

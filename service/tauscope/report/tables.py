@@ -19,6 +19,8 @@ def csv_text(columns: Mapping[str, Sequence[float]]) -> str:
 
 @dataclass(frozen=True)
 class Table:
+    """Cells as text."""
+
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     words: int = 1
@@ -74,6 +76,7 @@ def residual_table(document: DiagnosisDocument) -> Table:
 
 
 def difference_table(document: DiagnosisDocument) -> Table:
+    """What the simulation has wrong."""
     rows = [
         (e.parameter, *(significant(value, 4) for value in (e.simulation, e.real)), significant(e.difference_in_std, 3))
         for e in document.parameter_differences
@@ -82,6 +85,7 @@ def difference_table(document: DiagnosisDocument) -> Table:
 
 
 def shift_table(document: DiagnosisDocument) -> Table:
+    """What the left-out effects had done to the parameters."""
     rows = [
         (e.parameter, *(significant(value, 4) for value in (e.before, e.after)), significant(e.shift_in_std, 3))
         for e in document.parameter_shifts[:MOST_SHIFTS]
@@ -109,6 +113,7 @@ _COEFFICIENTS = ("stiction", "stribeck", "viscous", "offset", "k_v", "delta")
 
 
 def fit_table(document: IdentificationDocument, robot: Robot) -> Table:
+    """Noise and residual of every joint."""
     fit = document.fit
     unseen = fit.held_out.rms if fit.held_out else [None] * len(document.joints)
     rows = []
@@ -141,6 +146,7 @@ def friction_table(document: IdentificationDocument) -> Table:
 
 
 def rotor_table(document: IdentificationDocument) -> Table:
+    """Reflected rotor inertia where the data ask for it."""
     rows = [[entry.joint, *with_uncertainty(entry.value, entry.std)] for entry in document.rotor_inertia]
     return Table(("joint", "I_a [kg m², kg]", "± std"), rows)
 
@@ -155,6 +161,7 @@ def base_parameter_table(document: IdentificationDocument) -> Table:
 
 
 def link_table(document: IdentificationDocument) -> Table:
+    """Mass, centre of mass and inertia of every link."""
     rows = []
     for number, link in enumerate(document.links, start=1):
         centre = [moment / link.mass if link.mass > 0.0 else None for moment in link.first_moment]
@@ -179,5 +186,6 @@ def conditioning_table(document: IdentificationDocument) -> Table:
 
 
 def input_table(provenance: Provenance) -> Table:
+    """Files with their hashes."""
     rows = [[entry.path, entry.role, entry.sha256, str(entry.size_bytes)] for entry in provenance.inputs]
     return Table(("file", "read as", "SHA-256", "bytes"), rows, words=3)

@@ -46,6 +46,7 @@ _RESIDUAL_LEVELS = {
 
 
 def fit_sentences(document: IdentificationDocument) -> list[str]:
+    """How well the model explains the torque."""
     train, held_out = document.fit.train, document.fit.held_out
     error = f"Relative error, sensor noise included: {percent(train.relative_error)} on the model's own recordings"
     if held_out is None:
@@ -75,6 +76,7 @@ def noise_words(method: str) -> str:
 
 
 def band_words(document: IdentificationDocument) -> str:
+    """The band in which torque and model are compared."""
     return "all frequencies" if document.cutoff_hz is None else f"0 – {significant(document.cutoff_hz, 3)} Hz"
 
 
@@ -130,6 +132,7 @@ NOTHING_ELSE = "No competing explanation"
 
 
 def effect_title(effect: str) -> str:
+    """An effect's id as a heading."""
     return effect.replace("_", " ").capitalize()
 
 
@@ -139,6 +142,7 @@ def place_title(joint: str | None) -> str:
 
 
 def file_title(name: str) -> str:
+    """A recording's name without its folders."""
     return PurePath(name).name or name
 
 

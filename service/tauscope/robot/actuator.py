@@ -78,6 +78,7 @@ class Actuator:
 
     @property
     def conversion(self) -> Servo:
+        """Register conversion."""
         return SERVOS[self.servo or ASSUMED_SERVO]
 
     @property

@@ -74,6 +74,7 @@ class DocumentOrigin:
         return ": ".join(parts)
 
     def error(self, place: Place, text: str) -> RobotFileError:
+        """The error of an entry."""
         return RobotFileError(f"{self.where(place)}: {text}")
 
     def validate(self, kind: type[DocumentType]) -> DocumentType:
@@ -284,6 +285,7 @@ class RecordingDocument(Document):
 
     @property
     def layout(self) -> RecordingLayout:
+        """The same for those who read."""
         return RecordingLayout(self.units, self.rate_hz, self.columns, self.decimal, self.delimiter, self.topic)
 
 

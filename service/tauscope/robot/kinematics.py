@@ -70,6 +70,8 @@ def joint_displacement(kind: JointType, axis: Array, position: float) -> Placeme
 
 @dataclass(frozen=True)
 class DenavitHartenbergRow:
+    """One row of Denavit-Hartenberg parameters."""
+
     theta: float  # θ; a revolute joint's position adds to it [rad]
     d: float  # along z; a prismatic joint's position adds to it [m]
     a: float  # along x [m]

@@ -29,10 +29,12 @@ class JointType(StrEnum):
 
     @property
     def unit(self) -> str:
+        """Unit of its position."""
         return "m" if self is JointType.PRISMATIC else "rad"
 
     @property
     def torque_unit(self) -> str:
+        """Unit of what drives it."""
         return "N" if self is JointType.PRISMATIC else "Nm"
 
 
@@ -195,6 +197,7 @@ class Robot:
 
     @property
     def joint_count(self) -> int:
+        """Number of joints n."""
         return len(self.joints)
 
     @property

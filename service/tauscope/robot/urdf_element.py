@@ -32,6 +32,7 @@ def where(label: str, element: Element) -> str:
 
 
 def urdf_error(label: str, element: Element, text: str) -> RobotFileError:
+    """The error of an element."""
     return RobotFileError(f"{where(label, element)}: {text}")
 
 

@@ -14,6 +14,8 @@ XACRO_DEFINITIONS = frozenset({"arg", "macro", "property"})  # elements of xacro
 
 @dataclass(frozen=True)
 class UrdfJoint:
+    """A joint of a URDF."""
+
     name: str
     type: str
     parent: str
@@ -23,6 +25,8 @@ class UrdfJoint:
 
 @dataclass(frozen=True)
 class UrdfTree:
+    """Links and joints of a URDF."""
+
     label: str
     links: Mapping[str, Element]
     parent_joint: Mapping[str, UrdfJoint]

@@ -73,6 +73,8 @@ class Request(CampaignOptions):
 
 @dataclass(frozen=True, eq=False)
 class Result:
+    """What came of it."""
+
     recordings: tuple[Path, ...]  # the training recording, and the held-out one where there is one
     identification: identify.Result
     diagnosis: diagnose.Result | None

@@ -105,6 +105,8 @@ class Request(StrictModel):
 
 @dataclass(frozen=True, eq=False)
 class Result:
+    """What came of it."""
+
     request: Request
     robot: Robot
     design: ExcitationDesign

@@ -93,6 +93,8 @@ class Request(TaskRequest):
 
 @dataclass(frozen=True, eq=False)
 class Result(TaskResult):
+    """What came of it."""
+
     held_out: tuple[Recording, ...]
     diagnosis: Diagnosis
     document: DiagnosisDocument

@@ -41,6 +41,8 @@ class Request(TaskRequest):
 
 @dataclass(frozen=True, eq=False)
 class Result(TaskResult):
+    """What came of it."""
+
     rollout: Rollout
     document: RolloutDocument
 

@@ -63,6 +63,8 @@ class Request(StrictModel):
 
 @dataclass(frozen=True, eq=False)
 class Result:
+    """What came of it."""
+
     robot: Robot
     record: RunRecord
     folder: Path

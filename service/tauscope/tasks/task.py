@@ -34,6 +34,7 @@ class TaskRequest(StrictModel):
 
     @property
     def command(self) -> tuple[str, ...]:
+        """The command line that does the same."""
         raise NotImplementedError
 
     @property
@@ -100,6 +101,7 @@ class ReadingOptions(StrictModel):
 
     @property
     def reading(self) -> Reading:
+        """The same for those who read."""
         return Reading(
             self.units or {},
             self.rate_hz,

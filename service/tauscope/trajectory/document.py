@@ -114,6 +114,7 @@ class TrajectoryDocument(TrajectoryPart):
 
 
 def trajectory_document(trajectory: Trajectory) -> TrajectoryDocument:
+    """The document of a trajectory."""
     limits, design = trajectory.limits, trajectory.design
     return TrajectoryDocument(
         robot=trajectory.robot,

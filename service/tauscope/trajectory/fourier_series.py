@@ -48,10 +48,12 @@ class FourierSeries:
 
     @property
     def joint_count(self) -> int:
+        """Number of joints n."""
         return len(self.centre)
 
     @property
     def harmonics(self) -> int:
+        """Number of harmonics M."""
         return self.cosine.shape[1]
 
     @property

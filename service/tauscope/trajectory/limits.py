@@ -56,6 +56,7 @@ class MotionLimits:
         return place, motion.velocity / self.velocity, motion.acceleration / self.acceleration
 
     def random_states(self, count: int, rng: np.random.Generator) -> MotionSamples:
+        """States anywhere within the limits."""
         place, speed, change = (rng.uniform(-1.0, 1.0, (count, len(self.velocity))) for _ in range(3))
         return MotionSamples(self.middle + self.half_range * place, self.velocity * speed, self.acceleration * change)
 

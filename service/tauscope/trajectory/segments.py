@@ -21,8 +21,12 @@ PEAK_ACCELERATION = 10.0 / np.sqrt(3.0)
 
 
 class Segment(Protocol):
+    """A piece of a trajectory."""
+
     @property
-    def joint_count(self) -> int: ...
+    def joint_count(self) -> int:
+        """Number of joints n."""
+        ...
 
     @property
     def duration_s(self) -> float:
@@ -54,6 +58,7 @@ class FourierSegment:
 
     @property
     def joint_count(self) -> int:
+        """Number of joints n."""
         return self.series.joint_count
 
     @property
@@ -87,6 +92,7 @@ class MoveSegment:
 
     @property
     def joint_count(self) -> int:
+        """Number of joints n."""
         return len(self.start)
 
     def evaluate(self, time: Array) -> MotionSamples:
@@ -119,6 +125,7 @@ class PathSegment:
 
     @property
     def joint_count(self) -> int:
+        """Number of joints n."""
         return self.series.joint_count
 
     def evaluate(self, time: Array) -> MotionSamples:
@@ -156,6 +163,7 @@ class SampledSegment:
 
     @property
     def joint_count(self) -> int:
+        """Number of joints n."""
         return self.motion.position.shape[1]
 
     @property

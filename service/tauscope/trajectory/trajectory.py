@@ -93,6 +93,7 @@ class Trajectory:
 
     @property
     def joint_count(self) -> int:
+        """Number of joints n."""
         return len(self.joints)
 
     @property

@@ -15,6 +15,8 @@ from tauscope_sim.canopen_bus.power_state import PowerState, PowerStateMachine
 
 
 class AxisMode(Enum):
+    """What a drive does to its joint."""
+
     RELEASED = "released"
     HOLDING = "holding"
     POSITION = "position"
@@ -38,6 +40,8 @@ class AxisDemand:
 
 @dataclass(frozen=True)
 class AxisMeasurement:
+    """What a drive's sensors tell of its joint."""
+
     position: float  # [rad or m]
     velocity: float  # [rad/s or m/s]
     torque: float  # [Nm or N]
@@ -78,6 +82,8 @@ _EXPONENTS = range(-6, 1)
 
 
 class EmulatedDrive:
+    """A drive with its node on the bus."""
+
     def __init__(self, node_id: int, scale: AxisScale, file: DeviceFile | None = None) -> None:
         """Power up. `file`: whose objects it has; all that a master may need where None."""
         self.node_id = node_id
@@ -103,6 +109,7 @@ class EmulatedDrive:
         self._outbox: list[Frame] = [(0x700 + self.node_id, b"\0")]
 
     def receive(self, frame: Frame, now_s: float) -> list[Frame]:
+        """Answers to a frame of the bus. it came [s]."""
         identifier, payload = frame
         if identifier == _NMT and len(payload) == 2 and payload[1] in (0, self.node_id):
             self._follow_network(payload[0])
@@ -132,6 +139,7 @@ class EmulatedDrive:
         return frames
 
     def demand(self) -> AxisDemand:
+        """What the drive wants of its joint now."""
         cap = self.dictionary.get(0x6072) * self.scale.torque_per_permille
         if self.power.state is PowerState.QUICK_STOP_ACTIVE:
             return AxisDemand(AxisMode.HOLDING, torque_cap=cap)
@@ -151,6 +159,7 @@ class EmulatedDrive:
         return AxisDemand(AxisMode.HOLDING, torque_cap=cap)
 
     def measure(self, measurement: AxisMeasurement) -> None:
+        """Let the sensors see the joint."""
         put, scale = self.dictionary.put, self.scale
         put(0x6064, round(measurement.position * scale.counts_per_radian))
         put(0x606C, round(measurement.velocity * scale.counts_per_radian))
@@ -160,6 +169,7 @@ class EmulatedDrive:
         self._show_status()
 
     def fail(self, error_code: int) -> None:
+        """Go into fault and say so."""
         self.power.fail()
         self._report(error_code)
 

@@ -47,6 +47,7 @@ class CanEmulator(Emulator):
 
     @property
     def next_due_s(self) -> float:
+        """When the next frame reaches the master [s]."""
         return self.now_s if self._answers else self._wire.arriving.next_s
 
     def hears(self, baud: int) -> bool:
@@ -76,10 +77,12 @@ class CanEmulator(Emulator):
         self.advance_to(now_s)
 
     def due(self, now_s: float) -> bytes:
+        """Text that has reached the host by now."""
         text, self._answers = self._answers, b""
         return text + b"".join(map(self._line.text, self._wire.arriving.take_due(now_s)))
 
     def describe(self) -> dict[str, Any]:
+        """Where the arm is and what its drives do."""
         position, velocity = self.driven.motion
         return {
             "time": self.now_s,
@@ -94,17 +97,21 @@ class CanEmulator(Emulator):
         }
 
     def inject(self, faults: list[InjectedFault]) -> None:
+        """Plan faults, and carry out those that are due."""
         super().inject(faults)
         for drive in self.drives:
             self._let_ail(drive)
 
     def get(self, device: int, place: tuple[int, int]) -> int:
+        """Value of an entry."""
         return self._drive(device).dictionary.get(*place)
 
     def put(self, device: int, place: tuple[int, int], value: int) -> None:
+        """Set an entry."""
         self._drive(device).dictionary.put(place[0], value, place[1])
 
     def set_stand(self, is_there: bool) -> None:
+        """Put the stand under the arm, or take it away."""
         self.driven.stands_on_stand = is_there
 
     def _step(self) -> None:
@@ -173,6 +180,8 @@ _SOCKET = "socketcan:"
 
 @dataclass(frozen=True)
 class CanOrder(EmulatorOrder):
+    """What to emulate."""
+
     robot: str
     start: tuple[float, ...]  # where the joints stand [rad or m]
     port: str
@@ -189,6 +198,7 @@ class CanOrder(EmulatorOrder):
         return super().open_port() if self._interface is None else CanSocket(self._interface)
 
     def build(self, now_s: float) -> CanEmulator:
+        """The emulator."""
         robot = read_robot(Path(self.robot))
         scenario = Scenario() if self.scenario is None else read_scenario(Path(self.scenario), robot)
         drives = []

@@ -95,6 +95,7 @@ class CanSocket:
         self._socket.setblocking(False)
 
     def fileno(self) -> int:
+        """Descriptor to wait on."""
         return self._socket.fileno()
 
     def read(self) -> bytes:
@@ -112,6 +113,7 @@ class CanSocket:
                 self._socket.send(data[start : start + _FRAME.size])
 
     def close(self) -> None:
+        """Leave the bus."""
         self._socket.close()
 
 
@@ -127,6 +129,7 @@ class SocketLine:
         return frames, b""
 
     def text(self, frame: Frame) -> bytes:
+        """A frame as the kernel takes it."""
         identifier, payload = frame
         return _FRAME.pack(identifier, len(payload), payload)
 
@@ -162,6 +165,7 @@ class Wire:
                 self.arriving.put(arrival_s, frame)
 
     def occupy(self, frame: Frame, now_s: float) -> None:
+        """Let a frame take its time."""
         self._free_s = max(now_s, self._free_s) + self.duration_s(frame)
 
     def duration_s(self, frame: Frame) -> float:

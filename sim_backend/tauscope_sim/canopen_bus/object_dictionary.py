@@ -24,6 +24,8 @@ class Abort(IntEnum):
 
 
 class AbortError(Exception):
+    """A transfer is refused."""
+
     def __init__(self, code: Abort) -> None:
         super().__init__(code.name)
         self.code = code
@@ -47,6 +49,8 @@ class Entry:
 
 @dataclass
 class ObjectDictionary:
+    """All entries, by index and subindex."""
+
     entries: dict[tuple[int, int], Entry] = field(default_factory=dict)  # of (index, subindex) to Entry
 
     def add(
@@ -65,6 +69,7 @@ class ObjectDictionary:
         return entry
 
     def get(self, index: int, subindex: int = 0) -> int:
+        """Value of an entry."""
         return self._find(index, subindex).value
 
     def put(self, index: int, value: int, subindex: int = 0) -> None:

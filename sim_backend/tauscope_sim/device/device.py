@@ -81,10 +81,12 @@ class SimulatedDevice:
 
     @property
     def activity(self) -> Activity:
+        """What the drives are doing."""
         return self._activity
 
     @property
     def fault_codes(self) -> tuple[str, ...]:
+        """Codes of the latched faults."""
         return tuple(fault.code for fault in self._latch.faults)
 
     @property
@@ -102,6 +104,7 @@ class SimulatedDevice:
             self._tick += 1
 
     def read(self) -> ArmState:
+        """What the drives report now."""
         position, velocity, effort = self._mechanism.reading()
         temperature = self._mechanism.true.temperature
         if self._disturbances.any:

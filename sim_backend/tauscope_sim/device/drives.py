@@ -14,6 +14,8 @@ from tauscope_sim.scenario import Scenario
 
 
 class Activity(StrEnum):
+    """What the drives do with the arm."""
+
     BRAKED = "braked"  # never yet under power: the brakes carry the arm, which stands still
     TRACKING = "tracking"  # following the host's positions
     TORQUE = "torque"  # giving the torque that the host commands
@@ -44,6 +46,7 @@ _BY_POLICY = {
 
 
 def commanded_by(mode: ControlMode) -> Activity:
+    """What enabling leads to."""
     return _BY_MODE[mode]
 
 
@@ -95,6 +98,7 @@ class Drives:
             self._commanded_torque = setpoint.torque
 
     def hold(self, before: Activity, motion: Motion) -> None:
+        """Bring the joints to rest and hold them."""
         if before is Activity.TRACKING or self._waits_for_torque(before):
             self._servo.absorb(self._target.feed_forward)
             self._target.brake()

@@ -11,6 +11,8 @@ from tauscope_drivers import Fault
 
 
 class FaultCode(StrEnum):
+    """What the simulated drives report."""
+
     WATCHDOG = "watchdog"
     OVER_TEMPERATURE = "over-temperature"
     OVERLOAD = "overload"
@@ -31,6 +33,8 @@ REMEDIES = {
 
 
 class Disturbance(StrEnum):
+    """What a test can make happen to a joint."""
+
     LOST_SAMPLE = "lost-sample"  # the joint does not answer: its readings are missing
     OVER_TEMPERATURE = "over-temperature"  # the motor's temperature rises by the size [K]
     OVERLOAD = "overload"  # the drive reports an overload
@@ -49,6 +53,7 @@ class Injection:
     size: float = 0.0  # rise of the temperature or slip of the encoder [K; rad or m]
 
     def active_at(self, time_ns: int) -> bool:
+        """Whether it acts at an instant."""
         return self.start_ns <= time_ns and (self.duration_ns is None or time_ns < self.start_ns + self.duration_ns)
 
 
@@ -68,15 +73,19 @@ class FaultLatch:
         self.faults: tuple[Fault, ...] = ()
 
     def latch(self, fault: Fault) -> None:
+        """Keep a fault."""
         self._faults.setdefault((fault.code, fault.joint), fault)
         self.faults = tuple(self._faults.values())
 
     def clear(self) -> None:
+        """Forget them all."""
         self._faults.clear()
         self.faults = ()
 
 
 class Disturbances:
+    """What acts now."""
+
     def __init__(self, joint_count: int) -> None:
         self.slip: Array = np.zeros(joint_count)  # slip of the encoders so far [rad or m]
         self.heat: Array = np.zeros(joint_count)  # rise of the motors' temperature [K]
@@ -88,13 +97,16 @@ class Disturbances:
 
     @property
     def waiting(self) -> bool:
+        """Whether there is anything that begins or ends yet."""
         return bool(self._injections)
 
     def add(self, injection: Injection) -> None:
+        """Take note of a disturbance."""
         self.any = True
         self._injections.append(injection)
 
     def update(self, time_ns: int) -> None:
+        """Renew what acts at an instant."""
         if not self._injections:
             return
         for values in (self.heat, self.lost, self.overloaded):

@@ -22,6 +22,8 @@ _HEADER = struct.Struct("<BxxxII")
 
 
 class FrameKind(IntEnum):
+    """What a frame is."""
+
     HELLO = 1
     ENABLE = 2
     EXCHANGE = 3
@@ -40,11 +42,14 @@ class FrameKind(IntEnum):
 
 @dataclass(frozen=True)
 class Frame:
+    """One message."""
+
     kind: FrameKind
     sequence: int
     body: bytes = b""
 
     def encode(self) -> bytes:
+        """The frame as it goes over the wire."""
         return _HEADER.pack(self.kind, self.sequence, len(self.body)) + self.body
 
 
@@ -53,6 +58,8 @@ class BrokenFrameError(ValueError):
 
 
 class FrameBuffer:
+    """Cuts a stream of bytes into frames."""
+
     def __init__(self) -> None:
         self._bytes = bytearray()
 
@@ -87,6 +94,8 @@ class BadMessageError(ValueError):
 
 @dataclass(frozen=True)
 class Enabling:
+    """A request to enable."""
+
     mode: ControlMode
     stop_policy: StopPolicy
     watchdog_s: float
@@ -95,6 +104,8 @@ class Enabling:
 
 @dataclass(frozen=True)
 class Refusal:
+    """A `DriverError`."""
+
     kind: DriverErrorKind
     message: str
     faults: tuple[Fault, ...]
@@ -155,6 +166,7 @@ def decode_state(body: bytes) -> ArmState:
 
 
 def encode_error(error: DriverError) -> bytes:
+    """A refusal."""
     return encode_document(Refusal(error.kind, str(error), error.faults))
 
 

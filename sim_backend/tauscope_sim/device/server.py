@@ -48,6 +48,7 @@ class TraceWriter:
         self._write(",".join([str(device.time_ns), device.activity.value, "+".join(device.fault_codes), *numbers]))
 
     def close(self) -> None:
+        """Close the file."""
         os.close(self._file)
 
     def _write(self, line: str) -> None:
@@ -64,6 +65,8 @@ _PEER = struct.Struct("3i")
 
 @dataclass
 class Punctuality:
+    """How well the device kept to the machine's clock."""
+
     overruns: int = 0
     largest_lag_ns: int = 0  # the latest of them [ns]
 

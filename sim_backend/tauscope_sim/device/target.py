@@ -249,6 +249,7 @@ class Target:
         self._ticks_left = round(STOP_TIME_S / self._tick_s) if self.velocity.any() else 0
 
     def advance(self, tick: int) -> None:
+        """Move on by one tick."""
         if not self._braking and self._spline.is_starved(tick):
             self.brake()
         if not self._braking:

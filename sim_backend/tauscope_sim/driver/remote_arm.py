@@ -42,6 +42,8 @@ _LONGEST_SOCKET_PATH = 107
 
 @dataclass(frozen=True, eq=False)
 class DeviceProcess:
+    """A running device process."""
+
     process: "subprocess.Popen[bytes]"
     socket: Path
     trace: Path
@@ -144,6 +146,7 @@ class RemoteSimulatedArm:
 
     @property
     def capabilities(self) -> Capabilities:
+        """What it can do."""
         return Capabilities(
             joint_count=self._count,
             modes=frozenset(ControlMode),
@@ -155,6 +158,7 @@ class RemoteSimulatedArm:
 
     @property
     def clock(self) -> Clock:
+        """The machine's monotonic clock, which is the device's too."""
         return self._clock
 
     def connect(self) -> ArmState:
@@ -189,6 +193,7 @@ class RemoteSimulatedArm:
             raise DriverError.no_connection(str(error)) from error
 
     def acknowledge_faults(self) -> ArmState:
+        """Clear the latched faults; see `drivers.Backend`."""
         return self._state_after(messages.FrameKind.ACKNOWLEDGE)
 
     def enable(
@@ -208,6 +213,7 @@ class RemoteSimulatedArm:
         return self._state_after(messages.FrameKind.ENABLE, asked)
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
+        """Write the setpoints, read the arm; see `drivers.Backend`."""
         require_finite(setpoint, self._count)
         body = messages.encode_setpoint(self._clock.now_ns(), setpoint)
         try:
@@ -238,6 +244,7 @@ class RemoteSimulatedArm:
         return messages.decode_document(dict, self._patiently(messages.FrameKind.STATUS).body)
 
     def inject(self, injection: Injection) -> ArmState:
+        """Make a disturbance happen, for a test."""
         return self._state_after(messages.FrameKind.INJECT, messages.encode_document(injection))
 
     def put_back(self) -> ArmState:

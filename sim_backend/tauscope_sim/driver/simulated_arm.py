@@ -23,6 +23,7 @@ class VirtualClock:
         self._advance = advance
 
     def now_ns(self) -> int:
+        """The present instant [ns]."""
         return self._now_ns
 
     def wait_until_ns(self, deadline_ns: int) -> int:
@@ -55,10 +56,12 @@ class SimulatedArm:
 
     @property
     def capabilities(self) -> Capabilities:
+        """What it can do."""
         return self.device.capabilities
 
     @property
     def clock(self) -> Clock:
+        """Virtual time."""
         return self._clock
 
     def connect(self) -> ArmState:
@@ -69,6 +72,7 @@ class SimulatedArm:
         return self.device.read()
 
     def acknowledge_faults(self) -> ArmState:
+        """Clear the latched faults; see `drivers.Backend`."""
         self._require_connection()
         self.device.acknowledge_faults()
         return self.device.read()
@@ -91,6 +95,7 @@ class SimulatedArm:
         return self.device.read()
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
+        """Write the setpoints, read the arm; see `drivers.Backend`."""
         self._require_connection()
         self.device.command(setpoint, self._clock.now_ns())
         return self.device.read()

@@ -27,10 +27,12 @@ class Pendulums:
 
     @property
     def joint_count(self) -> int:
+        """Number of joints n."""
         return self._position.size
 
     @property
     def motion(self) -> tuple[Array, Array]:
+        """Position and velocity."""
         return self._position.copy(), self._velocity.copy()
 
     def torque(self, demands: Sequence[Demand]) -> Array:

@@ -19,6 +19,8 @@ _library = Protocol2PacketHandler()
 
 @dataclass(frozen=True)
 class Instruction:
+    """What a master asks."""
+
     servo: int
     code: int
     parameters: bytes
@@ -54,6 +56,7 @@ class InstructionParser:
         self._buffer = bytearray()
 
     def feed(self, received: bytes) -> list[Instruction]:
+        """Instructions that are complete now."""
         self._buffer += received
         found: list[Instruction] = []
         while True:
@@ -103,6 +106,8 @@ _REBOOT_S = 0.3
 
 
 class EmulatedBus:
+    """Servos on one line."""
+
     def __init__(self, servos: Sequence[EmulatedServo], *, fast_sync_read: bool = True, paced: bool = True) -> None:
         self.servos = {servo.servo: servo for servo in servos}
         self._fast = fast_sync_read
@@ -138,6 +143,7 @@ class EmulatedBus:
         return instructions
 
     def answer(self, instructions: Iterable[Instruction], now_s: float) -> list[Delivery]:
+        """Carry instructions out and answer them."""
         deliveries: list[Delivery] = []
         for instruction in instructions:
             end_s = max(now_s, self._free_s) + self._wire_s(instruction.length)
@@ -151,6 +157,7 @@ class EmulatedBus:
         return self._handlers.get(instruction.code, self._refuse)(instruction, end_s)
 
     def carry_out(self, fault: InjectedFault, now_s: float) -> None:
+        """Let a fault happen now."""
         if fault.kind is FaultKind.POWER_DIP:
             for servo in self.servos:
                 self._restart(servo, now_s + fault.seconds)

@@ -8,6 +8,8 @@ from dynamixel_easy_sdk import ControlTable
 
 @dataclass(frozen=True)
 class ModelFigures:
+    """What distinguishes one model of servo from another."""
+
     counts_per_turn: int
     zero_count: int
     velocity_unit: float  # one unit of Present Velocity [rad/s]
@@ -54,6 +56,7 @@ class ServoSpecification:
 
     @property
     def figures(self) -> ModelFigures:
+        """Of its model."""
         return MODELS[self.model_number]
 
     @property
@@ -84,6 +87,8 @@ _SIZE = 1024
 
 
 class WriteRefusedError(Exception):
+    """A write that the servo does not take."""
+
     def __init__(self, error: int) -> None:
         super().__init__(error)
         self.error = error

@@ -41,6 +41,7 @@ class DynamixelEmulator(Emulator):
         self._look()
 
     def hears(self, baud: int) -> bool:
+        """Whether a master that has set this baud rate is understood. `baud`: of the master's port [bit/s]."""
         return baud in self._bauds
 
     def receive(self, data: bytes, now_s: float) -> None:
@@ -57,13 +58,16 @@ class DynamixelEmulator(Emulator):
             self._outgoing.put(due_s + self._latency_s, frame)
 
     def due(self, now_s: float) -> bytes:
+        """Bytes that have reached the master by now."""
         return b"".join(self._outgoing.take_due(now_s))
 
     @property
     def next_due_s(self) -> float:
+        """When the next bytes reach the master; infinite where none are under way [s]."""
         return self._outgoing.next_s
 
     def describe(self) -> dict[str, Any]:
+        """Where the arm is and what its servos do."""
         position, velocity = self.arm.motion
         return {
             "time": self.now_s,
@@ -80,12 +84,15 @@ class DynamixelEmulator(Emulator):
         }
 
     def get(self, device: int, place: str) -> int:
+        """Value of an item."""
         return self.bus.servos[device].memory.get(place)
 
     def put(self, device: int, place: str, value: int) -> None:
+        """Set an item."""
         self.bus.servos[device].memory.put(place, value)
 
     def set_stand(self, is_there: bool) -> None:
+        """Put the stand under the arm, or take it away."""
         self.stands_on_stand = is_there
 
     def _step(self) -> None:
@@ -112,6 +119,8 @@ class DynamixelEmulator(Emulator):
 
 @dataclass(frozen=True)
 class ServoOrder(EmulatorOrder, Generic[_Servo]):
+    """An arm of servos, whoever made them."""
+
     specification: ClassVar[type]
 
     servos: tuple[_Servo, ...]
@@ -128,6 +137,7 @@ class ServoOrder(EmulatorOrder, Generic[_Servo]):
 
     @classmethod
     def from_json(cls, text: str) -> Self:
+        """The order in a text."""
         order: Any = super().from_json(text)
         return replace(order, servos=tuple(cls.specification(**servo) for servo in order.servos))
 
@@ -136,6 +146,7 @@ class ServoOrder(EmulatorOrder, Generic[_Servo]):
         """The servos on their bus."""
 
     def build(self, now_s: float) -> DynamixelEmulator:
+        """The emulator."""
         return DynamixelEmulator(self.make_bus(), self._arm(), now_s, latency_s=self.latency_s)
 
     def _arm(self) -> "Pendulums | PlantArm":
@@ -154,6 +165,8 @@ class ServoOrder(EmulatorOrder, Generic[_Servo]):
 
 @dataclass(frozen=True)
 class DynamixelOrder(ServoOrder[ServoSpecification]):
+    """Dynamixel servos."""
+
     specification: ClassVar[type] = ServoSpecification
 
     fast_sync_read: bool = True

@@ -33,6 +33,7 @@ class PlantArm:
 
     @property
     def joint_count(self) -> int:
+        """Number of joints n."""
         return self._plant.joint_count
 
     @property

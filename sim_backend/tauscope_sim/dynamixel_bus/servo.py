@@ -118,6 +118,8 @@ _FILTERED_STEPS = 5
 
 
 class EmulatedServo:
+    """A servo on the bus and at its joint."""
+
     alarms: ClassVar[Mapping[FaultKind, int]] = {
         FaultKind.OVER_TEMPERATURE: OVERHEATING,
         FaultKind.OVERLOAD: OVERLOAD,
@@ -138,6 +140,7 @@ class EmulatedServo:
 
     @property
     def servo(self) -> int:
+        """ID."""
         return self.specification.servo
 
     @property
@@ -148,6 +151,7 @@ class EmulatedServo:
 
     @property
     def has_torque(self) -> bool:
+        """Whether it drives or holds its joint."""
         return bool(self.memory.get("Torque Enable"))
 
     @property

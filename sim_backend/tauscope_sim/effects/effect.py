@@ -59,10 +59,12 @@ def one_of(*words: str) -> Any:
 
 
 def zero_vector() -> list[float]:
+    """Three zeros."""
     return [0.0, 0.0, 0.0]
 
 
 def single_zero() -> list[float]:
+    """A zero for all."""
     return [0.0]
 
 

@@ -59,6 +59,7 @@ class Emulator(ABC):
 
     @property
     def now_s(self) -> float:
+        """Instant up to which the devices have come [s]."""
         return self._clock.now_s
 
     @property
@@ -104,6 +105,7 @@ class Emulator(ABC):
         return None
 
     def inject(self, faults: list[InjectedFault]) -> None:
+        """Plan faults, and carry out those that are due."""
         for fault in faults:
             self.schedule.put(fault.at_s, fault)
         self._run_faults()
@@ -141,7 +143,9 @@ class Port(Protocol):
         """What the master has set, or a rate that is understood where there is none to set [bit/s]."""
         ...
 
-    def fileno(self) -> int: ...
+    def fileno(self) -> int:
+        """Descriptor to wait on."""
+        ...
 
     def read(self) -> bytes | None:
         """What a master sent; None where no master has it open."""
@@ -151,7 +155,9 @@ class Port(Protocol):
         """Send to the master; lost where there is none, or where it reads nothing."""
         ...
 
-    def close(self) -> None: ...
+    def close(self) -> None:
+        """Hang up."""
+        ...
 
 
 _TCGETS2 = 0x802C542A
@@ -175,9 +181,11 @@ class PseudoTerminal:
         os.set_blocking(self._near, False)
 
     def fileno(self) -> int:
+        """Descriptor to wait on."""
         return self._near
 
     def read(self) -> bytes | None:
+        """What a master sent; None where no master has it open."""
         try:
             return os.read(self._near, 4096)
         except BlockingIOError:
@@ -188,15 +196,18 @@ class PseudoTerminal:
             raise
 
     def write(self, data: bytes) -> None:
+        """Send to the master; lost where there is none, or where it reads nothing."""
         with contextlib.suppress(BlockingIOError, OSError):
             os.write(self._near, data)
 
     @property
     def baud(self) -> int:
+        """What the master has set [bit/s]."""
         settings = fcntl.ioctl(self._near, _TCGETS2, bytes(struct.calcsize(_TERMIOS2)))
         return struct.unpack(_TERMIOS2, settings)[-1]
 
     def close(self) -> None:
+        """Hang up."""
         os.close(self._near)
         with contextlib.suppress(FileNotFoundError):
             os.unlink(self._link)
@@ -216,10 +227,12 @@ class EmulatorOrder(ABC):
         return f"{type(self).__module__}:{type(self).__qualname__}"
 
     def to_json(self) -> str:
+        """The order as text, which the process is started with."""
         return json.dumps(vars(self), default=asdict)
 
     @classmethod
     def from_json(cls, text: str) -> Self:
+        """The order in a text."""
         document = json.loads(text)
         return cls(**{key: tuple(value) if isinstance(value, list) else value for key, value in document.items()})
 

@@ -9,6 +9,8 @@ from typing import Any, Generic, TypeVar
 
 
 class FaultKind(StrEnum):
+    """What happens."""
+
     LOSE = "lose"  # the device's next answers do not arrive
     CORRUPT = "corrupt"  # one bit of them is wrong
     LATE = "late"  # they arrive `seconds` late
@@ -62,6 +64,7 @@ class TimedQueue(Generic[_Item]):
         return self._queue[0][0] if self._queue else inf
 
     def put(self, at_s: float, item: _Item) -> None:
+        """Plan one."""
         self._number += 1
         heapq.heappush(self._queue, (at_s, self._number, item))
 
@@ -87,6 +90,7 @@ class AnswerFaults:
         return [(at_s, frame) for at_s in self.arrivals(kind, due_s)]
 
     def next_kind(self) -> FaultKind | None:
+        """What happens to the next answer."""
         if self.count <= 0:
             return None
         self.count -= 1

@@ -49,6 +49,7 @@ class Arrivals:
         os.close(self._end)
 
     def fileno(self) -> int:
+        """Descriptor to wait on."""
         return self._wake
 
     def take(self) -> tuple[list[tuple[bytes, int]], int]:
@@ -99,6 +100,7 @@ class EmulatorServer:
         self._master_is_there = True
 
     def run(self) -> None:
+        """Serve."""
         take_precedence()
         try:
             with self._arrivals or contextlib.nullcontext():

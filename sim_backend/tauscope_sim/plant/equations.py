@@ -117,12 +117,14 @@ class StaticFriction(Term):
         ]
 
     def act(self, moment: Moment, forces: Forces) -> None:
+        """Add τ_f."""
         velocity, friction = moment.velocity, forces.friction
         for joint, place, stiction, k_v, stribeck, delta, viscous in self._laws:
             v = velocity[place]
             friction[joint] += stiction * atan(k_v * v) + stribeck * atan(delta * v) + viscous * v
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
+        """Add dτ_f/dv."""
         for _, place, stiction, k_v, stribeck, delta, viscous in self._laws:
             x, y = k_v * moment.velocity[place], delta * moment.velocity[place]
             slope = stiction * k_v / (1.0 + x * x) + stribeck * delta / (1.0 + y * y) + viscous

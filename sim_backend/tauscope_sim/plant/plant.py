@@ -100,6 +100,7 @@ class Plant:
 
     @property
     def joint_count(self) -> int:
+        """Number of joints n."""
         return self._coordinates.joint_count
 
     @property
@@ -109,6 +110,7 @@ class Plant:
 
     @property
     def state(self) -> PlantState:
+        """Where the plant is."""
         count, size = self.joint_count, self._coordinates.size
         return PlantState(
             time=self._time,

@@ -33,6 +33,7 @@ class Coordinates:
 
     @property
     def size(self) -> int:
+        """Number of coordinates N."""
         return self.joint_count + len(self.compliant)
 
     def motor(self, joint: int) -> int:
@@ -73,6 +74,7 @@ class Forces:
         self.clear()
 
     def clear(self) -> None:
+        """Begin a sum."""
         self.friction = self._none.copy()  # friction on the motor's side [Nm or N]
         self.motor = self._none.copy()  # anything else on the motor's side [Nm or N]
         self.link = self._none.copy()  # on the link's side: part of the load [Nm or N]

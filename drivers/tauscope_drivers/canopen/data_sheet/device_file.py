@@ -158,6 +158,8 @@ _LONGEST_NAME = 60
 
 @dataclass(frozen=True)
 class DescribedObject:
+    """One entry of the object dictionary as a file describes it."""
+
     name: str
     index: int
     subindex: int
@@ -170,6 +172,7 @@ class DescribedObject:
 
     @property
     def type_name(self) -> str:
+        """Name of its data type."""
         return TYPE_NAMES.get(self.data_type, f"data type 0x{self.data_type:02X}")
 
 
@@ -186,6 +189,7 @@ class DeviceFile:
 
 
 def read_device_file(path: Path, node_id: int) -> DeviceFile:
+    """Read a file. Raises DataSheetError where it cannot be read, or is no such file."""
     sections = read_sections(_content(path))
     entries = {(entry.index, entry.subindex): entry for entry in _describe_all(sections, node_id)}
     device = sections.get("DeviceInfo", {})
@@ -294,6 +298,8 @@ _LINE = re.compile(r"node.?id|baud|bit.?rate", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Setting:
+    """A value for a drive."""
+
     entry: DriveObject
     data: bytes
     text: str

@@ -106,6 +106,8 @@ class JointFriction:
 
 @dataclass(frozen=True)
 class JointCompensation:
+    """One joint of a compensation model."""
+
     name: str
     type: JointType  # revolute (rad, Nm) or prismatic (m, N)
     friction: JointFriction

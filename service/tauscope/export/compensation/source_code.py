@@ -36,6 +36,8 @@ COEFFICIENTS = ("stiction", "stribeck", "viscous", "offset", "k_v", "delta")
 
 @dataclass(frozen=True)
 class UnitFunction:
+    """A function that gives the friction in one unit."""
+
     suffix: str
     meaning: str
     torque_per_unit: tuple[float, ...]  # what one unit means at each joint [Nm or N]

@@ -36,6 +36,7 @@ class Prior:
 
     @property
     def link_count(self) -> int:
+        """Number of links n."""
         return len(self.masses)
 
     def widen(self, width: float) -> "Prior":

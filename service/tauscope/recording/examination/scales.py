@@ -26,6 +26,7 @@ class Sketch:
 
     @staticmethod
     def of(recording: Recording) -> "Sketch":
+        """The windows of a recording."""
         count = len(recording)
         if count <= WINDOWS * WINDOW_ROWS:
             return Sketch((recording.samples(),))
@@ -161,6 +162,7 @@ class EffortScale:
 
 
 def measure_positions(sketch: Sketch, types: list[JointType]) -> list[PositionScale]:
+    """Scales of every joint's position."""
     scales = []
     for joint, kind in enumerate(types):
         pieces = [
