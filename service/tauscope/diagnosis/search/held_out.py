@@ -20,6 +20,7 @@ from tauscope.diagnosis.evidence.scales import REST_BOUNDS
 from tauscope.diagnosis.fitting.white_columns import WhiteColumns
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.held_out_change import STRETCHES, HeldOutChange, stretches, sum_stretches
+from tauscope.diagnosis.model.residual import raw_squares
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.search.hypothesis import Hypothesis
 from tauscope.effects.computation import LastFew
@@ -41,8 +42,13 @@ class HeldOut:
         return self._compare(self._errors(before), self._errors(after), after)
 
     def trained_change(self, before: Hypothesis, after: Hypothesis) -> HeldOutChange:
-        """…from training alone: this is what a user of the model gets."""
+        """…from training alone."""
         return self._compare(self._white.residual(before.model), self._white.residual(after.model), after)
+
+    def delivered_change(self, before: Hypothesis, after: Hypothesis) -> HeldOutChange:
+        """…at the recorded rate, every row of motion alike: what a user of the model gets, and a table says."""
+        sums = (sum_stretches(raw_squares(each.model, self.observations)[0]) for each in (before, after))
+        return HeldOutChange.between(*sums)
 
     def _compare(self, before: Sequence[Array], after: Sequence[Array], at: Hypothesis) -> HeldOutChange:
         """From the errors of every joint; rows near rest count as little as the scales of a hypothesis say."""

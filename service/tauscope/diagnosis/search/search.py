@@ -155,7 +155,7 @@ class Search:
 
     def _holds(self, at: Hypothesis, weighed: Weighed) -> bool:
         """Whether an effect is as probable beside all others, and as visible, as one that is added has to be."""
-        return weighed.log_odds > 0.0 and self._agrees(weighed.without, at, weighed.places, SHOWN)
+        return weighed.log_odds > 0.0 and self._agrees(weighed.without, at, weighed.places)
 
     def _least(self, at: Hypothesis, weighed: Weighed) -> float:
         """Log odds from which an effect is a finding: one that every arm has must stand out."""
@@ -285,7 +285,7 @@ class Search:
         if self.held_out is not None:  # what training does not ask for may cost no joint anything
             told = self.held_out.trained_change(at, found)
             confirmed &= told.harm <= 0.0 if asked else not told.losing
-        confirmed = confirmed and self._agrees(at, found, [len(found.model.terms) - 1], SHOWN if asked else UNASKED)
+        confirmed = confirmed and self._agrees(at, found, [len(found.model.terms) - 1], asked=asked)
         covariance = found.posterior.covariance
         return Step(proposal, log_odds, rivals, change, confirmed, at.model, found.model, covariance, trained), found
 
@@ -302,19 +302,25 @@ class Search:
         gained = self.laboratory.under(found, at.dependence, range(len(at.scales))).log_evidence - at.log_evidence
         return proposal.log_factor - gained + sum(self._prior_odds(effect, 0.0) for effect in lost)
 
-    def _agrees(self, without: Hypothesis, at: Hypothesis, places: Sequence[int], least: float) -> bool:
-        """Whether held-out motion shows an effect by some log odds, and training predicts its joints no worse.
+    def _agrees(self, without: Hypothesis, at: Hypothesis, places: Sequence[int], *, asked: bool = True) -> bool:
+        """Whether held-out motion shows an effect, and training predicts its joints no worse.
 
-        No other motion shows a window in time.
+        What training does not ask for has to be beyond doubt, also in the table that a user sees. No other motion shows
+        a window in time.
         """
         effect = at.model.terms[places[0]].effect
         if self.held_out is None or isinstance(effect, TimeLocalEffect):
             return True
         touched = effect.touched(len(at.scales))
+        if self.held_out.trained_change(without, at).log_odds(touched) < 0.0:
+            return False
+        if not asked and self.held_out.delivered_change(without, at).log_odds(touched) < UNASKED:
+            return False
+        least = SHOWN if asked else UNASKED
         shown = self.held_out.change(without, at).log_odds(touched)
         if shown <= least:
             shown = self.held_out.change(self._hold_friction(at, places), at).log_odds(touched)
-        return shown > least and self.held_out.trained_change(without, at).log_odds(touched) >= 0.0
+        return shown > least
 
     def _hold_friction(self, at: Hypothesis, places: Sequence[int]) -> Hypothesis:
         """The hypothesis without an effect, friction's slopes as they are with it.
