@@ -25,6 +25,7 @@ class Trial:
     held_out: float
     beside_friction: float = 0.0
     predicted: float = 10.0
+    delivered: float = 20.0
     harm: float = 0.0
     lost: float | None = None
 
@@ -85,6 +86,7 @@ def is_named(trial: Trial) -> bool:
     held_out: Any = SimpleNamespace(
         change=lambda before, after: said[before.name],
         trained_change=lambda before, after: change(trial.predicted, trial.harm),
+        delivered_change=lambda before, after: change(trial.delivered),
     )
     proposal: Any = SimpleNamespace(term=holding("found").model.terms[0], log_factor=trial.training)
     nominal: Any = SimpleNamespace(model=SimpleNamespace(terms=[]))
@@ -106,11 +108,13 @@ UNASKED = Trial(training=2.0, held_out=20.0)
         (replace(ASKED, held_out=0.5), False),  # three to one of held-out motion
         (replace(ASKED, held_out=0.5, beside_friction=1.5), True),  # where friction's slopes take its place
         (replace(ASKED, predicted=-1.0), False),  # by training alone no worse
+        (replace(ASKED, delivered=0.0), True),  # whatever single samples say
         (replace(ASKED, harm=0.5), False),  # at no other joint's cost
         (replace(ASKED, lost=0.5), True),  # without what it makes impossible
         (replace(ASKED, lost=5.0), False),  # but what is lost with that counts
         (UNASKED, True),
         (replace(UNASKED, held_out=16.0), False),  # three standard errors
+        (replace(UNASKED, delivered=16.0), False),  # which the table shows, too
         (replace(ASKED, held_out=20.0, harm=0.006), True),  # at a small cost beside its gain
         (replace(UNASKED, harm=0.006), False),  # which nothing is worth that training does not ask for
         (replace(UNASKED, training=-20.0), False),  # what training is sure is not there
