@@ -5,7 +5,7 @@ their own (`Scales`). All rows of a stop count as one, whose friction is unknown
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from tauscope.diagnosis.fitting.white_columns import WhiteColumns, white_columns
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.observations.observations import Observations, Piece
 from tauscope.effects import Effect, Signals
+from tauscope.effects.computation import THREADS, LastFew
 from tauscope.recording.recording import Array
 
 REVERSAL = 2.0
@@ -33,6 +34,10 @@ OPEN = 1.0
 
 AROUND_STOP = 1
 """Rows on either side of a stop that share its samples."""
+
+
+MOMENTS_KEPT = 2 * THREADS
+"""Moments that are kept a joint: those of the hypothesis at hand, and of another that differs from it there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +59,10 @@ class EvidenceRows:
     features: tuple[Array, ...]
     groups: NDArray[np.intp]
     successions: tuple[Succession, ...]
+    _known: LastFew[tuple[object, ...], tuple[ExtendedModel, JointMoments]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_known", LastFew(MOMENTS_KEPT * len(self.order)))
 
     @staticmethod
     def prepare(observations: Observations, model: ExtendedModel) -> "EvidenceRows":
@@ -106,9 +115,17 @@ class EvidenceRows:
 
         The discrepancy is beyond what the nominal model can make; where terms are `owned`, beyond what they can, too.
         """
-        plain = model.size if owned else model.structure.size + len(model.constants)
-        given = zip(self.white.residual(model), self.white.all(model), dependence, strict=True)
-        return tuple(self.joint_moments(joint, *own, plain) for joint, own in enumerate(given))
+        return tuple(self._joint_moments(joint, model, own, owned=owned) for joint, own in enumerate(dependence))
+
+    def _joint_moments(self, joint: int, model: ExtendedModel, dependence: float, *, owned: bool) -> JointMoments:
+        """Those of one joint: most hypotheses differ from another one at few joints."""
+
+        def made() -> tuple[ExtendedModel, JointMoments]:
+            plain = model.size if owned else model.structure.size + len(model.constants)
+            own = self.white.residual_at(model, joint), self.white.all_at(model, joint)
+            return model, self.joint_moments(joint, *own, dependence, plain)
+
+        return self._known.get((joint, dependence, owned, *self.white.key(model, joint)), made)[1]
 
     def joint_moments(
         self, joint: int, residual: Array, linear: JointColumns, dependence: float, plain: int

@@ -46,46 +46,64 @@ class WhiteColumns:
 
     def residual(self, model: ExtendedModel) -> list[Array]:
         """What a model leaves of the measured torque, (R_j,) a joint."""
-        found = []
-        for joint in self._joints:
-            rigid, friction = self._white_rigid(joint), self._white_friction(model, joint)
-            links, plain = np.split(model.parameters[model.structure.joint_columns(joint)], [len(rigid)])
-            found.append(self.measured(joint) - links @ rigid - plain @ friction)
-        for term in model.terms:
-            for joint, columns in self._white_term(model, term).items():
-                found[joint] -= term.coefficients @ columns
-        return found
+        return [self.residual_at(model, joint) for joint in self._joints]
+
+    def residual_at(self, model: ExtendedModel, joint: int) -> Array:
+        """What it leaves of the measured torque of one joint, (R,)."""
+        rigid, friction = self._white_rigid(joint), self._white_friction(model, joint)
+        links, plain = np.split(model.parameters[model.structure.joint_columns(joint)], [len(rigid)])
+        found = self.measured(joint) - links @ rigid - plain @ friction
+        for term, _ in self._terms_at(model, joint):
+            found -= term.coefficients @ self._white_term(model, term)[joint]
+        return np.asarray(found)
 
     def linear(self, model: ExtendedModel) -> list[JointColumns]:
         """Columns of the parameters in which a model is linear, Θ and the terms' coefficients, a joint each."""
-        return _joined(*self._linear(model))
+        return [_join(*self._linear(model, joint)) for joint in self._joints]
 
     def all(self, model: ExtendedModel) -> list[JointColumns]:
         """Columns of all parameters, a joint each: slopes of the model's torque."""
-        index, rows = self._linear(model)
-        for joint in self._joints:
-            places, amplitudes = model.slope_amplitudes(joint)
-            slopes = self._scale(model, joint) * amplitudes[:, None] * self._white_friction_slopes(model, joint)
-            index[joint] += places
-            rows[joint].append(slopes + self._of_steps(model, joint, places))
-        for term, place in zip(model.terms, model.term_places(), strict=True):
-            if term.free_shapes:
-                for joint, by_shape in self._white_shape_slopes(model, term).items():
-                    index[joint] += range(place.start + len(term.coefficients), place.stop)
-                    rows[joint].append(term.coefficients @ by_shape)
-        return _joined(index, rows)
+        return [self.all_at(model, joint) for joint in self._joints]
 
-    def _linear(self, model: ExtendedModel) -> tuple[list[list[int]], list[list[Array]]]:
-        """Places and columns of Θ and of the terms' coefficients, a list a joint."""
-        index, rows = [], []
-        for joint in self._joints:
-            factor = self._scale(model, joint)
-            index.append([int(place) for place in model.structure.joint_columns(joint)])
-            rows.append([factor * self._white_rigid(joint), factor * self._white_friction(model, joint)])
-        for term, place in zip(model.terms, model.term_places(), strict=True):
-            for joint, columns in self._white_term(model, term).items():
-                index[joint] += range(place.start, place.start + len(columns))
-                rows[joint].append(columns)
+    def all_at(self, model: ExtendedModel, joint: int) -> JointColumns:
+        """Columns of all parameters at one joint."""
+        index, rows = self._linear(model, joint)
+        places, amplitudes = model.slope_amplitudes(joint)
+        slopes = self._scale(model, joint) * amplitudes[:, None] * self._white_friction_slopes(model, joint)
+        index += places
+        rows.append(slopes + self._of_steps(model, joint, places))
+        for term, place in self._terms_at(model, joint):
+            if term.free_shapes:
+                index += range(place.start + len(term.coefficients), place.stop)
+                rows.append(term.coefficients @ self._white_shape_slopes(model, term)[joint])
+        return _join(index, rows)
+
+    def key(self, model: ExtendedModel, joint: int) -> tuple[object, ...]:
+        """All that the residual and the columns of a joint depend on.
+
+        `joint`: joint index, from 0.
+        """
+        terms: list[object] = []
+        for term, place in self._terms_at(model, joint):
+            terms.append((_key(model, term), term.coefficients.tobytes(), place.start))
+            if term.effect.bends:
+                terms.append((model.structure.terms, model.parameters.tobytes()))
+        own = model.parameters[model.structure.joint_columns(joint)]
+        return model.structure.terms[joint], own.tobytes(), tuple(terms)
+
+    def _terms_at(self, model: ExtendedModel, joint: int) -> list[tuple[Term, slice]]:
+        """Terms that touch a joint, and where their parameters stand."""
+        terms = zip(model.terms, model.term_places(), strict=True)
+        return [each for each in terms if joint in each[0].effect.touched(len(self._joints))]
+
+    def _linear(self, model: ExtendedModel, joint: int) -> tuple[list[int], list[Array]]:
+        """Places and columns of Θ and of the terms' coefficients at a joint."""
+        factor = self._scale(model, joint)
+        index = [int(place) for place in model.structure.joint_columns(joint)]
+        rows = [factor * self._white_rigid(joint), factor * self._white_friction(model, joint)]
+        for term, place in self._terms_at(model, joint):
+            rows.append(self._white_term(model, term)[joint])
+            index += range(place.start, place.start + len(rows[-1]))
         return index, rows
 
     def _scale(self, model: ExtendedModel, joint: int) -> Array | float:
@@ -200,12 +218,9 @@ def _key(model: ExtendedModel, term: Term) -> tuple[object, ...]:
     return id(term.effect), term.shape.tobytes(), _beside(model, term)
 
 
-def _joined(index: Sequence[Sequence[int]], rows: Sequence[Sequence[Array]]) -> list[JointColumns]:
-    """Columns of every joint and their places among all parameters."""
-    return [
-        JointColumns(np.array(places, dtype=np.intp), np.concatenate(own))
-        for places, own in zip(index, rows, strict=True)
-    ]
+def _join(index: Sequence[int], rows: Sequence[Array]) -> JointColumns:
+    """Columns of a joint and their places among all parameters."""
+    return JointColumns(np.array(index, dtype=np.intp), np.concatenate(rows))
 
 
 def white_columns(
