@@ -1,7 +1,5 @@
 """What training shows and held-out motion refutes: told apart, once a place, as it was tried last."""
 
-from typing import Any
-
 import numpy as np
 
 from diagnosis.diagnosed_arm import sound_arm
@@ -17,9 +15,8 @@ def step(joint: int, stiffness: float, *, trained: float = 9.0, is_confirmed: bo
     """A spring that was tried beside the sound arm's model."""
     nominal = sound_arm().selection.fit.model
     term = Term(JointSpring(joint), np.zeros(0), np.array([stiffness]))
-    proposal: Any = term
     after = with_terms(nominal, [*nominal.terms, term])
-    return Step(proposal, -5.0, (), None, is_confirmed, nominal, after, np.eye(after.size), trained)
+    return Step(term.effect, -5.0, is_confirmed, nominal, after, np.eye(after.size), trained)
 
 
 def tentative(*steps: Step, found: frozenset[Place] = frozenset()) -> list[Finding]:

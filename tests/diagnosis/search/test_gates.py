@@ -91,7 +91,7 @@ def is_named(trial: Trial) -> bool:
     proposal: Any = SimpleNamespace(term=holding("found").model.terms[0], log_factor=trial.training)
     nominal: Any = SimpleNamespace(model=SimpleNamespace(terms=[]))
     search = Asking(nominal, NOTHING, NOTHING, held_out, lost=trial.lost)
-    step, found = search._try(holding("at"), proposal, [proposal])
+    step, found = search._try(holding("at"), proposal)
     assert len(found.model.terms) == 1
     return step.is_confirmed
 

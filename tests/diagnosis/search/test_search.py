@@ -29,7 +29,7 @@ def found_on(effect: EffectTorque | None) -> Found:
 @pytest.mark.parametrize("effect_id", ["load_dependent_friction", pytest.param("cogging", marks=pytest.mark.proof)])
 def test_the_concealed_effect_comes_first_and_alone(effect_id: str) -> None:
     found = found_on(CONCEALED[effect_id])
-    confirmed = [step.proposal.place for step in found.steps if step.is_confirmed]
+    confirmed = [step.place for step in found.steps if step.is_confirmed]
     assert confirmed == [(effect_id, PLACES[effect_id])]
 
 

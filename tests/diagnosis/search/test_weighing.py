@@ -69,7 +69,7 @@ def test_what_the_data_hardly_tell_from_a_finding_is_an_alternative(log_odds: fl
 
 @pytest.mark.parametrize(("is_confirmed", "most"), [(True, 1.0), (False, 0.5)])
 def test_what_held_out_motion_contradicts_is_no_likelier_than_not(is_confirmed: bool, most: float) -> None:
-    step = Step(NOTHING, 50.0, (), None, is_confirmed, NOTHING, NOTHING, np.zeros((0, 0)), 50.0)
+    step = Step(NOTHING, 50.0, is_confirmed, NOTHING, NOTHING, np.zeros((0, 0)), 50.0)
     assert step.probability == pytest.approx(most)
 
 
@@ -84,16 +84,18 @@ class Deciding(Search):
         own = at.model.terms[places[0]]
         others = [each for each in (JointSpring(0), CableForce(0)) if each.id != own.effect.id]
         rivals = tuple(rival(odds, each) for each in others if (odds := self.odds[each.id, 0]) > -1.0)
-        proposals: Any = tuple(SimpleNamespace(term=each.term) for each in rivals)
+        proposals: Any = tuple(SimpleNamespace(term=each.term, place=each.term.place) for each in rivals)
         kept = [term.effect for number, term in enumerate(at.model.terms) if number not in places]
         return Weighed(places, holding(*kept), self.odds[own.place], rivals, proposals)
 
     def _prior_odds(self, effect: Any, unnamed: float) -> float:
         return 0.0
 
-    def _try(self, at: Any, proposal: Any, proposals: Any) -> Any:
+    def _try(self, at: Any, proposal: Any) -> Any:
         stands = proposal.term.place not in self.refuted
-        step = Step(proposal, self.odds[proposal.term.place], (), None, stands, NOTHING, NOTHING, np.zeros((0, 0)), 0.0)
+        step = Step(
+            proposal.term.effect, self.odds[proposal.term.place], stands, NOTHING, NOTHING, np.zeros((0, 0)), 0.0
+        )
         return step, holding(proposal.term.effect)
 
     def _compare(self, at: Any, found: Any, touched: Any) -> float:
@@ -113,7 +115,7 @@ def deciding(odds: dict[Place, float], *nominal: Effect, refuted: frozenset[Plac
 def test_a_more_probable_rival_takes_the_place_where_held_out_motion_lets_it(refuted: bool) -> None:
     odds: dict[Place, float] = {("joint_spring", 0): 20.0, ("cable_force", 0): 60.0}
     asked = deciding(odds, refuted=frozenset({("cable_force", 0)}) if refuted else frozenset[Place]())
-    at, (found,), exchanges = asked._exchange(holding(JointSpring(0)), 1)
+    at, (found,), exchanges = asked._exchange(holding(JointSpring(0)), 1, {})
     assert at.model.terms[0].effect.id == ("joint_spring" if refuted else "cable_force")
     assert exchanges == (not refuted)
     assert bool(found.rivals) is not refuted, "one that is refuted is no alternative"
@@ -124,7 +126,7 @@ def test_a_more_probable_rival_takes_the_place_where_held_out_motion_lets_it(ref
 
 def test_the_more_probable_of_two_stays() -> None:
     odds: dict[Place, float] = {("joint_spring", 0): 60.0, ("cable_force", 0): 20.0}
-    at, (found,), _ = deciding(odds)._exchange(holding(JointSpring(0)), 1)
+    at, (found,), _ = deciding(odds)._exchange(holding(JointSpring(0)), 1, {})
     assert at.model.terms[0].effect.id == "joint_spring"
     assert found.rivals[0].log_odds == 20.0
 
@@ -132,16 +134,16 @@ def test_the_more_probable_of_two_stays() -> None:
 @pytest.mark.parametrize(("log_odds", "named"), [(2.0, False), (4.0, True)])
 def test_what_every_geared_joint_has_must_stand_out_to_be_a_finding(log_odds: float, named: bool) -> None:
     odds: dict[Place, float] = {("rotor_inertia", 0): log_odds, ("joint_spring", 0): -9.0, ("cable_force", 0): -9.0}
-    _, found, _ = deciding(odds)._exchange(holding(RotorInertia(0)), 1)
+    _, found, _ = deciding(odds)._exchange(holding(RotorInertia(0)), 1, {})
     assert bool(found) is named
     odds = {("joint_spring", 0): log_odds, ("cable_force", 0): -9.0}
-    _, found, _ = deciding(odds)._exchange(holding(JointSpring(0)), 1)
+    _, found, _ = deciding(odds)._exchange(holding(JointSpring(0)), 1, {})
     assert found
 
 
 def test_what_is_improbable_is_dropped_beside_a_nominal_effect_that_is_less_probable_still() -> None:
     odds: dict[Place, float] = {("rotor_inertia", 0): -5.0, ("joint_spring", 0): -1.0, ("cable_force", 0): -9.0}
-    at, found, _ = deciding(odds, RotorInertia(0))._exchange(holding(RotorInertia(0), JointSpring(0)), 1)
+    at, found, _ = deciding(odds, RotorInertia(0))._exchange(holding(RotorInertia(0), JointSpring(0)), 1, {})
     assert [each.effect.id for each in at.model.terms] == ["rotor_inertia"]
     assert not found
 
@@ -149,7 +151,7 @@ def test_what_is_improbable_is_dropped_beside_a_nominal_effect_that_is_less_prob
 def test_what_takes_the_place_of_a_nominal_effect_is_added_and_what_stands_beside_it_is_not_nominal() -> None:
     odds: dict[Place, float] = {("rotor_inertia", 0): 2.0, ("joint_spring", 0): 60.0, ("cable_force", 0): -9.0}
     asked = deciding(odds, RotorInertia(0))
-    at, _, exchanges = asked._exchange(holding(RotorInertia(0)), 1)
+    at, _, exchanges = asked._exchange(holding(RotorInertia(0)), 1, {})
     assert exchanges == 1
     assert asked._find_added(at) == [0]
 
@@ -159,7 +161,7 @@ class Wavering(Deciding):
 
     def _weigh(self, at: Any, places: tuple[int, ...], known: Any = None) -> Weighed:
         own = rival(25.0, at.model.terms[places[0]].effect)
-        proposals: Any = (SimpleNamespace(term=own.term),)
+        proposals: Any = (SimpleNamespace(term=own.term, place=own.place),)
         return Weighed(places, holding(), 20.0, (own,), proposals)
 
     def _compare(self, at: Any, found: Any, touched: Any) -> float:
@@ -168,6 +170,6 @@ class Wavering(Deciding):
 
 def test_an_effect_takes_its_own_place_in_another_shape_only_where_that_is_clearly_more_probable() -> None:
     asked = Wavering(holding(), NOTHING, NOTHING, None, odds={("joint_spring", 0): 20.0})
-    _, found, exchanges = asked._exchange(holding(JointSpring(0)), 4)
+    _, found, exchanges = asked._exchange(holding(JointSpring(0)), 4, {})
     assert exchanges == 0
     assert found[0].log_odds == 20.0

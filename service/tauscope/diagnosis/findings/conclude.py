@@ -116,7 +116,7 @@ def _findings(
 
 def _tentative(steps: Sequence[Step], found: set[Place], fitter: Fitter, unseen: Unseen | None) -> tuple[Finding, ...]:
     """Effects that training shows and held-out motion refutes, each as it was tried last."""
-    refuted = {step.proposal.place: step for step in steps if not step.is_confirmed and step.trained_log_odds > 0.0}
+    refuted = {step.place: step for step in steps if not step.is_confirmed and step.trained_log_odds > 0.0}
     tentative = []
     for step in (step for place, step in refuted.items() if place not in found):
         before, after = (fitter.projected(model) for model in (step.before, step.after))

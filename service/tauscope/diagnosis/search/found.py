@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauscope.diagnosis.model.extended import ExtendedModel
-from tauscope.diagnosis.model.held_out_change import HeldOutChange
 from tauscope.diagnosis.model.term import Place, Term
 from tauscope.diagnosis.search.hypothesis import Hypothesis
 from tauscope.diagnosis.search.proposals import Proposal
+from tauscope.effects import Effect
 from tauscope.recording.recording import Array
 
 
@@ -18,20 +18,21 @@ class Step:
     """An effect that was added or refused.
 
     `log_odds`, `trained_log_odds`: posterior, that it is there, after all motion and after training.
-    `rivals`: other effects that were as good as looked at in its place.
-    `change`: on held-out motion; None where there is none.
     `covariance`: (p, p), of the parameters with it.
     """
 
-    proposal: Proposal
+    effect: Effect
     log_odds: float
-    rivals: tuple[Proposal, ...]
-    change: HeldOutChange | None
     is_confirmed: bool
     before: ExtendedModel
     after: ExtendedModel
     covariance: Array
     trained_log_odds: float
+
+    @property
+    def place(self) -> Place:
+        """Which effect where."""
+        return self.effect.id, self.effect.joint
 
     @property
     def probability(self) -> float:

@@ -1,7 +1,7 @@
 """The effects that are worth a closer look beside a hypothesis, each at its most probable shape."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -46,19 +46,39 @@ class Proposal:
     believed.
     `size`: (c,), standard deviation believed of its coefficients.
     `unnamed`: log Bayes factor of torque without a name in its place.
-    `found`: with it, its coefficients at zero.
+    `before`, `found`: the hypothesis, and with it, its coefficients at zero.
     """
 
     term: Term
     size: Array
     log_factor: float
     unnamed: float
+    before: Hypothesis
     found: Hypothesis
 
     @property
     def place(self) -> Place:
         """Which effect where."""
         return self.term.place
+
+
+@dataclass(frozen=True, eq=False)
+class Looks:
+    """Effects as they were seen beside hypotheses that differ at joints which they do not touch.
+
+    `scored`: by an effect's identity, on its grid with the discrepancy and without.
+    `looked`: those that were looked at closer; None where no such effect can be.
+    """
+
+    scored: dict[int, tuple[Scored, Scored]] = field(default_factory=dict)
+    looked: dict[int, Proposal | None] = field(default_factory=dict)
+
+    def forget(self, joints: Collection[int], count: int) -> None:
+        """Nothing of effects that touch some joints of an arm of `count` is known any more."""
+        for each, (beside, _) in list(self.scored.items()):
+            if not set(joints).isdisjoint(beside.effect.touched(count)):
+                del self.scored[each]
+                self.looked.pop(each, None)
 
 
 class Proposer:
@@ -68,31 +88,51 @@ class Proposer:
         self.laboratory, self.rows, self.effects = laboratory, laboratory.rows, tuple(effects)
 
     def propose(
-        self, at: Hypothesis, is_wanted: Callable[[Effect], bool], most: int = LOOKED_AT, instead: Place | None = None
+        self,
+        at: Hypothesis,
+        is_wanted: Callable[[Effect], bool],
+        most: int = LOOKED_AT,
+        instead: Place | None = None,
+        looks: Looks | None = None,
     ) -> list[Proposal]:
         """Effects that make the data more probable, the most probable first.
 
         `instead`: effect in whose place they are looked for; None where they are to be added.
+        `looks`: what is known of them, to which this adds.
         """
+        looks = looks or Looks()
         independent = self.laboratory.under(at, [1.0] * len(at.scales), range(len(at.scales)))
         scorer = Scorer(self.rows, independent)
         signals = [at.model.signals(piece) for piece in self.rows.observations]
         wanted = [effect for effect in self.effects if is_wanted(effect) and len(effect.grid)]
-        scored = side_by_side(lambda effect: self._on_grid(effect, scorer, signals, independent), wanted)
-        looked: dict[int, Proposal | None] = {}
+        new = [effect for effect in wanted if id(effect) not in looks.scored]
+        made = side_by_side(lambda effect: self._on_grid(effect, scorer, signals, independent), new)
+        looks.scored.update(zip(map(id, new), made, strict=True))
+        scored, found = [looks.scored[id(effect)] for effect in wanted], list[Proposal]()
         for kind in (0, 1):
             seen = set[Place]()
             own = (each[kind].log_evidence for each in scored if _place(each) == instead)
             least = max(RIVALS * max(own, default=0.0), WORTH_A_LOOK)
-            for place in sorted(range(len(scored)), key=lambda place: -scored[place][kind].log_evidence):
-                if scored[place][kind].log_evidence < least:
+            for each in sorted(scored, key=lambda each: -each[kind].log_evidence):
+                if each[kind].log_evidence < least:
                     break
-                if len(seen) < most or _place(scored[place]) in seen:  # with all forms of one effect
-                    if place not in looked:
-                        looked[place] = self._look_at(scored[place], scorer, at, signals)
-                    if looked[place] is not None:
-                        seen.add(_place(scored[place]))
-        return sorted((each for each in looked.values() if each is not None), key=lambda each: -each.log_factor)
+                if len(seen) < most or _place(each) in seen:  # with all forms of one effect
+                    name = id(each[0].effect)
+                    if name not in looks.looked:
+                        looks.looked[name] = self._look_at(each, at, signals)
+                    proposal = looks.looked[name]
+                    if proposal is not None:
+                        seen.add(proposal.place)
+                        found += [proposal] if proposal not in found else []
+        return sorted(found, key=lambda each: -each.log_factor)
+
+    def renew(self, proposal: Proposal, at: Hypothesis, looks: Looks) -> Proposal | None:
+        """The same effect beside another hypothesis; None where it cannot be there."""
+        if proposal.before is at:
+            return proposal
+        effect = proposal.term.effect
+        signals = [at.model.signals(piece) for piece in self.rows.observations]
+        return self._look_at(looks.scored[id(effect)], at, signals)
 
     def _on_grid(
         self, effect: Effect, scorer: Scorer, signals: Sequence[Signals], at: Hypothesis
@@ -105,9 +145,7 @@ class Proposer:
         beside, alone = ([part[kind] for part in parts] for kind in (0, 1))
         return _join(beside), _join(alone)
 
-    def _look_at(
-        self, scored: tuple[Scored, Scored], scorer: Scorer, at: Hypothesis, signals: Sequence[Signals]
-    ) -> Proposal | None:
+    def _look_at(self, scored: tuple[Scored, Scored], at: Hypothesis, signals: Sequence[Signals]) -> Proposal | None:
         """An effect with scales of its own, at its most probable shape; None where no such effect can be."""
         beside, alone = scored
         on_grid = beside if np.isfinite(beside.log_factors.max()) else alone
@@ -139,7 +177,7 @@ class Proposer:
         sized = float(np.log(2.0)) * one_sided - float(np.log(len(SIZES)))
         before = self.laboratory.tune(self.laboratory.under(at, found.dependence, joints), joints)
         factor = found.log_evidence - before.log_evidence + averaged + sized
-        return Proposal(term, size, factor, unnamed_log_odds(at), found)
+        return Proposal(term, size, factor, unnamed_log_odds(at), at, found)
 
     def _zoom_in_each_form(self, on_grid: Scored, at: Hypothesis, signals: Sequence[Signals]) -> tuple[Array, Array]:
         """The most probable shape of all values that no step changes: each has an optimum of its own."""

@@ -11,7 +11,7 @@ from tauscope.diagnosis.model.term import Place
 from tauscope.diagnosis.search.found import Found, Rival, Step, Weighed
 from tauscope.diagnosis.search.held_out import HeldOut
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
-from tauscope.diagnosis.search.proposals import Proposal, Proposer
+from tauscope.diagnosis.search.proposals import Looks, Proposal, Proposer
 from tauscope.diagnosis.search.scoring import unnamed_log_odds
 from tauscope.diagnosis.search.window import window_log_odds
 from tauscope.effects import Effect, TimeLocalEffect
@@ -59,14 +59,14 @@ class Search:
         at, steps, refused, exchanges = self.nominal, list[Step](), dict[Place, frozenset[int]](), 0
         if before is not None:
             at, steps = before.hypothesis, list(before.steps)
-        exchanged, weighed, made = None, tuple[Weighed, ...](), MOST_EXCHANGES
+        exchanged, weighed, made, rivals = None, tuple[Weighed, ...](), MOST_EXCHANGES, dict[Place, set[Place]]()
         while made:
             at, tried = self._grow(at, refused)
             steps += tried
             at = self._refine(self._drop_harmful(at))
             if at is exchanged:
                 break
-            exchanged, weighed, made = self._exchange(at, MOST_EXCHANGES - exchanges)
+            exchanged, weighed, made = self._exchange(at, MOST_EXCHANGES - exchanges, rivals)
             exchanges += made
             at = self._drop_superfluous(exchanged) if made else exchanged
         return Found(self.nominal, at, tuple(steps), weighed)
@@ -79,17 +79,24 @@ class Search:
     def _grow(self, at: Hypothesis, refused: dict[Place, frozenset[int]]) -> tuple[Hypothesis, list[Step]]:
         """One more effect, and without those that it makes superfluous, until nothing helps.
 
-        What was refused is tried again after something else was found at its joints.
+        What was refused is tried again after something else was found at its joints; all others are looked at anew
+        where nothing helps any more.
         """
-        steps: list[Step] = []
+        steps, looks, is_anew = list[Step](), Looks(), True
         while len(self._find_added(at)) < MOST_EFFECTS:
-            proposals = self.proposer.propose(at, _Wanted(_places(at), refused))
-            tried, found = self._best(at, proposals)
+            proposals = self.proposer.propose(at, _Wanted(_places(at), refused), looks=looks)
+            tried, found = self._best(at, proposals, looks)
             steps += tried
-            refused |= {step.proposal.place: _find_joints(step) for step in tried if not step.is_confirmed}
-            if found is None:
+            refused |= {step.place: _find_joints(step) for step in tried if not step.is_confirmed}
+            if found is None and is_anew:
                 break
-            at = self._drop_superfluous(found)
+            if found is None:
+                looks, is_anew = Looks(), True
+                continue
+            at, is_anew = self._drop_superfluous(found), False
+            lost = (term for term in found.model.terms if term.place not in _places(at))
+            changed = _find_joints(tried[-1]).union(*(term.effect.touched(len(at.scales)) for term in lost))
+            looks.forget(changed, len(at.scales))
             for place in [each for each, own in refused.items() if own & _find_joints(tried[-1])]:
                 del refused[place]
             refused |= dict.fromkeys(_places(found) - _places(at), frozenset())
@@ -115,11 +122,18 @@ class Search:
                 return found
         return at
 
-    def _exchange(self, at: Hypothesis, most: int) -> tuple[Hypothesis, tuple[Weighed, ...], int]:
-        """Each effect weighed beside all others, a more probable one in its place, and none that does not hold."""
+    def _exchange(
+        self, at: Hypothesis, most: int, rivals: dict[Place, set[Place]]
+    ) -> tuple[Hypothesis, tuple[Weighed, ...], int]:
+        """Each effect weighed beside all others, a more probable one in its place, and none that does not hold.
+
+        `rivals`: of each effect that was weighed before, to which this adds.
+        """
         groups, exchanges, stale, refused, gone = _groups(at.model), 0, set[Place](), set[Place](), set[Place]()
-        weighed = dict(zip(groups, side_by_side(lambda places: self._weigh(at, places), groups.values()), strict=True))
+        found = side_by_side(lambda own: self._weigh(at, groups[own], rivals.get(own)), groups)
+        weighed = dict(zip(groups, found, strict=True))
         while weighed:
+            rivals |= {own: {each.place for each in found.proposals} for own, found in weighed.items()}
             weighed = {each: found.refuse(refused) for each, found in weighed.items()}
             behind = [each for each, found in weighed.items() if found.is_behind]
             own: Place | None = next(iter(stale), None)
@@ -136,8 +150,7 @@ class Search:
                 continue
             if own in stale:
                 stale.remove(own)
-                known = {each.place for each in weighed[own].proposals}
-                weighed[own] = self._weigh(at, _groups(at.model)[own], known)
+                weighed[own] = self._weigh(at, _groups(at.model)[own], rivals[own])
                 continue
             rival = weighed[own].rivals[0].place
             other = None if rival in gone else self._try_rival(at, weighed[own])
@@ -150,8 +163,8 @@ class Search:
             groups = _groups(at.model)
             stale = set(groups) - {new}
             weighed = {each: weighed[each] for each in stale} | {new: self._weigh(at, groups[new])}
-        found = (each.refuse({own}) for own, each in weighed.items() if each.log_odds > self._least(at, each))
-        return at, tuple(found), exchanges
+        findings = (each.refuse({own}) for own, each in weighed.items() if each.log_odds > self._least(at, each))
+        return at, tuple(findings), exchanges
 
     def _holds(self, at: Hypothesis, weighed: Weighed) -> bool:
         """Whether an effect is as probable beside all others, and as visible, as one that is added has to be."""
@@ -169,7 +182,7 @@ class Search:
         rival, own = weighed.rivals[0].term.effect, at.model.terms[weighed.places[0]].effect
         touched = {*rival.touched(len(at.scales)), *own.touched(len(at.scales))}
         proposal = next(each for each in weighed.proposals if each.term.effect is rival)
-        step, found = self._try(weighed.without, proposal, weighed.proposals)
+        step, found = self._try(weighed.without, proposal)
         gained = self._compare(at, found, touched)
         gained += self._prior_odds(rival, 0.0) - self._prior_odds(own, 0.0) - (CATALOGUED if rival is own else 0.0)
         told = 0.0 if self.held_out is None else self.held_out.trained_change(at, found).log_odds(sorted(touched))
@@ -178,7 +191,11 @@ class Search:
     def _compare(self, at: Hypothesis, found: Hypothesis, touched: Collection[int]) -> float:
         """Log Bayes factor of a second hypothesis; what both predict alike of held-out motion says nothing."""
         gained = self.laboratory.under(found, at.dependence, touched).log_evidence - at.log_evidence
-        return gained + (0.0 if self.held_out is None else self.held_out.change(at, found).log_odds())
+        return gained + self._told(at, found)
+
+    def _told(self, before: Hypothesis, after: Hypothesis) -> float:
+        """Log odds that held-out motion adds to the second of two hypotheses."""
+        return 0.0 if self.held_out is None else self.held_out.change(before, after).log_odds()
 
     def _weigh(self, at: Hypothesis, places: tuple[int, ...], known: Collection[Place] | None = None) -> Weighed:
         """An effect's odds against none and against others in its place: all, or those that are known to compete."""
@@ -190,7 +207,7 @@ class Search:
         effect, shared = at.model.terms[places[0]].effect, set(touched)
         lasts = not isinstance(effect, TimeLocalEffect)
         trained = at.log_evidence - before.log_evidence + self._prior_odds(effect, unnamed_log_odds(before))
-        log_odds = trained + (0.0 if self.held_out is None else self.held_out.change(without, at).log_odds())
+        log_odds = trained + self._told(without, at)
         own, may_be_added = (effect.id, effect.joint), _Wanted(_places(without), ())
 
         def competes(each: Effect) -> bool:
@@ -209,8 +226,7 @@ class Search:
                 odds = log_odds + self._compare(at, nearer, touched) - CATALOGUED
             else:
                 nearer = self.laboratory.approach(nearer)
-                odds = log_odds - trained + self._log_odds(proposal)
-                odds += 0.0 if self.held_out is None else self.held_out.change(at, nearer).log_odds()
+                odds = log_odds - trained + self._log_odds(proposal) + self._told(at, nearer)
             rivals.append(Rival(nearer.model.terms[-1], nearer.model, odds))
         rivals.sort(key=lambda each: -each.log_odds)
         return Weighed(places, without, log_odds, tuple(rivals), tuple(proposals))
@@ -229,17 +245,20 @@ class Search:
         touched = at.model.terms[place].effect.touched(len(at.scales))
         return self.laboratory.settle(self.laboratory.without_term(at, place), touched)
 
-    def _best(self, at: Hypothesis, proposals: list[Proposal]) -> tuple[list[Step], Hypothesis | None]:
+    def _best(
+        self, at: Hypothesis, proposals: Sequence[Proposal], looks: Looks
+    ) -> tuple[list[Step], Hypothesis | None]:
         """The most probable proposal that held-out motion does not contradict, after those that it does."""
         refusals, untried = list[Step](), list(self.farther)
-        for proposal in self._rank(at, proposals):
-            step, found = self._try(at, proposal, proposals)
+        renewed = (self.proposer.renew(each, at, looks) for each in self._rank(at, proposals))
+        for proposal in (each for each in renewed if each is not None):
+            step, found = self._try(at, proposal)
             name, joint = proposal.place
             forms = [each for each in untried if name in each.refines and each.joint == joint]
             if forms and not step.is_confirmed and not _stands(found.model):  # its own law cannot be
                 untried = [each for each in untried if each not in forms]
                 for form in Proposer(self.laboratory, forms).propose(at, lambda _: True):
-                    step, found = self._try(at, form, proposals)
+                    step, found = self._try(at, form)
                     if step.is_confirmed:
                         break
             if step.is_confirmed:
@@ -269,17 +288,15 @@ class Search:
     def _add(self, at: Hypothesis, proposal: Proposal) -> Hypothesis:
         return self.laboratory.with_term(self.laboratory.paint(at, proposal.found), proposal.term, proposal.size)
 
-    def _try(self, at: Hypothesis, proposal: Proposal, proposals: Sequence[Proposal]) -> tuple[Step, Hypothesis]:
+    def _try(self, at: Hypothesis, proposal: Proposal) -> tuple[Step, Hypothesis]:
         """A proposal in the model, and what held-out motion says of it."""
         touched = proposal.term.effect.touched(len(at.scales))
         found, lost = self._drop_impossible(self._settle(self._add(at, proposal), touched))
         trained = self._log_odds(proposal) - (self._weigh_lost(lost, at, found, proposal) if lost else 0.0)
-        change = None if self.held_out is None else self.held_out.change(at, found)
-        rivals = tuple(each for each in proposals if each is not proposal)
         passes = isinstance(proposal.term.effect, TimeLocalEffect)
         if passes:
             trained = min(trained, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
-        log_odds = trained + (0.0 if change is None else change.log_odds())
+        log_odds = trained + self._told(at, found)
         confirmed = log_odds > (UNASKED if passes else NAMED) and _stands(found.model)
         asked = trained > NAMED
         if self.held_out is not None:  # what training does not ask for may cost no joint anything
@@ -287,7 +304,7 @@ class Search:
             confirmed &= told.harm <= 0.0 if asked else not told.losing
         confirmed = confirmed and self._agrees(at, found, [len(found.model.terms) - 1], asked=asked)
         covariance = found.posterior.covariance
-        return Step(proposal, log_odds, rivals, change, confirmed, at.model, found.model, covariance, trained), found
+        return Step(proposal.term.effect, log_odds, confirmed, at.model, found.model, covariance, trained), found
 
     def _drop_impossible(self, at: Hypothesis) -> tuple[Hypothesis, list[Effect]]:
         """The same without what was found before its last effect and cannot be beside it, and what that is."""
@@ -352,12 +369,12 @@ class Search:
         last = len(at.model.terms) - 1
         term = at.model.terms[last]
         outside = term.effect.outside(term.shape) if isinstance(term.effect, TimeLocalEffect) else None
-        if outside is None or self.held_out is None:
+        if outside is None:
             return at
         turned = replace(term, shape=outside, coefficients=-term.coefficients)
         other = self.laboratory.with_term(self.laboratory.without_term(at, last), turned, at.sizes[last])
         other = self.laboratory.settle(other, touched)
-        return other if self.held_out.change(at, other).log_odds() > 0.0 else at
+        return other if self._told(at, other) > 0.0 else at
 
     def _log_odds(self, proposal: Proposal) -> float:
         return proposal.log_factor + self._prior_odds(proposal.term.effect, proposal.unnamed)
@@ -388,8 +405,7 @@ class Search:
     def _leave_out(self, at: Hypothesis, place: int, gain: float) -> Hypothesis | None:
         """The hypothesis without an effect; None where held-out motion asks for it."""
         without = self._settle_without(at, place)
-        gain += 0.0 if self.held_out is None else self.held_out.change(at, without).log_odds()
-        return without if gain > CATALOGUED else None
+        return without if gain + self._told(at, without) > CATALOGUED else None
 
     def _weigh_absence(self, at: Hypothesis, place: int) -> float:
         """Log posterior odds that an effect is not there."""
@@ -432,7 +448,7 @@ class _Wanted:
 
 def _find_joints(step: Step) -> frozenset[int]:
     """Joints at which a step's effect acts."""
-    return frozenset(step.proposal.term.effect.touched(step.after.structure.robot.joint_count))
+    return frozenset(step.effect.touched(step.after.structure.robot.joint_count))
 
 
 def _groups(model: ExtendedModel) -> dict[Place, tuple[int, ...]]:
