@@ -4,12 +4,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tauscope.dynamics import gravity_torque
+from tauscope.dynamics import torque_regressor
 from tauscope.effects.context import ArmContext, Signals
 from tauscope.effects.effect import Coefficient, Effect, Entry, Sizes, size_text
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
+from tauscope.robot.robot import STANDARD_PARAMETERS
 
 
 def tilt_directions(gravity: Array) -> tuple[Array, Array]:
@@ -45,13 +47,9 @@ class BaseTilt(Effect):
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """Torque of gravity of the same strength across the stated one."""
-        strength = float(np.linalg.norm(signals.robot.gravity))
-        position = np.ascontiguousarray(signals.position.T)
-        torques = [
-            gravity_torque(replace(signals.robot, gravity=strength * direction), signals.links, position).T
-            for direction in tilt_directions(signals.robot.gravity)
-        ]
-        return np.stack(torques)[None]
+        places = np.flatnonzero([_is_weighed(place) for place in range(len(signals.links))])
+        regressors = signals.remembered_of_motion("tilt", lambda: _make_regressors(signals, places))
+        return np.stack([signals.links[places] @ each for each in regressors])[None]
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
         size = replace(found["alpha_1"], value=float(np.hypot(found["alpha_1"].value, found["alpha_2"].value)))
@@ -62,3 +60,16 @@ class BaseTilt(Effect):
         if robot.gravity[2] >= 0.0 or np.abs(robot.gravity[:2]).max() > 0.0:
             return []
         return [{"about_x": coefficients[1], "about_y": -coefficients[0]}]
+
+
+def _make_regressors(signals: Signals, places: NDArray[np.intp]) -> list[Array]:
+    """Regressors at rest of some standard parameters, under gravity across the stated one, (n, C, N)."""
+    robot, position = signals.robot, np.ascontiguousarray(signals.position.T)
+    strength, rest = float(np.linalg.norm(robot.gravity)), np.zeros_like(position)
+    tilted = (replace(robot, gravity=strength * each) for each in tilt_directions(robot.gravity))
+    return [torque_regressor(each, position, rest, rest, columns=places).transpose(1, 2, 0) for each in tilted]
+
+
+def _is_weighed(place: int) -> bool:
+    """Whether a standard parameter is a mass or a first moment."""
+    return STANDARD_PARAMETERS[place % len(STANDARD_PARAMETERS)] in ("m", "msx", "msy", "msz")
