@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
-from scipy.interpolate import CubicSpline
+from scipy.ndimage import map_coordinates
 
 from tauscope.effects.context import ArmContext
 from tauscope.effects.deflection import BAND, Deflection
@@ -104,7 +104,7 @@ def place_between_springs(
             stopped = (side * coasting - step * force) / (1.0 + step * (lost * force + damper))
             speed = side * min(stopped, side * coasting)
         place += step * speed
-    return np.asarray(CubicSpline(instants, places)(time))
+    return np.asarray(map_coordinates(np.array(places), [time / step], mode="nearest"))
 
 
 def _first(is_so: np.ndarray) -> int:

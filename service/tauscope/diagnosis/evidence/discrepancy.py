@@ -9,6 +9,7 @@ take the links' torque from the links.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.observations.observations import Observations
@@ -31,6 +32,9 @@ DIRECTION = 1e-6
 
 GROUP = np.repeat(np.arange(len(FEATURES)), FEATURES)
 """Kind of each feature."""
+
+RESOLVED = 1e-3
+"""Singular values of the features of a kind below this share of the largest are none: a millionth of its power."""
 
 SEED = 20
 """Of the frequencies and phases: the same recordings get the same features."""
@@ -60,8 +64,10 @@ class Reach:
         )
 
 
-def smooth_features(observations: Observations, model: ExtendedModel, joint: int, reach: Reach) -> Array:
-    """White rows of the features of one joint, (b, R).
+def smooth_features(
+    observations: Observations, model: ExtendedModel, joint: int, reach: Reach
+) -> tuple[Array, NDArray[np.intp]]:
+    """White rows of the features of one joint, (b, R), and the kind of each, (b,).
 
     `joint`: joint index, from 0.
     """
@@ -83,7 +89,19 @@ def smooth_features(observations: Observations, model: ExtendedModel, joint: int
         )
         values = size[:, None] * np.cos(frequency @ state + phase[:, None])
         rows.append(piece.repeated(motion.band.reduce(values)))
-    return observations.white(joint, rows)
+    white = observations.white(joint, rows)
+    kinds = [_find_principal(white[kind == GROUP]) for kind in range(len(FEATURES))]
+    return np.vstack(kinds), np.repeat(np.arange(len(kinds)), [len(each) for each in kinds])
+
+
+def _find_principal(features: Array) -> Array:
+    """Fewer features of the same covariance, (c, R).
+
+    `features`: (b, R), white rows.
+    """
+    _, sizes, directions = np.linalg.svd(features, full_matrices=False)
+    kept = sizes > RESOLVED * sizes.max(initial=0.0)
+    return np.asarray(sizes[kept, None] * directions[kept])
 
 
 def beyond(columns: Array, features: Array) -> Array:

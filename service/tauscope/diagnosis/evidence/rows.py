@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.diagnosis.evidence.dependence import Succession
-from tauscope.diagnosis.evidence.discrepancy import GROUP, Reach, beyond, smooth_features
+from tauscope.diagnosis.evidence.discrepancy import Reach, beyond, smooth_features
 from tauscope.diagnosis.evidence.moments import JointMoments
 from tauscope.diagnosis.evidence.scales import REST_BOUNDS, REST_SHARES, Scales
 from tauscope.diagnosis.fitting.projection import JointColumns
@@ -48,7 +48,8 @@ class EvidenceRows:
     `certain`: tuple of (R_j,), weight of each of them beside friction's step, whose place the velocity's noise leaves
     open.
     `bounds`: tuple of (K + 1,), where each class begins.
-    `features`: tuple of (b, R), discrepancy, then errors that all reversals share, in order of time.
+    `features`: tuple of (b_j, R_j), discrepancy, then errors that all reversals share, in order of time.
+    `groups`: tuple of (b_j,), kind of each; -1 for an error.
     """
 
     observations: Observations
@@ -57,7 +58,7 @@ class EvidenceRows:
     certain: tuple[Array, ...]
     bounds: tuple[NDArray[np.intp], ...]
     features: tuple[Array, ...]
-    groups: NDArray[np.intp]
+    groups: tuple[NDArray[np.intp], ...]
     successions: tuple[Succession, ...]
     _known: LastFew[tuple[object, ...], tuple[ExtendedModel, JointMoments]] = field(init=False)
 
@@ -68,8 +69,7 @@ class EvidenceRows:
     def prepare(observations: Observations, model: ExtendedModel) -> "EvidenceRows":
         """Rows of training recordings beside a nominal model."""
         reach, white = Reach.of(observations), WhiteColumns(observations)
-        order, certain, bounds, features, successions = [], [], [], [], []
-        shared = 0
+        order, certain, bounds, features, groups, successions = [], [], [], [], [], []
         for joint in range(observations.robot.joint_count):
             near, _ = find_rest(observations, model, joint)
             kinds = np.digitize(near, REST_BOUNDS)
@@ -77,12 +77,11 @@ class EvidenceRows:
             order.append(np.concatenate(places))
             certain.append(weigh_rows(observations, model, joint)[order[-1]])
             bounds.append(np.cumsum([0, *map(len, places)]))
-            smooth = smooth_features(observations, model, joint, reach)
+            smooth, kinds = smooth_features(observations, model, joint, reach)
             errors = shared_errors(observations, model, joint, np.ones(smooth.shape[1]))
-            shared = len(errors)
             features.append(np.vstack([smooth, errors]))
+            groups.append(np.concatenate([kinds, np.full(len(errors), -1)]))
             successions.append(Succession.of(*observations.row_labels(joint)))
-        groups = np.concatenate([GROUP, np.full(shared, -1)])
         return EvidenceRows(
             observations,
             white,
@@ -90,7 +89,7 @@ class EvidenceRows:
             tuple(certain),
             tuple(bounds),
             tuple(features),
-            groups,
+            tuple(groups),
             tuple(successions),
         )
 
@@ -137,7 +136,7 @@ class EvidenceRows:
         `dependence`: κ.
         `plain`: number of parameters that the discrepancy leaves alone.
         """
-        columns, smooth = self.take(joint, linear.rows, dependence), self.groups >= 0
+        columns, smooth = self.take(joint, linear.rows, dependence), self.groups[joint] >= 0
         features = self.take(joint, self.features[joint], dependence)
         features[smooth] = beyond(columns[linear.index < plain], features[smooth])
         # Σ log(σ² + u²) over rows of uncertainty u grows with log σ² by 1 / (1 + u²/σ²) for each.
@@ -145,7 +144,7 @@ class EvidenceRows:
         told = np.where(np.diff(self.bounds[joint]) > 0, told, 0.0)
         counts = told * self.observations.noise[joint].share / dependence
         target = self.take(joint, residual, dependence)
-        return JointMoments.of(linear.index, target, columns, features, self.bounds[joint], counts, self.groups)
+        return JointMoments.of(linear.index, target, columns, features, self.bounds[joint], counts, self.groups[joint])
 
     def dependence(self, joint: int, left: Array) -> float:
         """κ of what a model leaves beside its discrepancy.

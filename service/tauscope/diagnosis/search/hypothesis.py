@@ -44,7 +44,7 @@ WEIGHINGS = 5
 ALIKE = 0.5
 """…which end where the logarithm of κ changes by less."""
 
-NEAR = 3
+NEAR = 1
 """Steps to parameters by which proposals are ranked."""
 
 BODY_STEPS = 20
