@@ -18,7 +18,6 @@ import numpy as np
 from tauscope.diagnosis.evidence.rows import find_rest, weigh_rows
 from tauscope.diagnosis.evidence.scales import REST_BOUNDS
 from tauscope.diagnosis.fitting.white_columns import WhiteColumns
-from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.held_out_change import STRETCHES, HeldOutChange, stretches, sum_stretches
 from tauscope.diagnosis.model.residual import raw_squares
 from tauscope.diagnosis.observations.observations import Observations
@@ -26,8 +25,8 @@ from tauscope.diagnosis.search.hypothesis import Hypothesis
 from tauscope.effects.computation import LastFew
 from tauscope.recording.recording import Array
 
-MODELS_KEPT = 16
-"""Models whose errors are kept: each is compared with several others."""
+KEPT = 16
+"""Hypotheses whose errors are kept: each is compared with several others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +34,7 @@ class HeldOut:
     """Held-out recordings in the band of the training rows; their rows are not whitened."""
 
     observations: Observations
-    _known: LastFew[int, tuple[ExtendedModel, list[Array]]] = field(default_factory=lambda: LastFew(MODELS_KEPT))
+    _known: LastFew[int, tuple[Hypothesis, list[Array]]] = field(default_factory=lambda: LastFew(KEPT))
 
     def change(self, before: Hypothesis, after: Hypothesis) -> HeldOutChange:
         """What a second hypothesis predicts better than a first from training and all other stretches."""
@@ -70,7 +69,7 @@ class HeldOut:
 
     def _errors(self, at: Hypothesis) -> list[Array]:
         """Measured less predicted torque of every joint, (R,)."""
-        return self._known.get(id(at.model), lambda: (at.model, self._make_errors(at)))[1]
+        return self._known.get(id(at), lambda: (at, self._make_errors(at)))[1]
 
     def _make_errors(self, at: Hypothesis) -> list[Array]:
         columns, residuals = self._white.all(at.model), self._white.residual(at.model)

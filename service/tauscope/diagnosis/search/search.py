@@ -1,5 +1,6 @@
 """From the nominal model to the most probable set of effects: one more, one less, until nothing helps."""
 
+from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cmp_to_key
@@ -66,9 +67,10 @@ class Search:
             at = self._refine(self._drop_harmful(at))
             if at is exchanged:
                 break
-            exchanged, weighed, made = self._exchange(at, MOST_EXCHANGES - exchanges, rivals)
+            before, (exchanged, weighed, made) = at, self._exchange(at, MOST_EXCHANGES - exchanges, rivals)
             exchanges += made
             at = self._drop_superfluous(exchanged) if made else exchanged
+            _forgive(refused, _find_changed(before, at))
         return Found(self.nominal, at, tuple(steps), weighed)
 
     def _find_added(self, at: Hypothesis) -> list[int]:
@@ -79,8 +81,8 @@ class Search:
     def _grow(self, at: Hypothesis, refused: dict[Place, frozenset[int]]) -> tuple[Hypothesis, list[Step]]:
         """One more effect, and without those that it makes superfluous, until nothing helps.
 
-        What was refused is tried again after something else was found at its joints; all others are looked at anew
-        where nothing helps any more.
+        What was refused is tried again after something changed at its joints; all others are looked at anew where
+        nothing helps any more.
         """
         steps, looks, is_anew = list[Step](), Looks(), True
         while len(self._find_added(at)) < MOST_EFFECTS:
@@ -93,12 +95,10 @@ class Search:
             if found is None:
                 looks, is_anew = Looks(), True
                 continue
-            at, is_anew = self._drop_superfluous(found), False
-            lost = (term for term in found.model.terms if term.place not in _places(at))
-            changed = _find_joints(tried[-1]).union(*(term.effect.touched(len(at.scales)) for term in lost))
+            before, at, is_anew = at, self._drop_superfluous(found), False
+            changed = _find_changed(before, at)
             looks.forget(changed, len(at.scales))
-            for place in [each for each, own in refused.items() if own & _find_joints(tried[-1])]:
-                del refused[place]
+            _forgive(refused, changed)
             refused |= dict.fromkeys(_places(found) - _places(at), frozenset())
         return at, steps
 
@@ -449,6 +449,21 @@ class _Wanted:
 def _find_joints(step: Step) -> frozenset[int]:
     """Joints at which a step's effect acts."""
     return frozenset(step.effect.touched(step.after.structure.robot.joint_count))
+
+
+def _find_changed(before: Hypothesis, after: Hypothesis) -> set[int]:
+    """Joints at which two hypotheses have other effects."""
+    one, other = (
+        Counter((term.place, term.effect.touched(len(each.scales))) for term in each.model.terms)
+        for each in (before, after)
+    )
+    return {joint for _, joints in (one - other) + (other - one) for joint in joints}
+
+
+def _forgive(refused: dict[Place, frozenset[int]], joints: set[int]) -> None:
+    """Nothing that acts at some joints is refused any more."""
+    for place in [each for each, own in refused.items() if own & joints]:
+        del refused[place]
 
 
 def _groups(model: ExtendedModel) -> dict[Place, tuple[int, ...]]:
