@@ -9,6 +9,7 @@ import pytest
 
 from tauscope.diagnosis.model.held_out_change import HeldOutChange
 from tauscope.diagnosis.model.term import Term
+from tauscope.diagnosis.search.gates import Gates
 from tauscope.diagnosis.search.search import Search
 from tauscope.effects.joint_spring import JointSpring
 from tauscope.effects.time_delay import Shift
@@ -41,18 +42,18 @@ def change(log_odds: float, harm: float = 0.0) -> HeldOutChange:
 
 
 @dataclass(frozen=True, eq=False)
-class Asking(Search):
-    """A search whose odds are given, among them those that are lost with a lag where the spring leaves none."""
+class Asking(Gates):
+    """Gates whose odds are given, among them those that are lost with a lag where the spring leaves none."""
 
     lost: float | None = None
 
-    def _add(self, at: Any, proposal: Any) -> Any:
+    def add(self, at: Any, proposal: Any) -> Any:
         found = holding("found")
         if self.lost is not None:
             found.model.terms.insert(0, Term(Shift(0), np.array([0.01]), np.array([0.4])))
         return found
 
-    def _settle_without(self, at: Any, place: int) -> Any:
+    def settle_without(self, at: Any, place: int) -> Any:
         assert place == 0
         return holding("found")
 
@@ -61,13 +62,13 @@ class Asking(Search):
         assert self.lost is not None
         return self.lost
 
-    def _settle(self, at: Any, touched: Any) -> Any:
+    def settle(self, at: Any, touched: Any) -> Any:
         return at
 
     def _hold_friction(self, at: Any, places: Any) -> Any:
         return holding("friction")
 
-    def _log_odds(self, proposal: Any) -> float:
+    def log_odds(self, proposal: Any) -> float:
         return float(proposal.log_factor)
 
 
@@ -90,8 +91,8 @@ def is_named(trial: Trial) -> bool:
     )
     proposal: Any = SimpleNamespace(term=holding("found").model.terms[0], log_factor=trial.training)
     nominal: Any = SimpleNamespace(model=SimpleNamespace(terms=[]))
-    search = Asking(nominal, NOTHING, NOTHING, held_out, lost=trial.lost)
-    step, found = search._try(holding("at"), proposal)
+    gates = Asking(nominal, NOTHING, NOTHING, held_out, lost=trial.lost)
+    step, found = gates.attempt(holding("at"), proposal)
     assert len(found.model.terms) == 1
     return step.is_confirmed
 
@@ -133,4 +134,4 @@ def test_an_effect_is_tried_where_training_asks_for_it_or_held_out_motion_alone(
     laboratory: Any = SimpleNamespace(approach=lambda found: found)
     judge: Any = SimpleNamespace(change=lambda before, after: change(held_out))
     proposal: Any = SimpleNamespace(term=NOTHING, log_factor=training)
-    assert Asking(NOTHING, laboratory, NOTHING, judge)._rank(holding("at"), [proposal]) == [proposal] * tried
+    assert Search(Asking(NOTHING, laboratory, NOTHING, judge))._rank(holding("at"), [proposal]) == [proposal] * tried

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from tauscope.diagnosis.findings.finding import EQUIVALENT, FORMULA_ERROR, equivalent
 from tauscope.diagnosis.model.term import Place, Term
+from tauscope.diagnosis.search.exchange import Exchange
 from tauscope.diagnosis.search.found import Rival, Step, Weighed
-from tauscope.diagnosis.search.search import Search
+from tauscope.diagnosis.search.gates import Gates
 from tauscope.effects import Effect
 from tauscope.effects.cable_force import CableForce
 from tauscope.effects.joint_spring import JointSpring
@@ -74,33 +75,38 @@ def test_what_held_out_motion_contradicts_is_no_likelier_than_not(is_confirmed: 
 
 
 @dataclass(frozen=True, eq=False)
-class Deciding(Search):
-    """A search whose odds are given: what is in the place of a finding is what held-out motion lets there."""
+class GivenOdds(Gates):
+    """Gates whose odds are given, and the gain of one effect over another."""
 
     odds: dict[Place, float] = field(default_factory=dict)
     refuted: frozenset[Place] = frozenset()
+    gain: float | None = None
 
-    def _weigh(self, at: Any, places: tuple[int, ...], known: Any = None) -> Weighed:
-        own = at.model.terms[places[0]]
-        others = [each for each in (JointSpring(0), CableForce(0)) if each.id != own.effect.id]
-        rivals = tuple(rival(odds, each) for each in others if (odds := self.odds[each.id, 0]) > -1.0)
-        proposals: Any = tuple(SimpleNamespace(term=each.term, place=each.term.place) for each in rivals)
-        kept = [term.effect for number, term in enumerate(at.model.terms) if number not in places]
-        return Weighed(places, holding(*kept), self.odds[own.place], rivals, proposals)
+    def attempt(self, at: Any, proposal: Any) -> Any:
+        effect, place = proposal.term.effect, proposal.term.place
+        stands = place not in self.refuted
+        return Step(effect, self.odds[place], stands, NOTHING, NOTHING, np.zeros((0, 0)), 0.0), holding(effect)
 
-    def _prior_odds(self, effect: Any, unnamed: float) -> float:
+    def prior_odds(self, effect: Any, unnamed: float) -> float:
         return 0.0
 
-    def _try(self, at: Any, proposal: Any) -> Any:
-        stands = proposal.term.place not in self.refuted
-        step = Step(
-            proposal.term.effect, self.odds[proposal.term.place], stands, NOTHING, NOTHING, np.zeros((0, 0)), 0.0
-        )
-        return step, holding(proposal.term.effect)
-
-    def _compare(self, at: Any, found: Any, touched: Any) -> float:
+    def compare(self, at: Any, found: Any, touched: Any) -> float:
         own, other = (each.model.terms[-1].place for each in (at, found))
-        return self.odds[other] - self.odds[own]
+        return self.odds[other] - self.odds[own] if self.gain is None else self.gain
+
+
+class Deciding(Exchange):
+    """An exchange among effects whose odds are given."""
+
+    gates: GivenOdds
+
+    def _weigh(self, at: Any, places: tuple[int, ...], known: Any = None) -> Weighed:
+        own, odds = at.model.terms[places[0]], self.gates.odds
+        others = [each for each in (JointSpring(0), CableForce(0)) if each.id != own.effect.id]
+        rivals = tuple(rival(odds[each.id, 0], each) for each in others if odds[each.id, 0] > -1.0)
+        proposals: Any = tuple(SimpleNamespace(term=each.term, place=each.term.place) for each in rivals)
+        kept = [term.effect for number, term in enumerate(at.model.terms) if number not in places]
+        return Weighed(places, holding(*kept), odds[own.place], rivals, proposals)
 
 
 def holding(*effects: Effect) -> Any:
@@ -108,16 +114,16 @@ def holding(*effects: Effect) -> Any:
 
 
 def deciding(odds: dict[Place, float], *nominal: Effect, refuted: frozenset[Place] = frozenset()) -> Deciding:
-    return Deciding(holding(*nominal), NOTHING, NOTHING, None, odds=odds, refuted=refuted)
+    return Deciding(GivenOdds(holding(*nominal), NOTHING, NOTHING, None, odds=odds, refuted=refuted))
 
 
 @pytest.mark.parametrize("refuted", [False, True])
 def test_a_more_probable_rival_takes_the_place_where_held_out_motion_lets_it(refuted: bool) -> None:
     odds: dict[Place, float] = {("joint_spring", 0): 20.0, ("cable_force", 0): 60.0}
     asked = deciding(odds, refuted=frozenset({("cable_force", 0)}) if refuted else frozenset[Place]())
-    at, (found,), exchanges = asked._exchange(holding(JointSpring(0)), 1, {})
+    at, (found,) = asked.run(holding(JointSpring(0)))
     assert at.model.terms[0].effect.id == ("joint_spring" if refuted else "cable_force")
-    assert exchanges == (not refuted)
+    assert asked.made == (not refuted)
     assert bool(found.rivals) is not refuted, "one that is refuted is no alternative"
     if not refuted:
         assert found.log_odds == 60.0
@@ -126,7 +132,7 @@ def test_a_more_probable_rival_takes_the_place_where_held_out_motion_lets_it(ref
 
 def test_the_more_probable_of_two_stays() -> None:
     odds: dict[Place, float] = {("joint_spring", 0): 60.0, ("cable_force", 0): 20.0}
-    at, (found,), _ = deciding(odds)._exchange(holding(JointSpring(0)), 1, {})
+    at, (found,) = deciding(odds).run(holding(JointSpring(0)))
     assert at.model.terms[0].effect.id == "joint_spring"
     assert found.rivals[0].log_odds == 20.0
 
@@ -134,16 +140,16 @@ def test_the_more_probable_of_two_stays() -> None:
 @pytest.mark.parametrize(("log_odds", "named"), [(2.0, False), (4.0, True)])
 def test_what_every_geared_joint_has_must_stand_out_to_be_a_finding(log_odds: float, named: bool) -> None:
     odds: dict[Place, float] = {("rotor_inertia", 0): log_odds, ("joint_spring", 0): -9.0, ("cable_force", 0): -9.0}
-    _, found, _ = deciding(odds)._exchange(holding(RotorInertia(0)), 1, {})
+    _, found = deciding(odds).run(holding(RotorInertia(0)))
     assert bool(found) is named
     odds = {("joint_spring", 0): log_odds, ("cable_force", 0): -9.0}
-    _, found, _ = deciding(odds)._exchange(holding(JointSpring(0)), 1, {})
+    _, found = deciding(odds).run(holding(JointSpring(0)))
     assert found
 
 
 def test_what_is_improbable_is_dropped_beside_a_nominal_effect_that_is_less_probable_still() -> None:
     odds: dict[Place, float] = {("rotor_inertia", 0): -5.0, ("joint_spring", 0): -1.0, ("cable_force", 0): -9.0}
-    at, found, _ = deciding(odds, RotorInertia(0))._exchange(holding(RotorInertia(0), JointSpring(0)), 1, {})
+    at, found = deciding(odds, RotorInertia(0)).run(holding(RotorInertia(0), JointSpring(0)))
     assert [each.effect.id for each in at.model.terms] == ["rotor_inertia"]
     assert not found
 
@@ -151,25 +157,22 @@ def test_what_is_improbable_is_dropped_beside_a_nominal_effect_that_is_less_prob
 def test_what_takes_the_place_of_a_nominal_effect_is_added_and_what_stands_beside_it_is_not_nominal() -> None:
     odds: dict[Place, float] = {("rotor_inertia", 0): 2.0, ("joint_spring", 0): 60.0, ("cable_force", 0): -9.0}
     asked = deciding(odds, RotorInertia(0))
-    at, _, exchanges = asked._exchange(holding(RotorInertia(0)), 1, {})
-    assert exchanges == 1
-    assert asked._find_added(at) == [0]
+    at, _ = asked.run(holding(RotorInertia(0)))
+    assert asked.made == 1
+    assert asked.gates.find_added(at) == [0]
 
 
 class Wavering(Deciding):
-    """…in which each effect in another shape seems to lead, and gains a little in its own place."""
+    """…in which each effect in another shape seems to lead."""
 
     def _weigh(self, at: Any, places: tuple[int, ...], known: Any = None) -> Weighed:
         own = rival(25.0, at.model.terms[places[0]].effect)
         proposals: Any = (SimpleNamespace(term=own.term, place=own.place),)
         return Weighed(places, holding(), 20.0, (own,), proposals)
 
-    def _compare(self, at: Any, found: Any, touched: Any) -> float:
-        return 1.0
-
 
 def test_an_effect_takes_its_own_place_in_another_shape_only_where_that_is_clearly_more_probable() -> None:
-    asked = Wavering(holding(), NOTHING, NOTHING, None, odds={("joint_spring", 0): 20.0})
-    _, found, exchanges = asked._exchange(holding(JointSpring(0)), 4, {})
-    assert exchanges == 0
+    asked = Wavering(GivenOdds(holding(), NOTHING, NOTHING, None, odds={("joint_spring", 0): 20.0}, gain=1.0))
+    _, found = asked.run(holding(JointSpring(0)))
+    assert asked.made == 0
     assert found[0].log_odds == 20.0

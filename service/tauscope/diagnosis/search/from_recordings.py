@@ -14,6 +14,7 @@ from tauscope.diagnosis.noise.floor import band_share, white_noise, with_pure_er
 from tauscope.diagnosis.observations.band import diagnosis_cutoff
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.search.found import Found
+from tauscope.diagnosis.search.gates import Gates
 from tauscope.diagnosis.search.held_out import HeldOut
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory, Prior
 from tauscope.diagnosis.search.left import is_left
@@ -83,12 +84,12 @@ def search(
     confirming = None if unseen is None else HeldOut(unseen.with_noise(white_noise(unseen, model)))
     farther = tuple(farther_effects(setting))
     near, far = Proposer(laboratory, effects), Proposer(laboratory, [*effects, *farther])
-    search_near = Search(nominal, laboratory, near, confirming, farther)
+    search_near = Search(Gates(nominal, laboratory, near, confirming), farther)
     found = search_near.run()
     named = any(not term.effect.is_expected for term in found.hypothesis.model.terms)
     if not named and is_left(found.hypothesis, white, pure_error=repeated is not None):
         progress("look farther")
-        found = replace(search_near, proposer=far, farther=()).run(found)
+        found = Search(Gates(nominal, laboratory, far, confirming)).run(found)
     return Searched(found, laboratory, effects, setting, white, unseen, deflections, cutoff, repeated is not None)
 
 

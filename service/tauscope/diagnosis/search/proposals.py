@@ -81,6 +81,24 @@ class Looks:
                 self.looked.pop(each, None)
 
 
+@dataclass(frozen=True)
+class Wanted:
+    """Whether an effect may be added: none a second time, but what repeats, and none that was refused."""
+
+    present: set[Place]
+    refused: Collection[Place]
+
+    def __call__(self, effect: Effect) -> bool:
+        """Whether one may."""
+        place = effect.id, effect.joint
+        return place not in self.refused and (effect.repeats or not self._is_present(effect))
+
+    def _is_present(self, effect: Effect) -> bool:
+        """Whether it is there at its joint, or at the whole arm: an effect of all joints and one of each are alike."""
+        joints = {joint for name, joint in self.present if name == effect.id}
+        return bool(joints) if effect.joint is None else bool(joints & {None, effect.joint})
+
+
 class Proposer:
     """Proposes effects for the same rows."""
 

@@ -1,0 +1,184 @@
+"""What training and held-out motion must say before an effect is named."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.model.term import Place
+from tauscope.diagnosis.search.found import Step
+from tauscope.diagnosis.search.held_out import HeldOut
+from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
+from tauscope.diagnosis.search.proposals import Proposal, Proposer
+from tauscope.diagnosis.search.window import window_log_odds
+from tauscope.effects import Effect, TimeLocalEffect
+
+NAMED = 3.0
+"""Log odds from which an effect is named, and from which training asks for it: nineteen in twenty."""
+
+SHOWN = float(np.log(3.0))
+"""Log odds of held-out motion alone, of the joints that an effect touches, from which it is shown: three to one."""
+
+UNASKED = 18.0
+"""…of held-out motion where training does not ask for it, and of a window in time, which no other motion can refute:
+three standard errors."""
+
+CATALOGUED = 3.0
+"""Log odds before the data that torque which is left out has a name: one in twenty laws is in no catalogue."""
+
+
+@dataclass(frozen=True, eq=False)
+class Gates:
+    """Hypotheses on the same rows, judged by training and by held-out motion.
+
+    `nominal`: model without what is looked for.
+    """
+
+    nominal: Hypothesis
+    laboratory: Laboratory
+    proposer: Proposer
+    held_out: HeldOut | None
+
+    def find_added(self, at: Hypothesis) -> list[int]:
+        """Places of the terms that the nominal model has not."""
+        known = find_places(self.nominal)
+        return [place for place, term in enumerate(at.model.terms) if term.place not in known]
+
+    def add(self, at: Hypothesis, proposal: Proposal) -> Hypothesis:
+        """A hypothesis with a proposal as it is, under the scales that were found with it."""
+        return self.laboratory.with_term(self.laboratory.paint(at, proposal.found), proposal.term, proposal.size)
+
+    def attempt(self, at: Hypothesis, proposal: Proposal) -> tuple[Step, Hypothesis]:
+        """A proposal in the model, and what held-out motion says of it."""
+        touched = proposal.term.effect.touched(len(at.scales))
+        found, lost = self._drop_impossible(self.settle(self.add(at, proposal), touched))
+        trained = self.log_odds(proposal) - (self._weigh_lost(lost, at, found, proposal) if lost else 0.0)
+        passes = isinstance(proposal.term.effect, TimeLocalEffect)
+        if passes:
+            trained = min(trained, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
+        log_odds = trained + self.told(at, found)
+        confirmed = log_odds > (UNASKED if passes else NAMED) and stands(found.model)
+        asked = trained > NAMED
+        if self.held_out is not None:  # what training does not ask for may cost no joint anything
+            told = self.held_out.trained_change(at, found)
+            confirmed &= told.harm <= 0.0 if asked else not told.losing
+        confirmed = confirmed and self.agrees(at, found, [len(found.model.terms) - 1], asked=asked)
+        covariance = found.posterior.covariance
+        return Step(proposal.term.effect, log_odds, confirmed, at.model, found.model, covariance, trained), found
+
+    def _drop_impossible(self, at: Hypothesis) -> tuple[Hypothesis, list[Effect]]:
+        """The same without what was found before its last effect and cannot be beside it, and what that is."""
+        lost: list[Effect] = []
+        while broken := [place for place in self.find_added(at)[:-1] if not _is_possible(at.model, place)]:
+            lost.append(at.model.terms[broken[0]].effect)
+            at = self.settle_without(at, broken[0])
+        return at, lost
+
+    def _weigh_lost(self, lost: Sequence[Effect], at: Hypothesis, found: Hypothesis, proposal: Proposal) -> float:
+        """Log odds that are lost with effects that a proposal makes impossible."""
+        gained = self.laboratory.under(found, at.dependence, range(len(at.scales))).log_evidence - at.log_evidence
+        return proposal.log_factor - gained + sum(self.prior_odds(effect, 0.0) for effect in lost)
+
+    def agrees(self, without: Hypothesis, at: Hypothesis, places: Sequence[int], *, asked: bool = True) -> bool:
+        """Whether held-out motion shows an effect, and training predicts its joints no worse.
+
+        What training does not ask for has to be beyond doubt, also in the table that a user sees. No other motion shows
+        a window in time.
+        """
+        effect = at.model.terms[places[0]].effect
+        if self.held_out is None or isinstance(effect, TimeLocalEffect):
+            return True
+        touched = effect.touched(len(at.scales))
+        if self.held_out.trained_change(without, at).log_odds(touched) < 0.0:
+            return False
+        if not asked and self.held_out.delivered_change(without, at).log_odds(touched) < UNASKED:
+            return False
+        least = SHOWN if asked else UNASKED
+        shown = self.held_out.change(without, at).log_odds(touched)
+        if shown <= least:
+            shown = self.held_out.change(self._hold_friction(at, places), at).log_odds(touched)
+        return shown > least
+
+    def _hold_friction(self, at: Hypothesis, places: Sequence[int]) -> Hypothesis:
+        """The hypothesis without an effect, friction's slopes as they are with it.
+
+        Where they may move to what nobody believes, slopes and effect may predict the same.
+        """
+        laboratory, without = self.laboratory.with_slopes_of(at), at
+        for place in reversed(places):
+            without = laboratory.without_term(without, place)
+        return laboratory.settle(without, at.model.terms[places[0]].effect.touched(len(at.scales)))
+
+    def settle(self, at: Hypothesis, touched: Sequence[int]) -> Hypothesis:
+        """The most probable parameters; the edges of a window, of which each has several, are looked for once more."""
+        found, last = self.laboratory.settle(at, touched), len(at.model.terms) - 1
+        term = found.model.terms[last]
+        if not isinstance(term.effect, TimeLocalEffect):
+            return found
+        without = self.laboratory.without_term(found, last)
+        signals = [without.model.signals(piece) for piece in self.laboratory.rows.observations]
+        shape, size = self.proposer.zoom(term.effect, term.shape, found.sizes[last], without, signals)
+        other = self.laboratory.with_term(without, replace(term, shape=shape), size)
+        other = self.laboratory.settle(other, touched)
+        compared = self.laboratory.under(other, found.dependence, touched)
+        found = other if compared.log_evidence > found.log_evidence else found
+        return self._turn(found, touched)
+
+    def settle_without(self, at: Hypothesis, place: int) -> Hypothesis:
+        """The most probable parameters without one term."""
+        touched = at.model.terms[place].effect.touched(len(at.scales))
+        return self.laboratory.settle(self.laboratory.without_term(at, place), touched)
+
+    def _turn(self, at: Hypothesis, touched: Sequence[int]) -> Hypothesis:
+        """The same effect outside its window where held-out motion says so: training cannot tell which of the two."""
+        last = len(at.model.terms) - 1
+        term = at.model.terms[last]
+        outside = term.effect.outside(term.shape) if isinstance(term.effect, TimeLocalEffect) else None
+        if outside is None:
+            return at
+        turned = replace(term, shape=outside, coefficients=-term.coefficients)
+        other = self.laboratory.with_term(self.laboratory.without_term(at, last), turned, at.sizes[last])
+        other = self.laboratory.settle(other, touched)
+        return other if self.told(at, other) > 0.0 else at
+
+    def compare(self, at: Hypothesis, found: Hypothesis, touched: Collection[int]) -> float:
+        """Log Bayes factor of a second hypothesis; what both predict alike of held-out motion says nothing."""
+        gained = self.laboratory.under(found, at.dependence, touched).log_evidence - at.log_evidence
+        return gained + self.told(at, found)
+
+    def told(self, before: Hypothesis, after: Hypothesis) -> float:
+        """Log odds that held-out motion adds to the second of two hypotheses."""
+        return 0.0 if self.held_out is None else self.held_out.change(before, after).log_odds()
+
+    def log_odds(self, proposal: Proposal) -> float:
+        """Log odds of a proposal after training."""
+        return proposal.log_factor + self.prior_odds(proposal.term.effect, proposal.unnamed)
+
+    def prior_odds(self, effect: Effect, unnamed: float) -> float:
+        """Log odds before the data, that one effect at one place is missing, whichever.
+
+        Torque without a name needs odds of its own: something is missing at one of the joints, and in no catalogue.
+        """
+        if effect.is_expected:
+            return 0.0
+        sites = len({(each.id, each.joint) for each in self.proposer.effects})
+        joints = self.laboratory.rows.observations.robot.joint_count
+        return float(np.clip(unnamed, 0.0, CATALOGUED + np.log(joints)) - np.log(sites))
+
+
+def _is_possible(model: ExtendedModel, place: int) -> bool:
+    """Whether a term is still what its effect means."""
+    term, joint = model.terms[place], model.terms[place].effect.joint
+    return term.is_possible(None if joint is None else model.structure.terms[joint].k_v)
+
+
+def stands(model: ExtendedModel) -> bool:
+    """Whether the last term is what its effect means, without being held there."""
+    term = model.terms[-1]
+    return _is_possible(model, -1) and term.effect.is_consistent(term.coefficients, term.shape)
+
+
+def find_places(at: Hypothesis) -> set[Place]:
+    """Effects of a hypothesis, and where."""
+    return {term.place for term in at.model.terms}
