@@ -123,7 +123,7 @@ def test_a_more_probable_rival_takes_the_place_where_held_out_motion_lets_it(ref
     asked = deciding(odds, refuted=frozenset({("cable_force", 0)}) if refuted else frozenset[Place]())
     at, (found,) = asked.run(holding(JointSpring(0)))
     assert at.model.terms[0].effect.id == ("joint_spring" if refuted else "cable_force")
-    assert asked.made == (not refuted)
+    assert bool(asked.gone) is not refuted
     assert bool(found.rivals) is not refuted, "one that is refuted is no alternative"
     if not refuted:
         assert found.log_odds == 60.0
@@ -158,7 +158,7 @@ def test_what_takes_the_place_of_a_nominal_effect_is_added_and_what_stands_besid
     odds: dict[Place, float] = {("rotor_inertia", 0): 2.0, ("joint_spring", 0): 60.0, ("cable_force", 0): -9.0}
     asked = deciding(odds, RotorInertia(0))
     at, _ = asked.run(holding(RotorInertia(0)))
-    assert asked.made == 1
+    assert asked.gone == {("rotor_inertia", 0)}
     assert asked.gates.find_added(at) == [0]
 
 
@@ -174,5 +174,5 @@ class Wavering(Deciding):
 def test_an_effect_takes_its_own_place_in_another_shape_only_where_that_is_clearly_more_probable() -> None:
     asked = Wavering(GivenOdds(holding(), NOTHING, NOTHING, None, odds={("joint_spring", 0): 20.0}, gain=1.0))
     _, found = asked.run(holding(JointSpring(0)))
-    assert asked.made == 0
+    assert not asked.gone
     assert found[0].log_odds == 20.0

@@ -15,18 +15,15 @@ from tauscope.effects.computation import side_by_side
 WEIGHED = 4
 """Rivals of a finding that are looked at, itself in another shape among them."""
 
-MOST_EXCHANGES = 4
-"""Effects whose place another one takes at most: after each, all are weighed anew."""
-
 
 class Exchange:
     """Exchanges among the effects of hypotheses.
 
-    `made`: how many there were.
+    `gone`: effects whose place another one took; they do not come back, so that there is an end.
     """
 
     def __init__(self, gates: Gates) -> None:
-        self.gates, self.made = gates, 0
+        self.gates, self.gone = gates, set[Place]()
         self._rivals: dict[Place, set[Place]] = {}  # of each effect that was ever weighed
 
     def run(self, at: Hypothesis) -> tuple[Hypothesis, tuple[Weighed, ...]]:
@@ -34,11 +31,11 @@ class Exchange:
         groups = _groups(at.model)
         found = side_by_side(lambda own: self._weigh(at, groups[own], self._rivals.get(own)), groups)
         weighed, stale = dict(zip(groups, found, strict=True)), set[Place]()
-        refused, gone = set[Place](), set[Place]()
+        refused = set[Place]()
         while weighed:
             self._rivals |= {own: {each.place for each in found.proposals} for own, found in weighed.items()}
             weighed = {own: found.refuse(refused) for own, found in weighed.items()}
-            behind = [own for own, found in weighed.items() if found.is_behind and self.made < MOST_EXCHANGES]
+            behind = [own for own, found in weighed.items() if found.is_behind]
             own = max(behind, key=lambda each: weighed[each].lead) if behind else next(iter(stale), None)
             if own is None:
                 doubtful = self._find_doubtful(at, weighed)
@@ -48,11 +45,10 @@ class Exchange:
             elif own in stale:
                 stale.remove(own)
                 weighed[own] = self._weigh(at, _groups(at.model)[own], self._rivals[own])
-            elif (other := self._try_rival(at, weighed[own], gone)) is None:
+            elif (other := self._try_rival(at, weighed[own])) is None:
                 refused.add(weighed[own].rivals[0].place)
             else:
-                self.made += 1
-                gone.add(own)  # what another one took the place of does not come back
+                self.gone.add(own)
                 at, new = other, other.model.terms[-1].place
                 groups = _groups(at.model)
                 stale = set(groups) - {new}
@@ -70,13 +66,13 @@ class Exchange:
         ]
         return min(doubtful, key=lambda own: weighed[own].log_odds, default=None)
 
-    def _try_rival(self, at: Hypothesis, weighed: Weighed, gone: Collection[Place]) -> Hypothesis | None:
+    def _try_rival(self, at: Hypothesis, weighed: Weighed) -> Hypothesis | None:
         """The hypothesis with the best rival in the place of an effect, where that is more probable.
 
         Training alone, too, has to predict their joints no worse with it.
         """
         gates = self.gates
-        if weighed.rivals[0].place in gone:
+        if weighed.rivals[0].place in self.gone:
             return None
         rival, own = weighed.rivals[0].term.effect, at.model.terms[weighed.places[0]].effect
         touched = {*rival.touched(len(at.scales)), *own.touched(len(at.scales))}

@@ -42,13 +42,14 @@ class Search:
             at = self._refine(self._drop_harmful(at))
             if at is exchanged:
                 break
-            grown, made = at, exchange.made
+            grown, gone = at, len(exchange.gone)
             exchanged, weighed = exchange.run(grown)
-            if exchange.made == made:
+            if len(exchange.gone) == gone:
                 at = exchanged
                 break
             at = self._drop_superfluous(exchanged)
             _forgive(refused, _find_changed(grown, at))
+            refused |= dict.fromkeys(exchange.gone, frozenset())
         return Found(self.gates.nominal, at, tuple(steps), weighed)
 
     def _grow(self, at: Hypothesis, refused: dict[Place, frozenset[int]]) -> tuple[Hypothesis, list[Step]]:
