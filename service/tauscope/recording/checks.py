@@ -239,10 +239,7 @@ class RecordingReport:
     findings: tuple[Finding, ...] = Field(description="warnings first")
 
     def require_usable(self) -> None:
-        """Refuse a recording that no other verb accepts.
-
-        Raises RecordingError where a column can hardly be in its unit, or a joint has no effort.
-        """
+        """Raise RecordingError where a column can hardly be in its unit, or a joint has no effort."""
         for finding in self.findings:
             if finding.severity is Severity.ERROR:
                 raise RecordingError(f"{self.name}: column {finding.where}: {finding.text}")
@@ -251,12 +248,7 @@ class RecordingReport:
 def check_recording(
     path: str | Path, joint_count: int | None = None, robot: Robot | None = None, reading: Reading = SI
 ) -> RecordingReport:
-    """Read a recording and report what it holds, in memory that does not grow with its length.
-
-    Raises RecordingError where the file cannot be read or breaks a rule.
-
-    `joint_count`: joints that the recording must have; None where any number is welcome.
-    """
+    """Read a recording and report on it in bounded memory. Raises RecordingError where it breaks a rule."""
     reading = reading.for_robot(robot)
     joints = None if robot is None else [joint.name for joint in robot.joints]
     recording = read_recording(path, joint_count, joints, reading)

@@ -33,13 +33,10 @@ def read_batches(
     first_row: int = 0,
     has_episodes: bool = False,
 ) -> Recording:
-    """Find the wanted columns and take all rows.
+    """Take all rows of the wanted columns.
 
-    Raises RecordingError, which names the row and column at fault. Raises RecordingMismatchError where the file has
-    another number of joints.
+    Raises RecordingError, which names row and column, and RecordingMismatchError for another number of joints.
 
-    `rows`: expected number.
-    `open_batches`: the batches of the columns that it is told to read.
     `first_row`: number of the file's first row in messages.
     `has_episodes`: whether a column `episode_index` splits the rows into episodes, each on a clock of its own.
     """
@@ -77,10 +74,7 @@ _UNREADABLE = (
 
 
 def read_npz(path: Path, choice: Choice) -> Recording:
-    """Read an archive; columns of an array are named ``qpos[0]``, ``qpos[1]``, ….
-
-    Raises RecordingError where the archive is damaged, is none of NumPy's, or names the row and column at fault.
-    """
+    """Read a NumPy archive; columns are named ``qpos[0]``, …. Raises RecordingError, which names row and column."""
     columns = _read_columns(path, choice.file)
     rows = len(next(iter(columns.values())))
 

@@ -49,10 +49,9 @@ def is_column(name: str) -> bool:
 
 
 def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLayout:
-    """Find the columns of CONTRACT.md in a file's header, as its mapping, its preset or their own names say.
+    """Columns of CONTRACT.md in a file's header, by its mapping, its preset or their own names.
 
-    Raises RecordingError where a column is missing; the message holds the mapping that the header suggests. Raises
-    RecordingMismatchError where the file names other joints than the robot.
+    Raises RecordingError, which holds the mapping that the header suggests; RecordingMismatchError for other joints.
     """
     renamed = rename_columns(header, reading, file)
     counts_rows = reading.units.get("t") == "index" and "t" not in renamed
@@ -139,12 +138,7 @@ def _choose_reading(header: Sequence[str], reading: Reading, file: str) -> Readi
 
 
 def find_columns(header: Sequence[str], file: str, *, counts_rows: bool = False) -> ColumnLayout:
-    """Find the columns of CONTRACT.md in a header.
-
-    Raises RecordingError where a required column is missing, a name appears twice, a joint's number leaves a gap.
-
-    `counts_rows`: whether t is the number of the row, and the header's first name is no column of the file.
-    """
+    """Columns of CONTRACT.md in a header; `counts_rows`: its first name is no column. Raises RecordingError."""
     where = _positions(header, file)
     if "t" not in where:
         raise RecordingError(f"{file}: column t (time in seconds) is missing; the columns are {listed(header)}")
@@ -171,12 +165,7 @@ def find_columns(header: Sequence[str], file: str, *, counts_rows: bool = False)
 
 
 def require_joint_count(found: int, expected: int | None, file: str) -> None:
-    """Refuse a recording of another robot.
-
-    Raises RecordingMismatchError where the numbers differ.
-
-    `expected`: joints of the robot; None where any number is welcome.
-    """
+    """Refuse a recording of another robot. Raises RecordingMismatchError."""
     if expected is None or found == expected:
         return
     fault = f"column q{found + 1} is missing" if found < expected else f"column q{expected + 1} belongs to no joint"

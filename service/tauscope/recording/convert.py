@@ -26,10 +26,7 @@ _LATEST_STAMP_S = 2.0**31
 
 
 def write_mcap(recording: Recording, file: BinaryIO, joint_names: Sequence[str] | None = None) -> tuple[str, ...]:
-    """Write a recording as ``/joint_states`` of type sensor_msgs/msg/JointState.
-
-    Raises RecordingError where efforts are currents, or times cannot be kept as nanoseconds.
-    """
+    """Write ``/joint_states``. Raises RecordingError for currents, and for times that are no nanoseconds."""
     if recording.effort_kind is not EffortKind.TORQUE:
         raise RecordingError(f"{recording.name}: JointState holds torques and this recording currents (i1…); use .csv")
     n = recording.joint_count
@@ -93,9 +90,8 @@ def convert_recording(
 ) -> Conversion:
     """Write a recording, in SI, in the format that the target's suffix names.
 
-    MCAP holds time from the first sample on in whole nanoseconds, positions, torques and velocities; CSV and Parquet
-    hold every column exactly. Raises RecordingError where the source cannot be read, or the target cannot hold it or
-    exists.
+    MCAP holds time in whole nanoseconds, positions, torques and velocities; CSV and Parquet hold every column exactly.
+    Raises RecordingError where the source cannot be read, or the target cannot hold it or exists.
     """
     source_path, target_path = Path(source), Path(target)
     _require_other(source_path, target_path)
@@ -110,10 +106,7 @@ def convert_recording(
 def write_recording(
     recording: Recording, path: str | Path, *, joint_names: Sequence[str] | None = None, overwrite: bool = False
 ) -> tuple[str, ...]:
-    """Write a recording; the file appears under its name only when it is complete.
-
-    Raises RecordingError where the file exists or cannot be written, or its suffix names no format.
-    """
+    """Write a recording, whole or not at all. Raises RecordingError where the target exists or is no format."""
     path = Path(path)
     _require_writable(path, overwrite=overwrite)
     try:

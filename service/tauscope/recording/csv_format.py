@@ -37,8 +37,7 @@ def read_csv(path: Path, choice: Choice) -> Recording:
     """Read a CSV recording, in time linear and in memory bounded in its number of lines.
 
     Comma, semicolon, tab, | or blanks between the fields; an empty field or ``nan`` is a missed sample. Raises
-    RecordingError, which names the line and column at fault. Raises RecordingMismatchError where the file has another
-    number of joints.
+    RecordingError, which names line and column, and RecordingMismatchError for another number of joints.
     """
     name = choice.file
     with path.open("rb") as file:
@@ -59,10 +58,7 @@ def read_csv(path: Path, choice: Choice) -> Recording:
 
 
 def read_csv_header(path: Path, name: str) -> list[str]:
-    """Names of a file's columns, or numbers from 1 where it has none.
-
-    Raises RecordingError where the file holds no line of text.
-    """
+    """Names of a file's columns, or numbers from 1. Raises RecordingError where it holds no line of text."""
     with path.open("rb") as file:
         return _read_names(file, name, SI).names
 

@@ -19,12 +19,7 @@ Value = int | bytes
 
 
 def decode_foxglove_protobuf(schema: bytes) -> Callable[[bytes], JointState]:
-    """The decoder of a log's messages.
-
-    Raises ValueError where the schema cannot be read; so does the decoder where a message is no JointStates.
-
-    `schema`: FileDescriptorSet of the type; empty for the numbers that Foxglove publishes.
-    """
+    """The decoder of JointStates by a FileDescriptorSet, or by Foxglove's numbers. Both raise ValueError."""
     numbers = _field_numbers(schema)
     states, state = numbers.get("JointStates", _STATES), numbers.get("JointState", _STATE)
     wanted = {state[name]: name for name in _QUANTITIES if name in state}
@@ -112,20 +107,14 @@ _EFFORTS = ("effort", "torque", "current")
 
 
 def find_decoder(type_name: str, encoding: str, schema: bytes) -> Decoder | None:
-    """The decoder of a topic's messages, None where they are no joint states.
-
-    `schema`: of the type, empty where the log has none.
-    """
+    """The decoder of a topic's messages, None where they are no joint states; `schema` is empty where unknown."""
     if (type_name, encoding) == ("foxglove.JointStates", "protobuf"):
         return decode_foxglove_protobuf(schema)
     return _DECODERS.get((type_name, encoding))
 
 
 def decode_ros1(message: bytes) -> JointState:
-    """Decode sensor_msgs/JointState of ROS 1: no alignment, strings without a closing NUL.
-
-    Raises ValueError where it is no JointState.
-    """
+    """Decode sensor_msgs/JointState of ROS 1, unaligned, no closing NUL. Raises ValueError where it is none."""
     try:
         _, seconds, nanoseconds, length = struct.unpack_from("<IIII", message)
         at = 16 + length
@@ -149,10 +138,7 @@ def decode_ros1(message: bytes) -> JointState:
 
 
 def decode_dynamic(message: bytes) -> JointState:
-    """Decode control_msgs/msg/DynamicJointState: per joint, names and values of its interfaces.
-
-    Raises ValueError where it is no DynamicJointState.
-    """
+    """Decode control_msgs/msg/DynamicJointState: each joint's named interfaces. Raises ValueError where it is none."""
     cursor = CdrCursor(message)
     stamp = cursor.stamp()
     cursor.string()  # frame_id

@@ -36,10 +36,7 @@ class Journal:
 
 
 def read_journal(path: Path) -> Journal:
-    """Read a journal up to its end or its first damage.
-
-    Raises RecordingError where the file cannot be read, or its header did not come through.
-    """
+    """Read a journal up to its end or its first damage. Raises RecordingError where its header did not come through."""
     collector = _Collector()
     try:
         damage = scan_mcap(path, collector)
@@ -56,10 +53,9 @@ def read_journal(path: Path) -> Journal:
 def journal_recording(journal: Journal, name: str) -> Recording:
     """The recording of a journal's motion, without the ramp; time runs from the motion's first sample.
 
-    Columns t, q, tau (i where the drives report no torque), qd, temp and volt where they report them, qref, taucmd
-    where effort was commanded, and period where the motion is repeated. Where the host commanded effort, tau (i) is the
-    mean of what acted before and after the sample; the journal keeps what was reported. Raises RecordingError: next to
-    nothing of the motion is there.
+    Columns are those that the drives report (i where they report no torque), qref, taucmd where effort was commanded,
+    and period where the motion is repeated. Where the host commanded effort, tau (i) is the mean of what acted before
+    and after the sample. Raises RecordingError where the motion was never reached.
     """
     rows, header = journal.motion, journal.header
     if not len(rows):

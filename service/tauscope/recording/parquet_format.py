@@ -34,10 +34,7 @@ class FileColumn:
 
 
 def unfold_columns(arrow: Any, file: Any, path: Path, name: str) -> dict[str, FileColumn]:
-    """Every column by its name, elements as ``observation.state[0]`` or ``observation.state[elbow.pos]``.
-
-    Raises RecordingError where two columns have one name.
-    """
+    """Columns by name, ``observation.state[0]`` or ``state[elbow.pos]``. Raises RecordingError for one twice."""
     found: dict[str, FileColumn] = {}
     schema, elements = file.schema_arrow, _element_names(path)
     for column in map(str, schema.names):
@@ -109,8 +106,7 @@ _NUMBER_TYPE = re.compile(r"u?int(8|16|32|64)|halffloat|float|double")
 def read_parquet(path: Path, choice: Choice) -> Recording:
     """Read a Parquet recording batch by batch; null is a missed sample.
 
-    Raises MissingExtraError where pyarrow is not installed. Raises RecordingError where the file is damaged, or
-    names the row and column at fault. Raises RecordingMismatchError where the file has another number of joints.
+    Raises MissingExtraError, RecordingError, which names row and column, and RecordingMismatchError for other joints.
     """
     name = choice.file
     arrow = _arrow(name)
@@ -151,20 +147,14 @@ def _take_batches(
 
 
 def read_parquet_header(path: Path, name: str) -> list[str]:
-    """Names of a file's columns, lists unfolded.
-
-    Raises MissingExtraError where pyarrow is not installed. Raises RecordingError where the file is damaged.
-    """
+    """Names of columns, lists unfolded. Raises MissingExtraError, and RecordingError for a damaged file."""
     arrow = _arrow(name)
     with path.open("rb") as stream, _arrow_errors(arrow, name):
         return list(unfold_columns(arrow, arrow.parquet.ParquetFile(stream), path, name))
 
 
 def write_parquet(recording: Recording, file: BinaryIO) -> None:
-    """Write a recording as Parquet, float64 columns, checksums on every page.
-
-    Raises MissingExtraError where pyarrow is not installed.
-    """
+    """Write float64 columns, checksums on every page. Raises MissingExtraError where pyarrow is not installed."""
     arrow = _arrow(recording.name)
     table = recording.table
     schema = arrow.schema([(name, arrow.float64()) for name in table.names])

@@ -69,8 +69,7 @@ def read_recording(
 ) -> Recording:
     """Read a recording: CSV, Parquet, MCAP, a ROS 1 bag, or a rosbag2 folder or database; told apart by content.
 
-    Raises RecordingError where the file cannot be read or breaks a rule; the message names the place. Raises
-    RecordingMismatchError where the recording has other joints than asked for.
+    Raises RecordingError, which names the place, and RecordingMismatchError where it has other joints than asked for.
 
     `joint_count`: joints that the recording must have; None where any number is welcome, or as many as `joint_names`.
     """
@@ -92,10 +91,7 @@ def read_recording(
 
 
 def read_header(path: Path) -> list[str]:
-    """Names of the columns of a CSV or Parquet file; numbers from 1 where there are none.
-
-    Raises RecordingError where the file cannot be read, or is a log, which names its joints itself.
-    """
+    """Names of a table's columns, or numbers from 1. Raises RecordingError where it is a log, which names joints."""
     path = find_path(path)
     name = printable(str(path), _LONGEST_PATH)
     try:
@@ -111,10 +107,7 @@ def read_header(path: Path) -> list[str]:
 
 
 def first_bytes(path: Path, name: str) -> bytes:
-    """The first bytes of a regular file, by which formats are told apart.
-
-    Raises RecordingError where it is not a regular file.
-    """
+    """The first bytes of a file, by which formats are told apart. Raises RecordingError where it is not regular."""
     if isinstance(path, Path) and not path.is_file():
         if not path.exists():
             raise FileNotFoundError(errno.ENOENT, "no such file")
@@ -169,10 +162,7 @@ class ColumnMapping:
 
 
 def find_mapping(path: Path, robot: Robot | None = None, reading: Reading = SI) -> ColumnMapping:
-    """The mapping by which a table is read; where none is, as much as its column names suggest.
-
-    Raises RecordingError where the header cannot be read, or the file is a log, which names its joints itself.
-    """
+    """The mapping by which a table is read, or that its column names suggest. Raises RecordingError for a log."""
     header = tuple(read_header(path))
     reading = reading.for_robot(robot)
     try:

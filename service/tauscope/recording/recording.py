@@ -45,11 +45,7 @@ class Recording:
         return any(name.rstrip("0123456789") == group for name in self.table.names)
 
     def samples(self, start: int = 0, stop: int | None = None) -> Samples:
-        """Samples start:stop, as read-only views of the table where its columns allow.
-
-        `start`: first sample, counted from 0; `stop`: the one after the last; None for the end. Returns Samples: the
-        columns that the recording has; None for the others.
-        """
+        """Samples start:stop, as read-only views of the table where its columns allow; None for columns it lacks."""
         first, last, _ = slice(start, stop).indices(len(self.table))
         block = self.table.rows(first, max(first, last))
         where = {name: index for index, name in enumerate(self.table.names)}
@@ -64,13 +60,9 @@ class Recording:
         )
 
     def joint_torque(self, effort: Array, robot: Robot) -> Array:
-        """Turn recorded efforts into joint torque: τ = sign · k · effort, with k = 1 where torque was recorded.
+        """τ = sign · k · effort, with k = 1 where torque was recorded; `effort` and τ (N, n) [Nm or N].
 
-        Raises RecordingMismatchError where the efforts have another number of joints than the robot. Raises
-        RecordingError where commands were recorded, and no actuator has made torque of them.
-
-        `effort`: (N, n), `Samples.effort` of this recording [Nm or N, or drive units]. Returns (N, n), joint torque [Nm
-        or N].
+        Raises RecordingMismatchError for another number of joints, and RecordingError for commands without an actuator.
         """
         if self.effort_kind is EffortKind.COMMAND:
             raise RecordingError(
@@ -99,8 +91,7 @@ class Recording:
     ) -> "Recording":
         """Make a recording of arrays, held to the same rules as a file.
 
-        Raises RecordingError, which names the argument, the row (counted from 0, as NumPy does) and the joint at fault.
-        Raises TypeError for another argument than those of `Samples`.
+        Raises RecordingError, which names argument, row (counted from 0) and joint; TypeError for an unknown argument.
 
         `time`: (N,), strictly increasing [s].
         `position`: (N, n), q [rad or m].

@@ -30,10 +30,9 @@ _LARGEST_HEADER_BYTES = 2**16
 
 
 def add_ros1_bag(path: Path, name: str, log: JointStateLog) -> None:
-    """Add the joint states of a ROS 1 bag to a log; only chunks that hold messages of their topics are read.
+    """Add the joint states of a ROS 1 bag to a log; chunks without messages of their topics are not read.
 
-    Raises MissingExtraError where rosbags is not installed. Raises RecordingError where the bag is damaged or not
-    indexed.
+    Raises MissingExtraError where rosbags is not installed, and RecordingError for a damaged bag or one without index.
     """
     with require_extra(f"{name}: a ROS 1 bag"):
         rosbag1: Any = import_module("rosbags.rosbag1")
@@ -106,10 +105,7 @@ _SQLITE_HEADER_BYTES = 100
 
 
 def add_rosbag2(folder: Path, bag: str, log: JointStateLog) -> None:
-    """Add the joint states of a rosbag2 folder to a log, its files in the order in which they were recorded.
-
-    Raises RecordingError where a file is missing or damaged.
-    """
+    """Add a rosbag2 folder to a log, file by file. Raises RecordingError where a file is missing or damaged."""
     for file in _files(folder, bag):
         name = f"{bag}/{printable(file)}"
         path = folder / file

@@ -70,10 +70,7 @@ MINIMUM_ROWS = 10  # fewer samples than this are a mistake and not a motion
 
 
 class RowCheck:
-    """Checks blocks of rows: time is known, no number is infinite, a period is a whole number.
-
-    NaN is a missed sample and welcome in every column but time.
-    """
+    """Checks that time is known, no number is infinite, and a period is whole; NaN is a missed sample."""
 
     def __init__(self, file: str, names: tuple[str, ...]) -> None:
         self._file = file
@@ -81,12 +78,7 @@ class RowCheck:
         self._period = names.index("period") if "period" in names else None
 
     def __call__(self, block: Array, place: Callable[[int], str]) -> None:
-        """Check the next block.
-
-        Raises RecordingError, which names the row and the column at fault.
-
-        `block`: (rows, columns), the rows.
-        """
+        """Check the next `block`. Raises RecordingError, which names the row and the column."""
         if not len(block):
             return
         if np.isinf(block).any():
@@ -112,12 +104,7 @@ class RowCheck:
 
 
 def require_rising(time: Array, previous: float, file: str, place: Callable[[int], str]) -> None:
-    """Refuse time that does not rise from row to row.
-
-    Raises RecordingError, which names the row.
-
-    `time`: (rows,), stamps [s]; `previous`: the stamp before them [s].
-    """
+    """Raise RecordingError, which names the row, where `time` (rows,) does not rise from `previous` on."""
     is_up = np.diff(time, prepend=previous) > 0
     if is_up.all():
         return

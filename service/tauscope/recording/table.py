@@ -77,10 +77,7 @@ class TableBuilder:
     def __init__(
         self, names: tuple[str, ...], expected_rows: int = 0, spool_above_bytes: int = SPOOL_ABOVE_BYTES
     ) -> None:
-        """Prepare an empty table.
-
-        `spool_above_bytes`: size of the rows above which they go to a temporary file [bytes].
-        """
+        """Prepare an empty table; larger ones than `spool_above_bytes` go to a temporary file."""
         self._names = names
         self._limit_rows = spool_above_bytes // (8 * len(names))
         self._length = 0
@@ -94,12 +91,7 @@ class TableBuilder:
         return self._length
 
     def append(self, block: Array) -> None:
-        """Add rows behind the last one.
-
-        Raises RecordingError where the temporary folder has no room left.
-
-        `block`: (rows, columns), the rows; copied.
-        """
+        """Add a copy of `block`, (rows, columns). Raises RecordingError where the temporary folder is full."""
         length = self._length + len(block)
         if self._spool is None and length > self._limit_rows:
             self._start_spool()

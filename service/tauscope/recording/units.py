@@ -45,10 +45,7 @@ class Reading:
     is_usual: bool = False
 
     def for_robot(self, robot: Robot | None) -> "Reading":
-        """The same reading, with the units of the robot file where this one states none.
-
-        Raises RecordingError where a unit is not known, or the rate is missing.
-        """
+        """Fill in what the robot file states. Raises RecordingError for an unknown unit, or a missing rate."""
         layout = RecordingLayout() if robot is None else robot.recording
         columns = layout.columns if self.columns is None else self.columns
         preset = PRESET_OF[columns].units if isinstance(columns, str) else {}

@@ -77,10 +77,7 @@ class Conditioner:
 
     @staticmethod
     def survey(recording: Recording, robot: Robot) -> "Conditioner":
-        """Find the usable stretches of a recording, the noise of its positions and the best source of its motion.
-
-        Raises RecordingError where nothing in the recording is long enough to be used.
-        """
+        """Find stretches, noise and source of the motion. Raises RecordingError where no stretch is long enough."""
         timing = find_stretches(recording)
         spans = _spread_windows(timing.rows)
         step = encoder_step([recording.samples(*span).position for span in spans])
@@ -91,10 +88,7 @@ class Conditioner:
         return Conditioner(recording, robot, timing, noise, source)
 
     def as_one_motion(self, state_hz: Array | None) -> "Conditioner":
-        """The same recording with no period averaged: each repetition of a motion counts as the motion that it was.
-
-        `state_hz`: (n,), cut-off of the motion's own smoothing, joint by joint [Hz]; by the common band's where None.
-        """
+        """The same recording with no period averaged, smoothed at `state_hz`, (n,) [Hz]."""
         return replace(self, timing=replace(self.timing, runs=()), state_hz=state_hz)
 
     @property
@@ -125,12 +119,7 @@ class Conditioner:
                 yield self.recording.samples(first, min(first + WINDOW_ROWS, stop))
 
     def motions(self, cutoff_hz: float | None) -> Iterator[Motion]:
-        """The recording's motion, piece by piece, in one band.
-
-        Raises RecordingError where the band is so narrow that nothing of the recording is left.
-
-        `cutoff_hz`: cut-off of the band that torque and regressor share [Hz]; None for no filter.
-        """
+        """The motion, piece by piece, in one band. Raises RecordingError where the filters' edges take all of it."""
         found = False
         for rows in self.timing.rows:
             for motion in self._stretch_motions(rows, cutoff_hz):
@@ -144,10 +133,7 @@ class Conditioner:
             )
 
     def summary(self, cutoff_hz: float | None) -> ConditioningSummary:
-        """Counts of what was missing and what was averaged.
-
-        `cutoff_hz`: the band [Hz]; whether periods are averaged depends on it.
-        """
+        """What was missing, and what was averaged in this band."""
         missed, resampled = np.zeros(self.robot.joint_count, int), False
         for samples in self.usable_samples():
             missed += np.isnan(samples.effort, order="F").sum(axis=0)

@@ -72,11 +72,7 @@ class Trim:
 
     @staticmethod
     def design(rate_hz: float, cutoff_hz: float | None, state_hz: Array | None = None) -> "Trim":
-        """Band and margin for a cut-off.
-
-        `rate_hz`: sampling rate [Hz]; `cutoff_hz`: of the common band [Hz]; None for no filter; `state_hz`: (n,), of
-        the motion's own smoothing, joint by joint [Hz]; `state_cutoff` where None.
-        """
+        """Band and margin; `state_hz`: (n,), cut-off of the motion's own smoothing, `state_cutoff` where None."""
         margin = 2 * DIFFERENCE_MARGIN
         if cutoff_hz is None or cutoff_hz >= OPEN_BAND_FRACTION * rate_hz:
             return Trim(AllPass(rate_hz), None, rate_hz, margin)
@@ -100,18 +96,12 @@ class Trim:
 
 
 def state_cutoff(rate_hz: float, cutoff_hz: float | None) -> float:
-    """Cut-off of the motion's own smoothing for a given common band.
-
-    `rate_hz`: sampling rate [Hz]; `cutoff_hz`: of the common band [Hz]; None for no filter.
-    """
+    """Cut-off [Hz] of the motion's own smoothing for a given common band."""
     return rate_hz / 2.0 if cutoff_hz is None else min(STATE_BAND_RATIO * cutoff_hz, rate_hz / 2.0)
 
 
 def transient_motion(stretch: Stretch, trim: Trim, source: MotionSource) -> Motion | None:
-    """Smoothed and differentiated motion of a stretch, edges trimmed.
-
-    Returns Motion or None: None where the stretch is too short for one output of the band.
-    """
+    """Smoothed and differentiated motion of a stretch; None where it is too short for one output of the band."""
     rate, count = stretch.rate_hz, len(stretch.position)
     if not trim.outputs(count):
         return None
@@ -142,10 +132,7 @@ def transient_motion(stretch: Stretch, trim: Trim, source: MotionSource) -> Moti
 
 
 def average_motion(periods: Periods, cutoff_hz: float | None, source: MotionSource) -> Motion:
-    """One period for all: positions averaged, differentiated by their Fourier series, torques kept apart.
-
-    `cutoff_hz`: of the common band [Hz]; None for no filter.
-    """
+    """One period for all: positions averaged, differentiated by their Fourier series, torques kept apart."""
     rate, count = periods.rate_hz, periods.position.shape[1]
     cutoff = state_cutoff(rate, cutoff_hz)
     series = fourier_derivatives(periods.position.mean(axis=0), rate, cutoff, periods.advance)

@@ -145,10 +145,7 @@ def _quieter_bands(stretches: Sequence[Stretch], noise: PositionNoise) -> Array 
 
 @dataclass(frozen=True)
 class _Fit:
-    """A recorded signal as x_recorded = g x - d ẋ + offset, x by the positions, in their band.
-
-    `delay`, `delay_std`: d and its standard error [s].
-    """
+    """x_recorded = g x - d ẋ + offset, x by the positions, in their band."""
 
     gain: float
     gain_std: float
@@ -163,10 +160,7 @@ class _Fit:
     def solve(
         matrix: Array, target: Array, rate_hz: float, band_hz: float, offset: float | None = None
     ) -> "_Fit | None":
-        """Least squares; None where the motion tells nothing.
-
-        `matrix`: (N, 2), x and ẋ, and ones as a third column where the offset is not known; `target`: (N,).
-        """
+        """Least squares of `matrix` (N, 2 or 3), x, ẋ and ones; None where the motion tells nothing."""
         scale = np.sqrt(np.mean(matrix**2, axis=0))
         if not (scale > 0.0).all() or not target.any() or np.linalg.matrix_rank(matrix / scale) < matrix.shape[1]:
             return None

@@ -61,11 +61,7 @@ class Periods:
 
 
 def split_periods(stretch: Stretch, refine: bool = False) -> Periods | None:
-    """The complete repeated periods of a stretch.
-
-    Returns Periods or None: as many whole periods as the longest repeated part holds, counted from where it begins,
-    which may be anywhere in a period; None where it holds fewer than two.
-    """
+    """All whole periods of the longest repeated part, from wherever it begins; None where there are fewer than two."""
     if stretch.period is None or len(stretch.period) < 3:
         return None
     part = _longest_steady(stretch.period)
@@ -97,11 +93,7 @@ def _align(stretch: Stretch, first: int, length: float, count: int) -> Periods |
 
 
 def with_turns_removed(periods: Periods, joint_types: Sequence[JointType]) -> Periods | None:
-    """The periods with their joints' advance from one to the next known, and whole turns taken out of the positions.
-
-    Returns Periods or None: None where a joint ends a period elsewhere than it began: gravity then differs from period
-    to period.
-    """
+    """The periods without whole turns; None where a joint ends one elsewhere: gravity differs then."""
     steps = periods.count - 1
     centre = periods.position.mean(axis=1)
     advance = (centre[-1] - centre[0]) / steps
@@ -115,11 +107,9 @@ def with_turns_removed(periods: Periods, joint_types: Sequence[JointType]) -> Pe
 
 
 def repeats(periods: Periods, cutoff_hz: float, noise_density: Array) -> bool:
-    """Whether the motion is the same in every period.
+    """Whether the motion below a cut-off repeats so well that an average of its periods is a motion.
 
-    `cutoff_hz`: only what lies below matters [Hz].
     `noise_density`: (n,), one-sided spectral density of the positions' noise [rad²/Hz or m²/Hz].
-    Returns bool: False where tracking differs so much from period to period that an average would not be a motion.
     """
     samples = periods.position.shape[1]
     frequency = np.fft.rfftfreq(samples, 1.0 / periods.rate_hz)[:, None]
@@ -141,10 +131,8 @@ def fourier_derivatives(
     q̇ = Σ i ω_l c_l e^{i ω_l t},  q̈ = −Σ ω_l² c_l e^{i ω_l t}.
 
     `values`: (N, n), exactly one period of q [rad or m], or of a derivative of it.
-    `rate_hz`: sampling rate [Hz].
-    `cutoff_hz`: highest harmonic kept [Hz].
     `advance`: (n,), what a joint that turns on and on gains in one period: the series is that of q less this ramp.
-    Returns tuple of (N, n), q, q̇, q̈, or those that `orders` names.
+    Returns (N, n) arrays: q, q̇, q̈, or those that `orders` names.
     """
     count = len(values)
     ramp = np.zeros(values.shape[1]) if advance is None else advance

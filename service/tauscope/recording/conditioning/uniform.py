@@ -91,10 +91,9 @@ def read_stretch(recording: Recording, robot: Robot, start: int, stop: int, timi
 
 
 def uniform_grid(elapsed: Array, rate_hz: float) -> Grid | None:
-    """The uniform grid that the samples lie on, as far as their stamps can tell.
+    """The uniform grid of stamps `elapsed`, (N,) since the first; None where they lie off it.
 
-    `elapsed`: (N,), stamps relative to the first one [s]; `rate_hz`: nominal sampling rate [Hz]. Returns Grid or None:
-    None where the stamps deviate by more than `UNIFORM_TOLERANCE` and half of their own last digit.
+    They may deviate by `UNIFORM_TOLERANCE` and half of their own last digit.
     """
     tolerance = UNIFORM_TOLERANCE + 0.5 * _last_digit(elapsed) * rate_hz
     fits = [_fit_grid(index, elapsed, rate_hz) for index in _possible_indices(elapsed * rate_hz)]

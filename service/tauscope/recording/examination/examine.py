@@ -118,20 +118,14 @@ TRUST = "go on with --trust-units"
 
 
 def open_recording(path: str | Path, robot: Robot | None = None, reading: Reading = SI) -> Recording:
-    """Read a recording, convert its units, and examine it.
-
-    Raises RecordingError where the file cannot be read, a column can hardly be in its unit, or a joint has no effort.
-    """
+    """Read and examine a recording. Raises RecordingError where it cannot be read, or as `examine_recording`."""
     reading = reading.for_robot(robot)
     joints = None if robot is None else [joint.name for joint in robot.joints]
     return examine_recording(read_recording(path, None, joints, reading), robot, trust_units=reading.trust_units)
 
 
 def examine_recording(recording: Recording, robot: Robot | None = None, *, trust_units: bool = False) -> Recording:
-    """Examine a recording, and mend its samples; an examined one is returned as it is.
-
-    Raises RecordingError where a column can hardly be in its unit, or a joint has no effort.
-    """
+    """Mend samples, once. Raises RecordingError where a unit is implausible, or a joint has no effort."""
     if recording.is_examined:
         return recording
     missing = find_missing_effort(recording)
@@ -155,10 +149,7 @@ def examine_recording(recording: Recording, robot: Robot | None = None, *, trust
 
 
 def find_missing_effort(recording: Recording) -> str | None:
-    """The columns of effort that are NaN throughout, or zero at all joints, and what to do; None where there is none.
-
-    Position servos report zero for what they do not measure.
-    """
+    """Columns of effort that are NaN, or as of position servos zero, throughout, and what to do."""
     n, kind = recording.joint_count, recording.effort_kind.value
     seen, is_zero = np.zeros(n, dtype=bool), recording.effort_kind is not EffortKind.COMMAND
     for start in range(0, len(recording), BLOCK_ROWS):

@@ -112,10 +112,7 @@ def joint_types(recording: Recording, robot: Robot | None) -> list[JointType]:
 
 
 def percentile(values: Array, share: float) -> Array:
-    """Percentile of every column's finite values, (n,); 0 where there are none.
-
-    `values`: (N, n), columns; `share`: percentile, 0 to 100.
-    """
+    """Percentile of the finite `values` (N, n) of every column, (n,); 0 where there are none."""
     few = values[:: max(1, len(values) // RANKED_ROWS)]
     known = [column[np.isfinite(column)] for column in few.T]
     return np.array([float(np.percentile(column, share)) if len(column) else 0.0 for column in known])
@@ -227,11 +224,9 @@ def neighbour_windows(values: Array) -> Array:
 
 
 def distance_beyond(windows: Array) -> Array:
-    """Distance of the middle value of every window beyond the range of the others, (N,); 0 within it.
+    """Distance of the middle of `windows`, (N, 7), beyond the range of the others, (N,); 0 within it.
 
     The range leaves the highest and the lowest neighbour out, which may be a spike, too. A step lies within it.
-
-    `windows`: (N, 7), values and their neighbours.
     """
     values = windows[:, NEIGHBOURS]
     others = np.sort(np.delete(windows, NEIGHBOURS, axis=1), axis=1)

@@ -47,10 +47,7 @@ class JointDefects:
     wraps: list[tuple[int, float]] = field(default_factory=list)
 
     def position_edit(self, count: int, lost: Numbers) -> ColumnEdit:
-        """Edit of the position of a recording of `count` rows: jumps are relative to the longest piece.
-
-        `lost`: (m,) int64, further rows to be masked.
-        """
+        """Edit of a position of `count` rows, further rows `lost` (m,): jumps count from the longest piece."""
         where, offsets = NO_NUMBERS, np.empty(0)
         if self.jumps or self.wraps:
             where = np.unique([0, *(row for row, _ in (*self.jumps, *self.wraps))])
@@ -77,10 +74,7 @@ class Defects:
 
 
 def find_defects(recording: Recording, types: list[JointType]) -> Defects:
-    """Find a recording's defects in memory that grows with their number only.
-
-    `types`: of the joints: only revolute ones wrap.
-    """
+    """Find a recording's defects in memory that grows with their number only."""
     sketch = Sketch.of(recording)
     positions, efforts = measure_positions(sketch, types), measure_efforts(sketch)
     joints = [JointDefects(q.hold, tau.hold) for q, tau in zip(positions, efforts, strict=True)]
@@ -159,10 +153,7 @@ class _Scan:
 
 
 def _sum_jumps(jumps: list[tuple[int, float]], where: Numbers, count: int) -> Array:
-    """Offset from each of some rows on, (m,): the sum of the jumps up to there, 0 in the longest piece between them.
-
-    `where`: (m,) int64, rows, ascending.
-    """
+    """Sum of the jumps up to each row of `where`, (m,); 0 in the longest piece between them."""
     ordered = sorted(jumps)
     starts = np.array([0, *(row for row, _ in ordered)], dtype=np.int64)
     heights = np.cumsum([0.0, *(height for _, height in ordered)])

@@ -19,11 +19,7 @@ _EFFORTS = ("tau", "i")
 
 
 def rename_columns(header: Sequence[str], reading: Reading, file: str) -> list[str]:
-    """The header with the names of CONTRACT.md.
-
-    Raises RecordingError where the file has no column of a name that the mapping states. Raises RecordingMismatchError
-    where it names other joints than the robot, or numbers more of them.
-    """
+    """The header with the names of CONTRACT.md. Raises RecordingError for names or joints that it lacks."""
     columns = reading.columns
     if columns is None:
         return list(header)
