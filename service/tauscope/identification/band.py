@@ -55,10 +55,7 @@ SMOOTHING = np.sqrt(2.0)
 
 
 def choose_cutoff(conditioners: Sequence[Conditioner], robot: Robot, base: BaseParameters) -> float | None:
-    """Cut-off of the common band, chosen from the data.
-
-    Returns cut-off [Hz]; None where the positions are clean enough for no filter.
-    """
+    """Cut-off of the common band, chosen from the data [Hz]; None where the positions need no filter."""
     conditioners = [_beginning(conditioner) for conditioner in conditioners]
     quiet = quiet_limit(conditioners)
     if quiet is None:

@@ -56,11 +56,10 @@ def project_grids(
     noise_std: Array,
     slopes: list[Array],
 ) -> list[JointGrid]:
-    """Candidate columns of every joint, projected off the shared ones; one pass over the data.
+    """Candidate columns of every joint, projected off the `shared` ones, (z,) int; one pass over the data.
 
-    `shared`: (z,) int, its global columns that do not depend on any shape constant, ascending.
     `noise_std`: (n,), residual standard deviation of every joint, for the weights [Nm or N].
-    `slopes`: list of (g,), length n, every joint's candidates [s/rad or s/m].
+    `slopes`: (g,) a joint, its candidates [s/rad or s/m].
     """
     joints = range(structure.robot.joint_count)
     gram = [np.zeros((len(values) + 1, len(values) + 1)) for values in slopes]
@@ -360,12 +359,7 @@ def _with_stribeck(
 
 
 def gentle_range(k_v: float, speed: float) -> tuple[float, float]:
-    """Between which slopes a δ stands for a term of its own: gentler ones are viscous friction, steeper ones K_v's.
-
-    `k_v`: slope of the step at zero velocity [s/rad or s/m].
-    `speed`: the joint's rms velocity [rad/s or m/s].
-    Returns gentlest and steepest δ [s/rad or s/m].
-    """
+    """Gentlest and steepest δ that is a term of its own: others are viscous friction, or K_v's [s/rad or s/m]."""
     return STRAIGHT / speed, k_v / SEPARATION
 
 

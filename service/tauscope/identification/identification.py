@@ -32,10 +32,7 @@ from tauscope.robot import Robot
 
 
 def require_motion(conditioners: Sequence[Conditioner]) -> None:
-    """Refuse recordings in which no joint leaves the noise of its own encoder.
-
-    Raises IdentificationError, which names the recordings.
-    """
+    """Raise IdentificationError where no joint leaves the noise of its own encoder in any recording."""
     if not any(conditioner.moving.any() for conditioner in conditioners):
         names = ", ".join(conditioner.recording.name for conditioner in conditioners)
         raise IdentificationError(
@@ -50,10 +47,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Options:
-    """What a user may ask of an identification.
-
-    `cutoff_hz`: band that torque and regressor share [Hz]; None for no filter; chosen from the data by default.
-    """
+    """What a user may ask of an identification; `cutoff_hz` is chosen from the data, None for no filter."""
 
     estimator: Estimator = Estimator.WLS
     cutoff_hz: float | Literal["auto"] | None = "auto"
@@ -127,9 +121,8 @@ def identify(
 ) -> Identification:
     """Identify a robot arm from recordings.
 
-    Raises RecordingMismatchError where a recording has another number of joints than the robot. Raises RecordingError
-    where a recording is too short or too broken to be used. Raises IdentificationError where the recordings hold too
-    little for the parameters.
+    Raises RecordingMismatchError for another number of joints, RecordingError where a recording is too short or broken,
+    and IdentificationError where the recordings hold too little for the parameters.
     """
     _require_joints(robot, (*recordings, *held_out))
     progress("condition recordings")

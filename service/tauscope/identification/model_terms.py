@@ -51,10 +51,7 @@ def choose_model(
 
 
 def _doubt_friction_at_rest(motions: Dataset, structure: ModelStructure) -> None:
-    """Give rows at rest the variance that friction has there: it holds with any torque up to its breakaway torque.
-
-    What it holds with is estimated by a model that doubts these rows: one whose friction is anywhere up to breakaway.
-    """
+    """Give rows at rest the variance that friction has there: any torque up to breakaway, by such a model."""
     if not any(prepared.at_rest.any() for prepared in motions):
         return
     posterior = infer(structure, factorise(motions, structure))

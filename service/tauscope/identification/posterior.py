@@ -36,7 +36,6 @@ class Posterior:
 
     `weights`: (n,), 1/(σ_j √ρ_j), by which the joints' equations are multiplied.
     `factor`, `target`: (p, p), (p,), R and z of the data's weighted equations.
-    `mean`: (p,), of the posterior, before bodies and friction restrict it.
     `covariance`, `precision`: (p, p), S of the posterior, and P⁻¹ of the prior.
     """
 
@@ -67,10 +66,7 @@ def infer(
     ratios: Array | None = None,
     estimator: Estimator = Estimator.WLS,
 ) -> Posterior:
-    """The posterior of all parameters.
-
-    `ratios`: (n,) or None, ρ_j, long-run over white variance of each joint's residual; ones where it is not known.
-    """
+    """The posterior; `ratios`: (n,) or None, ρ_j, long-run over white variance of residuals, ones where not known."""
     full = FullParameters.of(structure)
     colour = np.ones(len(factors)) if ratios is None else np.sqrt(ratios)
     std = torque_rms(factors)  # from above: beside a noise of nothing every parameter looks determined
@@ -94,11 +90,7 @@ def infer(
 
 
 def _friction_doubt(structure: ModelStructure, deviation: Array, learnt: Array) -> Array:
-    """Deviation from the prior that coefficients of a kind show at the joints whose data determine them, (p,).
-
-    `deviation`: (p,), of the mean from the prior's, in its standard deviations.
-    `learnt`: (p,), share of the prior's variance that the data took away.
-    """
+    """Deviation from the prior that coefficients of a kind show at the joints whose data determine them, (p,)."""
     doubt = np.ones(structure.size)
     for name in FRICTION_COLUMNS:
         columns = [*structure.coefficients(name).values()]

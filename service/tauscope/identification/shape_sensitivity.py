@@ -30,10 +30,9 @@ STEPS = 10
 def columns_with_shapes(
     prepared: PreparedMotion, structure: ModelStructure, joint: int, parameters: Array, shapes: Sequence[ShapeParameter]
 ) -> tuple[Array, NDArray[np.intp]]:
-    """A joint's columns followed by those of its estimated shape constants.
+    """A joint's columns (k, M), those of its estimated shape constants last, and their global places (k,).
 
     `parameters`: (p,), the coefficients, for the amplitudes c.
-    Returns tuple of (k, M) and (k,) int, columns in the common band, and their global places.
     """
     columns = prepared.joint_columns(structure, joint)
     index = structure.joint_columns(joint)
@@ -60,11 +59,9 @@ def refine_structure(
     shapes: Sequence[ShapeParameter],
     speed: Array,
 ) -> ModelStructure:
-    """The structure with its estimated shape constants moved to the joint optimum, by Gauss–Newton steps.
+    """The structure with its estimated shape constants at the joint optimum, by Gauss–Newton steps.
 
-    `parameters`: (p,), its coefficients.
-    `weight`: (n,), 1/σ_j of every joint.
-    `speed`: (n,), rms velocity of every joint [rad/s or m/s].
+    `parameters`: (p,); `weight`: (n,), 1/σ_j; `speed`: (n,), rms velocity [rad/s or m/s].
     """
     start = structure
     for _ in range(STEPS):
@@ -85,10 +82,7 @@ def refine_structure(
 
 
 def pseudo_inverse(matrix: Array) -> Array:
-    """Inverse (p, p) of a normal matrix in scaled columns; directions without information are left out.
-
-    `matrix`: (p, p), symmetric, positive semidefinite.
-    """
+    """Inverse (p, p) of a symmetric normal matrix in scaled columns, directions without information left out."""
     scale = np.sqrt(np.diag(matrix))
     scale[scale == 0.0] = 1.0
     values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))

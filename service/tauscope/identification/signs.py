@@ -27,11 +27,7 @@ FELT = 1e-3  # gravity below this share of the masses' weight at one metre, per 
 
 
 def gravity_scale(motions: Dataset, structure: ModelStructure, parameters: Array) -> float | None:
-    """Least-squares factor between the estimated torque of gravity and that of the stated links.
-
-    `parameters`: (p,), the estimate.
-    Returns 1 where both agree; None where the file states no links, or gravity does not show.
-    """
+    """Factor from stated gravity to that of `parameters`, (p,), by least squares; None where none shows."""
     links = structure.robot.model.links
     if links is None:
         return None
@@ -63,10 +59,7 @@ def reversed_joints(
     posterior: Posterior,
     consistent: ConsistentParameters,
 ) -> tuple[int, ...]:
-    """Indices of the joints whose torque explains itself much better with the other sign.
-
-    `ratios`: (n,), ρ_j, long-run over white variance of each joint's residual.
-    """
+    """Joints whose torque explains itself much better with the other sign; `ratios`: (n,), ρ_j of residuals."""
     unexplained = (posterior.noise_std > UNEXPLAINED * torque_rms(factors)) & (ratios > COLOURED)
     if not (is_rejected(consistent) or unexplained.any()):
         return ()

@@ -14,11 +14,7 @@ GainUnit = Literal["register", "Nm_per_rad"]
 
 @dataclass(frozen=True)
 class Servo:
-    """Register conversion of a servo family.
-
-    `torque_per_volt`: stall torque over supply voltage in the data sheet [Nm/V]; None where the family has several
-        motors.
-    """
+    """Registers of a servo family; `torque_per_volt` at stall [Nm/V], None where it has several motors."""
 
     duty_per_rad: float  # duty of the bridge per unit of the P register and rad of position error [1/rad]
     max_duty: float = 1.0  # largest duty that the firmware gives, 0 to 1

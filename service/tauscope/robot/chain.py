@@ -98,11 +98,7 @@ def default_ends_note(label: str, kind: str, base: str, tip: str, joints: Sequen
 
 
 def rigid_branch_note(label: str, joints: Sequence[str], mass: float, following: Sequence[str] = ()) -> ResultWarning:
-    """Which joints beside the chain count as rigid, and what they carry.
-
-    `mass`: of all bodies that these joints move [kg]; `following`: those of them that would follow a joint of the
-    chain.
-    """
+    """Which joints beside the chain count as rigid, the `mass` that they move [kg], and who would follow it."""
     more = f" and {len(joints) - MOST_NAMES} more" if len(joints) > MOST_NAMES else ""
     names = ", ".join(map(shown, joints[:MOST_NAMES])) + more
     verbs = ("moves", "counts") if len(joints) == 1 else ("move", "count")

@@ -45,10 +45,7 @@ class RobotReport:
 
 
 def check_robot(path: Path | str, *, expands_xacro: bool = True) -> RobotReport:
-    """The report on a robot file, read as `read_robot` does; links that no body can be are among its findings.
-
-    Raises RobotFileError if the file or its URDF cannot be read or is not valid.
-    """
+    """Report on a robot file, impossible links included. Raises RobotFileError where it cannot be read."""
     robot = read_robot(path, expands_xacro=expands_xacro)
     rank = list(Severity)
     findings = sorted((*robot.findings, *_remarks(robot, str(path))), key=lambda finding: rank.index(finding.severity))

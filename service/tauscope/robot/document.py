@@ -220,10 +220,7 @@ class JointDocument(Document):
 
 
 class InertiaDocument(Document):
-    """The six entries of an inertia matrix about the link frame's origin.
-
-    `xx`, `yy`, `zz`, `xy`, `xz`, `yz`: entries [kg m²].
-    """
+    """The six entries of an inertia matrix about the link frame's origin [kg m²]."""
 
     xx: Number
     yy: Number
@@ -250,10 +247,7 @@ class FrictionDocument(Document):
 
 
 class ModelDocument(Document):
-    """What the user's simulation believes.
-
-    `rotor_inertia`: reflected to the joint, one a joint [kg m² or kg].
-    """
+    """What the user's simulation believes; `rotor_inertia` is reflected to the joint [kg m² or kg]."""
 
     links: list[LinkDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
     friction: list[FrictionDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)

@@ -33,10 +33,7 @@ def rotation_about_z(angle: float) -> Array:
 
 
 def rotation_of_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Array:
-    """The URDF's fixed-axis angles: R = Rz(yaw) Ry(pitch) Rx(roll), shape (3, 3).
-
-    `roll`: about x [rad]; `pitch`: about y [rad]; `yaw`: about z [rad].
-    """
+    """The URDF's fixed-axis angles [rad]: R = Rz(yaw) Ry(pitch) Rx(roll), shape (3, 3)."""
     return rotation_about_z(yaw) @ rotation_about_y(pitch) @ rotation_about_x(roll)
 
 
@@ -100,12 +97,9 @@ def _along_x(row: DenavitHartenbergRow) -> Placement:
 
 
 def link_placements(chain: Robot | Sequence[Segment], q: Array) -> Array:
-    """Every link frame seen from the base: T_j = T_{j-1} · before_j · motion_z(q_j) · after_j.
+    """Every link frame seen from the base, (N, m, 4, 4), by `q`, (N, n) [rad or m].
 
-    Raises RecordingMismatchError if `q` has not one column a joint.
-
-    `chain`: the arm, or its segments, base first; `q`: (N, n), joint position [rad or m]. Returns (N, m, 4, 4),
-    homogeneous transforms; [:, j] is link frame j + 1 in the base frame [m].
+    T_j = T_{j-1} · before_j · motion_z(q_j) · after_j. Raises RecordingMismatchError for another number of joints.
     """
     segments = chain.segments if isinstance(chain, Robot) else tuple(chain)
     position = np.asarray(q, dtype=np.float64)

@@ -28,10 +28,7 @@ def pseudo_inertia(link: LinkInertia) -> Array:
 
 
 def find_defect(link: LinkInertia, tolerance: float = ROUNDING) -> str | None:
-    """Why no rigid body has these parameters; None where a body can have them.
-
-    `tolerance`: violation that is allowed, relative to the largest entry of the inertia.
-    """
+    """Why no rigid body has these parameters, by more than a share of its largest inertia; None where one can."""
     offset = float(np.linalg.norm(link.first_moment))
     if link.mass < 0.0:
         return f"mass {link.mass:g} kg is negative"
@@ -91,10 +88,7 @@ def repair_text(stated: LinkInertia, body: LinkInertia) -> str | None:
 
 
 def about_centre(link: LinkInertia) -> Array:
-    """Inertia about the centre of mass: I_c = I - (hᵀh 1 - h hᵀ)/m, equation (5) reversed; I itself without mass.
-
-    Returns (3, 3), I_c [kg m²].
-    """
+    """Inertia about the centre of mass, (3, 3): I_c = I - (hᵀh 1 - h hᵀ)/m, (5) reversed; I without mass."""
     if link.mass == 0.0:
         return link.inertia
     moment = link.first_moment

@@ -50,10 +50,7 @@ class RecordingLayout:
 
 
 def find_fault(units: Mapping[str, str], rate_hz: float | None) -> tuple[str, str] | None:
-    """The column, or ``rate_hz``, whose unit cannot be used, and the reason; None where all can be.
-
-    `rate_hz`: samples a second [Hz].
-    """
+    """The column, or ``rate_hz``, whose unit cannot be used, and the reason; None where all can be."""
     for column, unit in units.items():
         match = _COLUMN.fullmatch(column)
         if match is None or (match[1] in ("t", "tau") and match[2]):

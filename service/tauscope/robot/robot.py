@@ -137,11 +137,7 @@ class LinkInertia:
 
 @dataclass(frozen=True, eq=False)
 class Repair:
-    """Stated inertial parameters that no body has, and the nearest body, which the model holds instead.
-
-    `link`: index of the link that the body belongs to, from 0.
-    `before`, `after`: of the body, in the frame of that link.
-    """
+    """Stated parameters that no body has, of a link from 0; `before`, `after` the nearest body, in its frame."""
 
     link: int
     place: str

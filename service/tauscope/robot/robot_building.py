@@ -62,11 +62,8 @@ def read_mjcf_chain(
 ) -> Chain:
     """The chain from body `base` to body `tip` of an MJCF; by default from the root to the deepest body.
 
-    Raises RobotFileError if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip. Raises
-    MissingExtraError where MuJoCo is not installed.
-
-    `path`: where the file lies, for the files that it names; None for text without files beside it; `locked`: position
-    of joints that do not move [rad or m].
+    Raises RobotFileError where MuJoCo refuses the file or no chain of hinges and slides leads there, MissingExtraError
+    without MuJoCo. `locked`: position of joints that do not move [rad or m].
     """
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         with require_extra(f"{label}: reading an MJCF"):
@@ -110,10 +107,7 @@ class _Kinematics:
 
 
 def build_robot(document: RobotDocument, origin: DocumentOrigin, file_source: FileSource) -> Robot:
-    """The robot of a document; a link of its model that no body can be is replaced by the nearest body.
-
-    Raises RobotFileError if parts of the document do not fit each other, or the URDF is not valid.
-    """
+    """The robot of a document, impossible links replaced by the nearest body. Raises RobotFileError."""
     kinematics = _kinematics(document, origin, file_source)
     chain = kinematics.chain
     findings: list[Finding] = [*(chain.findings if chain else ())]

@@ -15,11 +15,7 @@ ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def inertia_about_frame(mass: float, centre: Placement, inertia: np.ndarray) -> LinkInertia:
-    """Inertial parameters about a link frame, equation (5): I' = R I Rᵀ + m (sᵀs 1 - s sᵀ).
-
-    `mass`: m [kg]; `centre`: the centre-of-mass frame seen from the link frame: R and s [m]; `inertia`: (3, 3), I about
-    the centre of mass, in the centre-of-mass frame [kg m²].
-    """
+    """Parameters about a link frame, (5): I' = R I Rᵀ + m (sᵀs 1 - s sᵀ); `inertia`: (3, 3) [kg m²]."""
     s, rotation = centre.translation, centre.rotation
     shifted = rotation @ inertia @ rotation.T + mass * (s @ s * np.eye(3) - np.outer(s, s))
     return LinkInertia(mass, mass * s, 0.5 * (shifted + shifted.T))
@@ -28,12 +24,9 @@ def inertia_about_frame(mass: float, centre: Placement, inertia: np.ndarray) -> 
 def lumped_inertia(
     label: str, link: int, bodies: Iterable[tuple[Element, Placement]], findings: list[Finding]
 ) -> tuple[LinkInertia | None, list[Repair]]:
-    """Sum of the inertials of the bodies that move with one link, or None where none of them has an `<inertial>`.
+    """Sum of the inertials of bodies that move with link `link`, each at its placement; None where none has any.
 
     Raises RobotFileError if an `<inertial>` is incomplete or not made of numbers.
-
-    `link`: index of the link, from 0; `bodies`: iterable of (Element, Placement), link elements, with the placement of
-    each in the frame of the link that they move with.
     """
     vectors, repairs = [], []
     for body, placement in bodies:

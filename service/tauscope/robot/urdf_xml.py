@@ -34,10 +34,7 @@ class UrdfTree:
 
 
 def parse_urdf(data: bytes, label: str, findings: list[Finding]) -> UrdfTree:
-    """Links and joints of URDF text.
-
-    Raises RobotFileError if the text is not well-formed, holds a DOCTYPE, or its links and joints are no forest.
-    """
+    """Links and joints of URDF text. Raises RobotFileError for a DOCTYPE, text that is no XML, or no forest."""
     root = parse_xml(data, label, findings)
     _refuse_xacro(root, label, findings)
     if local_name(root) != "robot":

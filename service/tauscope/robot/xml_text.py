@@ -33,11 +33,7 @@ def is_xml(data: bytes) -> bool:
 
 
 def parse_xml(data: bytes, label: str, findings: list[Finding]) -> Element:
-    """The root element.
-
-    Raises RobotFileError if the text is not well-formed or holds a DOCTYPE, which is refused before entities can be
-    expanded.
-    """
+    """The root element. Raises RobotFileError where it is not well-formed, or holds a DOCTYPE with its entities."""
     text = decode_xml(data, label, findings)
     doctype = text.find("<!DOCTYPE")
     if doctype >= 0:
@@ -68,10 +64,7 @@ def parse_xml(data: bytes, label: str, findings: list[Finding]) -> Element:
 
 
 def decode_xml(data: bytes, label: str, findings: list[Finding]) -> str:
-    """Text of a file by its byte order mark, as UTF-8, as its declaration says, or else as Latin-1, with a finding.
-
-    Raises RobotFileError if the bytes are no text.
-    """
+    """Text by byte order mark, as UTF-8, by its declaration, or as Latin-1 with a finding. Raises RobotFileError."""
     declared = _DECLARATION.match(data[:200])
     marked = _marked_encoding(data)
     stated = None if declared is None else declared[1].decode("ascii")

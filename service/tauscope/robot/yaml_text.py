@@ -59,10 +59,7 @@ class _BoundedComposer(Composer):
 
 
 def read_yaml(text: str, label: str) -> YamlContent:
-    """Plain data of one YAML document.
-
-    Raises RobotFileError if the text is not one well-formed YAML document of plain data.
-    """
+    """Plain data of one YAML document. Raises RobotFileError where it is not one, well-formed."""
     root = _compose(text, label)
     if root is None:
         raise RobotFileError(f"{label}: the file holds no entries")

@@ -54,14 +54,12 @@ def nearest_consistent_parameters(
 ) -> ConsistentParameters:
     """Nearest x to a weighted least-squares estimate such that every link can exist and G x ≤ h.
 
-    min ‖R x - z‖² + ‖W (x - μ)‖², pseudo-inertia ⪰ ε, G x ≤ h; see the module for ε. The program
-    is convex: there is one answer, and `duality_gap` certifies it. Raises IdentificationError where R or z is not
-    finite, where the inequalities contradict each other or leave no link that can exist, or where the solver does not
-    reach the accuracy that is asked for.
+    min ‖R x - z‖² + ‖W (x - μ)‖², pseudo-inertia ⪰ ε, G x ≤ h; see the module for ε. The program is convex: there is
+    one answer, certified by `duality_gap`. Raises IdentificationError where R or z is not finite, the inequalities
+    contradict each other, or the solver does not reach the accuracy that is asked for.
 
-    `factor`: (r, p), R, any factor of the weighted normal matrix RᵀR, whitened: a unit of R x is one standard deviation
-    of the noise. Columns: ten standard parameters for each link, then friction coefficients. Rank may be deficient.
-    `target`: (r,), z.
+    `factor`: (r, p), R, whitened: a unit of R x is one standard deviation of the noise; of any rank. Columns: ten
+    standard parameters for each link, then friction coefficients. `target`: (r,), z.
     """
     inequalities = inequalities or LinearInequalities.none(prior.mean.size)
     _check_input(factor, target, prior, inequalities)
