@@ -69,10 +69,7 @@ def make_efforts(
 
 
 def require_loops(robot: Robot, recording: Recording) -> None:
-    """Refuse a robot without loops, or without the supply of one.
-
-    Raises RecordingError naming the joint and the key.
-    """
+    """Raise RecordingError, which names joint and key, where a loop is missing, or its supply."""
     for number, joint in enumerate(robot.joints, 1):
         loop = joint.actuator
         if loop is None or not loop.has_loop:

@@ -32,14 +32,9 @@ class Delay:
 
 
 def shift_command(time: Array, command: Array, delay: float, rate_hz: float | None, at: Array) -> Array:
-    """Command in force: late by a delay, and held from one update of the loop to the next.
+    """`command`, (N,), at `at`, (M,), late by a delay and held from one update of the loop to the next.
 
-    `time`: (N,), of the recorded commands [s].
-    `command`: (N,) [rad or m].
-    `delay`: [s].
-    `rate_hz`: updates a second; None: with every sample.
-    `at`: (M,), instants that are asked for [s].
-    Returns (M,) [rad or m].
+    `time`: (N,), of the recorded commands [s]; without `rate_hz` there is an update with every sample.
     """
     since = at if rate_hz is None else time[0] + np.floor((at - time[0]) * rate_hz + 1e-9) / rate_hz
     known = np.isfinite(command)

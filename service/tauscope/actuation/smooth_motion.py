@@ -59,10 +59,7 @@ class SmoothMotion:
         return 2.0 * self.band / self.rate
 
     def onto(self, values: Array) -> Array:
-        """Values of the recording on the grid.
-
-        `values`: (M,), one a row of the recording; NaN where it was missed. Returns (N,).
-        """
+        """`values`, (M,), one a row of the recording, NaN where missed, on the grid, (N,)."""
         return _onto(self.samples.time, values, self.time)
 
     def moves(self, joint: int) -> NDArray[np.bool_]:
@@ -77,10 +74,7 @@ class SmoothMotion:
         return moving
 
     def reduce(self, columns: Array, joint: int) -> Array:
-        """Columns with those of a joint's friction and constant beside them, in the band, where the joint moves.
-
-        `columns`: (N, k), torque by coefficient. Returns (M, k + 3).
-        """
+        """`columns`, (N, k), and a joint's friction and constant, in the band, where it moves: (M, k + 3)."""
         speed = self.velocity[:, joint]
         whole = np.column_stack([columns, speed, np.sign(speed), np.ones(len(speed))])
         return smooth(whole, self.rate, self.band)[self.moves(joint)]

@@ -24,10 +24,7 @@ def compensation_code(
     version: str,
     effort_kind: EffortKind,
 ) -> str:
-    """Source code that gives the torque of friction and of the found effects.
-
-    Raises ExportError for another suffix, or coefficients that no controller can use.
-    """
+    """Source code of the torque of friction and found effects. Raises ExportError for another suffix."""
     origin = Origin(tuple(sources), effort_kind, created, version=version)
     return source_code(of_extended_model(diagnosis.selection.fit.model, (), origin), suffix)
 

@@ -69,12 +69,9 @@ SUFFIXES = {
 
 
 def make_export(export_format: ExportFormat, model: ExportModel, choice: ActuatorChoice | None = None) -> bytes:
-    """The content of an export.
+    """The content of an export. Raises ExportError if the format cannot hold this model.
 
     Controllers get the delivered friction; simulators the physically consistent links with the friction that fits them.
-    Raises ExportError if the format cannot hold this model.
-
-    `choice`: actuators of an MJCF; None writes torque motors.
     """
     match export_format:
         case ExportFormat.JSON:

@@ -76,10 +76,7 @@ def to_mjcf(model: ExportModel, choice: ActuatorChoice = MOTORS) -> MjcfModel:
 
 
 def passive_elements(joint: int, extras: JointExtras, names: list[str]) -> list[str]:
-    """Passive torques of a joint, which have no control input and whose motor is switched off.
-
-    `names`: of the joints, as quoted attribute values.
-    """
+    """Passive torques of a joint, by its quoted name; no control input, and its motor is switched off."""
     return [
         f'<dcmotor joint={names[joint]} resistance="1.0" motorconst="0.0 0.0" input="none" {each}/>'
         for each in extras.passive

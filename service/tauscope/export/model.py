@@ -58,11 +58,7 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class ExportModel:
-    """Bodies that can exist, friction for simulators and for controllers, and findings.
-
-    `links`: one a segment.
-    `friction`, `delivered_friction`: one a joint: beside these bodies, and as delivered.
-    """
+    """Bodies that can exist, one a segment, friction beside them and as delivered, one a joint, and findings."""
 
     robot: Robot
     links: tuple[LinkInertia, ...]
@@ -79,10 +75,7 @@ class ExportModel:
 
     @property
     def compensation(self) -> CompensationModel:
-        """Friction as delivered, for controllers.
-
-        Raises ExportError if a coefficient is not usable, or the drive's units contradict each other.
-        """
+        """Friction as delivered, for controllers. Raises ExportError for coefficients or units without meaning."""
         joints = tuple(
             JointCompensation(joint.name, joint.type, friction, drive_units(joint, self.origin.effort_kind))
             for joint, friction in zip(self.robot.joints, self.delivered_friction, strict=True)

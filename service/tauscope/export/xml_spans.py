@@ -47,10 +47,7 @@ class Edit:
 
 
 class XmlText:
-    """The bytes of an XML file, its elements, and the edits that are to be made.
-
-    Raises ExportError if the file is not well-formed XML in UTF-8, or declares a DOCTYPE.
-    """
+    """The bytes of an XML file, and edits to be made. Raises ExportError unless it is sound UTF-8 without DOCTYPE."""
 
     def __init__(self, data: bytes, label: str) -> None:
         self.data = data

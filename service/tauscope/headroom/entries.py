@@ -76,13 +76,7 @@ REFUTES_FROM = 0.05
 
 
 def require_black_box(held_out: int) -> None:
-    """Check that headroom can be measured, before anything else is.
-
-    Raises MissingExtraError where scikit-learn is not installed. Raises IdentificationError where no recording is held
-    out.
-
-    `held_out`: number of held-out recordings.
-    """
+    """Raise MissingExtraError without scikit-learn, and IdentificationError without a held-out recording."""
     with require_extra("tauscope diagnose --headroom"):
         import sklearn  # noqa: F401
     if not held_out:
@@ -90,11 +84,7 @@ def require_black_box(held_out: int) -> None:
 
 
 def measure_headroom(diagnosis: Diagnosis) -> list[HeadroomEntry]:
-    """What a black box of the same training motion predicts of held-out motion, joint by joint.
-
-    Raises MissingExtraError where scikit-learn is not installed. Raises IdentificationError where no recording is held
-    out.
-    """
+    """What a black box of the same motion predicts of held-out motion, joint by joint; raises as above."""
     training, held_out = motion_rows(diagnosis)
     require_black_box(len(held_out))
     # One after another: scikit-learn's own use of warnings.catch_warnings allows no two threads.

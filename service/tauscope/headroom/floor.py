@@ -131,10 +131,7 @@ def noise_between_periods(observations: Observations, model: ExtendedModel) -> A
 
 
 def noise_above_band(observations: Observations, model: ExtendedModel, cutoff_hz: float) -> Array:
-    """Rms in the band of white noise of the density above it, (n,) [Nm or N]; NaN where the band is open.
-
-    `cutoff_hz`: of the band [Hz].
-    """
+    """Rms in the band of white noise of the density above it, (n,) [Nm or N]; NaN where the band is open."""
     joints = observations.robot.joint_count
     power, weight = np.zeros(joints), 0.0
     for piece in observations:

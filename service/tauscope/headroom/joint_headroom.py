@@ -35,10 +35,7 @@ class Choice:
     members: tuple[Member, ...] = ()
 
     def predict(self, inputs: Inputs, target: Array, judged: Inputs) -> Array:
-        """Learn from all training rows, and predict others, (J,).
-
-        `target`: (R,), what is to be predicted of the training rows [Nm or N].
-        """
+        """Learn `target`, (R,) [Nm or N], from all training rows, and predict others, (J,)."""
         total = np.zeros(len(judged.columns))
         for each in self.members:
             total += each.weight * each.learner.predict(inputs, target, judged)[each.size]
@@ -132,8 +129,6 @@ def joint_headroom(training: Sequence[MotionRows], held_out: Sequence[MotionRows
     """Train black boxes on the training motion, and judge the chosen one once on held-out motion.
 
     They start from the model with all findings: from the nominal model they would have to learn those again.
-
-    `joint`: index, from 0.
     """
     known, asked = _rows(training, joint), _rows(held_out, joint)
     plain, explained = (_residual(held_out, model, joint) for model in ("plain", "explained"))
@@ -148,11 +143,7 @@ def joint_headroom(training: Sequence[MotionRows], held_out: Sequence[MotionRows
 
 
 def compare_residuals(plain: Array, explained: Array, left: Array, blocks: NDArray[np.intp]) -> JointHeadroom:
-    """Rms of each, and how much less is left than by the explained model.
-
-    `plain`, `explained`, `left`: (R,), residuals of both models and of the black box [Nm or N]; `blocks`: (R,) int,
-    number of every row's block.
-    """
+    """Rms of `plain`, `explained`, `left`, (R,), and how much less is left than explained, by `blocks`, (R,)."""
     energy = max(float(explained @ explained), np.finfo(float).tiny)
     _, place = np.unique(blocks, return_inverse=True)
     gains = np.bincount(place, explained**2 - left**2) if len(place) else np.zeros(0)

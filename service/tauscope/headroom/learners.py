@@ -30,11 +30,7 @@ class Learner(Protocol):
     """A black box of one kind."""
 
     def predict(self, inputs: Inputs, target: Array, judged: Inputs) -> Mapping[float, Array]:
-        """Learn from some rows and predict others, by size of the black box.
-
-        `target`: (R,), what is to be predicted of the rows that are learned from [Nm or N]. Returns mapping of float to
-        (J,), predictions for the judged rows [Nm or N].
-        """
+        """Learn `target`, (R,), of some rows and predict others, (J,), by size of the black box [Nm or N]."""
         ...
 
 
@@ -45,11 +41,7 @@ class BoostedTrees:
     leaves: int
 
     def predict(self, inputs: Inputs, target: Array, judged: Inputs) -> Mapping[float, Array]:
-        """By number of trees.
-
-        `target`: (R,), what is to be predicted of the rows that are learned from [Nm or N]. Returns mapping of float to
-        (J,), predictions for the judged rows [Nm or N].
-        """
+        """By number of trees; `target`: (R,), predictions (J,) [Nm or N]."""
         from sklearn.ensemble import HistGradientBoostingRegressor
 
         model = HistGradientBoostingRegressor(
@@ -76,11 +68,7 @@ class KernelRidge:
     own_joint: bool
 
     def predict(self, inputs: Inputs, target: Array, judged: Inputs) -> Mapping[float, Array]:
-        """By ridge weight.
-
-        `target`: (R,), what is to be predicted of the rows that are learned from [Nm or N]. Returns mapping of float to
-        (J,), predictions for the judged rows [Nm or N].
-        """
+        """By ridge weight; `target`: (R,), predictions (J,) [Nm or N]."""
         from sklearn.kernel_approximation import Nystroem
 
         count = inputs.own if self.own_joint else inputs.columns.shape[1]

@@ -44,12 +44,7 @@ class Inputs:
 
 
 def joint_inputs(motion: MotionRows, joint: int) -> Inputs:
-    """Columns of one joint's black box, a row each: q, q̇, q̈, load, and q̇, q̈ one row earlier and later, of all joints.
-
-    And the travel of the joint since its last reversal.
-
-    `joint`: index, from 0.
-    """
+    """Rows of a black box: q, q̇, q̈, load, also one row earlier and later, of all joints, and travel."""
     order = [joint, *(other for other in range(len(motion.position)) if other != joint)]
     now = (motion.position, motion.velocity, motion.acceleration, motion.load)
     beside = [shifted(values, step) for values in now[1:3] for step in (-1, 1)]
@@ -65,10 +60,7 @@ def shifted(values: Array, step: int) -> Array:
 
 
 def travel_since_reversal(position: Array, velocity: Array) -> Array:
-    """Way since the velocity last changed its sign, with that sign, (M,) [rad or m].
-
-    `position`, `velocity`: (M,), of one joint.
-    """
+    """Way since `velocity`, (M,), last changed its sign, with that sign, (M,); `position`: (M,)."""
     turns = np.flatnonzero(np.diff(np.signbit(velocity), prepend=np.signbit(velocity[:1])))
     last = np.searchsorted(turns, np.arange(len(position)), side="right")
     return position - position[np.append(0, turns)[last]]

@@ -21,11 +21,9 @@ from tauscope.strict_model import ResultModel
 
 
 def envelope_indices(values: Array, most: int) -> NDArray[np.intp]:
-    """Samples that keep a curve's look: the least and the greatest of each of most/2 equal buckets, in order of time.
+    """Samples, increasing (M,), that keep the look of `values`, (N,): least and greatest of each of most/2 buckets.
 
-    No peak is lost. NaN are passed over, but a bucket that holds nothing else keeps one of them, so that the gap shows.
-
-    `values`: (N,), the curve. Returns (M,) intp, increasing indices, M ≤ max(most, 2).
+    No peak is lost, and of a bucket that is all NaN one is kept, so that the gap shows.
     """
     count = len(values)
     if count <= most:

@@ -243,10 +243,7 @@ FRICTION_ROW_INCHES = 2.25
 def friction_figure(
     name: str, curves: Sequence[FrictionCurve], titles: Sequence[str], units: Sequence[tuple[str, str]]
 ) -> Markup:
-    """Draw the friction of every joint over velocity.
-
-    `units`: sequence of (str, str), units of velocity and of torque, one pair a joint.
-    """
+    """Draw the friction of every joint over velocity; `units` of velocity and torque, one pair a joint."""
     columns = min(COLUMNS, max(len(curves), 2))
     rows = math.ceil(len(curves) / columns)
 
@@ -345,10 +342,7 @@ ENLARGED_SHARE = 0.1  # part of the time that is enlarged: where the residual's 
 
 
 def torque_figure(name: str, series: TorqueSeries, joint: int, noise_std: float, unit: str) -> Markup:
-    """Draw one joint's torque and residual, whole and enlarged where they differ most.
-
-    `joint`: joint index, from 0; `noise_std`: σ of the sensor noise [Nm or N].
-    """
+    """Draw one joint's torque and residual, whole and enlarged where they differ most."""
     enlarged = worst_part(series.residual[:, joint], ENLARGED_SHARE)
 
     def draw(figure: Figure) -> None:
@@ -384,10 +378,7 @@ def torque_columns(series: TorqueSeries, joint: int) -> dict[str, list[float]]:
 
 
 def worst_part(residual: Array, share: float) -> slice:
-    """The stretch of this share of a residual whose mean square is greatest.
-
-    `residual`: (N,), NaN where nothing was measured.
-    """
+    """The stretch of this share of `residual`, (N,), NaN where missed, whose mean square is greatest."""
     length = min(max(int(len(residual) * share), 2), len(residual))
     total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(residual) ** 2)])
     start = int(np.argmax(total[length:] - total[:-length]))

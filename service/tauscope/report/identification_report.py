@@ -29,10 +29,7 @@ def identification_report(
     held_out: Sequence[Recording],
     provenance: Provenance,
 ) -> str:
-    """A self-contained HTML page on an identification.
-
-    Raises RecordingError where a recording cannot be conditioned again.
-    """
+    """A self-contained HTML page. Raises RecordingError where a recording cannot be conditioned again."""
     result = document(identification)
     train = [torque_series(identification, recording) for recording in recordings[:MOST_SERIES]]
     judged = [torque_series(identification, recording) for recording in held_out[:1]]

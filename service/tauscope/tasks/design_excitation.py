@@ -124,10 +124,7 @@ class Result:
 
 
 def perform(request: Request, files: Files, progress: Progress) -> Result:
-    """Read the robot and design its motion.
-
-    Raises TauscopeError where the robot file is not valid, or no motion keeps the limits.
-    """
+    """Read the robot and design its motion. Raises TauscopeError where no motion keeps the limits."""
     progress("read robot")
     robot = read_robot(files.find("robot", request.robot))
     progress("design the motion")

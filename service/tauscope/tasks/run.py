@@ -110,10 +110,7 @@ def start(
     sim_socket: Path | None = None,
     beats_by_itself: bool = True,
 ) -> RunProcess:
-    """Start the control process of a run.
-
-    Raises RobotFileError if the robot file is not valid. Raises AcquisitionError if the process cannot be started.
-    """
+    """Start the control process. Raises RobotFileError for the robot file, AcquisitionError for the process."""
     robot_file, backend = files.find("robot", request.robot), request.backend
     settings: dict[str, Any] = {
         "time": backend.time,

@@ -157,10 +157,7 @@ class Files:
 
 
 class Outputs(Mapping[str, bytes]):
-    """Files that a task can write, by name; each is made when it is asked for.
-
-    Asking raises ExportError where a format cannot hold the model.
-    """
+    """Files that a task can write, by name, each made when asked for; ExportError where a format is too poor."""
 
     def __init__(self, make: Mapping[str, Callable[[], str | bytes]]) -> None:
         self._make = make
