@@ -108,10 +108,7 @@ def _invert(mass: Array) -> Array:
 
 
 def _brake(inverse: Array, velocity: Array, most: Array) -> Array:
-    """Velocity after dry friction, which stops a joint and never turns it round, (n, S, V).
-
-    `most`: (n, S, V), largest impulse of friction [Nm s or N s].
-    """
+    """Velocity after an impulse of dry friction of at `most`, (n, S, V), which never turns a joint round."""
     impulse, out = np.zeros_like(velocity), velocity.copy()
     for _ in range(SWEEPS if len(velocity) > 1 else 1):
         for joint in range(len(velocity)):

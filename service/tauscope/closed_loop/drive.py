@@ -24,11 +24,7 @@ STATE_BAND_HZ = 15.0
 
 @dataclass(frozen=True, eq=False)
 class RecordedMotion:
-    """A recording on the steps of a rollout.
-
-    `time`: (K,), of the steps [s].
-    `position`, `velocity`: (K, n), of the real arm [rad or m, rad/s or m/s].
-    """
+    """A recording on the steps of a rollout, `time` (K,) [s]; `position`, `velocity`: (K, n) of the real arm."""
 
     name: str
     time: Array
@@ -70,10 +66,7 @@ class LoopDrive:
     is_closed = True
 
     def __init__(self, loops: Sequence[Actuator], recording: Recording, time: Array, *, is_damped: bool) -> None:
-        """Put the commands, supplies and gains on the steps.
-
-        `is_damped`: whether torque includes the loops' damping; where not, the plant has it.
-        """
+        """Put commands, supplies and gains on the steps; the plant has the loops' damping unless `is_damped`."""
         self._damped = 1.0 if is_damped else 0.0
         samples = recording.samples()
         reference = samples.reference if samples.reference is not None else samples.effort
@@ -142,11 +135,9 @@ LOST = 1e3  # position error beyond which the simulated arm is lost and held the
 def simulate_motion(
     model: RolloutModel, plant: Plant, drive: Drive, motion: RecordedMotion, horizon_s: float | None
 ) -> Array:
-    """Positions of the simulated arm at the rows of the recording, (N, n) [rad or m].
+    """Positions of the simulated arm at the rows of the recording, (N, n), restarted at every horizon.
 
     Raises TauscopeError where the recording holds no torque for a joint.
-
-    `horizon_s`: time between restarts at the real state [s]; None starts once.
     """
     steps = len(motion.time)
     every = steps if horizon_s is None else max(round(horizon_s / STEP_S), 1)

@@ -28,11 +28,7 @@ class LoadFriction:
     braking: Array  # (n,) or (n, 1, V), μ_b [1]
 
     def level(self, load: Array, direction: Array) -> Array:
-        """Level of dry friction.
-
-        `load`: (n,) or (n, S, V), torque of the rigid body [Nm or N]; `direction`: (n,) or (n, S, V), sign of the
-        motion. Returns (n,) or (n, S, V) [Nm or N].
-        """
+        """Level of dry friction at `load` [Nm or N] for the sign `direction`; all (n,) or (n, S, V)."""
         size = np.abs(load)
         return np.where(direction * load > 0.0, self.driving * size, self.braking) * size
 
@@ -88,10 +84,10 @@ class JointLaws:
         )
 
     def __call__(self, position: Array, velocity: Array, load: Array, drive: Array) -> tuple[Array, Array]:
-        """Levels of dry friction, and torque against the motion beside them.
+        """Levels of dry friction, and torque against the motion beside them, (n,) each [Nm or N].
 
-        `position`, `velocity`: (n,), q, q̇; `load`: (n,), torque of the rigid body [Nm or N]; `drive`: (n,), torque of
-        the drive, which gives a resting joint its direction [Nm or N]. Returns (n,), (n,) [Nm or N].
+        `position`, `velocity`: (n,), q, q̇; `load`: (n,), torque of the rigid body; `drive`: (n,), torque of the drive,
+        which gives a resting joint its direction [Nm or N].
         """
         level = self._stiction + self._stribeck * smooth_sign(np.abs(velocity), self._delta)
         torque = self._offset.copy()

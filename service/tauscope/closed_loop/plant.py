@@ -49,12 +49,9 @@ class PlantMaker(Protocol):
 
 
 def make_plant(mjcf: str, joints: Sequence[str], damping: Array) -> Plant:
-    """The plant of an MJCF.
+    """The plant of an MJCF; `damping`: (n,), torque per velocity of the loops, integrated implicitly.
 
-    Raises MissingExtraError where MuJoCo is not installed. Raises TauscopeError where no simulator is registered.
-
-    `damping`: (n,), torque per velocity of the loops, which MuJoCo integrates implicitly as it does an actuator's kv
-    [Nm s/rad or N s/m].
+    Raises MissingExtraError without MuJoCo, and TauscopeError where no simulator is registered.
     """
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         with require_extra("tauscope rollout"):

@@ -262,11 +262,7 @@ MOVES = 0.05  # share of its top speed above which a joint moves: below it, it m
 
 
 def _lag(time: Array, measured: Array, simulated: Array) -> Array:
-    """Delay of the real motion behind the simulated one, (n,) [s]: that at which both differ least.
-
-    `time`: (N,) [s]; `measured`, `simulated`: (N, n), q of the real and of the simulated arm [rad or m]; NaN where it
-    was missed.
-    """
+    """Delay of the real motion behind the simulated one, (n,) [s]: that at which both differ least."""
     step = float(np.median(np.diff(time)))
     reach = int(LONGEST_LAG_S / step)
     found = np.zeros(measured.shape[1])
@@ -288,13 +284,7 @@ def _lag(time: Array, measured: Array, simulated: Array) -> Array:
 
 
 def _reversal_error(rows: Array, measured: Array, simulated: Array, time: Array, velocity: Array) -> Array:
-    """Rms of the position error within `REVERSAL_S` of a reversal of the real joint, (n,) [rad or m]; NaN without one.
-
-    `rows`: (N,), instants of both positions [s].
-    `measured`, `simulated`: (N, n), q of the real and of the simulated arm [rad or m]; NaN where it was missed.
-    `time`: (K,), instants of the velocity [s].
-    `velocity`: (K, n), of the real arm [rad/s or m/s].
-    """
+    """Rms position error within `REVERSAL_S` of a reversal of the real joint, (n,) [rad or m]; NaN without one."""
     found = np.full(measured.shape[1], np.nan)
     for joint, speed in enumerate(velocity.T):
         moving = np.flatnonzero(np.abs(speed) > MOVES * np.abs(speed).max())

@@ -68,26 +68,17 @@ class BaseParameters:
     first_links: tuple[int, ...]  # first link that each joint moves, from 0
 
     def is_independent(self, index: int) -> bool:
-        """Whether a base parameter is one standard parameter alone: its row of B is zero.
-
-        `index`: base parameter, from 0.
-        """
+        """Whether base parameter `index` is one standard parameter alone: its row of B is zero."""
         return not np.any(self.combination[index])
 
     def outward(self, joint: int) -> slice:
-        """Base parameters of the links that a joint moves: from its own link's first one to the last of all.
-
-        `joint`: joint index, from 0.
-        """
+        """Base parameters of the links that a joint moves: from its own link's first one to the last of all."""
         return slice(
             int(np.searchsorted(self.independent_columns, len(STANDARD_PARAMETERS) * self.first_links[joint])), None
         )
 
     def project(self, parameters: Array) -> Array:
-        """Values of the base parameters, Θ* = Θ_L + B Θ_K, equation (14).
-
-        `parameters`: (10 n,), Θ, ten standard parameters a link. Returns (m,), Θ*.
-        """
+        """Base parameters Θ* = Θ_L + B Θ_K, (m,), equation (14), of `parameters`, (10 n,)."""
         return parameters[self.independent_columns] + self.combination @ parameters[self.dependent_columns]
 
 

@@ -71,11 +71,7 @@ class ChainMotion:
         self._products = aligned_empty(3, capacity)
 
     def links(self, q: Array, qd: Array, qdd: Array) -> Iterator[LinkMotion]:
-        """Motion of link 1, 2, … n in turn.
-
-        `q`: (n, N), joint position [rad or m], a contiguous row a joint; `qd`: (n, N), joint velocity; `qdd`: (n, N),
-        joint acceleration.
-        """
+        """Motion of link 1, 2, … n in turn; `q`, `qd`, `qdd`: (n, N), a contiguous row a joint."""
         moving = _Frame(self._blocks, self._scratch, self._field, self._products, samples=q.shape[1])
         moving.rest(self._gravity)
         for coupling, step in zip(self._couplings, self._steps, strict=True):

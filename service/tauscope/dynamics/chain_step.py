@@ -41,19 +41,13 @@ class Step:
         self._axis = _offset(segment.after.rotation[2])
 
     def slid(self, q: Array) -> Offset:
-        """Offset after a prismatic joint, p + ẑ q in frame j.
-
-        `q`: (N,), joint position [m]. Returns three floats or (N,), the components [m].
-        """
+        """Offset after a prismatic joint, p + ẑ q in frame j [m]; `q`: (N,) [m]."""
         x, y, z = (p if along == 0.0 else p + along * q for p, along in zip(self.after, self._axis, strict=True))
         return x, y, z
 
 
 def euler_zxz(rotation: Array) -> tuple[float, float, float]:
-    """Angles of R = Rz(φ) Rx(β) Rz(γ), with φ in [-π/2, π/2], and zero where z stays parallel to z.
-
-    `rotation`: (3, 3), R. Returns tuple of float: φ, β, γ [rad].
-    """
+    """Angles of `rotation` (3, 3) = Rz(φ) Rx(β) Rz(γ), φ in [-π/2, π/2] and zero where z stays parallel to z."""
     first = 0.0
     sine_x, sine_y = rotation[0, 2], -rotation[1, 2]
     if np.hypot(sine_x, sine_y) > _ROUNDING:

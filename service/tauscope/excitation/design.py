@@ -46,10 +46,7 @@ def design_excitation(
     *,
     progress: Callable[[OptimiserProgress], None] = lambda _: None,
 ) -> ExcitationDesign:
-    """The best excitation found within the limits: the seed paper's (20) and (21).
-
-    Raises ExcitationError where no motion keeps the limits, naming the constraint and the joint that block.
-    """
+    """The best excitation within the limits, (20) and (21). Raises ExcitationError, which names what blocks."""
     options = options or ExcitationOptions()
     setting = Setting.of(robot, options)
     rng = np.random.default_rng(options.seed)

@@ -43,10 +43,7 @@ class ColumnScaling(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class MotionGradient:
-    """Derivatives of a scalar by a motion.
-
-    `position`, `velocity`, `acceleration`: (N, n), by q, q̇ and q̈ of every sample.
-    """
+    """Derivatives of a scalar by q, q̇ and q̈ of every sample, (N, n) each."""
 
     position: Array
     velocity: Array
@@ -94,10 +91,7 @@ class ExcitationRegressor:
         return out
 
     def rows(self, motion: MotionSamples, base: Array | None = None) -> list[Array]:
-        """L joint by joint: for each its columns that are not always zero, (C_j, N), weighted.
-
-        `base`: (n, m, N), `base_regressor` of the same motion, where the caller has it.
-        """
+        """L joint by joint: its columns that are not always zero, (C_j, N), weighted; `base`: (n, m, N)."""
         base = self.base_regressor(motion) if base is None else base
         rows = []
         for joint, slopes in enumerate(self._slopes):
@@ -128,10 +122,7 @@ class ExcitationRegressor:
         return matrix
 
     def pull_back(self, motion: MotionSamples, rows: list[Array], by_information: Array) -> MotionGradient:
-        """Derivatives by the motion of a scalar whose derivative by A is known.
-
-        `rows`: list of (C_j, N), from `rows`; `by_information`: (p, p), symmetric derivative by A.
-        """
+        """Derivatives of a scalar by the motion from those by A, `by_information`, (p, p), symmetric."""
         count = len(motion.position)
         weight = np.zeros((self.joint_count, len(self.base_columns), count))
         of_velocity = np.zeros_like(motion.velocity)
@@ -147,10 +138,7 @@ class ExcitationRegressor:
         return MotionGradient(gradient.position, gradient.velocity + of_velocity, gradient.acceleration)
 
     def pull_back_base(self, motion: MotionSamples, weight: Array) -> MotionGradient:
-        """Derivatives by the motion of a scalar whose derivatives by the base parameters' columns are known.
-
-        `weight`: (n, m, N), derivative by `base_regressor`.
-        """
+        """Derivatives of a scalar by the motion from those by `base_regressor`, `weight`, (n, m, N)."""
         parts = self._gradient.contract(motion.position, motion.velocity, motion.acceleration, weight)
         return MotionGradient(*parts)
 
@@ -189,10 +177,7 @@ class CriterionValue:
 
 
 def criterion_value(criterion: Criterion, information: Array, information_weight: float = 0.0) -> CriterionValue:
-    """A criterion, its gradient, and the condition number, from one eigenvalue decomposition.
-
-    `information`: (p, p), A = LᵀL, symmetric.
-    """
+    """A criterion of `information`, A = LᵀL, (p, p), its gradient, and the condition number."""
     values, vectors = np.linalg.eigh(information)
     low, high = float(values[0]), float(values[-1])
     if not low > SINGULAR * high:

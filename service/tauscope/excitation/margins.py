@@ -47,10 +47,7 @@ class Margins:
 def trajectory_margins(
     trajectory: Trajectory, limits: MotionLimits, states: StateUsage | None, available: Array
 ) -> Margins:
-    """Margins over a whole trajectory; of Fourier series at every instant.
-
-    `available`: (n,), torque that may be used, infinite where there is no limit [Nm or N].
-    """
+    """Margins over a whole trajectory; `available`: (n,), torque, infinite without limit [Nm or N]."""
     usage = np.zeros((3, trajectory.joint_count))
     torque = np.zeros(trajectory.joint_count)
     clearance = np.inf
@@ -70,10 +67,7 @@ def trajectory_margins(
 
 
 def require_within_limits(trajectory: Trajectory, robot: Robot, limits: MotionLimits, name: str = "trajectory") -> None:
-    """Refuse a trajectory that leaves the limits of position, velocity or acceleration at any instant.
-
-    Raises ExcitationError naming joint, instant, value and limit.
-    """
+    """Raise ExcitationError, which names joint, instant, value and limit, where a trajectory leaves a limit."""
     margins = trajectory_margins(trajectory, limits, None, limits.torque)
     for kind in ("position", "velocity", "acceleration"):
         left = getattr(margins, kind)

@@ -77,10 +77,7 @@ class SeriesSpace:
 
 
 class SeriesGrid:
-    """Motion at fixed instants as a linear function of the vector x, and the way back.
-
-    `bases`: three (K, 2 (M - 1)), position, velocity and acceleration per coefficient.
-    """
+    """Motion at fixed instants by the vector x; `bases`: (K, 2 (M - 1)) of q, q̇ and q̈ by coefficient."""
 
     def __init__(self, limits: MotionLimits, bases: tuple[Array, Array, Array]) -> None:
         self._limits = limits

@@ -106,10 +106,7 @@ class WorkspaceUsage:
         return np.maximum(1.0 - self.clearance(motion.position) / REFERENCE_M, 0.0)
 
     def pull_back(self, motion: MotionSamples, _base: Array, weight: Array) -> MotionGradient:
-        """Derivatives by the motion of Σ weight · usage.
-
-        `_base`: (n, m, N), not needed; `weight`: (N, obstacles × points), derivative by `usage`.
-        """
+        """Derivatives of Σ `weight` (N, obstacles × points) · usage; `_base` (n, m, N) is not needed."""
         chain = self._frames(motion.position)
         points = self._places(chain)
         force = np.zeros_like(points)

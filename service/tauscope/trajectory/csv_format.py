@@ -34,19 +34,13 @@ PIECE_ROWS = 10_000
 
 
 def trajectory_csv(trajectory: Trajectory, rate_hz: float) -> str:
-    """A trajectory as CSV text: t, q1…, qd1…, qdd1…, period; shortest digits that read back as they were.
-
-    `rate_hz`: samples a second [Hz].
-    """
+    """CSV text: t, q1…, qd1…, qdd1…, period; shortest digits that read back as they were."""
     starts = range(0, trajectory.count_samples(rate_hz), PIECE_ROWS)
     return "".join(write_trajectory_rows(trajectory, rate_hz, start) for start in starts)
 
 
 def write_trajectory_rows(trajectory: Trajectory, rate_hz: float, start: int) -> str:
-    """`PIECE_ROWS` rows of the text from row `start` on; the header goes before the first ones.
-
-    `rate_hz`: samples a second [Hz].
-    """
+    """`PIECE_ROWS` rows of the text from row `start` on; the header goes before the first ones."""
     stop = min(start + PIECE_ROWS, trajectory.count_samples(rate_hz))
     samples = trajectory.evaluate(np.arange(start, stop) / rate_hz)
     joints = range(1, trajectory.joint_count + 1)

@@ -27,10 +27,7 @@ DEFAULT_RATE_HZ = 500.0
 
 
 def read_trajectory(path: str | Path, robot: Robot) -> Trajectory:
-    """Read a trajectory for a robot: JSON (``.json``) or CSV (anything else).
-
-    Raises ExcitationError naming the file and the key, or the line and the column.
-    """
+    """Read JSON (``.json``) or else CSV. Raises ExcitationError, which names file and key, or line and column."""
     path = Path(path)
     try:
         text = decode_utf8(read_bounded(path, LARGEST_FILE), str(path))
@@ -65,12 +62,7 @@ def trajectory_json(trajectory: Trajectory) -> str:
 
 
 def write_trajectory(trajectory: Trajectory, path: str | Path, *, rate_hz: float = DEFAULT_RATE_HZ) -> None:
-    """Write a trajectory: JSON (``.json``) or CSV (``.csv``).
-
-    Raises ExcitationError for another suffix, or where the file cannot be written.
-
-    `rate_hz`: samples a second of a CSV file [Hz].
-    """
+    """Write JSON or CSV. Raises ExcitationError for another suffix, or where it cannot be written."""
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in (".json", ".csv"):

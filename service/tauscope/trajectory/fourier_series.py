@@ -13,10 +13,7 @@ LEAST_HARMONICS = 2
 
 @dataclass(frozen=True, eq=False)
 class MotionSamples:
-    """A motion at given instants.
-
-    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈ [rad or m, and per s, per s²].
-    """
+    """q, q̇, q̈ at given instants, (N, n) each [rad or m, and per s, per s²]."""
 
     position: Array
     velocity: Array
@@ -76,8 +73,7 @@ class FourierSeries:
 def between_samples(harmonics: int, samples: int) -> float:
     """Factor by which a trigonometric polynomial may exceed its largest equispaced sample: 1/cos(π M / K).
 
-    Ehlich and Zeller's bound for degree M and K > 2 M samples a period: what holds at the samples with this factor to
-    spare holds at every instant.
+    Ehlich and Zeller's bound for degree M and K > 2 M samples a period.
     """
     if samples <= 2 * harmonics:
         raise ExcitationError(f"{samples} samples a period cannot bound {harmonics} harmonics; take more samples")

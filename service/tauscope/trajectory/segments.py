@@ -38,19 +38,13 @@ class Segment(Protocol):
         ...
 
     def period(self, time: Array) -> Array:
-        """Index of the repeated excitation period, NaN where the motion is no part of it, shape (N,).
-
-        `time`: (N,), instants since its start [s].
-        """
+        """Index of the repeated excitation period, (N,), NaN outside; `time`: (N,) since its start [s]."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class FourierSegment:
-    """Whole periods of a Fourier series.
-
-    `first_period`: index of the first repeat in a recording's column `period`; None where it is not to be counted.
-    """
+    """Whole periods of a Fourier series; `first_period` counts in column `period`, None where not to be counted."""
 
     series: FourierSeries
     repeats: int = 1
@@ -81,10 +75,7 @@ class FourierSegment:
 
 @dataclass(frozen=True, eq=False)
 class MoveSegment:
-    """A straight minimum-jerk move from posture to posture: q = q_0 + (q_1 - q_0)(10 s³ - 15 s⁴ + 6 s⁵), s = t/T.
-
-    `start`, `end`: (n,), postures [rad or m].
-    """
+    """A minimum-jerk move between postures (n,): q = q_0 + (q_1 - q_0)(10 s³ - 15 s⁴ + 6 s⁵), s = t/T."""
 
     start: Array
     end: Array
@@ -129,10 +120,7 @@ class PathSegment:
         return self.series.joint_count
 
     def evaluate(self, time: Array) -> MotionSamples:
-        """Exact position, velocity and acceleration: q̇ = F' σ̇, q̈ = F'' σ̇² + F' σ̈.
-
-        `time`: (N,), instants since its start [s].
-        """
+        """Exact q, q̇ = F' σ̇, q̈ = F'' σ̇² + F' σ̈; `time`: (N,) since its start [s]."""
         progress, rate, bend = minimum_jerk(time, self.duration_s)
         way = self.to_s - self.from_s
         sigma = np.where(progress > 0.5, self.to_s - (1.0 - progress) * way, self.from_s + progress * way)
@@ -147,10 +135,7 @@ class PathSegment:
 
 @dataclass(frozen=True, eq=False)
 class SampledSegment:
-    """A motion given by samples, between them the quintic that meets position, velocity and acceleration at both.
-
-    `label`: (K,), index of the repeated excitation period from each sample on, NaN outside; None where there is none.
-    """
+    """Samples and the quintics between them; `label`: (K,), period from each sample on, NaN outside."""
 
     time: Array  # (K,), instants of the samples, from 0, increasing [s]
     motion: MotionSamples
@@ -172,10 +157,7 @@ class SampledSegment:
         return float(self.time[-1])
 
     def evaluate(self, time: Array) -> MotionSamples:
-        """Position, velocity and acceleration of the interpolating quintics; the samples themselves at their instants.
-
-        `time`: (N,), instants since its start [s].
-        """
+        """Motion by the quintics, the samples themselves at their instants; `time`: (N,) since its start [s]."""
         left = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.time) - 2)
         width = (self.time[left + 1] - self.time[left])[:, None]
         share = (np.clip(time, 0.0, self.time[-1]) - self.time[left])[:, None] / width
@@ -196,11 +178,7 @@ class SampledSegment:
 
 
 def minimum_jerk(time: Array, duration_s: float) -> tuple[Array, Array, Array]:
-    """Progress 10 s³ - 15 s⁴ + 6 s⁵ of a move from 0 to 1 and its first two derivatives, s = t/T.
-
-    `time`: (N,), instants since its start [s]; `duration_s`: T [s]. Returns tuple of (N,), progress [1], its rate [1/s]
-    and the rate's rate [1/s²].
-    """
+    """Progress 10 s³ - 15 s⁴ + 6 s⁵ from 0 to 1, its rate and the rate's rate, (N,); s = `time`/T, (N,)."""
     s = np.clip(time / duration_s, 0.0, 1.0)
     progress = s**3 * (10.0 + s * (6.0 * s - 15.0))
     rate = 30.0 * (s * (1.0 - s)) ** 2 / duration_s

@@ -40,11 +40,7 @@ MOST_SAMPLES = 50_000_000
 
 @dataclass(frozen=True, eq=False)
 class TrajectorySamples:
-    """A trajectory at given instants.
-
-    `time`: (N,), instants since the start [s].
-    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈ [rad or m, and per s, per s²].
-    """
+    """A trajectory at instants `time`, (N,) [s]: q, q̇, q̈, (N, n) [rad or m, and per s, per s²]."""
 
     time: Array
     position: Array
@@ -55,11 +51,7 @@ class TrajectorySamples:
 
 @dataclass(frozen=True)
 class DesignRecord:
-    """How a trajectory was made and what it is good for.
-
-    `margins`: for each kind of limit (``position``, ``velocity``, ``acceleration``, ``torque``) the part of the limit
-        that is left, one a joint; None where there is no limit.
-    """
+    """How a trajectory was made; `margins`: part left of each kind of limit by joint, None where there is none."""
 
     criterion: str
     value: float
@@ -119,20 +111,11 @@ class Trajectory:
         return next(lengths, None)
 
     def samples(self, rate_hz: float) -> TrajectorySamples:
-        """The trajectory at a constant rate, from its start to its end.
-
-        Raises ExcitationError for a rate that is not positive, or absurd.
-
-        `rate_hz`: samples a second [Hz]. Returns TrajectorySamples: instants k / rate from 0 to the first one at which
-        the motion has ended.
-        """
+        """Samples at k / rate until the motion has ended. Raises ExcitationError for an absurd rate."""
         return self.evaluate(np.arange(self.count_samples(rate_hz)) / rate_hz)
 
     def count_samples(self, rate_hz: float) -> int:
-        """How many samples it has at a constant rate [1/s].
-
-        Raises ExcitationError for a rate that is not positive, or absurd.
-        """
+        """How many samples it has at a rate. Raises ExcitationError for one that is absurd."""
         if not (np.isfinite(rate_hz) and rate_hz > 0.0):
             raise ExcitationError(f"the sampling rate is {rate_hz} Hz; give a positive number")
         count = self.duration_s * rate_hz
@@ -143,10 +126,7 @@ class Trajectory:
         return int(np.ceil(count - 1e-6)) + 1
 
     def evaluate(self, time: Array) -> TrajectorySamples:
-        """The trajectory at given instants; before its start and after its end it stands still.
-
-        `time`: (N,), ascending instants since the start [s].
-        """
+        """The trajectory at `time`, (N,), ascending [s]; before its start and after its end it stands still."""
         shape = (len(time), self.joint_count)
         result = TrajectorySamples(time, np.empty(shape), np.empty(shape), np.empty(shape), np.full(len(time), np.nan))
         starts = np.concatenate([[0.0], np.cumsum([segment.duration_s for segment in self.segments])])
@@ -168,12 +148,10 @@ class Trajectory:
 
 
 def ramp(start: Array, end: Array, limits: MotionLimits, *, fraction: float = RAMP_FRACTION) -> MoveSegment:
-    """A straight minimum-jerk move between postures within the limits of velocity and acceleration.
+    """A straight minimum-jerk move from `start` to `end`, (n,), within the limits of velocity and acceleration.
 
-    Its duration is known before it runs, and it stays between the two postures: where both are within the position
-    limits, so is all of it. Raises ExcitationError for a posture that is not finite or has another number of joints.
-
-    `start`, `end`: (n,), postures [rad or m].
+    It stays between them: where both are within the position limits, so is all of it. Raises ExcitationError for a
+    posture that is not finite or has another number of joints.
     """
     start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     joints = len(limits.velocity)
@@ -187,10 +165,7 @@ def ramp(start: Array, end: Array, limits: MotionLimits, *, fraction: float = RA
 
 
 def whole_steps(duration_s: float) -> float:
-    """A duration rounded up to `TIME_STEP_S`, so that what follows begins at a sample of all usual rates.
-
-    `duration_s`: shortest duration [s].
-    """
+    """A duration rounded up to `TIME_STEP_S`, so that what follows begins at a sample of all usual rates."""
     steps_a_second = round(1.0 / TIME_STEP_S)
     return float(np.ceil(duration_s * steps_a_second - 1e-9) / steps_a_second)
 
