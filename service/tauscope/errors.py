@@ -19,6 +19,8 @@ is stable: scripts and the pages below ``docs/errors/`` rely on it. A message is
 row or joint, and what to do next.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import ClassVar
 
 LONGEST_MESSAGE = 2000
@@ -39,6 +41,15 @@ class TauscopeError(Exception):
     def __init__(self, message: str = "") -> None:
         """Take the message, whatever a file's content put into it, as one printable line."""
         super().__init__(one_line(message))
+
+
+@contextmanager
+def explain_os_errors(kind: type[TauscopeError], words: str, advice: str = "") -> Iterator[None]:
+    """Raise ``WORDS (reason)ADVICE`` where the operating system refuses what is done within."""
+    try:
+        yield
+    except OSError as error:
+        raise kind(f"{words} ({error.strerror or error}){advice}") from error
 
 
 class RobotFileError(TauscopeError, ValueError):

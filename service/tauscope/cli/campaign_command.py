@@ -14,7 +14,7 @@ from tauscope.cli.diagnose_command import show_diagnosis
 from tauscope.cli.identify_command import show_identification
 from tauscope.cli.task_run import write_file
 from tauscope.cli.terminal import output, say, show_progress
-from tauscope.errors import ExportError
+from tauscope.errors import ExportError, explain_os_errors
 from tauscope.runtime.drivers import DEFAULT_BACKEND, driver_names
 from tauscope.tasks import campaign as task
 from tauscope.tasks.task import Files
@@ -55,10 +55,8 @@ def campaign(
         "diagnosis": diagnosis,
     }
     request = _request(robot, steps)
-    try:
+    with explain_os_errors(ExportError, f"{out}: cannot be made", "; name a new folder"):
         out.mkdir()
-    except OSError as error:
-        raise ExportError(f"{out}: cannot be made ({error.strerror}); name a new folder") from error
     with show_progress() as progress:
         result = task.perform(request, Files({"campaign": out}), progress)
         progress("write files")

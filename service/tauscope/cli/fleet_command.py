@@ -11,7 +11,7 @@ from tauscope.cli.arguments import name_input
 from tauscope.cli.task_run import require_new
 from tauscope.cli.terminal import say, show_progress
 from tauscope.cli.verbs import make_group
-from tauscope.errors import ExportError, IdentificationError
+from tauscope.errors import ExportError, IdentificationError, explain_os_errors
 from tauscope.number_text import counted
 from tauscope.server.queue.cluster_executor import ClusterExecutor, open_executor
 from tauscope.server.queue.fleet import (
@@ -60,10 +60,8 @@ def diagnose_fleet(manifest: Manifest, out: Out, workers: Workers = CORES) -> No
 def run_fleet(verb: Literal["identify", "diagnose"], manifest: Path, out: Path, workers: int) -> None:
     """Raises RecordingError for a bad manifest, ExportError for results, IdentificationError if any robot failed."""
     total = sum(1 for _ in read_manifest(manifest))
-    try:
+    with explain_os_errors(ExportError, f"{out}: cannot be made", "; choose another --out"):
         out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ExportError(f"{out}: cannot be made ({error.strerror}); choose another --out") from error
     require_new(out / TABLE)
     failed = _run(verb, manifest, out.resolve(), workers, total)
     say(f"wrote {out / TABLE}: {counted(total, 'robot')}, {failed} failed")

@@ -17,7 +17,7 @@ from tauscope.cli.device_command import show_frames
 from tauscope.cli.task_run import keep_file, require_new
 from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
-from tauscope.errors import AcquisitionError, one_line
+from tauscope.errors import AcquisitionError, explain_os_errors, one_line
 from tauscope.number_text import ABSENT, counted, significant
 from tauscope.report.tables import Table
 from tauscope.robot import Robot
@@ -166,12 +166,8 @@ def _output(asked: Path | None) -> Path:
 
 def _folder_beside(out: Path) -> Path:
     """A hidden folder beside the recording, on the same disk; what is in it outlives a crash."""
-    try:
+    with explain_os_errors(AcquisitionError, f"{out}: cannot be written there", "; choose another place"):
         return Path(tempfile.mkdtemp(prefix=".tauscope-run-", dir=out.resolve().parent))
-    except OSError as error:
-        raise AcquisitionError(
-            f"{out}: cannot be written there ({error.strerror or error}); choose another place"
-        ) from error
 
 
 def show_run(console: Console, record: RunRecord, robot: Robot) -> None:

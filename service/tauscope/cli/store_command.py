@@ -14,7 +14,7 @@ from tauscope.cli.arguments import name_input
 from tauscope.cli.task_run import require_new
 from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import make_group
-from tauscope.errors import StoreError
+from tauscope.errors import StoreError, explain_os_errors
 from tauscope.number_text import ABSENT, counted
 from tauscope.report.tables import Table
 from tauscope.server.history.indexer import Indexer, open_index
@@ -135,11 +135,9 @@ def prune_store(
         kept = RecordingStore(store.folder / RECORDINGS)
         removal = plan_removal(store.keeper, ModelHistory(store.database), kept, rule, utc_now())
         if not dry_run:
-            try:
-                removers = {kind: items.remove for kind, items in item_stores(store.folder).items()}
+            removers = {kind: items.remove for kind, items in item_stores(store.folder).items()}
+            with explain_os_errors(StoreError, f"{store.folder}: cannot be removed from"):
                 removal = remove(removal, removers, kept, store.keeper)
-            except OSError as error:
-                raise StoreError(f"{store.folder}: cannot be removed from ({error.strerror or error})") from error
     rows = [(entry.kind, entry.identifier, entry.robot or ABSENT) for entry in removal.items]
     rows += [("recording", name, ABSENT) for name in removal.recordings]
     done = "would go" if dry_run else "removed"
@@ -158,10 +156,8 @@ def backup(
     folder = data or default_data_folder()
     with show_progress() as progress, open_database(folder, database) as opened:
         progress(f"copy {folder}")
-        try:
+        with explain_os_errors(StoreError, f"{file}: cannot be written", "; choose another place"):
             count = write_backup(folder, opened, file, tauscope_version())
-        except OSError as error:
-            raise StoreError(f"{file}: cannot be written ({error.strerror or error}); choose another place") from error
     say(f"wrote {file}: {counted(count, 'file')} and the database")
 
 
@@ -173,10 +169,8 @@ def restore(
     """Make a data folder from a backup; also where the database was one of the other kind."""
     with show_progress() as progress:
         progress(f"unpack {file}")
-        try:
+        with explain_os_errors(StoreError, f"{data}: cannot be written", "; choose another place"):
             count = restore_backup(file, data, database)
-        except OSError as error:
-            raise StoreError(f"{data}: cannot be written ({error.strerror or error}); choose another place") from error
     say(f"restored {data}: {counted(count, 'file')} and the database")
 
 

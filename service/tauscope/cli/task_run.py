@@ -9,7 +9,7 @@ from typing import Any
 import typer
 
 from tauscope.cli.terminal import Told, say, show_progress
-from tauscope.errors import ExportError, one_line
+from tauscope.errors import ExportError, explain_os_errors, one_line
 from tauscope.export.formats import SUFFIXES, ExportFile, ExportFormat
 from tauscope.files import open_atomically
 from tauscope.robot import Robot, Severity, read_robot
@@ -75,14 +75,12 @@ def write_file(path: Path, content: bytes) -> None:
         typer.echo(content, nl=False)
         return
     real = path.resolve()
-    try:
+    with explain_os_errors(ExportError, f"{path}: cannot be written", "; choose another place"):
         if real.exists() and not real.is_file():  # a device or a pipe: there is nothing to replace
             real.write_bytes(content)
         else:
             with open_atomically(real) as file:
                 file.write(content)
-    except OSError as error:
-        raise ExportError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
 
 
 def run_task(

@@ -8,7 +8,7 @@ from typing import BinaryIO
 import numpy as np
 from mcap_ros2.writer import Writer
 
-from tauscope.errors import RecordingError
+from tauscope.errors import RecordingError, explain_os_errors
 from tauscope.files import open_atomically
 from tauscope.recording.csv_format import write_csv
 from tauscope.recording.intake import Choice
@@ -109,14 +109,11 @@ def write_recording(
     """Write a recording, whole or not at all. Raises RecordingError where the target exists or is no format."""
     path = Path(path)
     _require_writable(path, overwrite=overwrite)
-    try:
-        with open_atomically(path) as file:
-            if path.suffix.lower() == ".mcap":
-                return write_mcap(recording, file, joint_names)
-            (write_parquet if path.suffix.lower() == ".parquet" else write_csv)(recording, file)
-            return ()
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be written ({error.strerror or error})") from error
+    with explain_os_errors(RecordingError, f"{path}: cannot be written"), open_atomically(path) as file:
+        if path.suffix.lower() == ".mcap":
+            return write_mcap(recording, file, joint_names)
+        (write_parquet if path.suffix.lower() == ".parquet" else write_csv)(recording, file)
+        return ()
 
 
 def _read(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic_core import from_json
 
-from tauscope.errors import RecordingError
+from tauscope.errors import RecordingError, explain_os_errors
 from tauscope.recording.joint_state import JointStateLayout, JointStates
 from tauscope.recording.joint_state_topic import MessageHandler
 from tauscope.recording.journal import CYCLE_TOPIC, EVENT_TOPIC, JOINT_STATE_TOPIC, REFERENCE_TOPIC
@@ -38,10 +38,8 @@ class Journal:
 def read_journal(path: Path) -> Journal:
     """Read a journal up to its end or its first damage. Raises RecordingError where its header did not come through."""
     collector = _Collector()
-    try:
+    with explain_os_errors(RecordingError, f"{path}: the journal cannot be read"):
         damage = scan_mcap(path, collector)
-    except OSError as error:
-        raise RecordingError(f"{path}: the journal cannot be read ({error.strerror or error})") from error
     try:
         header = collector.header()
         return Journal(header, collector.rows(header), tuple(collector.events[1:]), damage)

@@ -3,12 +3,11 @@
 import os
 import tempfile
 import weakref
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 
 import numpy as np
 
-from tauscope.errors import RecordingError
+from tauscope.errors import RecordingError, explain_os_errors
 from tauscope.recording.samples import Array, Table
 
 # Tables larger than this go to a temporary file: 1.3 million samples of a six-joint arm still fit into memory.
@@ -123,13 +122,7 @@ class TableBuilder:
         self._data = np.empty((0, len(self._names)))
 
 
-@contextmanager
-def _naming_room() -> Iterator[None]:
+def _naming_room() -> AbstractContextManager[None]:
     """Say in which folder there is no room. Raises RecordingError."""
-    try:
-        yield
-    except OSError as error:
-        raise RecordingError(
-            f"the temporary folder {tempfile.gettempdir()} cannot hold the recording ({error.strerror}): "
-            "make room there or set TMPDIR to a larger folder"
-        ) from error
+    words = f"the temporary folder {tempfile.gettempdir()} cannot hold the recording"
+    return explain_os_errors(RecordingError, words, ": make room there or set TMPDIR to a larger folder")

@@ -5,7 +5,7 @@ from typing import Any
 
 from pydantic import BaseModel, Field, ValidationError
 
-from tauscope.errors import ExcitationError, RobotFileError
+from tauscope.errors import ExcitationError, RobotFileError, explain_os_errors
 from tauscope.robot import Robot
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.messages import shown
@@ -68,10 +68,8 @@ def write_trajectory(trajectory: Trajectory, path: str | Path, *, rate_hz: float
     if suffix not in (".json", ".csv"):
         raise ExcitationError(f"{path}: a trajectory file ends in .json or .csv; rename it")
     text = trajectory_json(trajectory) if suffix == ".json" else trajectory_csv(trajectory, rate_hz)
-    try:
+    with explain_os_errors(ExcitationError, f"{path}: cannot be written", "; choose another place"):
         path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ExcitationError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
 
 
 def _document(text: str | bytes) -> TrajectoryDocument:
