@@ -10,12 +10,12 @@ from mcap_ros2.writer import Writer
 
 from tauscope.errors import RecordingError, explain_os_errors
 from tauscope.files import open_atomically
+from tauscope.recording.column_files import write_parquet
 from tauscope.recording.csv_format import write_csv
 from tauscope.recording.intake import Choice
 from tauscope.recording.joint_state import JOINT_STATE_DEFINITION
 from tauscope.recording.joint_state_decoders import JOINT_STATE_TYPES
 from tauscope.recording.mcap_format import MCAP_MAGIC, recover_mcap
-from tauscope.recording.parquet_format import write_parquet
 from tauscope.recording.reading import first_bytes, read_recording
 from tauscope.recording.recording import Array, EffortKind, Recording
 from tauscope.recording.units import SI, Reading

@@ -8,7 +8,14 @@ from pathlib import Path
 from pydantic import Field
 
 from tauscope.errors import RecordingError
-from tauscope.recording.column_files import ZIP_MAGIC, read_npz, read_npz_header
+from tauscope.recording.column_files import (
+    PARQUET_MAGIC,
+    ZIP_MAGIC,
+    read_npz,
+    read_npz_header,
+    read_parquet,
+    read_parquet_header,
+)
 from tauscope.recording.columns import find_layout, is_column, require_joint_count, suggest_layout
 from tauscope.recording.csv_format import read_csv, read_csv_header
 from tauscope.recording.intake import Choice
@@ -16,7 +23,6 @@ from tauscope.recording.joint_state_topic import JointStateLog
 from tauscope.recording.layout.guess import guess_parts
 from tauscope.recording.layout.rename import rename_columns
 from tauscope.recording.mcap_format import MCAP_MAGIC, add_mcap
-from tauscope.recording.parquet_format import PARQUET_MAGIC, read_parquet, read_parquet_header
 from tauscope.recording.recording import Recording
 from tauscope.recording.ros_bags import ROS1_MAGIC, SQLITE_MAGIC, add_database, add_ros1_bag, add_rosbag2
 from tauscope.recording.units import SI, Reading

@@ -24,8 +24,7 @@ from tauscope.robot.kinematics import compose, joint_displacement, rotation_of_z
 from tauscope.robot.messages import Finding, Severity, nearest, shown
 from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
 from tauscope.robot.urdf_element import Element, number, only_child, origin, urdf_error, vector, where
-from tauscope.robot.urdf_inertia import lumped_inertia, stated_mass
-from tauscope.robot.urdf_xml import UrdfJoint, UrdfTree, parse_urdf
+from tauscope.robot.urdf_xml import UrdfJoint, UrdfTree, lumped_inertia, parse_urdf, stated_mass
 
 MOVING = frozenset({"revolute", "continuous", "prismatic"})
 
