@@ -23,9 +23,8 @@ from tauscope.robot.actuator import ASSUMED_SERVO
 
 __all__ = ["make_efforts", "require_loops", "shift_command"]
 
+# Share of rows at the duty limit from which gain and torque per volt can be told from each other.
 SATURATED_SHARE = 0.02
-"""Share of rows at the duty limit from which gain and torque per volt can be told from each other."""
-
 _KEPT = {"qd": "velocity", "qdd": "acceleration", "qref": "reference", "temp": "temperature", "qlink": "link_position"}
 
 

@@ -13,14 +13,9 @@ from tauscope.recording.recording import Recording
 from tauscope.recording.samples import Array, Samples
 from tauscope.robot import Robot
 
-STEP_S = 2e-3
-"""Step of the search [s]; a parabola refines it."""
-
-FOUND_STD_S = 0.02
-"""Standard error above which a joint takes the delay of the others [s]."""
-
-SEEN = 3.0
-"""Standard errors above which a delay is taken: a loop in step with its log has none."""
+STEP_S = 2e-3  # step of the search [s]; a parabola refines it
+FOUND_STD_S = 0.02  # standard error above which a joint takes the delay of the others [s]
+SEEN = 3.0  # standard errors above which a delay is taken: a loop in step with its log has none
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,8 @@ from tauscope.recording.recording import Recording
 from tauscope.recording.samples import Array
 from tauscope.robot import Joint, Robot
 
-STATED_MASS_STD = 0.1
-"""Relative standard error of stated masses: a data sheet's sum, or CAD without screws and cables."""
-
-KNOWN_STD = 0.3
-"""Relative standard error above which a joint does not tell its torque per volt."""
+STATED_MASS_STD = 0.1  # relative standard error of stated masses: a data sheet's sum, or CAD without screws and cables
+KNOWN_STD = 0.3  # relative standard error above which a joint does not tell its torque per volt
 
 
 def is_open(joint: Joint) -> bool:

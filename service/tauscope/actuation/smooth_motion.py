@@ -10,17 +10,13 @@ from tauscope.recording.conditioning.filters import smooth
 from tauscope.recording.recording import Recording
 from tauscope.recording.samples import Array, Samples
 
+# Longest delay that is looked for [s]: buses of servos take 1 to 50 ms, a teleoperation loop up to 150 ms.
 LONGEST_S = 0.2
-"""Longest delay that is looked for [s]: buses of servos take 1 to 50 ms, a teleoperation loop up to 150 ms."""
 
+# Band of the comparison [Hz]: loops of servos pass no more, and above it steps of an encoder outweigh torque.
 BAND_HZ = 10.0
-"""Band of the comparison [Hz]: loops of servos pass no more, and above it steps of an encoder outweigh torque."""
-
-MOST_ROWS = 20_000
-"""Rows of a recording that are compared."""
-
-REST = 0.02
-"""Speed relative to the fastest below which friction has no direction."""
+MOST_ROWS = 20_000  # rows of a recording that are compared
+REST = 0.02  # speed relative to the fastest below which friction has no direction
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,8 +79,8 @@ Cutoff = Annotated[
 ]
 Json = Annotated[Path | None, name_output("Write the result as JSON; - is standard output.")]
 Report = Annotated[Path | None, name_output("Write a page to read, figures included.", "OUT.html")]
+# How recordings are read: fields of `ReadingOptions`, before `complete_reading`.
 ReadingFields = Annotated[dict[str, Any], OptionsOf(ReadingOptions)]
-"""How recordings are read: fields of `ReadingOptions`, before `complete_reading`."""
 LayoutFields = Annotated[dict[str, Any], OptionsOf(ReadingOptions, without=("trust_units",))]
 
 

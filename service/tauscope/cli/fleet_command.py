@@ -25,8 +25,8 @@ from tauscope.server.queue.fleet import (
 )
 
 TABLE = "table.csv"
+# How long a robot waits for a cluster that is away, as when its scheduler is started anew [s].
 CLUSTER_PATIENCE_S = 60.0
-"""How long a robot waits for a cluster that is away, as when its scheduler is started anew [s]."""
 CORES = os.cpu_count() or 1
 
 Manifest = Annotated[

@@ -25,28 +25,21 @@ from tauscope.robot.robot import STANDARD_PARAMETERS, JointType, Placement, Robo
 
 Columns = NDArray[np.intp]
 
-RIGHT_ANGLE = 1e-5
-"""Angles this close to a right one are meant to be right [rad]: 1.5708 is 3.7e-6 off."""
-
-_LENGTH = 1e-6
-"""Lengths below this are rounding of the file [m]."""
-
+RIGHT_ANGLE = 1e-5  # angles this close to a right one are meant to be right [rad]: 1.5708 is 3.7e-6 off
+_LENGTH = 1e-6  # lengths below this are rounding of the file [m]
 _LEADING = (1e-2, 1e-4, 1e-6, 1e-8)
 """Shares of a column, relative to the largest of its unit, that have to be new for it to lead: first choice to last.
 
 Below the last a column is a combination of others, or, where there are none, zero."""
 
-_ROUNDING = 1e-12
-"""Share of the largest column of any unit below which a column is zero: all columns of a unit may be."""
+_ROUNDING = 1e-12  # share of the largest column of any unit below which a column is zero: all columns of a unit may be
+_SHARE = 1e-9  # share of a column below which a term of its combination is rounding
 
-_SHARE = 1e-9
-"""Share of a column below which a term of its combination is rounding."""
-
+# Links 1 to j have 10 j parameters that show at joints 1 to j alone: twenty states give twice as many equations.
 _STATES = 20
-"""Links 1 to j have 10 j parameters that show at joints 1 to j alone: twenty states give twice as many equations."""
 
+# Inertia, mass and first moment: columns of one unit each, comparable in size.
 _UNITS = (slice(0, 6), slice(6, 7), slice(7, 10))
-"""Inertia, mass and first moment: columns of one unit each, comparable in size."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,14 +30,9 @@ import numpy as np
 from tauscope.dynamics.chain_step import ABOUT_Z, Offset, Plane, Step
 from tauscope.robot.robot import Array, Robot
 
-Vectors = tuple[Array, Array, Array]
-"""The x, y and z components, each an array of the same shape."""
-
-_FIRST_SCREW = 3
-"""Rows of a block: ω, ω̇, a, then w_i and v_i of each joint by turns."""
-
-_ALIGNMENT = 64
-"""Bytes of the widest vector register: rows that start elsewhere cost up to twice the time."""
+Vectors = tuple[Array, Array, Array]  # the x, y and z components, each an array of the same shape
+_FIRST_SCREW = 3  # rows of a block: ω, ω̇, a, then w_i and v_i of each joint by turns
+_ALIGNMENT = 64  # bytes of the widest vector register: rows that start elsewhere cost up to twice the time
 
 
 class LinkMotion(NamedTuple):

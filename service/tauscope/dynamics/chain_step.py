@@ -8,12 +8,11 @@ import numpy as np
 
 from tauscope.robot.robot import Array, JointType, Segment
 
+# The two components that a turn mixes, in the order in which a positive angle leads from one to the other.
 Plane = tuple[int, int]
-"""The two components that a turn mixes, in the order in which a positive angle leads from one to the other."""
 
+# Components of a shift of the origin, each the same for all samples or one a sample.
 Offset = tuple[float | Array, float | Array, float | Array]
-"""Components of a shift of the origin, each the same for all samples or one a sample."""
-
 ABOUT_X: Plane = (1, 2)
 ABOUT_Z: Plane = (0, 1)
 
@@ -70,8 +69,8 @@ def from_euler_zxz(first: float, about_x: float, last: float) -> Array:
     )
 
 
+# Below this a sine, cosine or length is rounding (cos π/2 = 6e-17); 1e-8 is a user's own digits and is kept.
 _ROUNDING = 1e-15
-"""Below this a sine, cosine or length is rounding (cos π/2 = 6e-17); 1e-8 is a user's own digits and is kept."""
 
 
 def _turns(angles: list[tuple[Plane, float]]) -> list[tuple[Plane, float, float]]:

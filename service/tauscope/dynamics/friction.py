@@ -5,9 +5,7 @@ import numpy as np
 from tauscope.errors import IdentificationError
 from tauscope.robot.robot import Array, FrictionCoefficients, FrictionShape
 
-FRICTION_COLUMNS = ("stiction", "stribeck", "viscous", "offset")
-"""Names of the columns of `friction_columns`."""
-
+FRICTION_COLUMNS = ("stiction", "stribeck", "viscous", "offset")  # names of the columns of `friction_columns`
 _TWO_OVER_PI = 2.0 / np.pi
 
 

@@ -30,12 +30,11 @@ from tauscope.robot.robot import STANDARD_PARAMETERS, Robot
 
 Columns = NDArray[np.intp]
 
+# Samples worked on at once: long enough that the calls cost little, short enough that the work stays in the cache.
 CHUNK = 3400
-"""Samples worked on at once: long enough that the calls cost little, short enough that the work stays in the cache."""
 
+# Bytes from which the C library always asks for new pages: they are zero, and cost nothing where they stay so.
 _FRESH_MEMORY = 2**25
-"""Bytes from which the C library always asks for new pages: they are zero, and cost nothing where they stay so."""
-
 _PER_LINK = len(STANDARD_PARAMETERS)
 
 
@@ -112,9 +111,8 @@ class TorqueRegressor:
             _write_sum(column(motion, difference), out[:, at], scratch)
 
 
+# Add or subtract, a component of the joint screws (j, N), and its coefficient (N,).
 _Term = tuple[np.ufunc, Array, Array]
-"""Add or subtract, a component of the joint screws (j, N), and its coefficient (N,)."""
-
 _Column = Callable[[LinkMotion, Array], Sequence[_Term]]
 
 
@@ -165,13 +163,13 @@ def _first_moment(k: int) -> _Column:
     return terms
 
 
+# One entry a standard parameter, in the order of `STANDARD_PARAMETERS`.
 _COLUMNS: tuple[_Column, ...] = (
     *(_moment_of_inertia(k) for k in range(3)),
     *(_product_of_inertia(other) for other in (2, 1, 0)),
     _mass,
     *(_first_moment(k) for k in range(3)),
 )
-"""One entry a standard parameter, in the order of `STANDARD_PARAMETERS`."""
 
 
 def _write_sum(terms: Sequence[_Term], out: Array, scratch: Array) -> None:

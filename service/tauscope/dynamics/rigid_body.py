@@ -8,8 +8,8 @@ from tauscope.dynamics.chain_motion import Array, ChainMotion
 from tauscope.dynamics.regressor import CHUNK
 from tauscope.robot.robot import STANDARD_PARAMETERS, LinkInertia, Robot
 
+# ε_ijk.
 _LEVI_CIVITA = np.array([[[(i - j) * (j - k) * (k - i) / 2.0 for k in range(3)] for j in range(3)] for i in range(3)])
-"""ε_ijk."""
 
 
 def inverse_dynamics(robot: Robot, parameters: Array, q: Array, qd: Array, qdd: Array) -> Array:

@@ -35,10 +35,8 @@ APART = 4.0  # k_v is never taken for less than this many δ: the two columns wo
 class ColumnScaling(StrEnum):
     """In which units the parameters are counted; condition numbers depend on it, ``log-det`` does not."""
 
-    NONE = "none"
-    """SI units, as the seed paper's (20), FIGAROH and `identify` count them."""
-    TYPICAL = "typical"
-    """Each column divided by its rms over random motions within the limits: units fall out."""
+    NONE = "none"  # SI units, as the seed paper's (20), FIGAROH and `identify` count them
+    TYPICAL = "typical"  # each column divided by its rms over random motions within the limits: units fall out
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,12 +156,10 @@ SINGULAR = 1e-13
 class Criterion(StrEnum):
     """What the optimiser minimises."""
 
-    COND_F = "cond-f"
-    """Cond_F(LᵀL) = ‖LᵀL‖_F ‖(LᵀL)⁻¹‖_F, the seed paper's equation (20)."""
+    COND_F = "cond-f"  # cond_F(LᵀL) = ‖LᵀL‖_F ‖(LᵀL)⁻¹‖_F, the seed paper's equation (20)
+    # -ln det(LᵀL) / p: the volume of the parameters' confidence ellipsoid (D-optimal); no matter in which units.
     LOG_DET = "log-det"
-    """-ln det(LᵀL) / p: the volume of the parameters' confidence ellipsoid (D-optimal); no matter in which units."""
-    COND_2 = "cond-2"
-    """Condition number of L in the 2-norm, σ_max / σ_min."""
+    COND_2 = "cond-2"  # condition number of L in the 2-norm, σ_max / σ_min
 
 
 @dataclass(frozen=True, eq=False)

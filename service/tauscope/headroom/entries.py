@@ -71,8 +71,8 @@ def _progress(observations: Observations, piece: Piece, time: Array, end_s: floa
     return progress
 
 
+# Part of a joint's held-out residual energy beyond which what a black box predicts is something (issue: 5 %).
 REFUTES_FROM = 0.05
-"""Part of a joint's held-out residual energy beyond which what a black box predicts is something (issue: 5 %)."""
 
 
 def require_black_box(held_out: int) -> None:

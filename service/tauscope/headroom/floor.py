@@ -26,11 +26,8 @@ SAME = 0.02
 """Rms difference of every joint's positions, relative to their spread, up to which two motions are the same: what a
 model leaves changes by no more than that part of itself."""
 
-LEAST_OVERLAP = 0.5
-"""Part of the shorter recording that must be the same."""
-
-FEWEST_SHARED = 100
-"""Rows that two recordings must share: the rms of their difference is then known to 10 %."""
+LEAST_OVERLAP = 0.5  # part of the shorter recording that must be the same
+FEWEST_SHARED = 100  # rows that two recordings must share: the rms of their difference is then known to 10 %
 
 
 def noise_between(motions: Sequence[MotionRows]) -> Array:
@@ -79,17 +76,10 @@ def _likeliest_lag(own: Array, others: Array, fewest: int) -> int:
 
 FloorKind = Literal["repetitions", "high_frequency", "none"]
 
-STOP_BAND = 1.5
-"""Frequencies from which the band's filter passes nothing, relative to its cut-off."""
-
-OPEN = 0.9
-"""…and up to which a recording's own anti-aliasing passes all, relative to its Nyquist frequency."""
-
-FEWEST_FREQUENCIES = 16
-"""Frequencies between the two that a density is told by."""
-
-SEGMENT_S = 2.0
-"""Length of a segment of Welch's method [s]."""
+STOP_BAND = 1.5  # frequencies from which the band's filter passes nothing, relative to its cut-off
+OPEN = 0.9  # …and up to which a recording's own anti-aliasing passes all, relative to its Nyquist frequency
+FEWEST_FREQUENCIES = 16  # frequencies between the two that a density is told by
+SEGMENT_S = 2.0  # length of a segment of Welch's method [s]
 
 
 @dataclass(frozen=True)

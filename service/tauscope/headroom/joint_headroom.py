@@ -12,9 +12,7 @@ from tauscope.headroom.learners import LEARNERS, Learner
 from tauscope.headroom.motion_rows import Inputs, MotionRows, joint_inputs
 from tauscope.recording.recording import Array
 
-FOLDS = 5
-"""Parts of the training motion, each of which is predicted from the others."""
-
+FOLDS = 5  # parts of the training motion, each of which is predicted from the others
 Folds = NDArray[np.intp]
 
 
@@ -86,20 +84,13 @@ def _stack(inputs: Inputs, target: Array, folds: Folds, learners: Sequence[Learn
     return Choice(float(left**2) / energy, tuple(Member(*each) for each in members if each[-1] > 0.0))
 
 
-MOST_ROWS = 6000
-"""Training rows of one joint that a black box learns from: evenly thinned beyond, to bound its time."""
+MOST_ROWS = 6000  # training rows of one joint that a black box learns from: evenly thinned beyond, to bound its time
+FEWEST_ROWS = 100  # training rows below which nothing is learned: five leaves of a tree
+BLOCK_S = 1.0  # shortest block of held-out motion whose gains count as independent [s]
 
-FEWEST_ROWS = 100
-"""Training rows below which nothing is learned: five leaves of a tree."""
-
-BLOCK_S = 1.0
-"""Shortest block of held-out motion whose gains count as independent [s]."""
-
+# Blocks of all held-out motion: longer ones where there is more of it, so that slow errors stay within one.
 MOST_BLOCKS = 20
-"""Blocks of all held-out motion: longer ones where there is more of it, so that slow errors stay within one."""
-
-STANDARD_ERRORS = 2.0
-"""Standard errors that a gain exceeds chance by, of normal blocks in any number."""
+STANDARD_ERRORS = 2.0  # standard errors that a gain exceeds chance by, of normal blocks in any number
 
 
 @dataclass(frozen=True)

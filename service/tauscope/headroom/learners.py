@@ -9,21 +9,15 @@ import numpy as np
 from tauscope.headroom.motion_rows import Inputs
 from tauscope.recording.recording import Array
 
-TREES = (10, 20, 40, 80, 160)
-"""Numbers of trees to choose from."""
-
+TREES = (10, 20, 40, 80, 160)  # numbers of trees to choose from
 LEARNING_RATE = 0.1
 FEWEST_IN_LEAF = 20
 
-LANDMARKS = 300
-"""Rows that a kernel compares every other row with (Nyström)."""
-
-RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
-"""Ridge weights to choose from, a row."""
+LANDMARKS = 300  # rows that a kernel compares every other row with (Nyström)
+RIDGES = (1e-3, 1e-2, 1e-1, 1.0)  # ridge weights to choose from, a row
 
 
-CHUNK = 8192
-"""Rows that a kernel predicts at once: bounds memory."""
+CHUNK = 8192  # rows that a kernel predicts at once: bounds memory
 
 
 class Learner(Protocol):
@@ -91,10 +85,10 @@ class KernelRidge:
         return dict(zip(RIDGES, mean + np.concatenate(predicted).T, strict=True))
 
 
+# All that are tried at every joint.
 LEARNERS: tuple[Learner, ...] = (
     BoostedTrees(8),
     BoostedTrees(32),
     KernelRidge(0.3, own_joint=True),
     KernelRidge(1.0, own_joint=False),
 )
-"""All that are tried at every joint."""

@@ -28,8 +28,8 @@ _STEP_SAMPLES = 30
 _CLIPPED_RUN = 5
 _CLIPPED_SHARE = 0.005
 _CLIPPED_SAMPLES = 10
+# A number; NaN, which JSON does not know, is null there: nothing was measured.
 Measured = Annotated[float, PlainSerializer(lambda value: None if math.isnan(value) else value, float | None)]
-"""A number; NaN, which JSON does not know, is null there: nothing was measured."""
 
 
 @entry

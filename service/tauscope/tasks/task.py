@@ -19,6 +19,7 @@ from tauscope.report.provenance import InputFile, Provenance, input_files, versi
 from tauscope.robot import RecordingLayout, Robot, find_column_fault, find_fault, find_separator_fault
 from tauscope.strict_model import StrictModel
 
+# Name of each input of a request in a report.
 ROLES = {
     "recordings": "recording",
     "held_out": "held out",
@@ -26,7 +27,6 @@ ROLES = {
     "simulated": "compared with",
     "model": "compared with",
 }
-"""Name of each input of a request in a report."""
 
 
 class TaskRequest(StrictModel):

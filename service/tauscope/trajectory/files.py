@@ -19,11 +19,8 @@ from tauscope.trajectory.document import (
 )
 from tauscope.trajectory.trajectory import Trajectory
 
-LARGEST_FILE = 256 * 2**20
-"""Bytes of the largest trajectory file that is read."""
-
-DEFAULT_RATE_HZ = 500.0
-"""Rate of CSV samples where none is asked for [Hz]."""
+LARGEST_FILE = 256 * 2**20  # bytes of the largest trajectory file that is read
+DEFAULT_RATE_HZ = 500.0  # rate of CSV samples where none is asked for [Hz]
 
 
 def read_trajectory(path: str | Path, robot: Robot) -> Trajectory:

@@ -7,8 +7,7 @@ import numpy as np
 from tauscope.errors import ExcitationError
 from tauscope.robot.robot import Array
 
-LEAST_HARMONICS = 2
-"""One harmonic alone cannot be at rest, with zero acceleration, at the ends of its period."""
+LEAST_HARMONICS = 2  # one harmonic alone cannot be at rest, with zero acceleration, at the ends of its period
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,11 +13,8 @@ from tauscope.errors import ExcitationError
 from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import FourierSeries, MotionSamples
 
-PEAK_SPEED = 1.875
-"""Largest speed of the minimum-jerk move over distance and duration one."""
-
-PEAK_ACCELERATION = 10.0 / np.sqrt(3.0)
-"""Largest acceleration of the minimum-jerk move over distance and duration one."""
+PEAK_SPEED = 1.875  # largest speed of the minimum-jerk move over distance and duration one
+PEAK_ACCELERATION = 10.0 / np.sqrt(3.0)  # largest acceleration of the minimum-jerk move over distance and duration one
 
 
 class Segment(Protocol):

@@ -19,23 +19,14 @@ from tauscope.trajectory.segments import (
     Segment,
 )
 
-JOIN_TOLERANCE = 1e-9
-"""Largest jump between segments that rounding explains [rad or m, and per s, per s²]."""
+JOIN_TOLERANCE = 1e-9  # largest jump between segments that rounding explains [rad or m, and per s, per s²]
 
+# Speed and acceleration at the ends of a motion given by samples that still count as rest [rad/s, rad/s²].
 SAMPLED_REST = 1e-3
-"""Speed and acceleration at the ends of a motion given by samples that still count as rest [rad/s, rad/s²]."""
-
-RAMP_FRACTION = 0.5
-"""Part of the velocity and acceleration limits that a ramp uses: nobody has seen this motion before."""
-
-SHORTEST_RAMP_S = 0.5
-"""A ramp lasts at least this long, also where there is no way to go [s]."""
-
-TIME_STEP_S = 0.01
-"""Durations of moves are a whole number of these [s]."""
-
-MOST_SAMPLES = 50_000_000
-"""Samples beyond which the asked rate must be a mistake."""
+RAMP_FRACTION = 0.5  # part of the velocity and acceleration limits that a ramp uses: nobody has seen this motion before
+SHORTEST_RAMP_S = 0.5  # a ramp lasts at least this long, also where there is no way to go [s]
+TIME_STEP_S = 0.01  # durations of moves are a whole number of these [s]
+MOST_SAMPLES = 50_000_000  # samples beyond which the asked rate must be a mistake
 
 
 @dataclass(frozen=True, eq=False)
