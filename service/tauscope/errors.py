@@ -19,7 +19,7 @@ is stable: scripts and the pages below ``docs/errors/`` rely on it. A message is
 row or joint, and what to do next.
 """
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from typing import ClassVar
 
@@ -44,7 +44,7 @@ class TauscopeError(Exception):
 
 
 @contextmanager
-def explain_os_errors(kind: type[TauscopeError], words: str, advice: str = "") -> Iterator[None]:
+def explain_os_errors(kind: type[TauscopeError], words: str, advice: str = "") -> Generator[None, None, None]:
     """Raise ``WORDS (reason)ADVICE`` where the operating system refuses what is done within."""
     try:
         yield

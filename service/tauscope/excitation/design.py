@@ -11,6 +11,7 @@ from tauscope.excitation.optimiser import OptimiserProgress, optimise
 from tauscope.excitation.setting import ExcitationOptions, Setting
 from tauscope.excitation.slow_reversals import SlowPart, slow_part
 from tauscope.robot import Robot
+from tauscope.strict_model import take_fields
 from tauscope.trajectory.document import ExcitationDocument, HistoryPart, trajectory_document
 from tauscope.trajectory.fourier_series import FourierSeries
 from tauscope.trajectory.segments import FourierSegment, Segment
@@ -54,13 +55,15 @@ def design_excitation(
     series = setting.space.series(result.x)
     slow = slow_part(robot, series, setting.planned, setting.states, options.slow_postures)
     value, condition_number = setting.value(series)
-    record = DesignRecord(options.criterion.value, value, condition_number, {}, options.seed)
+    record = DesignRecord(
+        criterion=options.criterion.value, value=value, condition_number=condition_number, margins={}, seed=options.seed
+    )
     segments = _segments(series, slow, options)
     names = tuple(joint.name for joint in robot.joints)
     trajectory = Trajectory(robot.name, names, segments, setting.stated, record)
     margins = trajectory_margins(trajectory, setting.stated, setting.states, setting.available)
     return ExcitationDesign(
-        trajectory=replace(trajectory, design=replace(record, margins=margins.as_table())),
+        trajectory=replace(trajectory, design=record.model_copy(update={"margins": margins.as_table()})),
         series=series,
         periods=options.periods,
         criterion=options.criterion,
@@ -122,23 +125,16 @@ def _notes(robot: Robot, setting: Setting, slow: SlowPart) -> tuple[str, ...]:
 def excitation_document(design: ExcitationDesign) -> ExcitationDocument:
     """The document of a designed excitation."""
     trajectory = trajectory_document(design.trajectory)
-    return ExcitationDocument(
+    return take_fields(
+        ExcitationDocument,
+        design,
         robot=trajectory.robot,
         joints=trajectory.joints,
         criterion=design.criterion.value,
-        value=design.value,
-        condition_number=design.condition_number,
-        random_value=design.random_value,
         period_s=design.series.period_s,
         harmonics=design.series.harmonics,
-        periods=design.periods,
         duration_s=design.trajectory.duration_s,
-        margins={kind: list(values) for kind, values in design.margins.as_table().items()},
+        margins=design.margins.as_table(),
         clearance_m=design.margins.workspace_m,
-        active=list(design.active),
-        notes=list(design.notes),
-        evaluations=design.evaluations,
-        seconds=design.seconds,
-        history=list(design.history),
         trajectory=trajectory,
     )

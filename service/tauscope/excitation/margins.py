@@ -1,6 +1,5 @@
 """What a trajectory leaves of every limit, and the refusal of one that leaves nothing."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,12 +35,12 @@ class Margins:
     torque: Array | None = None
     workspace_m: float | None = None
 
-    def as_table(self) -> Mapping[str, tuple[float | None, ...]]:
+    def as_table(self) -> dict[str, list[float | None]]:
         """Margins of the joints by kind of limit, None where there is no limit."""
         kinds = {"position": self.position, "velocity": self.velocity, "acceleration": self.acceleration}
         if self.torque is not None:
             kinds["torque"] = self.torque
-        return {kind: tuple(float(v) if np.isfinite(v) else None for v in values) for kind, values in kinds.items()}
+        return {kind: [float(v) if np.isfinite(v) else None for v in values] for kind, values in kinds.items()}
 
 
 def trajectory_margins(

@@ -1,7 +1,6 @@
 """The identification as a document: what ``identify --json`` writes and the REST API returns (CONTRACT.md)."""
 
 from collections.abc import Iterable
-from dataclasses import asdict
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -16,7 +15,7 @@ from tauscope.recording.conditioning import ConditioningSummary
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import STANDARD_PARAMETERS
 from tauscope.robot.robot_data import link_to_dict
-from tauscope.strict_model import ResultModel
+from tauscope.strict_model import ResultModel, take_fields
 
 
 class Entry(ResultModel):
@@ -288,12 +287,7 @@ def _rotors(result: Identification) -> list[RotorEntry]:
 
 
 def _fit(fit: Fit, predicted: np.ndarray | None = None) -> FitEntry:
-    return FitEntry(
-        rms=fit.rms.tolist(),
-        band_rms=fit.band_rms.tolist(),
-        relative_error=fit.relative_error,
-        predicted_rms=None if predicted is None else predicted.tolist(),
-    )
+    return take_fields(FitEntry, fit, predicted_rms=None if predicted is None else predicted.tolist())
 
 
 def _excitation(result: Identification) -> ExcitationEntry:
@@ -308,9 +302,8 @@ def _excitation(result: Identification) -> ExcitationEntry:
         )
         for joint, each in enumerate(result.robot.joints)
     ]
-    extrapolation = None if result.extrapolation is None else result.extrapolation.tolist()
-    return ExcitationEntry(joints=joints, extrapolation=extrapolation)
+    return take_fields(ExcitationEntry, result, joints=joints)
 
 
 def _conditioning(summaries: Iterable[ConditioningSummary]) -> list[ConditioningEntry]:
-    return [ConditioningEntry.model_validate(asdict(each), strict=False) for each in summaries]
+    return [take_fields(ConditioningEntry, each) for each in summaries]

@@ -10,7 +10,7 @@ from tauscope.robot.kinematics import homogeneous
 from tauscope.robot.messages import Finding, Severity
 from tauscope.robot.robot import Joint, JointLimits, JointType, Robot, Segment
 from tauscope.robot.robot_file import read_robot
-from tauscope.strict_model import entry
+from tauscope.strict_model import entry, take_fields
 
 EARTH = (9.7, 9.9)  # acceleration of gravity on the ground, with room for altitude and latitude [m/s²]
 
@@ -64,19 +64,15 @@ def check_robot(path: Path | str, *, expands_xacro: bool = True) -> RobotReport:
 
 def _summary(number: int, joint: Joint, segment: Segment, mass: float | None) -> JointSummary:
     before, after = segment.before, segment.after
-    return JointSummary(
+    return take_fields(
+        JointSummary,
+        joint,
         number=number,
-        name=joint.name,
-        type=joint.type,
-        limits=joint.limits,
-        gear_ratio=joint.gear_ratio,
-        torque_constant=joint.torque_constant,
-        sign=joint.sign,
         origin=_triple(before.translation + before.rotation @ after.translation),
         axis=_triple(before.rotation[:, 2]),
         mass=mass,
-        before=tuple(float(value) for value in homogeneous(before).ravel()),
-        after=tuple(float(value) for value in homogeneous(after).ravel()),
+        before=tuple(homogeneous(before).ravel().tolist()),
+        after=tuple(homogeneous(after).ravel().tolist()),
     )
 
 
@@ -108,5 +104,4 @@ def _remarks(robot: Robot, source: str) -> Iterator[Finding]:
 
 
 def _triple(vector: np.ndarray) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in vector)
-    return (x, y, z)
+    return tuple(vector.tolist())

@@ -1,13 +1,14 @@
 """A trajectory: what a run plays and what trajectory files hold."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from pydantic import ConfigDict, Field
 
 from tauscope.errors import ExcitationError
 from tauscope.robot.robot import Array
+from tauscope.strict_model import StrictModel
 from tauscope.trajectory.fourier_series import MotionSamples
 from tauscope.trajectory.limits import MotionLimits
 from tauscope.trajectory.segments import (
@@ -40,15 +41,18 @@ class TrajectorySamples:
     period: Array  # (N,), index of the repeated excitation period, counted from 0; NaN outside the repeated part
 
 
-@dataclass(frozen=True)
-class DesignRecord:
-    """How a trajectory was made; `margins`: part left of each kind of limit by joint, None where there is none."""
+class DesignRecord(StrictModel):
+    """How the trajectory was made."""
 
-    criterion: str
-    value: float
-    condition_number: float
-    margins: Mapping[str, tuple[float | None, ...]]
-    seed: int
+    model_config = ConfigDict(allow_inf_nan=False)
+
+    criterion: str = Field(description="what was minimised")
+    value: float = Field(description="its value")
+    condition_number: float = Field(description="of the stacked, unweighted regressor of the repeated part")
+    margins: dict[str, list[float | None]] = Field(
+        description="part of each kind of limit that is left, one a joint; null where there is no limit"
+    )
+    seed: int = Field(description="of the optimiser's starts")
 
 
 @dataclass(frozen=True, eq=False)
