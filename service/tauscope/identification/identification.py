@@ -25,7 +25,7 @@ from tauscope.identification.posterior import Posterior, infer
 from tauscope.identification.residuals import Fit, ResidualStatistics, evaluate
 from tauscope.identification.signs import gravity_scale, reversed_joints
 from tauscope.identification.structure import ModelStructure
-from tauscope.recording.conditioning import Conditioner, ConditioningSummary
+from tauscope.recording.conditioning import Conditioner, ConditioningEntry
 from tauscope.recording.recording import Array, Recording
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import Robot
@@ -91,8 +91,8 @@ class Identification:
     cutoff_hz: float | None
     options: Options
     recording_warnings: tuple[ResultWarning, ...]
-    conditioning: tuple[ConditioningSummary, ...]
-    held_out_conditioning: tuple[ConditioningSummary, ...]
+    conditioning: tuple[ConditioningEntry, ...]
+    held_out_conditioning: tuple[ConditioningEntry, ...]
     identifiable: tuple[dict[str, bool], ...]
 
 

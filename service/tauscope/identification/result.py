@@ -1,6 +1,5 @@
 """The identification as a document: what ``identify --json`` writes and the REST API returns (CONTRACT.md)."""
 
-from collections.abc import Iterable
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -11,7 +10,7 @@ from tauscope.identification.identification import Identification
 from tauscope.identification.posterior import DETERMINED
 from tauscope.identification.residuals import Fit
 from tauscope.identification.warnings import identification_warnings, weak_points
-from tauscope.recording.conditioning import ConditioningSummary
+from tauscope.recording.conditioning import ConditioningEntry
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import STANDARD_PARAMETERS
 from tauscope.robot.robot_data import link_to_dict
@@ -131,24 +130,6 @@ class ExcitationEntry(ResultModel):
     )
 
 
-class ConditioningEntry(ResultModel):
-    """What was done to one recording, and what was missing in it."""
-
-    recording: str = Field(description="name as given")
-    samples: int = Field(description="rows in the file")
-    missed_positions: int = Field(description="rows without a complete position: bridged or split, and masked")
-    missed_torques: list[int] = Field(description="per joint, samples without a torque: masked")
-    dropped: int = Field(description="rows in pieces too short to filter")
-    gaps: int = Field(description="long gaps at which the recording was split")
-    rate_hz: float = Field(description="sampling rate [Hz]")
-    resampled: bool = Field(description="whether stamps jittered so that signals were interpolated")
-    averaged_periods: int = Field(description="periods averaged into one; 0 where none were")
-    position_noise_std: list[float] = Field(description="per joint, noise of the positions [rad or m]")
-    velocity_source: list[str] = Field(
-        description="per joint, what q̇ and q̈ were taken from: position, recorded velocity or recorded acceleration"
-    )
-
-
 class IdentificationDocument(ResultModel):
     """Result of an identification, schema tauscope.identification/1."""
 
@@ -217,8 +198,8 @@ def document(identification: Identification) -> IdentificationDocument:
             price_of_bodies=result.price_of_bodies.tolist(),
         ),
         excitation=_excitation(result),
-        conditioning=_conditioning(result.conditioning),
-        held_out_conditioning=_conditioning(result.held_out_conditioning),
+        conditioning=list(result.conditioning),
+        held_out_conditioning=list(result.held_out_conditioning),
     )
 
 
@@ -303,7 +284,3 @@ def _excitation(result: Identification) -> ExcitationEntry:
         for joint, each in enumerate(result.robot.joints)
     ]
     return take_fields(ExcitationEntry, result, joints=joints)
-
-
-def _conditioning(summaries: Iterable[ConditioningSummary]) -> list[ConditioningEntry]:
-    return [take_fields(ConditioningEntry, each) for each in summaries]

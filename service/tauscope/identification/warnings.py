@@ -6,7 +6,7 @@ from tauscope.identification.consistency import far_reaching
 from tauscope.identification.excitation import Excitation
 from tauscope.identification.identification import Identification
 from tauscope.identification.posterior import DETERMINED
-from tauscope.recording.conditioning import ConditioningSummary
+from tauscope.recording.conditioning import ConditioningEntry
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import Robot
 from tauscope.robot.messages import listed
@@ -166,7 +166,7 @@ def extrapolation_warnings(result: Identification) -> Iterator[ResultWarning]:
         )
 
 
-def _samples(summaries: tuple[ConditioningSummary, ...]) -> Iterator[ResultWarning]:
+def _samples(summaries: tuple[ConditioningEntry, ...]) -> Iterator[ResultWarning]:
     for each in summaries:
         counts = {
             "without a position": each.missed_positions,

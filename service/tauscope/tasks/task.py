@@ -1,7 +1,7 @@
 """What all tasks share: how a request names files, how progress is told, and how outputs are made."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
@@ -102,15 +102,8 @@ class ReadingOptions(StrictModel):
     @property
     def reading(self) -> Reading:
         """The same for those who read."""
-        return Reading(
-            self.units or {},
-            self.rate_hz,
-            self.trust_units,
-            columns=self.columns,
-            decimal=self.decimal,
-            delimiter=self.delimiter,
-            topic=self.topic,
-        )
+        layout = {each.name: getattr(self, each.name) for each in fields(RecordingLayout)}
+        return Reading(**{**layout, "units": self.units or {}}, trust_units=self.trust_units)
 
     @property
     def words(self) -> dict[str, Any]:

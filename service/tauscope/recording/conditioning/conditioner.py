@@ -6,6 +6,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from pydantic import Field
 
 from tauscope.errors import RecordingError
 from tauscope.recording.conditioning.motion import Motion, Trim, average_motion, transient_motion
@@ -22,27 +23,25 @@ from tauscope.recording.conditioning.timing import PeriodRun, Timing, find_stret
 from tauscope.recording.conditioning.uniform import Mask, Stretch, read_stretch, uniform_grid
 from tauscope.recording.recording import Array, Recording, Samples
 from tauscope.robot.robot import Robot
+from tauscope.strict_model import ResultModel, take_fields
 
 
-@dataclass(frozen=True)
-class ConditioningSummary:
-    """What was done to one recording, for the result and its reader.
+class ConditioningEntry(ResultModel):
+    """What was done to one recording, and what was missing in it."""
 
-    `missed_torques`: per joint, samples without a torque (filled in for filtering, not counted in the fit).
-    `position_noise_std`: per joint, standard deviation of the position noise over the whole spectrum [rad or m].
-    """
-
-    recording: str
-    samples: int
-    missed_positions: int
-    dropped: int
-    missed_torques: tuple[int, ...]
-    gaps: int
-    rate_hz: float
-    resampled: bool
-    averaged_periods: int
-    position_noise_std: tuple[float, ...]
-    velocity_source: tuple[str, ...]
+    recording: str = Field(description="name as given")
+    samples: int = Field(description="rows in the file")
+    missed_positions: int = Field(description="rows without a complete position: bridged or split, and masked")
+    missed_torques: list[int] = Field(description="per joint, samples without a torque: masked")
+    dropped: int = Field(description="rows in pieces too short to filter")
+    gaps: int = Field(description="long gaps at which the recording was split")
+    rate_hz: float = Field(description="sampling rate [Hz]")
+    resampled: bool = Field(description="whether stamps jittered so that signals were interpolated")
+    averaged_periods: int = Field(description="periods averaged into one; 0 where none were")
+    position_noise_std: list[float] = Field(description="per joint, noise of the positions [rad or m]")
+    velocity_source: list[str] = Field(
+        description="per joint, what q̇ and q̈ were taken from: position, recorded velocity or recorded acceleration"
+    )
 
 
 WINDOW_ROWS = 1 << 15  # rows conditioned at once: bounds memory whatever the recording's length
@@ -132,7 +131,7 @@ class Conditioner:
                 " record longer or ask for a higher cut-off"
             )
 
-    def summary(self, cutoff_hz: float | None) -> ConditioningSummary:
+    def summary(self, cutoff_hz: float | None) -> ConditioningEntry:
         """What was missing, and what was averaged in this band."""
         missed, resampled = np.zeros(self.robot.joint_count, int), False
         for samples in self.usable_samples():
@@ -140,18 +139,16 @@ class Conditioner:
             time = samples.time[samples.complete]
             resampled = resampled or bool(len(time) > 1 and uniform_grid(time - time[0], self.timing.rate_hz) is None)
         groups = (self._average(group, cutoff_hz) for rows in self.timing.rows for group in self._groups(rows))
-        return ConditioningSummary(
+        return take_fields(
+            ConditioningEntry,
+            self.timing,
             recording=self.recording.name,
-            samples=self.timing.samples,
             missed_positions=self.timing.missed,
-            dropped=self.timing.dropped,
-            missed_torques=tuple(int(value) for value in missed),
-            gaps=self.timing.gaps,
-            rate_hz=self.timing.rate_hz,
+            missed_torques=missed.tolist(),
             resampled=resampled,
             averaged_periods=max((motion.repetitions for motion in groups if motion is not None), default=0),
-            position_noise_std=tuple(float(value) for value in self.position_noise_std),
-            velocity_source=tuple(str(name) for name in self.source.in_band(cutoff_hz).names),
+            position_noise_std=self.position_noise_std.tolist(),
+            velocity_source=[str(name) for name in self.source.in_band(cutoff_hz).names],
         )
 
     def _stretch_motions(self, rows: tuple[int, int], cutoff_hz: float | None) -> Iterator[Motion]:
