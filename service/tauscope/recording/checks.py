@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainSerializer
 
 from tauscope.errors import RecordingError
+from tauscope.number_text import counted
 from tauscope.recording.examination import find_implausible, find_missing_effort, mend_recording
 from tauscope.recording.reading import read_recording
 from tauscope.recording.recording import Array, EffortKind, Recording, Samples
@@ -262,10 +263,12 @@ def report_recording(recording: Recording, robot: Robot | None = None, *, trust_
     runs = measures.period_lengths
     findings = [*_about_units(recording, robot, trust_units=trust_units)]
     findings += [_locate(Severity.WARNING, note.text) for note in mend_recording(recording, robot).notes]
-    findings += [*_about_columns(recording), *_about_clock(gaps)]
-    for name, count in measures.missed.items():
-        text = "1 sample missed (NaN)" if count == 1 else f"{count} samples missed (NaN)"
-        findings += [Finding(Severity.INFO, name, text)] if name != "period" else []
+    findings += _about_columns(recording)
+    if gaps.count:
+        longest = f"the longest, {gaps.longest:.4g} s, begins at t = {gaps.longest_at:.6g} s"
+        findings.append(Finding(Severity.WARNING, "t", f"{counted(gaps.count, 'gap')} in the clock; {longest}"))
+    missed = {name: counted(count, "sample") for name, count in measures.missed.items() if name != "period"}
+    findings += [Finding(Severity.INFO, name, f"{text} missed (NaN)") for name, text in missed.items()]
     for joint, measure in enumerate(measures.joints, 1):
         findings += _about_position(f"q{joint}", measure)
         if recording.effort_kind is EffortKind.COMMAND:  # a target may rest
@@ -313,13 +316,6 @@ def _about_columns(recording: Recording) -> Iterator[Finding]:
         yield Finding(Severity.INFO, ", ".join(passed_over), "currents are not read where torques are there")
     if others:
         yield Finding(Severity.INFO, listed(others), "not read: no column of this name is known")
-
-
-def _about_clock(gaps: Gaps) -> Iterator[Finding]:
-    if gaps.count:
-        places = "1 gap" if gaps.count == 1 else f"{gaps.count} gaps"
-        longest = f"the longest, {gaps.longest:.4g} s, begins at t = {gaps.longest_at:.6g} s"
-        yield Finding(Severity.WARNING, "t", f"{places} in the clock; {longest}")
 
 
 def _about_position(q: str, measure: JointMeasures) -> Iterator[Finding]:

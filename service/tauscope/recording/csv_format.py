@@ -9,6 +9,7 @@ from typing import BinaryIO
 import numpy as np
 
 from tauscope.errors import RecordingError
+from tauscope.number_text import counted
 from tauscope.recording.columns import ColumnLayout, find_layout, require_joint_count
 from tauscope.recording.csv_dialect import (
     BLANK,
@@ -268,8 +269,9 @@ def _split_line(line: bytes, number: int, header: _Header, name: str, *, is_trun
         hint = ": are these decimal commas? write decimals with a point"
     else:
         hint = "; complete or delete the line"
-    found = "1 field" if len(fields) == 1 else f"{len(fields)} fields"
-    raise RecordingError(f"{name}: line {number} has {found} where the header has {width} columns{hint}")
+    raise RecordingError(
+        f"{name}: line {number} has {counted(len(fields), 'field')} where the header has {width} columns{hint}"
+    )
 
 
 def _refuse_units(fields: Sequence[bytes], number: int, header: _Header, name: str) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.errors import RecordingError
+from tauscope.number_text import counted
 from tauscope.recording.recording import Recording
 from tauscope.recording.samples import Array, EffortKind, RowCheck, require_rising, require_rows
 from tauscope.recording.table import SPOOL_ABOVE_BYTES, TableBuilder
@@ -167,8 +168,8 @@ class RowIntake:
     def _warnings(self) -> Sequence[ResultWarning]:
         found = []
         if self._late:
-            rows = "1 row came" if self._late == 1 else f"{self._late} rows came"
-            text = f"{rows} after a later one, first at t = {self._first_late:.6g} s; put in order of time"
+            rows = counted(self._late, "row")
+            text = f"{rows} came after a later one, first at t = {self._first_late:.6g} s; put in order of time"
             found.append((text, "record with one publisher, or sort the file by t"))
         if self._repeated:
             rows = "1 row has" if self._repeated == 1 else f"{self._repeated} rows have"

@@ -98,8 +98,10 @@ class TableBuilder:
             with _naming_room():
                 self._spool.append(block)
         else:
-            if length > len(self._data):
-                self._grow(length)
+            if length > len(self._data):  # by half as much again, so that growing stays linear in total
+                grown = np.empty((min(max(length, len(self._data) * 3 // 2), self._limit_rows), len(self._names)))
+                grown[: self._length] = self._data[: self._length]
+                self._data = grown
             self._data[self._length : length] = block
         self._length = length
 
@@ -108,12 +110,6 @@ class TableBuilder:
         if self._spool is not None:
             return self._spool
         return MemoryTable(self._names, self._data[: self._length])
-
-    def _grow(self, length: int) -> None:
-        """Make room for at least `length` rows, by half as much again so that growing stays linear in total."""
-        grown = np.empty((min(max(length, len(self._data) * 3 // 2), self._limit_rows), len(self._names)))
-        grown[: self._length] = self._data[: self._length]
-        self._data = grown
 
     def _start_spool(self) -> None:
         with _naming_room():

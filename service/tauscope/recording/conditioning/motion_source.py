@@ -134,7 +134,9 @@ def _quieter_bands(stretches: Sequence[Stretch], noise: PositionNoise) -> Array 
         fits.append(fit)
         spectrum = acceleration_spectrum([values[:, None] for _, values in pieces], rate, 1)
         density, expected = float(spectrum.density[0]), float(noise.density[joint])
-        if fit.is_alike and expected > 0.0 and _is_flat(spectrum, rate) and _has_own_noise(fit, expected, rate):
+        # A velocity that was made from the positions carries their noise, too.
+        is_own = fit.misfit**2 >= OWN_NOISE * expected * _noise_gain(rate, fit.band_hz, 1)
+        if fit.is_alike and expected > 0.0 and _is_flat(spectrum, rate) and is_own:
             bands[joint] = max(np.sqrt(5.0 * density / (3.0 * expected)) / (2.0 * np.pi), limit)
     if not fits:
         return None
@@ -216,11 +218,6 @@ def _fit_velocity(pieces: Sequence[tuple[Array, Array]], rate_hz: float, limit_h
     if not columns:
         return None
     return _Fit.solve(np.concatenate(columns), np.concatenate(targets), rate_hz, limit_hz)
-
-
-def _has_own_noise(fit: _Fit, density: float, rate_hz: float) -> bool:
-    """Whether the positions' noise shows in the difference: a velocity that was made from them carries it, too."""
-    return fit.misfit**2 >= OWN_NOISE * density * _noise_gain(rate_hz, fit.band_hz, 1)
 
 
 def _wider_band(

@@ -188,7 +188,10 @@ def find_stretches(recording: Recording) -> Timing:
             f"{recording.name}: broken by {len(breaks)} gaps into pieces of fewer than {SHORTEST_STRETCH} samples:"
             " record again, or check column t"
         )
-    row = _row_of(np.concatenate([first, last]), incomplete)
+    complete = np.concatenate(
+        [first, last]
+    )  # counted among themselves: each is as many further as incomplete ones before
+    row = complete + np.searchsorted(incomplete - np.arange(len(incomplete)), complete, side="right")
     rows = tuple((int(a), int(b) + 1) for a, b in zip(row[: len(first)], row[len(first) :], strict=True))
     dropped = count - int(np.sum(last - first + 1))
     runs = () if labels is None else _runs(recording, labels, rows, 1.0 / rate)
@@ -250,11 +253,6 @@ def _is_last_digit(median_s: float, interval: Array) -> bool:
 def _longest_bridge(typical_s: float) -> float:
     longest = max(min(BRIDGED_SAMPLES * typical_s, LONGEST_BRIDGE_S), BRIDGED_SECONDS)
     return max(min(longest, MOST_BRIDGED_SAMPLES * typical_s), FEWEST_BRIDGED_SAMPLES * typical_s)
-
-
-def _row_of(complete: NDArray[np.int_], incomplete: NDArray[np.int_]) -> NDArray[np.int_]:
-    """Rows of complete samples, counted among themselves: as many further as incomplete ones lie before them."""
-    return complete + np.searchsorted(incomplete - np.arange(len(incomplete)), complete, side="right")
 
 
 def _runs(

@@ -122,19 +122,16 @@ class ZeroRuns:
                 else:
                     runs.append((start, stop))
 
-    @property
-    def _is_noisy(self) -> bool:
-        """Whether noise lets no effort stay at one value."""
-        return any(0 < scale.run <= USUAL_RUN * scale.hold and scale.change > 0.0 for scale in self._scales)
-
     def find_dropouts(self, recording: Recording) -> list[Rows]:
         """Ranges of rows that are dropouts, of every joint, (k, 2); they may overlap."""
         change = np.array([scale.change for scale in self._scales])
+        # Whether noise lets no effort stay at one value.
+        is_noisy = any(0 < scale.run <= USUAL_RUN * scale.hold and scale.change > 0.0 for scale in self._scales)
         *own, common = ([] if len(runs) > MOST_RUNS else runs for runs in self._runs)
         shared = [
             run
             for run in (common if len(own) > 1 else ())
-            if (self._is_noisy and run[1] - run[0] >= COMMON_ROWS and _is_gap(recording, run))
+            if (is_noisy and run[1] - run[0] >= COMMON_ROWS and _is_gap(recording, run))
             or (_measure_drops(recording, run) > COMMON_DROP * change).any()
         ]
         lost = [set(shared) for _ in own]

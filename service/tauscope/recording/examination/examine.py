@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 
 from tauscope.errors import RecordingError
-from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, EditedTable, Numbers
+from tauscope.number_text import counted
+from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, EditedTable
 from tauscope.recording.examination.plausibility import find_implausible
 from tauscope.recording.examination.scales import BLOCK_ROWS, joint_types
 from tauscope.recording.examination.scan import Defects, JointDefects, find_defects
@@ -57,7 +58,7 @@ def _describe_defects(recording: Recording, defects: Defects, joints: Sequence[s
         return f"first at t = {recording.samples(row, row + 1).time[0]:.6g} s"
 
     if len(defects.bunched):
-        text = f"column t: {_count(defects.bunched)} that waited for a later one"
+        text = f"column t: {counted(len(defects.bunched), 'row')} that waited for a later one"
         remedy = "stamp samples when they are measured, not when a buffer is emptied"
         yield ResultWarning(
             code="time-stamps", text=f"{text}, {begin(int(defects.bunched[0]))}; left out", remedy=remedy
@@ -93,7 +94,7 @@ def _describe_joint(
         yield "q", "encoder-reset", text, "home the encoder before the recording, and not within it"
     slow = "record at the rate of the controller"
     if len(repeated := joint.rows["repeated"]):
-        text = f"each value is held for about {joint.hold} rows; {_count(repeated)} masked"
+        text = f"each value is held for about {joint.hold} rows; {counted(len(repeated), 'row')} masked"
         yield "q", "held-samples", text, slow
     if joint.effort_hold > 1:
         text = f"each value is held for about {joint.effort_hold} rows; interpolated from change to change"
@@ -107,11 +108,7 @@ def _describe_joint(
     )
     for column, code, kind, words in masked:
         if len(rows := joint.rows[kind]):
-            yield column, code, f"{_count(rows)} {words}, {begin(int(rows[0]))}; masked", BUS
-
-
-def _count(rows: Numbers) -> str:
-    return "1 row" if len(rows) == 1 else f"{len(rows)} rows"
+            yield column, code, f"{counted(len(rows), 'row')} {words}, {begin(int(rows[0]))}; masked", BUS
 
 
 TRUST = "go on with --trust-units"

@@ -180,7 +180,12 @@ def _find_segment_families(header: Sequence[str]) -> list[Family]:
     for column in header:
         for template, name in _segments(column):
             groups.setdefault(template, {})[name] = column
-    return [Family(template, tuple(c.values()), is_guessed=True) for template, c in groups.items() if _is_named(c)]
+    named = [
+        (template, columns)
+        for template, columns in groups.items()
+        if all(not key.isdecimal() and is_joint_name(words_of(key)) for key in columns)
+    ]
+    return [Family(template, tuple(columns.values()), is_guessed=True) for template, columns in named]
 
 
 def _segments(column: str) -> list[tuple[str, str]]:
@@ -191,7 +196,3 @@ def _segments(column: str) -> list[tuple[str, str]]:
     if first > 0 and last < len(column) - 1 and not spans:
         spans = [(0, last), (first + 1, len(column))]
     return [(column[:start] + BY_NAME + column[stop:], column[start:stop]) for start, stop in spans]
-
-
-def _is_named(columns: Mapping[str, str]) -> bool:
-    return not any(key.isdecimal() or not is_joint_name(words_of(key)) for key in columns)
