@@ -113,12 +113,14 @@ def build_robot(document: RobotDocument, origin: DocumentOrigin, file_source: Fi
     findings: list[Finding] = [*(chain.findings if chain else ())]
     joints = _joints(document.joints, kinematics, origin)
     model, repairs = _model(document.model, kinematics, origin, findings)
-    layout = document.recording
+    layout, gravity = document.recording, EARTH if chain is None or chain.gravity is None else chain.gravity
+    if document.gravity is not None:
+        gravity = np.array(document.gravity)
     return Robot(
         name=document.name,
         joints=joints,
         segments=kinematics.segments,
-        gravity=_gravity(document, chain),
+        gravity=gravity,
         model=model,
         urdf=kinematics.path if kinematics.key == "urdf" else None,
         mjcf=kinematics.path if kinematics.key == "mjcf" else None,
@@ -130,13 +132,6 @@ def build_robot(document: RobotDocument, origin: DocumentOrigin, file_source: Fi
         repairs=repairs,
         recording=RecordingLayout() if layout is None else layout.layout,
     )
-
-
-def _gravity(document: RobotDocument, chain: Chain | None) -> np.ndarray:
-    """Gravity in the base frame, (3,) [m/s²]: as the robot file says, else as its MJCF."""
-    if document.gravity is not None:
-        return np.array(document.gravity)
-    return EARTH if chain is None or chain.gravity is None else chain.gravity
 
 
 def _kinematics(document: RobotDocument, origin: DocumentOrigin, file_source: FileSource) -> _Kinematics:
@@ -245,20 +240,15 @@ def _links(
 ) -> tuple[tuple[LinkInertia, ...], tuple[Repair, ...]]:
     links, repairs = [], []
     for index, document in enumerate(documents):
-        stated, place = _link(document), origin.where(("model", "links", index))
+        i = document.inertia
+        entries = [i.xx, i.yy, i.zz, i.xy, i.xz, i.yz, document.mass, *document.first_moment]
+        stated, place = LinkInertia.from_vector(np.array(entries)), origin.where(("model", "links", index))
         links.append(nearest_body(stated))
         if text := repair_text(stated, links[index]):
             repairs.append(Repair(index, place, text, REPAIR_REMEDY, stated, links[index]))
         elif stated.mass == 0.0 and np.any(stated.inertia):
             findings.append(Finding(Severity.WARNING, place, "has inertia but no mass, as no body has; add the mass"))
     return tuple(links), tuple(repairs)
-
-
-def _link(document: LinkDocument) -> LinkInertia:
-    i = document.inertia
-    return LinkInertia.from_vector(
-        np.array([i.xx, i.yy, i.zz, i.xy, i.xz, i.yz, document.mass, *document.first_moment])
-    )
 
 
 def _check_count(origin: DocumentOrigin, place: tuple[str, ...], found: int, count: int, key: str) -> None:
