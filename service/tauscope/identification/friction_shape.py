@@ -198,7 +198,8 @@ def estimate_shapes(
     `speed`: (n,), rms velocity of every joint, which the candidates are relative to [rad/s or m/s].
     """
     given = [joint.friction_shape for joint in structure.robot.joints]
-    shared = _shared_columns(structure)
+    steps = [*structure.coefficients("stiction").values(), *structure.coefficients("stribeck").values()]
+    shared = np.setdiff1d(np.arange(structure.size), steps)
     without_steps = restrict(factors, shared)
     solution = solve(without_steps, len(shared), noise_std)
     slopes = _candidate_slopes(speed, given)
@@ -227,11 +228,6 @@ def _candidate_slopes(speed: Array, given: Sequence[FrictionShape]) -> list[Arra
         stated = [value for value in (shape.k_v, shape.delta) if value is not None]
         grids.append(np.append(grid, stated))
     return grids
-
-
-def _shared_columns(structure: ModelStructure) -> NDArray[np.intp]:
-    steps = [*structure.coefficients("stiction").values(), *structure.coefficients("stribeck").values()]
-    return np.setdiff1d(np.arange(structure.size), steps)
 
 
 def _search(grids: list[JointGrid], given: Sequence[FrictionShape]) -> list[list[int]]:

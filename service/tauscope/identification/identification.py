@@ -1,7 +1,6 @@
 """From a robot and recordings to parameters: the whole way, in the order of the steps."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -124,16 +123,23 @@ def identify(
     Raises RecordingMismatchError for another number of joints, RecordingError where a recording is too short or broken,
     and IdentificationError where the recordings hold too little for the parameters.
     """
-    _require_joints(robot, (*recordings, *held_out))
+    for recording in (*recordings, *held_out):
+        if recording.joint_count != robot.joint_count:
+            raise RecordingMismatchError(
+                f"{recording.name}: has {recording.joint_count} joints, robot {robot.name} has {robot.joint_count}:"
+                " give the robot file that belongs to it"
+            )
     progress("condition recordings")
     base = base_parameters(robot)
     conditioners = [Conditioner.survey(recording, robot) for recording in recordings]
     require_motion(conditioners)
-    with _naming(recordings):
+    try:
         asked = options.cutoff_hz
         cutoff = choose_cutoff(conditioners, robot, base) if asked == "auto" else asked
         motions = Dataset(conditioners, robot, base, cutoff)
         found = _estimate(motions, options, progress)
+    except IdentificationError as error:
+        raise IdentificationError(f"{', '.join(recording.name for recording in recordings)}: {error}") from error
     structure = found.structure
     consistent_parameters = FullParameters.of(structure).map @ found.consistent.parameters
     parameters = consistent_parameters if options.prior else found.solution.parameters
@@ -211,15 +217,6 @@ def _predict_residual(
     return np.sqrt(outside + noise**2 + uncertain**2), uncertain
 
 
-def _require_joints(robot: Robot, recordings: Sequence[Recording]) -> None:
-    for recording in recordings:
-        if recording.joint_count != robot.joint_count:
-            raise RecordingMismatchError(
-                f"{recording.name}: has {recording.joint_count} joints, robot {robot.name} has {robot.joint_count}:"
-                " give the robot file that belongs to it"
-            )
-
-
 def _estimate(motions: Dataset, options: Options, progress: Progress) -> _Estimates:
     progress("choose model terms")
     structure, shapes, factors = choose_model(motions, motions.robot, motions.base, rotor_inertia=options.rotor_inertia)
@@ -233,14 +230,6 @@ def _estimate(motions: Dataset, options: Options, progress: Progress) -> _Estima
     progress("compare signs")
     wrong = reversed_joints(motions, structure, factors, ratios, posterior, consistent)
     return _Estimates(structure, shapes, factors, weights, solution, free, posterior, consistent, wrong)
-
-
-@contextmanager
-def _naming(recordings: Sequence[Recording]) -> Iterator[None]:
-    try:
-        yield
-    except IdentificationError as error:
-        raise IdentificationError(f"{', '.join(recording.name for recording in recordings)}: {error}") from error
 
 
 def _identifiable(found: _Estimates, covariance: Array) -> tuple[dict[str, bool], ...]:

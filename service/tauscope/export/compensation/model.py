@@ -239,11 +239,5 @@ def _coefficients(joint: JointCompensation, torque_per_unit: float | None, unit:
     """Coefficients divided by what one unit means at the joint; None where that is not known."""
     if torque_per_unit is None:
         return None
-    friction = joint.friction
-    return {
-        "unit": unit,
-        "stiction": friction.stiction / torque_per_unit,
-        "stribeck": friction.stribeck / torque_per_unit,
-        "viscous": friction.viscous / torque_per_unit,
-        "offset": friction.offset / torque_per_unit,
-    }
+    names = ("stiction", "stribeck", "viscous", "offset")
+    return {"unit": unit} | {name: getattr(joint.friction, name) / torque_per_unit for name in names}
