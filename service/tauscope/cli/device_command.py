@@ -81,7 +81,8 @@ def release(
     """
     arm = read_robot(robot)
     bus = select_bus(arm) if backend is None else find_bus(backend)
-    if not supported and not _ask(arm.name):
+    question = f"{arm.name} will be without torque. Is it supported?"
+    if not supported and not (sys.stdin.isatty() and typer.confirm(question)):
         raise AcquisitionError(f"{arm.name} holds on; support it, then state --supported")
     release_drives(bus.name, arm, {})
     say(f"{arm.name}: no drive is under power")
@@ -164,10 +165,6 @@ def show_finding(console: Console, finding: Finding) -> None:
     remedy = f"; {finding.remedy}" if finding.remedy else ""
     line = f"{_MARKS[finding.severity]}: {finding.subject}: {finding.detail}{remedy}"
     say(line, console)
-
-
-def _ask(name: str) -> bool:
-    return sys.stdin.isatty() and typer.confirm(f"{name} will be without torque. Is it supported?")
 
 
 SHOWN_CYCLES = 3  # cycles of a run whose frames are shown

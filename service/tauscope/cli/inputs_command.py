@@ -22,7 +22,7 @@ from tauscope.recording.convert import FORMATS
 from tauscope.recording.layout.guess import guess_parts, layout_text
 from tauscope.recording.reading import read_header
 from tauscope.report.tables import Table
-from tauscope.robot import JointSummary, RecordingLayout, RobotReport, layout_from_dict, read_robot
+from tauscope.robot import JointSummary, RecordingLayout, layout_from_dict, read_robot
 from tauscope.robot.messages import listed
 from tauscope.robot.recording_layout import Source
 from tauscope.robot.yaml_text import read_yaml
@@ -124,11 +124,7 @@ def _ask(layout: RecordingLayout) -> RecordingLayout:
     columns = dict(guessed)
     for group, words in QUESTIONS.items():
         default = columns.pop(group, NONE)
-        shown = (
-            default
-            if isinstance(default, str)
-            else ", ".join(map(str, default if isinstance(default, list) else [default]))
-        )
+        shown = ", ".join(map(str, default if isinstance(default, list) else [default]))
         answer = typer.prompt(f"{group}, {words}", default=shown, err=True).strip()
         if answer != NONE:
             columns[group] = answer if "," not in answer else read_yaml(f"[{answer}]", group).data
@@ -165,9 +161,8 @@ def check_robot_file(file: RobotFile) -> None:
     """Show what a robot file says, and everything doubtful in it."""
     report = robots.check_robot(file)
     console, gravity = output(), ", ".join(given(value) for value in report.gravity)
-    say(
-        f"Robot {report.name}: {counted(len(report.joints), 'joint')}, gravity [{gravity}] m/s²{_mass(report)}", console
-    )
+    mass = "" if report.total_mass is None else f", model of {given(report.total_mass)} kg"
+    say(f"Robot {report.name}: {counted(len(report.joints), 'joint')}, gravity [{gravity}] m/s²{mass}", console)
     columns = ("joint", "name", "type", "position", "velocity", "acceleration", "torque")
     columns += ("gear", "per unit", "mass [kg]")
     console.print(table("Joints", Table(columns, [_row(joint) for joint in report.joints], words=3)))
@@ -178,10 +173,6 @@ def check_robot_file(file: RobotFile) -> None:
         show_finding(console, finding)
     require_sound(findings)
     say(f"{file}: valid", console)
-
-
-def _mass(report: RobotReport) -> str:
-    return "" if report.total_mass is None else f", model of {given(report.total_mass)} kg"
 
 
 def _row(joint: JointSummary) -> list[str]:

@@ -112,7 +112,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with require_extra(f"tauscope {verb}".rstrip()):
             get_command(app).main(words, prog_name="tauscope")
     except SystemExit as exit_:
-        return _status(exit_)
+        code = ExitStatus.DONE if exit_.code is None else exit_.code
+        return code if isinstance(code, int) else ExitStatus.CANNOT_ANSWER
     except KeyboardInterrupt:
         return ExitStatus.INTERRUPTED
     except TauscopeError as error:
@@ -156,9 +157,3 @@ def _fail(message: str) -> int:
 
     typer.echo(one_line(message), err=True)
     return ExitStatus.CANNOT_ANSWER
-
-
-def _status(exit_: SystemExit) -> int:
-    if exit_.code is None:
-        return ExitStatus.DONE
-    return exit_.code if isinstance(exit_.code, int) else ExitStatus.CANNOT_ANSWER

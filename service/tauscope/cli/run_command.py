@@ -101,7 +101,10 @@ def require_options(backend: str, options: Collection[str]) -> None:
 def _run_arm(request: task.Request, asked: Path | None) -> None:
     """Raises typer.BadParameter, or TauscopeError where the run cannot start or ended before its time."""
     out = _output(asked)
-    folder, is_settled = _folder_beside(out), False
+    with explain_os_errors(AcquisitionError, f"{out}: cannot be written there", "; choose another place"):
+        # Beside the recording, on the same disk: what is in it outlives a crash.
+        folder = Path(tempfile.mkdtemp(prefix=".tauscope-run-", dir=out.resolve().parent))
+    is_settled = False
     try:
         with show_progress() as told:
             result = task.perform(request, Files({"run": folder / "run"}), told)
@@ -162,12 +165,6 @@ def _output(asked: Path | None) -> Path:
         raise AcquisitionError(f"{out}: Parquet needs pyarrow, which is not installed; name a .csv file")
     require_new(out)
     return out
-
-
-def _folder_beside(out: Path) -> Path:
-    """A hidden folder beside the recording, on the same disk; what is in it outlives a crash."""
-    with explain_os_errors(AcquisitionError, f"{out}: cannot be written there", "; choose another place"):
-        return Path(tempfile.mkdtemp(prefix=".tauscope-run-", dir=out.resolve().parent))
 
 
 def show_run(console: Console, record: RunRecord, robot: Robot) -> None:

@@ -1,7 +1,7 @@
 """Design an excitation: the motion that tells most about an arm."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Annotated, Literal
 
 import numpy as np
@@ -76,21 +76,15 @@ class ExcitationDesignOptions(StrictModel):
     def to_options(self) -> ExcitationOptions:
         """The options as the design takes them. Raises ExcitationError if a box is none."""
         boxes = tuple(Box(np.array(box.low), np.array(box.high)) for box in self.boxes)
-        return ExcitationOptions(
-            period_s=self.duration_s,
-            harmonics=self.harmonics,
-            periods=self.periods,
-            criterion=Criterion(self.criterion),
-            scaling=ColumnScaling(self.scaling),
-            limit_fraction=self.limit_fraction,
-            torque_margin=self.torque_margin,
-            workspace=Workspace(self.floor_m, boxes, np.array(self.tool_m)),
-            slow_postures=self.slow_postures,
-            closing_period=self.closing_period,
-            starts=self.starts,
-            seed=self.seed,
-            noise_std=None if self.noise_std is None else np.array(self.noise_std),
-        )
+        same = {each.name for each in fields(ExcitationOptions)} & set(type(self).model_fields)
+        values = {name: getattr(self, name) for name in same} | {
+            "period_s": self.duration_s,
+            "criterion": Criterion(self.criterion),
+            "scaling": ColumnScaling(self.scaling),
+            "workspace": Workspace(self.floor_m, boxes, np.array(self.tool_m)),
+            "noise_std": None if self.noise_std is None else np.array(self.noise_std),
+        }
+        return ExcitationOptions(**values)
 
 
 class Request(StrictModel):
