@@ -23,13 +23,12 @@ REST = 0.02  # speed relative to the fastest below which friction has no directi
 class SmoothMotion:
     """Motion on a uniform grid.
 
-    `time`: (N,) [s].
     `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈.
     `rate`, `band`: sampling rate, and band of the comparison [Hz].
     """
 
     samples: Samples
-    time: Array
+    time: Array  # (N,) [s]
     position: Array
     velocity: Array
     acceleration: Array

@@ -19,13 +19,12 @@ SWEEPS = 4  # Gauss-Seidel sweeps over the dry friction of coupled joints
 class Variants:
     """Parameters of V models of one arm.
 
-    `links`: (V, 10 m), standard parameters.
     `rotor`, `stiction`, `viscous`, `offset`: (V, n) [kg m² or kg, Nm or N, Nm s/rad or N s/m, Nm or N].
     `stribeck`, `delta`: (n,), the same in all models.
     `driving`, `braking`: (V, n), as `LoadFriction`.
     """
 
-    links: Array
+    links: Array  # (V, 10 m), standard parameters
     rotor: Array
     stiction: Array
     viscous: Array

@@ -12,7 +12,6 @@ from tauscope.recording.recording import Array
 class MotionRows:
     """Evenly spaced rows of one piece of motion, in the band in which models and torque are compared.
 
-    `progress`: (M,), part of the recording's motion that is over, 0 to 1; alike in every repetition of a motion.
     `position`, `velocity`, `acceleration`, `load`: (n, M), q, q̇, q̈ and the rigid-body torque [SI].
     `torque`, `plain`, `explained`: (n, M), measured, by the nominal model, and by the model with all findings [Nm or
         N].
@@ -20,7 +19,7 @@ class MotionRows:
 
     recording: int  # number of the recording
     time: Array  # (M,), since the beginning of the recording [s]
-    progress: Array
+    progress: Array  # (M,), part of the recording's motion that is over, 0 to 1; alike in every repetition of a motion
     position: Array
     velocity: Array
     acceleration: Array

@@ -94,12 +94,9 @@ def total_gain(grids: list[JointGrid], chosen: list[list[int]]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Conditional:
-    """One joint's candidates after the chosen columns of all other joints are projected off as well.
+    """One joint's candidates after the chosen columns of all other joints are projected off as well."""
 
-    `gram`: (g + 1, g + 1), Gram matrix of the candidates; `target`: (g + 1,), their products with the torque.
-    """
-
-    gram: Array
+    gram: Array  # (g + 1, g + 1), Gram matrix of the candidates; `target`: (g + 1,), their products with the torque
     target: Array
 
     @staticmethod
@@ -158,13 +155,12 @@ SWEEPS = 4
 class EstimatedShape:
     """Shape constants of one joint.
 
-    `delta`: slope of the Stribeck term [s/rad or s/m]; None where the data show no such term.
     `k_v_identifiable`, `delta_identifiable`: False where the data cannot tell the constant.
     `k_v_given`, `delta_given`: True where the robot file states it.
     """
 
     k_v: float  # slope of the step at zero velocity [s/rad or s/m]
-    delta: float | None
+    delta: float | None  # slope of the Stribeck term [s/rad or s/m]; None where the data show no such term
     k_v_identifiable: bool
     delta_identifiable: bool
     k_v_given: bool

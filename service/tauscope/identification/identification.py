@@ -58,9 +58,8 @@ class Options:
 class Identification:
     """A model of the arm with what is known about its uncertainty.
 
-    `undetermined`: (p,), parameters about which the recordings say nothing.
     `predicted_train`, `predicted_held_out`: (n,), residual at the recorded rate that noise and covariance lead to
-    expect [Nm or N].
+        expect [Nm or N].
     """
 
     robot: Robot
@@ -73,7 +72,7 @@ class Identification:
     gravity_scale: float | None  # torque of gravity over that of the stated links; None where it cannot be told
     posterior: Posterior
     covariance: Array  # (p + s, p + s), of the parameters, and of the logarithms of the estimated shape constants
-    undetermined: np.ndarray
+    undetermined: np.ndarray  # (p,), parameters about which the recordings say nothing
     shapes: tuple[EstimatedShape, ...]
     consistent: ConsistentParameters
     condition_number: float

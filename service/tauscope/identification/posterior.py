@@ -34,7 +34,6 @@ DETERMINED = 0.9  # share of the prior's variance that data take from a paramete
 class Posterior:
     """What prior and data together say of the parameters, before bodies and friction restrict them.
 
-    `weights`: (n,), 1/(σ_j √ρ_j), by which the joints' equations are multiplied.
     `factor`, `target`: (p, p), (p,), R and z of the data's weighted equations.
     `covariance`, `precision`: (p, p), S of the posterior, and P⁻¹ of the prior.
     """
@@ -42,7 +41,7 @@ class Posterior:
     prior: Prior
     doubt: Array  # (p,), deviation from the prior that the data show, in its standard deviations
     noise_std: Array  # (n,), σ_j of a row in the common band
-    weights: Array
+    weights: Array  # (n,), 1/(σ_j √ρ_j), by which the joints' equations are multiplied
     factor: Array
     target: Array
     mean: Array

@@ -39,11 +39,10 @@ class JointState:
 class JointStates:
     """Messages of one layout.
 
-    `stamp`: (N,) int64, time of measurement [ns].
     `position`, `velocity`, `effort`: (N, n) or (N, 0), one row a message.
     """
 
-    stamp: NDArray[np.int64]
+    stamp: NDArray[np.int64]  # (N,) int64, time of measurement [ns]
     names: tuple[str, ...]
     position: Array
     velocity: Array

@@ -26,12 +26,11 @@ class LinkEncoders:
 
     `lag`: (N, n), q - qlink without whole turns and without its median [rad or m]; NaN where either is missing or a
         glitch.
-    `joints`: joints, from 0, that have an encoder on the link.
     `copies`, `strangers`: joints whose column repeats q, and whose column does not move with it.
     """
 
     lag: Array
-    joints: tuple[int, ...]
+    joints: tuple[int, ...]  # joints, from 0, that have an encoder on the link
     copies: tuple[int, ...]
     strangers: tuple[int, ...]
 

@@ -92,7 +92,6 @@ BEYOND = 1.15  # the curve is drawn over this many times the largest speed in th
 class FrictionCurve:
     """τ_f(v) = τ_s A(K_v v) + τ_sc A(δ v) + τ_v v + offset of one joint.
 
-    `seen`: (float, float), least and greatest velocity in the recordings [rad/s or m/s].
     `bin_velocity`, `bin_torque`: (B,), mean velocity, and mean of measured torque less the rigid body's, in velocity
         bins.
     """
@@ -100,7 +99,7 @@ class FrictionCurve:
     velocity: Array  # (G,), v, increasing, densest about zero [rad/s or m/s]
     torque: Array  # (G,), τ_f [Nm or N]
     std: Array  # (G,), its standard error, from the covariance of all its coefficients and shape constants [Nm or N]
-    seen: tuple[float, float]
+    seen: tuple[float, float]  # (float, float), least and greatest velocity in the recordings [rad/s or m/s]
     bin_velocity: Array
     bin_torque: Array
 

@@ -37,12 +37,11 @@ class RecordingLayout:
 
     `columns`: where the columns of CONTRACT.md are found, by column (``q3``) or for all joints (``q``).
     `units`: unit of ``t``, ``q``, ``qd``, ``tau``, or of one joint's column, ``q3``.
-    `rate_hz`: samples a second where t counts samples [Hz].
     `decimal`, `delimiter`: None where the file shows them.
     """
 
     units: Mapping[str, str] = field(default_factory=dict)
-    rate_hz: float | None = None
+    rate_hz: float | None = None  # samples a second where t counts samples [Hz]
     columns: Mapping[str, Source] | str | None = None
     decimal: str | None = None
     delimiter: str | None = None

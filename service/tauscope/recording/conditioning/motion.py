@@ -22,7 +22,6 @@ from tauscope.recording.recording import Array
 class Motion:
     """One piece of conditioned motion with the torque that went with it.
 
-    `time`: (N,) [s]; of the first period where periods were averaged.
     `position`, `velocity`, `acceleration`: (N, n), smoothed q, q̇, q̈ at the recorded rate.
     `period`: (N,), progress through the repeated excitation, where it is known and not averaged: index of the period
         plus the part of it that is over.
@@ -30,7 +29,7 @@ class Motion:
         averaged.
     """
 
-    time: Array
+    time: Array  # (N,) [s]; of the first period where periods were averaged
     position: Array
     velocity: Array
     acceleration: Array

@@ -39,7 +39,6 @@ class Periods:
     """P complete periods of N samples, aligned.
 
     `position`, `torque`: (P, N, n), q and τ of every period.
-    `rows`: (int, int), the samples of the stretch that the periods cover.
     `velocity`, `acceleration`: (P, N, n), recorded q̇ and q̈, where the stretch has them.
     `advance`: (n,), how far each joint gets from one period to the next [rad or m]; None where nobody asked.
     """
@@ -48,7 +47,7 @@ class Periods:
     position: Array
     torque: Array
     measured: Mask  # (P, N, n), where the torque was measured
-    rows: tuple[int, int]
+    rows: tuple[int, int]  # (int, int), the samples of the stretch that the periods cover
     start_s: float = 0.0
     velocity: Array | None = None
     acceleration: Array | None = None
