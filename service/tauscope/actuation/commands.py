@@ -6,12 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from tauscope.actuation.delay import FOUND_STD_S, Delay, command_torque, estimate_delays, shift_command
-from tauscope.actuation.scale import (
-    STATED_MASS_STD,
-    estimate_torque_per_volt,
-    is_open,
-    with_torque_per_volt,
-)
+from tauscope.actuation.scale import STATED_MASS_STD, estimate_torque_per_volt, is_open, with_torque_per_volt
 from tauscope.errors import RecordingError
 from tauscope.recording.columns import table_columns
 from tauscope.recording.recording import Recording

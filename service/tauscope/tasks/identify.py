@@ -10,14 +10,7 @@ from tauscope.actuation import make_efforts
 from tauscope.export.formats import EXPORT_FILES, ExportFormat, make_export
 from tauscope.export.model import of_identification
 from tauscope.export.model_file import identified_document, model_file
-from tauscope.identification import (
-    Estimator,
-    Identification,
-    IdentificationDocument,
-    Options,
-    document,
-    identify,
-)
+from tauscope.identification import Estimator, Identification, IdentificationDocument, Options, document, identify
 from tauscope.recording import Recording
 from tauscope.robot import read_robot
 from tauscope.tasks.task import (
