@@ -14,7 +14,7 @@ from tauscope.robot import Robot
 from tauscope.strict_model import take_fields
 from tauscope.trajectory.document import ExcitationDocument, HistoryPart, trajectory_document
 from tauscope.trajectory.fourier_series import FourierSeries
-from tauscope.trajectory.segments import FourierSegment, Segment
+from tauscope.trajectory.segments import FourierSegment
 from tauscope.trajectory.trajectory import DesignRecord, Trajectory
 
 # Part of a limit: a limit that leaves no more than this above what is spared by wish is one that limits the design.
@@ -58,7 +58,8 @@ def design_excitation(
     record = DesignRecord(
         criterion=options.criterion.value, value=value, condition_number=condition_number, margins={}, seed=options.seed
     )
-    segments = _segments(series, slow, options)
+    closing = [FourierSegment(series, 1, first_period=options.periods)] if options.closing_period else []
+    segments = (FourierSegment(series, options.periods, first_period=0), *slow.segments, *closing)
     names = tuple(joint.name for joint in robot.joints)
     trajectory = Trajectory(robot.name, names, segments, setting.stated, record)
     margins = trajectory_margins(trajectory, setting.stated, setting.states, setting.available)
@@ -81,14 +82,6 @@ def design_excitation(
         evaluations=result.evaluations,
         seconds=result.seconds,
     )
-
-
-def _segments(series: FourierSeries, slow: SlowPart, options: ExcitationOptions) -> tuple[Segment, ...]:
-    """The repeated periods, slow reversals, and the first period again, numbered on."""
-    segments: list[Segment] = [FourierSegment(series, options.periods, first_period=0), *slow.segments]
-    if options.closing_period:
-        segments.append(FourierSegment(series, 1, first_period=options.periods))
-    return tuple(segments)
 
 
 def _active(robot: Robot, margins: Margins, options: ExcitationOptions) -> tuple[str, ...]:

@@ -39,13 +39,7 @@ class ColumnScaling(StrEnum):
     TYPICAL = "typical"  # each column divided by its rms over random motions within the limits: units fall out
 
 
-@dataclass(frozen=True, eq=False)
-class MotionGradient:
-    """Derivatives of a scalar by q, q̇ and q̈ of every sample, (N, n) each."""
-
-    position: Array
-    velocity: Array
-    acceleration: Array
+MotionGradient = MotionSamples  # derivatives of a scalar by q, q̇ and q̈ of every sample, (N, n) each
 
 
 class ExcitationRegressor:

@@ -4,8 +4,8 @@ Each begins and ends at rest with zero acceleration: any two that share a postur
 differentiable.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -17,40 +17,32 @@ PEAK_SPEED = 1.875  # largest speed of the minimum-jerk move over distance and d
 PEAK_ACCELERATION = 10.0 / np.sqrt(3.0)  # largest acceleration of the minimum-jerk move over distance and duration one
 
 
-class Segment(Protocol):
+class Segment(ABC):
     """A piece of a trajectory."""
+
+    duration_s: float  # how long it lasts [s]
 
     @property
     def joint_count(self) -> int:
         """Number of joints n."""
-        ...
+        return self.evaluate(np.zeros(1)).position.shape[1]
 
-    @property
-    def duration_s(self) -> float:
-        """How long it lasts [s]."""
-        ...
-
+    @abstractmethod
     def evaluate(self, time: Array) -> MotionSamples:
         """Exact position, velocity and acceleration. `time`: (N,), instants since its start [s]."""
-        ...
 
     def period(self, time: Array) -> Array:
         """Index of the repeated excitation period, (N,), NaN outside; `time`: (N,) since its start [s]."""
-        ...
+        return np.full(len(time), np.nan)
 
 
 @dataclass(frozen=True, eq=False)
-class FourierSegment:
+class FourierSegment(Segment):
     """Whole periods of a Fourier series; `first_period` counts in column `period`, None where not to be counted."""
 
     series: FourierSeries
     repeats: int = 1
     first_period: int | None = None
-
-    @property
-    def joint_count(self) -> int:
-        """Number of joints n."""
-        return self.series.joint_count
 
     @property
     def duration_s(self) -> float:
@@ -71,17 +63,12 @@ class FourierSegment:
 
 
 @dataclass(frozen=True, eq=False)
-class MoveSegment:
+class MoveSegment(Segment):
     """A minimum-jerk move between postures (n,): q = q_0 + (q_1 - q_0)(10 s³ - 15 s⁴ + 6 s⁵), s = t/T."""
 
     start: Array
     end: Array
     duration_s: float  # T [s]
-
-    @property
-    def joint_count(self) -> int:
-        """Number of joints n."""
-        return len(self.start)
 
     def evaluate(self, time: Array) -> MotionSamples:
         """Exact position, velocity and acceleration. `time`: (N,), instants since its start [s]."""
@@ -92,13 +79,9 @@ class MoveSegment:
         position = np.where(from_end, self.end - (1.0 - progress)[:, None] * way, self.start + progress[:, None] * way)
         return MotionSamples(position, rate[:, None] * way, bend[:, None] * way)
 
-    def period(self, time: Array) -> Array:
-        """NaN: no part of the repeated excitation, shape (N,). `time`: (N,), instants since its start [s]."""
-        return np.full(len(time), np.nan)
-
 
 @dataclass(frozen=True, eq=False)
-class PathSegment:
+class PathSegment(Segment):
     """A move along the path of a Fourier series at a pace of its own: q = F(σ(t)), σ minimum-jerk.
 
     It visits only postures that the series visits: where that keeps clear of obstacles, so does this.
@@ -111,11 +94,6 @@ class PathSegment:
     to_s: float
     duration_s: float  # how long it takes [s]
 
-    @property
-    def joint_count(self) -> int:
-        """Number of joints n."""
-        return self.series.joint_count
-
     def evaluate(self, time: Array) -> MotionSamples:
         """Exact q, q̇ = F' σ̇, q̈ = F'' σ̇² + F' σ̈; `time`: (N,) since its start [s]."""
         progress, rate, bend = minimum_jerk(time, self.duration_s)
@@ -125,13 +103,9 @@ class PathSegment:
         pace, change = (way * rate)[:, None], (way * bend)[:, None]
         return MotionSamples(path.position, path.velocity * pace, path.acceleration * pace**2 + path.velocity * change)
 
-    def period(self, time: Array) -> Array:
-        """NaN: no part of the repeated excitation, shape (N,). `time`: (N,), instants since its start [s]."""
-        return np.full(len(time), np.nan)
-
 
 @dataclass(frozen=True, eq=False)
-class SampledSegment:
+class SampledSegment(Segment):
     """Samples and the quintics between them; `label`: (K,), period from each sample on, NaN outside."""
 
     time: Array  # (K,), instants of the samples, from 0, increasing [s]
@@ -142,11 +116,6 @@ class SampledSegment:
         """Refuse samples that are no motion."""
         if len(self.time) < 2 or self.time[0] != 0.0 or not (np.diff(self.time) > 0.0).all():
             raise ExcitationError("a sampled motion needs two or more instants that increase from 0")
-
-    @property
-    def joint_count(self) -> int:
-        """Number of joints n."""
-        return self.motion.position.shape[1]
 
     @property
     def duration_s(self) -> float:
