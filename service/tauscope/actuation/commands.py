@@ -28,14 +28,8 @@ def make_efforts(
 ) -> tuple[Robot, tuple[Recording, ...], tuple[Recording, ...]]:
     """Make torque where recordings hold commands in its place; delays that nothing states are estimated.
 
-    Raises RecordingError where a joint has no loop, or its loop lacks a voltage.
-
-    Returns
-    -------
-    Robot
-        with the delays, and with notes on what the torque is made of
-    tuple of Recording, tuple of Recording
-        training and held out, with torque
+    The robot has these delays, and notes on what the torque is made of. Raises RecordingError where a joint has no
+    loop, or its loop lacks a voltage.
     """
     commands = [each for each in recordings if each.effort_kind is EffortKind.COMMAND]
     unseen = [each for each in held_out if each.effort_kind is EffortKind.COMMAND]
@@ -49,7 +43,11 @@ def make_efforts(
     delays = estimate_delays(in_volts, given)
     if open_:
         scales = estimate_torque_per_volt(in_volts, given, delays, open_)
-        _require_scales(robot, given[0], set(open_) - set(scales))
+        for place in sorted(set(open_) - set(scales)):
+            raise RecordingError(
+                f"{given[0].name}: {robot.joints[place].name}: torque cannot be made of qref{place + 1} without its"
+                f" torque per volt, and stated masses do not tell it; state joints[{place}].actuator.torque_per_volt"
+            )
         robot = with_torque_per_volt(robot, scales, STATED_MASS_STD)
     joints = tuple(
         joint if joint.actuator is None else replace(joint, actuator=replace(joint.actuator, delay=delay.value))
@@ -76,15 +74,6 @@ def require_loops(robot: Robot, recording: Recording) -> None:
                 f"{recording.name}: {joint.name}: torque cannot be made of qref{number} without its supply; state"
                 f" joints[{number - 1}].actuator.supply_voltage, or record volt{number}"
             )
-
-
-def _require_scales(robot: Robot, recording: Recording, lacking: set[int]) -> None:
-    """Torque per volt is stated, or stated masses tell it."""
-    for place in sorted(lacking):
-        raise RecordingError(
-            f"{recording.name}: {robot.joints[place].name}: torque cannot be made of qref{place + 1} without its torque"
-            f" per volt, and stated masses do not tell it; state joints[{place}].actuator.torque_per_volt"
-        )
 
 
 def _make_effort(robot: Robot, recording: Recording, delays: Sequence[Delay]) -> Recording:

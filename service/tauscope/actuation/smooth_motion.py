@@ -42,7 +42,7 @@ class SmoothMotion:
         rate = 1.0 / float(np.median(np.diff(samples.time)))
         band = min(BAND_HZ, 0.2 * rate)
         time = np.arange(samples.time[0], samples.time[-1], 1.0 / rate)
-        raw = np.stack([_onto(samples.time, column, time) for column in samples.position.T], axis=1)
+        raw = np.stack([put_onto(samples.time, column, time) for column in samples.position.T], axis=1)
         position = smooth(raw, rate, 2.0 * band)
         velocity = np.gradient(position, 1.0 / rate, axis=0)
         acceleration = np.gradient(velocity, 1.0 / rate, axis=0)
@@ -55,7 +55,7 @@ class SmoothMotion:
 
     def onto(self, values: Array) -> Array:
         """`values`, (M,), one a row of the recording, NaN where missed, on the grid, (N,)."""
-        return _onto(self.samples.time, values, self.time)
+        return put_onto(self.samples.time, values, self.time)
 
     def moves(self, joint: int) -> NDArray[np.bool_]:
         """Rows in which a joint moves, and every delay has a command, (N,).
@@ -75,7 +75,7 @@ class SmoothMotion:
         return smooth(whole, self.rate, self.band)[self.moves(joint)]
 
 
-def _onto(time: Array, values: Array, at: Array) -> Array:
-    """Values at other instants; missed ones are bridged."""
+def put_onto(time: Array, values: Array, at: Array, missing: float = 0.0) -> Array:
+    """Values (M,) at other instants (N,); missed ones are bridged, and `missing` where all are. `time`: (M,) [s]."""
     known = np.isfinite(values)
-    return np.interp(at, time[known], values[known]) if known.any() else np.zeros(len(at))
+    return np.interp(at, time[known], values[known]) if known.any() else np.full(len(at), missing)

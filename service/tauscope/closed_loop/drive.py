@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from tauscope.actuation import shift_command
+from tauscope.actuation.smooth_motion import put_onto
 from tauscope.closed_loop.laws import RELAXED
 from tauscope.closed_loop.model import RolloutModel
 from tauscope.closed_loop.plant import STEP_S, Plant
@@ -48,10 +49,10 @@ def record_motion(recording: Recording) -> RecordedMotion:
     """A recording on the steps of a rollout."""
     samples = recording.samples()
     time = np.arange(samples.time[0], samples.time[-1] + 0.5 * STEP_S, STEP_S)
-    position = np.stack([_onto(samples.time, column, time) for column in samples.position.T], axis=1)
+    position = _onto(samples.time, samples.position, time)
     velocity = np.gradient(smooth(position, 1.0 / STEP_S, STATE_BAND_HZ), STEP_S, axis=0)
     if samples.velocity is not None and np.isfinite(samples.velocity).any(axis=0).all():
-        velocity = np.stack([_onto(samples.time, column, time) for column in samples.velocity.T], axis=1)
+        velocity = _onto(samples.time, samples.velocity, time)
     return RecordedMotion(recording.name, time, position, velocity, samples.time, samples.position)
 
 
@@ -76,7 +77,7 @@ class LoopDrive:
             command = shift_command(samples.time, reference[:, joint], loop.delay or 0.0, loop.rate_hz, time)
             self.command[:, joint] = command if loop.kind == "position" else np.gradient(command, STEP_S)
         self.voltage, self.gain, self.temperature = (
-            None if values is None else np.stack([_onto(samples.time, column, time) for column in values.T], axis=1)
+            None if values is None else _onto(samples.time, values, time)
             for values in (samples.voltage, samples.gain, samples.temperature)
         )
 
@@ -104,7 +105,7 @@ class TorqueDrive:
         samples = recording.samples()
         effort = samples.effort if samples.effort_command is None else samples.effort_command
         torque = recording.joint_torque(effort, robot)
-        self._torque = np.stack([_onto(samples.time, column, motion.time) for column in torque.T], axis=1)
+        self._torque = _onto(samples.time, torque, motion.time)
         self._motion = motion
         self._stiffness, self._damping = inertia * STABILISER_RAD_S**2, 2.0 * inertia * STABILISER_RAD_S
         self.squares, self.steps = np.zeros(len(inertia)), 0
@@ -125,8 +126,8 @@ class TorqueDrive:
 
 
 def _onto(time: Array, values: Array, at: Array) -> Array:
-    known = np.isfinite(values)
-    return np.interp(at, time[known], values[known]) if known.any() else np.full(len(at), np.nan)
+    """Columns (N, n) at other instants, NaN where all is missed."""
+    return np.stack([put_onto(time, column, at, np.nan) for column in values.T], axis=1)
 
 
 LOST = 1e3  # position error beyond which the simulated arm is lost and held there [rad or m]

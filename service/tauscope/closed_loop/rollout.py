@@ -7,7 +7,6 @@ import numpy as np
 
 from tauscope.actuation import estimate_delays, is_open, require_loops
 from tauscope.closed_loop.drive import (
-    Drive,
     LoopDrive,
     RecordedMotion,
     TorqueDrive,
@@ -35,6 +34,11 @@ from tauscope.result_warning import ResultWarning
 from tauscope.robot import Actuator, Robot
 
 HORIZONS_S = (0.1, 1.0, 10.0)  # times between restarts at the real state [s]: one command, one move, one task
+STABILISED = ResultWarning(
+    code="stabiliser",
+    text="no loop is stated, or commands are missing: recorded torque drives the arm, and a stabiliser holds it",
+    remedy="state joints[].actuator and record qref; compare torque of the stabiliser with that of the joint",
+)
 Progress = Callable[[str], None]
 
 
@@ -134,7 +138,11 @@ def roll_out(
             stabiliser = None
             for horizon in (*(h for h in HORIZONS_S if h < motion.time[-1] - motion.time[0]), None):
                 own = loops if refined is None or model.name != "refined" else refined.loops
-                drive = _drive(robot, recording, motion, model, own)
+                drive = (
+                    LoopDrive(own, recording, motion.time, is_damped=robot.mjcf is None)
+                    if own
+                    else TorqueDrive(robot, recording, motion, model.inertia)
+                )
                 runs[horizon] = simulate_motion(model, plant, drive, motion, horizon)
                 stabiliser = drive.stabiliser_rms.tolist() if isinstance(drive, TorqueDrive) else None
             simulated[model.name] = runs[None]
@@ -143,7 +151,7 @@ def roll_out(
         traces.append(
             Trace(motion, simulated, RecordingEntry(recording=recording.name, duration_s=length, models=entries))
         )
-    warnings = (*_warn_drive(is_closed=is_closed), *(w for recording in recordings for w in recording.warnings))
+    warnings = (*(() if is_closed else (STABILISED,)), *(w for recording in recordings for w in recording.warnings))
     return Rollout(robot, is_closed, tuple(models), tuple(traces), warnings, refined)
 
 
@@ -206,14 +214,6 @@ def _fill(loop: Actuator, known: Actuator) -> Actuator:
         delay=known.delay if loop.delay is None else loop.delay,
         torque_per_volt=known.torque_per_volt if loop.volt_torque is None else loop.torque_per_volt,
     )
-
-
-def _drive(
-    robot: Robot, recording: Recording, motion: RecordedMotion, model: RolloutModel, loops: tuple[Actuator, ...]
-) -> Drive:
-    if loops:
-        return LoopDrive(loops, recording, motion.time, is_damped=robot.mjcf is None)
-    return TorqueDrive(robot, recording, motion, model.inertia)
 
 
 def _plain_model(robot: Robot, exports: Sequence[ExportModel]) -> ExportModel | None:
@@ -300,11 +300,3 @@ def _reversal_error(rows: Array, measured: Array, simulated: Array, time: Array,
         if np.isfinite(error).any():
             found[joint] = float(np.sqrt(np.nanmean(error**2)))
     return found
-
-
-def _warn_drive(*, is_closed: bool) -> tuple[ResultWarning, ...]:
-    if is_closed:
-        return ()
-    text = "no loop is stated, or commands are missing: recorded torque drives the arm, and a stabiliser holds it"
-    remedy = "state joints[].actuator and record qref; compare torque of the stabiliser with that of the joint"
-    return (ResultWarning(code="stabiliser", text=text, remedy=remedy),)

@@ -90,15 +90,9 @@ def of_identification(identification: Identification, origin: Origin) -> ExportM
     rotors: list[float | None] = [None] * robot.joint_count
     for joint, column in structure.coefficients("rotor_inertia").items():
         rotors[joint] = float(parameters[column])
-    return ExportModel(
-        robot=robot,
-        links=tuple(identification.consistent.links),
-        friction=_frictions(structure, parameters, identification.shapes),
-        delivered_friction=_frictions(structure, identification.parameters, identification.shapes),
-        rotor_inertia=tuple(rotors),
-        effects=(),
-        origin=origin,
-    )
+    delivered = _frictions(structure, identification.parameters, identification.shapes)
+    friction, links = _frictions(structure, parameters, identification.shapes), tuple(identification.consistent.links)
+    return ExportModel(robot, links, friction, delivered, tuple(rotors), (), origin)
 
 
 def of_diagnosis(diagnosis: Diagnosis, origin: Origin) -> ExportModel:
@@ -115,15 +109,7 @@ def of_extended_model(model: ExtendedModel, links: Sequence[LinkInertia], origin
     for each in found:
         if each.effect.id == "rotor_inertia" and each.effect.joint is not None:
             rotors[each.effect.joint] = max(0.0, float(each.coefficients[0]))
-    return ExportModel(
-        robot=robot,
-        links=tuple(links),
-        friction=friction,
-        delivered_friction=friction,
-        rotor_inertia=tuple(rotors),
-        effects=found,
-        origin=origin,
-    )
+    return ExportModel(robot, tuple(links), friction, friction, tuple(rotors), found, origin)
 
 
 def _frictions(

@@ -102,11 +102,11 @@ def noise_floors(diagnosis: Diagnosis, motions: Sequence[MotionRows]) -> list[No
         ("repetitions", noise_between(motions)),
         ("high_frequency", noise_above_band(observations, model, diagnosis.cutoff_hz)),
     ]
-    return [_first_known([(kind, float(rms[joint])) for kind, rms in known]) for joint in range(len(known[0][1]))]
-
-
-def _first_known(known: Sequence[tuple[FloorKind, float]]) -> NoiseFloor:
-    return next((NoiseFloor(rms, kind) for kind, rms in known if np.isfinite(rms)), NoiseFloor(None, "none"))
+    floors = []
+    for joint in range(len(known[0][1])):
+        told = (NoiseFloor(float(rms[joint]), kind) for kind, rms in known if np.isfinite(rms[joint]))
+        floors.append(next(told, NoiseFloor(None, "none")))
+    return floors
 
 
 def noise_between_periods(observations: Observations, model: ExtendedModel) -> Array:
