@@ -220,17 +220,10 @@ def _base_parameters(result: Identification) -> list[BaseParameterEntry]:
             value=float(result.parameters[place]),
             std=std[place],
             independent=bool(base.is_independent(place)),
-            determined_by=_determined_by(float(learnt[place])),
+            determined_by="data" if taken >= DETERMINED else "prior" if taken <= 1.0 - DETERMINED else "both",
         )
-        for place in range(result.structure.base_count)
+        for place, taken in enumerate(learnt[: result.structure.base_count])
     ]
-
-
-def _determined_by(learnt: float) -> Literal["data", "prior", "both"]:
-    """Whose value it is, from the share of the prior's variance that the data took."""
-    if learnt >= DETERMINED:
-        return "data"
-    return "prior" if learnt <= 1.0 - DETERMINED else "both"
 
 
 def _friction(result: Identification, parameters: np.ndarray) -> list[FrictionEntry]:

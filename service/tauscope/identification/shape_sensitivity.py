@@ -75,7 +75,9 @@ def refine_structure(
                 moved = np.clip(moved, *gentle_range(structure.terms[joint].k_v, float(speed[joint])))
             elif abs(np.log(moved / _constant(start, joint, name))) > LARGEST_CHANGE:
                 moved = _constant(start, joint, name)
-            structure = _with_constant(structure, joint, name, float(moved))
+            terms = [*structure.terms]
+            terms[joint] = replace(terms[joint], **{name: float(moved)})
+            structure = structure.with_terms(tuple(terms))
         if np.abs(change).max() < SETTLED:
             break
     return structure
@@ -113,9 +115,3 @@ def _normal_equations(
 def _constant(structure: ModelStructure, joint: int, name: str) -> float:
     terms = structure.terms[joint]
     return terms.k_v if name == "k_v" else terms.delta or 0.0
-
-
-def _with_constant(structure: ModelStructure, joint: int, name: str, value: float) -> ModelStructure:
-    terms = list(structure.terms)
-    terms[joint] = replace(terms[joint], k_v=value) if name == "k_v" else replace(terms[joint], delta=value)
-    return structure.with_terms(tuple(terms))

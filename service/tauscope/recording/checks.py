@@ -95,13 +95,8 @@ class _Running:
 def measure_rows(recording: Recording) -> RowMeasures:
     """Take every figure that needs no other figure first, and then the clipped samples."""
     n, columns = recording.joint_count, len(recording.table.names)
-    running = _Running(
-        least=np.full(columns, np.inf),
-        greatest=np.full(columns, -np.inf),
-        missed=np.zeros(columns, dtype=np.int64),
-        wraps=np.zeros(n, dtype=np.int64),
-        first_wrap=np.full(n, np.nan),
-    )
+    least, greatest, missed = np.full(columns, np.inf), np.full(columns, -np.inf), np.zeros(columns, dtype=np.int64)
+    running = _Running(least, greatest, missed, np.zeros(n, dtype=np.int64), np.full(n, np.nan))
     stride = max(1, -(-len(recording) // _KEPT_STEPS))
     for start in range(0, len(recording), _ROWS_AT_ONCE):
         # One sample more than the block, so that the steps between blocks are seen too.

@@ -121,20 +121,16 @@ class Recording:
         require_rising(data[:, 0], -np.inf, name, lambda row: f"row {row}")
         return Recording(name, shape[1], effort_kind, MemoryTable(names, data))
 
-    @staticmethod
-    def _group(block: Array, group: str, where: Mapping[str, int]) -> Array | None:
+    def _group(self, block: Array, group: str, where: Mapping[str, int]) -> Array | None:
         """One column a joint; a view where the file has all of them, NaN where it lacks one."""
-        joints = [(joint, where[name]) for name in where if (joint := _joint_of(name, group)) is not None]
-        if not joints:
-            return None
-        joint_count = sum(_joint_of(name, "q") is not None for name in where)
-        first = joints[0][1]
-        if len(joints) == joint_count:
-            return block[:, first : first + joint_count]
-        columns = np.full((len(block), joint_count), np.nan)
-        for joint, index in joints:
-            columns[:, joint - 1] = block[:, index]
-        return columns
+        joints = range(self.joint_count)
+        places = {joint: where[name] for joint in joints if (name := f"{group}{joint + 1}") in where}
+        if len(places) == self.joint_count:
+            return block[:, places[0] : places[0] + self.joint_count]
+        columns = np.full((len(block), self.joint_count), np.nan)
+        for joint, place in places.items():
+            columns[:, joint] = block[:, place]
+        return columns if places else None
 
 
 _ARGUMENTS = {
@@ -147,11 +143,6 @@ _ARGUMENTS = {
     "temp": "temperature",
     "qlink": "link_position",
 }
-
-
-def _joint_of(name: str, group: str) -> int | None:
-    number = name.removeprefix(group)
-    return int(number) if number != name and number.isdecimal() else None
 
 
 def _check(argument: str, array: Array, name: str, shape: tuple[int | None, ...] | None) -> Array:

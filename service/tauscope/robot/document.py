@@ -66,7 +66,9 @@ class DocumentOrigin:
 
     def where(self, place: Place) -> str:
         """Where an entry stands, as ``arm.yaml:12: joints[2].limits.position (joint 3, 'wrist')``."""
-        line = self._line(place)
+        # Of an entry that is missing, the line of the nearest mapping that should hold it.
+        known = (place[:length] for length in range(len(place), -1, -1))
+        line = next((self.lines[above] for above in known if above in self.lines), None)
         path = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in place).lstrip(".")
         parts = [self.label if line is None else f"{self.label}:{line}"]
         if path:
@@ -86,13 +88,6 @@ class DocumentOrigin:
         except ValidationError as error:
             place, text = first_fault(error)
         raise self.error(place, text)
-
-    def _line(self, place: Place) -> int | None:
-        """Line of an entry, or of the nearest mapping that should hold it."""
-        for length in range(len(place), -1, -1):
-            if place[:length] in self.lines:
-                return self.lines[place[:length]]
-        return None
 
     def _joint(self, place: Place) -> str:
         """The joint or link that an entry is about, numbered from 1, with its name where the document gives one."""

@@ -32,7 +32,6 @@ class ConsistentParameters:
     objective: float
     squared_residual: float  # ‖R x - z‖² [noise variances]
     free_squared_residual: float  # the least that any x, consistent or not, reaches [noise variances]
-    prior_squared_distance: float
     status: str
     duality_gap: float
     active_links: tuple[bool, ...]
@@ -76,7 +75,6 @@ def nearest_consistent_parameters(
         objective=squared_residual + distance,
         squared_residual=squared_residual,
         free_squared_residual=_free_squared_residual(factor * prior.scale, target),
-        prior_squared_distance=distance,
         status=status,
         duality_gap=gap,
         active_links=tuple(bool(value <= _ACTIVE * MARGIN) for value in least),

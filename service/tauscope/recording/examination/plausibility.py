@@ -182,7 +182,7 @@ def _doubt_angle(sketch: Sketch, types: list[JointType], robot: Robot | None) ->
 
 def _find_beyond_limits(sketch: Sketch, kind: np.ndarray, factor: float, robot: Robot | None) -> tuple[int, str] | None:
     """A joint that is beyond its limits most of the time, where another unit would keep all joints within theirs."""
-    limits = [None if robot is None else joint.limits.position for joint in robot.joints] if robot else []
+    limits = [joint.limits.position for joint in robot.joints] if robot else []
     beyond, judged = [], 0
     for joint, limit in enumerate(limits):
         position = sketch.position[:, joint]
