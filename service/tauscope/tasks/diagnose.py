@@ -68,7 +68,6 @@ class DiagnosisOptions(ReadingOptions):
 class Request(TaskRequest):
     """What is to be diagnosed, by the names of its files."""
 
-    robot: str = Field(description="robot file")
     recordings: tuple[str, ...] = Field(description="recordings that are to be explained")
     held_out: tuple[str, ...] = Field(default=(), description="recordings that confirm findings")
     simulated: tuple[str, ...] = Field(default=(), description="recordings made in the user's own simulator")

@@ -20,7 +20,6 @@ from tauscope.tasks.task import (
     ReadingOptions,
     TaskRequest,
     TaskResult,
-    command_words,
     json_text,
     read_recordings,
 )
@@ -46,26 +45,9 @@ class IdentificationOptions(ReadingOptions):
 class Request(TaskRequest):
     """What is to be identified, by the names of its files."""
 
-    robot: str = Field(description="robot file")
     recordings: tuple[str, ...] = Field(description="recordings that the model is made from")
     held_out: tuple[str, ...] = Field(default=(), description="recordings that it is judged by")
     options: IdentificationOptions = Field(default=IdentificationOptions(), description="how it is identified")
-
-    @property
-    def command(self) -> tuple[str, ...]:
-        """The command line that does the same."""
-        options = self.options
-        return command_words(
-            "identify",
-            self.robot,
-            recordings=self.recordings,
-            held_out=self.held_out,
-            estimator=options.estimator,
-            cutoff=options.cutoff_hz,
-            rotor_inertia=options.rotor_inertia,
-            prior=options.prior,
-            **options.words,
-        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,6 @@ from tauscope.tasks.task import (
     ReadingOptions,
     TaskRequest,
     TaskResult,
-    command_words,
     json_text,
     read_recordings,
 )
@@ -24,19 +23,10 @@ from tauscope.tasks.task import (
 class Request(TaskRequest):
     """What is to be rolled out, by the names of its files."""
 
-    robot: str = Field(description="robot file")
     recordings: tuple[str, ...] = Field(description="recordings with commands, or with torque")
     refine: tuple[str, ...] = Field(default=(), description="recordings by which the model is refined")
     model: str | None = Field(default=None, description="model that identify or diagnose saved")
     options: ReadingOptions = Field(default=ReadingOptions(), description="how the recordings are read")
-
-    @property
-    def command(self) -> tuple[str, ...]:
-        """The command line that does the same."""
-        words = {} if self.model is None else {"model": self.model}
-        return command_words(
-            "rollout", self.robot, recordings=self.recordings, refine=self.refine, **words, **self.options.words
-        )
 
 
 @dataclass(frozen=True, eq=False)

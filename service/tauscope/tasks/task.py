@@ -32,10 +32,18 @@ ROLES = {
 class TaskRequest(StrictModel):
     """A request that names recordings, and perhaps a model."""
 
+    robot: str = Field(description="robot file")
+    options: Any
+
     @property
     def command(self) -> tuple[str, ...]:
-        """The command line that does the same."""
-        raise NotImplementedError
+        """The command line that does the same: the verb is the name of its module."""
+        verb = type(self).__module__.rpartition(".")[2]
+        own = {name: value for name, value in self if name not in ("robot", "options") and value is not None}
+        asked = {
+            name.removesuffix("_hz"): value for name, value in self.options if name not in ReadingOptions.model_fields
+        }
+        return command_words(verb, self.robot, **own, **asked, **self.options.words)
 
     @property
     def inputs(self) -> dict[str, tuple[str, ...]]:
