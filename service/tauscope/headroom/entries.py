@@ -13,6 +13,7 @@ from tauscope.headroom.floor import NoiseFloor, noise_floors
 from tauscope.headroom.joint_headroom import JointHeadroom, joint_headroom
 from tauscope.headroom.motion_rows import MotionRows
 from tauscope.recording.recording import Array
+from tauscope.strict_model import take_fields
 
 
 def motion_rows(diagnosis: Diagnosis) -> tuple[list[MotionRows], list[MotionRows]]:
@@ -107,10 +108,10 @@ def headroom_entry(joint: str, found: JointHeadroom, floor: NoiseFloor, *, is_op
         statement = f"A black box still predicts {share}; the verdict leaves it open."
     else:
         statement = f"A black box still predicts {share}: something is left."
-    return HeadroomEntry(
+    return take_fields(
+        HeadroomEntry,
+        found,
         joint=joint,
-        plain=found.plain,
-        explained=found.explained,
         black_box=_number(found.black_box),
         floor=floor.rms,
         floor_kind=floor.kind,

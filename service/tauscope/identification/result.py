@@ -174,17 +174,16 @@ def document(identification: Identification) -> IdentificationDocument:
     """The document of an identification."""
     result = identification
     names = [f"{name}{link + 1}" for link in range(result.robot.link_count) for name in STANDARD_PARAMETERS]
-    return IdentificationDocument(
+    return take_fields(
+        IdentificationDocument,
+        result,
         warnings=identification_warnings(result),
         robot=result.robot.name,
         joints=[joint.name for joint in result.robot.joints],
         estimator=result.options.estimator.value,
         prior=result.options.prior,
-        constrained=result.constrained,
-        cutoff_hz=result.cutoff_hz,
         noise_std=result.residuals.noise_std.tolist(),
         noise_method="periods" if result.residuals.noise_method == "periods" else "residual",
-        condition_number=result.condition_number,
         base_parameters=_base_parameters(result),
         unidentifiable=[names[column] for column in result.structure.base.unidentifiable_columns],
         undetermined=[name for name, open_ in zip(result.structure.names, result.undetermined, strict=True) if open_],
@@ -198,8 +197,6 @@ def document(identification: Identification) -> IdentificationDocument:
             price_of_bodies=result.price_of_bodies.tolist(),
         ),
         excitation=_excitation(result),
-        conditioning=list(result.conditioning),
-        held_out_conditioning=list(result.held_out_conditioning),
     )
 
 
