@@ -12,7 +12,6 @@ from excitation.excited_arms import limited_paper_arm, resting_series
 from tauscope.errors import ExcitationError
 from tauscope.excitation import require_within_limits
 from tauscope.trajectory import (
-    DesignRecord,
     FourierSegment,
     Trajectory,
     motion_limits,
@@ -22,6 +21,7 @@ from tauscope.trajectory import (
     write_trajectory,
 )
 from tauscope.trajectory.csv_format import parse_trajectory_csv, trajectory_csv
+from tauscope.trajectory.trajectory import DesignRecord
 from trajectory.test_trajectory import whole_trajectory
 
 ROBOT = limited_paper_arm()

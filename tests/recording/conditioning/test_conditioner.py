@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from recording.conditioning.synthetic import Harmonics, harmonics, own_samples, record, robot, torque_of
 from tauscope.errors import RecordingError
-from tauscope.recording.conditioning import Conditioner, Decimator, HarmonicBand, conditioner
+from tauscope.recording.conditioning import Conditioner, conditioner
+from tauscope.recording.conditioning.common_band import Decimator, HarmonicBand
 from tauscope.recording.conditioning.uniform import Stretch, read_stretch
 from tauscope.recording.recording import Recording
 from tauscope.recording.table import SpooledTable

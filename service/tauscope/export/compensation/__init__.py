@@ -2,12 +2,10 @@
 
 from tauscope.export.compensation.model import (
     CompensationModel,
-    DriveUnits,
     JointCompensation,
     JointFriction,
     RecordingSource,
     drive_units,
-    to_document,
     to_json,
     to_yaml,
 )
@@ -15,13 +13,11 @@ from tauscope.export.compensation.source_code import to_c_header, to_python
 
 __all__ = [
     "CompensationModel",
-    "DriveUnits",
     "JointCompensation",
     "JointFriction",
     "RecordingSource",
     "drive_units",
     "to_c_header",
-    "to_document",
     "to_json",
     "to_python",
     "to_yaml",

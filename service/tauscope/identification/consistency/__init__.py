@@ -3,7 +3,6 @@
 from tauscope.identification.consistency.inequalities import (
     LEAST_COULOMB,
     FrictionColumns,
-    LinearInequalities,
     friction_inequalities,
     mass_inequalities,
 )
@@ -14,7 +13,6 @@ __all__ = [
     "LEAST_COULOMB",
     "ConsistentParameters",
     "FrictionColumns",
-    "LinearInequalities",
     "Prior",
     "far_reaching",
     "friction_inequalities",

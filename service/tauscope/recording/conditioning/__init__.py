@@ -1,6 +1,6 @@
 """From raw samples to motion that a regressor can be evaluated on, and to one band for torque and regressor."""
 
-from tauscope.recording.conditioning.common_band import AllPass, Decimator, HarmonicBand
+from tauscope.recording.conditioning.common_band import AllPass
 from tauscope.recording.conditioning.conditioner import Conditioner, ConditioningEntry
 from tauscope.recording.conditioning.motion import Motion
 from tauscope.recording.conditioning.motion_source import Source
@@ -11,8 +11,6 @@ __all__ = [
     "AllPass",
     "Conditioner",
     "ConditioningEntry",
-    "Decimator",
-    "HarmonicBand",
     "Mask",
     "Motion",
     "Source",
