@@ -47,9 +47,7 @@ BusOption = Annotated[BusName | None, Option(help="Field bus; by default the one
 DoctorRobotFile = Annotated[
     Path | None,
     name_input(
-        "Robot file (YAML) whose drives are looked at; without one, the adapters of this machine.",
-        "ROBOT",
-        Argument,
+        "Robot file (YAML) whose drives are looked at; without one, the adapters of this machine.", "ROBOT", Argument
     ),
 ]
 _MARKS = {Severity.GOOD: "ok", Severity.WARNING: "warning", Severity.FAILURE: "failure"}
@@ -163,8 +161,7 @@ def _drives(path: Path, backend: str | None) -> Sequence[Finding]:
 
 def show_finding(console: Console, finding: Finding) -> None:
     remedy = f"; {finding.remedy}" if finding.remedy else ""
-    line = f"{_MARKS[finding.severity]}: {finding.subject}: {finding.detail}{remedy}"
-    say(line, console)
+    say(f"{_MARKS[finding.severity]}: {finding.subject}: {finding.detail}{remedy}", console)
 
 
 SHOWN_CYCLES = 3  # cycles of a run whose frames are shown

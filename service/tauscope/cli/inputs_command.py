@@ -12,7 +12,7 @@ from typer import Argument, Option
 from tauscope import robot as robots
 from tauscope.cli.arguments import LayoutFields, ReadingFields, RecordingFile, RobotFile, complete_reading, name_input
 from tauscope.cli.device_command import check_drives, require_sound, show_finding
-from tauscope.cli.task_run import write_file
+from tauscope.cli.task_run import parse_suffix, write_file
 from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import make_group, make_request
 from tauscope.number_text import ABSENT, counted, given, significant
@@ -79,10 +79,7 @@ def convert_file(
 ) -> None:
     """Write a recording in another format, in SI; the source stays as it is."""
     options = make_request(ReadingOptions, **complete_reading(reading)).reading
-    if target.suffix.lower() not in FORMATS:
-        raise typer.BadParameter(
-            f"{str(target)!r}: the suffix names no format; use {', '.join(FORMATS)}", param_hint="'TARGET'"
-        )
+    parse_suffix(target, FORMATS, "TARGET")
     with show_progress() as progress:
         progress(f"convert {source}")
         arm = None if robot is None else read_robot(robot)

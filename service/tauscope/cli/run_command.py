@@ -14,11 +14,12 @@ from typer import Option
 
 from tauscope.cli.arguments import RobotFile, name_input
 from tauscope.cli.device_command import show_frames
-from tauscope.cli.task_run import keep_file, require_new
+from tauscope.cli.task_run import keep_file, parse_suffix, require_new
 from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
 from tauscope.errors import AcquisitionError, explain_os_errors, one_line
 from tauscope.number_text import ABSENT, counted, significant
+from tauscope.recording.convert import FORMATS
 from tauscope.report.tables import Table
 from tauscope.robot import Robot
 from tauscope.runtime.drivers import DEFAULT_BACKEND, BackendName, driver_names, find_driver
@@ -45,7 +46,6 @@ HELD = (
     "! The arm is under power where it stopped, and its watchdog is off. Support it, then let go of it with: tauscope "
     "release."
 )
-SUFFIXES = (".csv", ".parquet", ".mcap")  # formats of a recording, by suffix
 
 
 def run(
@@ -158,10 +158,7 @@ def _describe_arm(record: RunRecord) -> str:
 def _output(asked: Path | None) -> Path:
     """The recording to make, refused before any work where it cannot be made."""
     out = asked or Path(f"run-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.csv")
-    if out.suffix.lower() not in SUFFIXES:
-        known = ", ".join(SUFFIXES)
-        raise typer.BadParameter(f"{str(out)!r}: the suffix names no format; use {known}", param_hint="'--out'")
-    if out.suffix.lower() == ".parquet" and find_spec("pyarrow") is None:
+    if parse_suffix(out, FORMATS, "--out") == ".parquet" and find_spec("pyarrow") is None:
         raise AcquisitionError(f"{out}: Parquet needs pyarrow, which is not installed; name a .csv file")
     require_new(out)
     return out

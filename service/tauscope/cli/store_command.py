@@ -1,7 +1,7 @@
 """``tauscope store``, ``tauscope backup`` and ``tauscope restore``: a data folder that no service works with."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
 from enum import StrEnum
@@ -66,18 +66,13 @@ def open_store(data: Path | None, database: str | None) -> Iterator[OpenStore]:
     folder = data or default_data_folder()
     if not folder.is_dir():
         raise StoreError(f"{folder}: there is no such data folder; name it with --data")
-    lock = FolderLock(folder)
-    try:
-        opened = Database(database or folder / FILE_NAME)
-        try:
-            index = Index(opened, site_identifier(folder))
-            keeper = open_index(index, item_stores(folder), RecordingStore(folder / RECORDINGS), folder.name)
-            keeper.sync(thorough=True)
-            yield OpenStore(folder, opened, keeper)
-        finally:
-            opened.close()
-    finally:
-        lock.release()
+    with ExitStack() as stack:
+        stack.callback(FolderLock(folder).release)
+        opened = stack.enter_context(closing(Database(database or folder / FILE_NAME)))
+        index = Index(opened, site_identifier(folder))
+        keeper = open_index(index, item_stores(folder), RecordingStore(folder / RECORDINGS), folder.name)
+        keeper.sync(thorough=True)
+        yield OpenStore(folder, opened, keeper)
 
 
 @contextmanager
@@ -86,11 +81,8 @@ def open_database(data: Path | None, database: str | None) -> Iterator[Database]
     path = (data or default_data_folder()) / FILE_NAME
     if database is None and not path.is_file():
         raise StoreError(f"{path}: there is no such database; name the data folder with --data, or serve it once")
-    opened = Database(database or path)
-    try:
+    with closing(Database(database or path)) as opened:
         yield opened
-    finally:
-        opened.close()
 
 
 def check_store(

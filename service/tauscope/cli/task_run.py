@@ -1,7 +1,7 @@
 """What every verb does around its task: check the files, perform, write outputs whole or not at all, show."""
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -125,16 +125,21 @@ def write_outputs(
 
 def export_outputs(paths: Sequence[Path], files: Mapping[ExportFormat, ExportFile]) -> list[tuple[Path, str]]:
     """Outputs of ``--export`` by their suffixes. Raises typer.BadParameter where one names no format."""
-    return [(path, files[parse_export_format(path, files, "'--export'")].output) for path in paths]
+    return [(path, files[parse_export_format(path, files, "--export")].output) for path in paths]
 
 
 def parse_export_format(path: Path, files: Mapping[ExportFormat, ExportFile], option: str) -> ExportFormat:
     """The format that the suffix of a file names. Raises typer.BadParameter where it names none."""
-    kind = SUFFIXES.get(path.suffix.lower())
-    if kind is None or kind not in files:
-        known = ", ".join(suffix for suffix, kind in SUFFIXES.items() if kind in files)
-        raise typer.BadParameter(f"{str(path)!r}: the suffix names no format; use {known}", param_hint=option)
-    return kind
+    return SUFFIXES[parse_suffix(path, [suffix for suffix, kind in SUFFIXES.items() if kind in files], option)]
+
+
+def parse_suffix(path: Path, known: Collection[str], option: str) -> str:
+    """The suffix of a file in lower case. Raises typer.BadParameter where it is none of those known."""
+    suffix = path.suffix.lower()
+    if suffix not in known:
+        text = f"{str(path)!r}: the suffix names no format; use {', '.join(known)}"
+        raise typer.BadParameter(text, param_hint=f"'{option}'")
+    return suffix
 
 
 def _show_warnings(robot: Robot, result: Any, *, summarised: bool) -> None:

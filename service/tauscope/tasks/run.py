@@ -29,8 +29,7 @@ class BackendChoice(StrictModel):
         default="virtual", description="of the simulated arm: as fast as it computes, or by the clock"
     )
     scenario: dict[str, Any] | None = Field(
-        default=None,
-        description="what the simulated arm conceals: content of a scenario file; null: nothing",
+        default=None, description="what the simulated arm conceals: content of a scenario file; null: nothing"
     )
 
     keep_settings: bool = Field(

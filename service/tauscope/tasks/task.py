@@ -76,8 +76,7 @@ class ReadingOptions(StrictModel):
     )
     decimal: str | None = Field(default=None, description="decimal sign of a CSV; null: detected")
     delimiter: str | None = Field(
-        default=None,
-        description="delimiter of a CSV: comma, semicolon, tab, blank or |; null: detected",
+        default=None, description="delimiter of a CSV: comma, semicolon, tab, blank or |; null: detected"
     )
     topic: str | None = Field(default=None, description="topic of a log that has several with joint states")
 

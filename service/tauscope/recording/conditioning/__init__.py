@@ -7,13 +7,4 @@ from tauscope.recording.conditioning.motion_source import Source
 from tauscope.recording.conditioning.periods import split_periods
 from tauscope.recording.conditioning.uniform import Mask, Stretch
 
-__all__ = [
-    "AllPass",
-    "Conditioner",
-    "ConditioningEntry",
-    "Mask",
-    "Motion",
-    "Source",
-    "Stretch",
-    "split_periods",
-]
+__all__ = ["AllPass", "Conditioner", "ConditioningEntry", "Mask", "Motion", "Source", "Stretch", "split_periods"]
