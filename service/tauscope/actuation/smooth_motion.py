@@ -21,19 +21,15 @@ REST = 0.02  # speed relative to the fastest below which friction has no directi
 
 @dataclass(frozen=True, eq=False)
 class SmoothMotion:
-    """Motion on a uniform grid.
-
-    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈.
-    `rate`, `band`: sampling rate, and band of the comparison [Hz].
-    """
+    """Motion on a uniform grid."""
 
     samples: Samples
     time: Array  # (N,) [s]
-    position: Array
+    position: Array  # (N, n), q; as are q̇, q̈
     velocity: Array
     acceleration: Array
-    rate: float
-    band: float
+    rate: float  # of sampling [Hz]
+    band: float  # of the comparison [Hz]
 
     @staticmethod
     def of(recording: Recording) -> "SmoothMotion":

@@ -17,22 +17,17 @@ SWEEPS = 4  # Gauss-Seidel sweeps over the dry friction of coupled joints
 
 @dataclass(frozen=True, eq=False)
 class Variants:
-    """Parameters of V models of one arm.
-
-    `rotor`, `stiction`, `viscous`, `offset`: (V, n) [kg m² or kg, Nm or N, Nm s/rad or N s/m, Nm or N].
-    `stribeck`, `delta`: (n,), the same in all models.
-    `driving`, `braking`: (V, n), as `LoadFriction`.
-    """
+    """Parameters of V models of one arm."""
 
     links: Array  # (V, 10 m), standard parameters
-    rotor: Array
-    stiction: Array
-    viscous: Array
-    offset: Array
-    stribeck: Array
-    delta: Array
-    driving: Array
-    braking: Array
+    rotor: Array  # (V, n) [kg m² or kg]
+    stiction: Array  # (V, n) [Nm or N]
+    viscous: Array  # (V, n) [Nm s/rad or N s/m]
+    offset: Array  # (V, n) [Nm or N]
+    stribeck: Array  # (n,), the same in all models
+    delta: Array  # (n,), the same in all models
+    driving: Array  # (V, n), as `LoadFriction`
+    braking: Array  # (V, n), as `LoadFriction`
     slope: Array  # (V,), loss of torque per volt with temperature [1/K]
 
 

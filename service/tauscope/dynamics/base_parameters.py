@@ -44,13 +44,9 @@ _UNITS = (slice(0, 6), slice(6, 7), slice(7, 10))
 
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
-    """The base parameters Θ* = Θ_L + B Θ_K of an arm, equation (14), m of them.
+    """The base parameters Θ* = Θ_L + B Θ_K of an arm, equation (14), m of them."""
 
-    `independent_columns`: (m,) int, j_L: the standard parameter that leads each base parameter, counted over all links
-        from 0.
-    """
-
-    independent_columns: Columns
+    independent_columns: Columns  # (m,) int, j_L: the standard parameter that leads each, counted over all links from 0
     dependent_columns: Columns  # (k,) int, j_K: standard parameters that appear in combinations only
     unidentifiable_columns: Columns  # (u,) int, standard parameters that no motion of the arm shows
     combination: Array  # (m, k), B, equation (12)

@@ -36,18 +36,13 @@ _ALIGNMENT = 64  # bytes of the widest vector register: rows that start elsewher
 
 
 class LinkMotion(NamedTuple):
-    """Motion of link j in link frame j: views that hold until the next link is asked for.
+    """Motion of link j in link frame j: views that hold until the next link is asked for."""
 
-    `screw_angular`, `screw_linear`: three (j, N), w_i and v_i of the j joints met so far.
-    `angular_velocity`, `angular_acceleration`, `acceleration`: three (N,), ω [rad/s], ω̇ [rad/s²], a [m/s²] of the
-        origin, minus gravity.
-    """
-
-    screw_angular: Vectors
-    screw_linear: Vectors
-    angular_velocity: Vectors
-    angular_acceleration: Vectors
-    acceleration: Vectors
+    screw_angular: Vectors  # three (j, N), w_i of the j joints met so far
+    screw_linear: Vectors  # three (j, N), v_i
+    angular_velocity: Vectors  # three (N,), ω [rad/s]
+    angular_acceleration: Vectors  # three (N,), ω̇ [rad/s²]
+    acceleration: Vectors  # three (N,), a of the origin, minus gravity [m/s²]
     products: Vectors  # three (N,), ω_y ω_z, ω_x ω_z, ω_x ω_y [rad²/s²]
     field: tuple[Vectors, Vectors, Vectors]  # three rows of three (N,), M = S(ω̇) + S(ω)² [1/s²]
 

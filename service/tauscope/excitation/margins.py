@@ -20,19 +20,14 @@ ROUNDING = 1e-6  # part of a limit by which rounding may exceed it: a file's dig
 
 @dataclass(frozen=True, eq=False)
 class Margins:
-    """What is left of every limit, as part of the limit; negative where it is exceeded.
+    """What is left of every limit, as part of the limit; negative where it is exceeded."""
 
-    `position`, `velocity`, `acceleration`: (n,), of each joint's limits; position counts from the middle of the range.
-    `torque`: (n,), of the torque that may be used, by the prior model; infinite where there is no limit, None without a
-        model.
-    `workspace_m`: smallest clearance of joint origins and tool from floor and boxes [m]; None where nothing is
-        forbidden.
-    """
-
-    position: Array
-    velocity: Array
-    acceleration: Array
+    position: Array  # (n,), of the range, from its middle
+    velocity: Array  # (n,)
+    acceleration: Array  # (n,)
+    # (n,), of what may be used, by the prior model; infinite without a limit, None without a model
     torque: Array | None = None
+    # least clearance of joint origins and tool from floor and boxes [m]; None: nothing is forbidden
     workspace_m: float | None = None
 
     def as_table(self) -> dict[str, list[float | None]]:

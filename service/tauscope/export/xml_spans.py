@@ -13,10 +13,7 @@ _TAG_END = re.compile(rb"""(?:[^>"']|"[^"]*"|'[^']*')*>""")
 
 @dataclass(eq=False)
 class Element:
-    """An element and where it stands in the file, in bytes.
-
-    `comments`: list of (int, int), spans of the comments directly inside.
-    """
+    """An element and where it stands in the file, in bytes."""
 
     name: str
     attributes: Mapping[str, str]
@@ -25,7 +22,7 @@ class Element:
     close_start: int = -1
     end: int = -1
     children: list["Element"] = field(default_factory=list)
-    comments: list[tuple[int, int]] = field(default_factory=list)
+    comments: list[tuple[int, int]] = field(default_factory=list)  # spans of those directly inside
 
     @property
     def prefix(self) -> str:

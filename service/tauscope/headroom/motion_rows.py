@@ -10,23 +10,18 @@ from tauscope.recording.recording import Array
 
 @dataclass(frozen=True, eq=False)
 class MotionRows:
-    """Evenly spaced rows of one piece of motion, in the band in which models and torque are compared.
-
-    `position`, `velocity`, `acceleration`, `load`: (n, M), q, q̇, q̈ and the rigid-body torque [SI].
-    `torque`, `plain`, `explained`: (n, M), measured, by the nominal model, and by the model with all findings [Nm or
-        N].
-    """
+    """Evenly spaced rows of one piece of motion, in the band in which models and torque are compared."""
 
     recording: int  # number of the recording
     time: Array  # (M,), since the beginning of the recording [s]
     progress: Array  # (M,), part of the recording's motion that is over, 0 to 1; alike in every repetition of a motion
-    position: Array
+    position: Array  # (n, M), q; as are q̇, q̈ [SI]
     velocity: Array
     acceleration: Array
-    load: Array
-    torque: Array
-    plain: Array
-    explained: Array
+    load: Array  # (n, M), rigid-body torque [Nm or N]
+    torque: Array  # (n, M), measured [Nm or N]
+    plain: Array  # (n, M), by the nominal model
+    explained: Array  # (n, M), by the model with all findings
     used: NDArray[np.bool_]  # (n, M), rows that rest on measured torque
 
 

@@ -65,13 +65,10 @@ class Autoregression:
 
 @dataclass(frozen=True, eq=False)
 class LaggedProducts:
-    """Σ e_t e_{t+k} of one stretch of a residual, and how many products that are.
+    """Σ e_t e_{t+k} of one stretch of a residual, and how many products that are."""
 
-    `products`, `counts`: (K + 1,), for the lags k = 0 … K; pairs of which one was not measured are left out of both.
-    """
-
-    products: Array
-    counts: Array
+    products: Array  # (K + 1,), for the lags k = 0 … K; pairs of which one was not measured are left out
+    counts: Array  # (K + 1,), of the products
     spans: Array  # (K + 1,), pairs that there would be if all had been measured
 
     @staticmethod

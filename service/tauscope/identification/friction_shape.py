@@ -153,17 +153,13 @@ SWEEPS = 4
 
 @dataclass(frozen=True)
 class EstimatedShape:
-    """Shape constants of one joint.
-
-    `k_v_identifiable`, `delta_identifiable`: False where the data cannot tell the constant.
-    `k_v_given`, `delta_given`: True where the robot file states it.
-    """
+    """Shape constants of one joint."""
 
     k_v: float  # slope of the step at zero velocity [s/rad or s/m]
     delta: float | None  # slope of the Stribeck term [s/rad or s/m]; None where the data show no such term
-    k_v_identifiable: bool
+    k_v_identifiable: bool  # False where the data cannot tell it
     delta_identifiable: bool
-    k_v_given: bool
+    k_v_given: bool  # True where the robot file states it
     delta_given: bool
 
     def open_at_limit(self) -> "EstimatedShape":

@@ -56,11 +56,7 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """A model of the arm with what is known about its uncertainty.
-
-    `predicted_train`, `predicted_held_out`: (n,), residual at the recorded rate that noise and covariance lead to
-        expect [Nm or N].
-    """
+    """A model of the arm with what is known about its uncertainty."""
 
     robot: Robot
     structure: ModelStructure
@@ -79,9 +75,9 @@ class Identification:
     residuals: ResidualStatistics
     free_fit: Fit
     price_of_bodies: Array  # (n,), training residual over that of the free estimate
-    predicted_train: Array
+    predicted_train: Array  # (n,), residual at the recorded rate that noise and covariance lead to expect [Nm or N]
     held_out: Fit | None
-    predicted_held_out: Array | None
+    predicted_held_out: Array | None  # (n,), the same of held-out motion [Nm or N]
     excitation: Excitation
     held_out_excitation: Excitation | None
     extrapolation: Array | None  # (n,) or None, share of the held-out torque's rms that training leaves uncertain

@@ -32,21 +32,17 @@ DETERMINED = 0.9  # share of the prior's variance that data take from a paramete
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """What prior and data together say of the parameters, before bodies and friction restrict them.
-
-    `factor`, `target`: (p, p), (p,), R and z of the data's weighted equations.
-    `covariance`, `precision`: (p, p), S of the posterior, and P⁻¹ of the prior.
-    """
+    """What prior and data together say of the parameters, before bodies and friction restrict them."""
 
     prior: Prior
     doubt: Array  # (p,), deviation from the prior that the data show, in its standard deviations
     noise_std: Array  # (n,), σ_j of a row in the common band
     weights: Array  # (n,), 1/(σ_j √ρ_j), by which the joints' equations are multiplied
-    factor: Array
-    target: Array
+    factor: Array  # (p, p), R of the data's weighted equations
+    target: Array  # (p,), z of these
     mean: Array
-    covariance: Array
-    precision: Array
+    covariance: Array  # (p, p), S of the posterior
+    precision: Array  # (p, p), P⁻¹ of the prior
 
     @property
     def learnt(self) -> Array:

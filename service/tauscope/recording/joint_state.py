@@ -37,14 +37,11 @@ class JointState:
 
 @dataclass(frozen=True, eq=False)
 class JointStates:
-    """Messages of one layout.
-
-    `position`, `velocity`, `effort`: (N, n) or (N, 0), one row a message.
-    """
+    """Messages of one layout, one row a message."""
 
     stamp: NDArray[np.int64]  # (N,) int64, time of measurement [ns]
     names: tuple[str, ...]
-    position: Array
+    position: Array  # (N, n) or (N, 0), as are velocity and effort
     velocity: Array
     effort: Array
 

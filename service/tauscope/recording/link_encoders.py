@@ -22,17 +22,12 @@ ONE_TURN = 2.0 * np.pi
 
 @dataclass(frozen=True, eq=False)
 class LinkEncoders:
-    """What the columns qlink say.
+    """What the columns qlink say."""
 
-    `lag`: (N, n), q - qlink without whole turns and without its median [rad or m]; NaN where either is missing or a
-        glitch.
-    `copies`, `strangers`: joints whose column repeats q, and whose column does not move with it.
-    """
-
-    lag: Array
+    lag: Array  # (N, n), q - qlink less whole turns and its median [rad or m]; NaN where either is missing or a glitch
     joints: tuple[int, ...]  # joints, from 0, that have an encoder on the link
-    copies: tuple[int, ...]
-    strangers: tuple[int, ...]
+    copies: tuple[int, ...]  # joints whose column repeats q
+    strangers: tuple[int, ...]  # joints whose column does not move with q
 
 
 def find_link_encoders(samples: Samples, types: Sequence[JointType]) -> LinkEncoders | None:

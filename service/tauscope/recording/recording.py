@@ -17,10 +17,7 @@ __all__ = ["Array", "EffortKind", "Recording", "Samples", "Table", "take_command
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One continuous motion as it was measured.
-
-    `effort_std`: relative standard error of each joint's effort as a whole; empty where it was measured.
-    """
+    """One continuous motion as it was measured."""
 
     name: str
     joint_count: int
@@ -28,6 +25,7 @@ class Recording:
     table: Table
     ignored_columns: tuple[str, ...] = ()
     notes: tuple[ResultWarning, ...] = ()  # warnings without its name
+    # relative standard error of each joint's effort as a whole; empty where measured
     effort_std: tuple[float, ...] = ()
     is_examined: bool = False  # whether units and samples were looked at, so that they need not be again
 

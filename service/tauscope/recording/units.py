@@ -23,15 +23,13 @@ _FOLLOWERS: Mapping[str, tuple[str, ...]] = {"q": ("q", "qref", "qlink"), "qd": 
 
 @dataclass(frozen=True)
 class Reading(RecordingLayout):
-    """How a file is to be read: its layout, SI where it states no unit, and what is known of the robot.
-
-    `is_usual`: whether the columns are those of the robot file: recordings that Tauscope made have their own.
-    """
+    """How a file is to be read: its layout, SI where it states no unit, and what is known of the robot."""
 
     trust_units: bool = False
     joint_types: tuple[JointType, ...] | None = None  # degrees are of revolute joints only, mm of prismatic ones
     joint_names: tuple[str, ...] | None = None
     prefers_torque: bool = False  # whether currents are of no use, because no torque constant is known
+    # whether the columns are those of the robot file: recordings that Tauscope made have their own
     is_usual: bool = False
 
     def for_robot(self, robot: Robot | None) -> "Reading":

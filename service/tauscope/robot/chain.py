@@ -18,10 +18,7 @@ MOST_NAMES = 4  # names that a note lists
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Joints, segments and bodies from the base to the tip.
-
-    `links`: one a segment, about the link frame; zero for a link without inertia, None where no link has one.
-    """
+    """Joints, segments and bodies from the base to the tip."""
 
     base: str
     tip: str
@@ -30,6 +27,7 @@ class Chain:
     segment_names: tuple[str, ...]  # the file's joint of each segment
     segments: tuple[Segment, ...]  # one a joint, and one for each joint that follows another
     limits: tuple[JointLimits, ...]
+    # one a segment, about the link frame; zero without inertia, None where no link has any
     links: tuple[LinkInertia, ...] | None
     friction: tuple[FrictionCoefficients, ...] | None  # one a joint; None where no joint states it
     rotor_inertia: tuple[float, ...] | None  # one a joint [kg m² or kg]; None where no joint states it

@@ -82,16 +82,11 @@ class MoveSegment(Segment):
 
 @dataclass(frozen=True, eq=False)
 class PathSegment(Segment):
-    """A move along the path of a Fourier series at a pace of its own: q = F(σ(t)), σ minimum-jerk.
-
-    It visits only postures that the series visits: where that keeps clear of obstacles, so does this.
-
-    `from_s`, `to_s`: instants of the series at which it begins and ends [s].
-    """
+    """A move along a series' path at a pace of its own: q = F(σ(t)), σ minimum-jerk; it visits no other posture."""
 
     series: FourierSeries
-    from_s: float
-    to_s: float
+    from_s: float  # instant of the series at which it begins [s]
+    to_s: float  # instant of the series at which it ends [s]
     duration_s: float  # how long it takes [s]
 
     def evaluate(self, time: Array) -> MotionSamples:

@@ -61,17 +61,14 @@ RESOLVED_STD = 4.0  # standard deviations of a position's noise that are motion
 
 @dataclass(frozen=True, eq=False)
 class Conditioner:
-    """One recording, surveyed once, from which conditioned motion can be drawn at any band.
-
-    state_hz : (n,) float64 or None
-        cut-off of the smoothing of motion that is not averaged, joint by joint [Hz]; by the common band's where None
-    """
+    """One recording, surveyed once, from which conditioned motion can be drawn at any band."""
 
     recording: Recording
     robot: Robot
     timing: Timing
     noise: PositionNoise
     source: MotionSource
+    # (n,) or None, cut-off of the smoothing of motion that is not averaged, by joint [Hz]
     state_hz: Array | None = None
 
     @staticmethod

@@ -20,26 +20,19 @@ from tauscope.recording.recording import Array
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """One piece of conditioned motion with the torque that went with it.
-
-    `position`, `velocity`, `acceleration`: (N, n), smoothed q, q̇, q̈ at the recorded rate.
-    `period`: (N,), progress through the repeated excitation, where it is known and not averaged: index of the period
-        plus the part of it that is over.
-    `scatter`: (n,), standard deviation of the positions from period to period [rad or m]; None where nothing was
-        averaged.
-    """
+    """One piece of conditioned motion with the torque that went with it."""
 
     time: Array  # (N,) [s]; of the first period where periods were averaged
-    position: Array
+    position: Array  # (N, n), smoothed q at the recorded rate; as are q̇, q̈
     velocity: Array
     acceleration: Array
     torque: Array  # (P, N, n), measured joint torque of every repetition; P = 1 where nothing was averaged
     measured: Mask  # (P, N, n), where that torque was measured and not filled in
     rate_hz: float  # sampling rate of all of these [Hz]
     band: BandFilter
-    period: Array | None = None
+    period: Array | None = None  # (N,), index of the period plus the part of it that is over; None where averaged
     own: slice = field(default_factory=lambda: slice(None))
-    scatter: Array | None = None
+    scatter: Array | None = None  # (n,), standard deviation of q from period to period [rad or m]; None: not averaged
 
     @property
     def repetitions(self) -> int:
@@ -58,14 +51,11 @@ class Motion:
 
 @dataclass(frozen=True)
 class Trim:
-    """The band of one recording's transient motion, and the samples that it costs.
-
-    `state_hz`: float or (n,), cut-off of the motion's own smoothing, of each joint if they differ [Hz]; the sampling
-        rate where nothing is smoothed.
-    """
+    """The band of one recording's transient motion, and the samples that it costs."""
 
     band: AllPass | Decimator
     cutoff_hz: float | None  # of the band [Hz]; None where it is open
+    # of the motion's own smoothing, of each joint if they differ [Hz]; the rate where nothing is smoothed
     state_hz: float | Array
     margin: int
 

@@ -61,15 +61,12 @@ class Source(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class MotionSource:
-    """What every joint's motion is made from, and the band that it stands.
+    """What every joint's motion is made from, and the band that it stands."""
 
-    `velocity`, `acceleration`: (n,), whether the recorded signal is used for q̇, for q̈.
-    `quieter_from_hz`: (n,), band from which on the recorded velocity is the quieter source; infinite where it never is.
-    """
-
-    velocity: np.ndarray
-    acceleration: np.ndarray
+    velocity: np.ndarray  # (n,), whether the recorded signal is used for q̇
+    acceleration: np.ndarray  # (n,), whether the recorded signal is used for q̈
     limits_hz: Array  # (n,), widest band in which q̈ keeps to `NOISE_SHARE`; infinite where it does everywhere
+    # (n,), band from which on the recorded velocity is the quieter source; infinite: never
     quieter_from_hz: Array | None = None
 
     def in_band(self, cutoff_hz: float | None) -> "MotionSource":

@@ -36,22 +36,17 @@ LEAST_WIDTH = 1e-15  # scatter below which a joint stands still [rad or m]
 
 @dataclass(frozen=True)
 class Periods:
-    """P complete periods of N samples, aligned.
-
-    `position`, `torque`: (P, N, n), q and τ of every period.
-    `velocity`, `acceleration`: (P, N, n), recorded q̇ and q̈, where the stretch has them.
-    `advance`: (n,), how far each joint gets from one period to the next [rad or m]; None where nobody asked.
-    """
+    """P complete periods of N samples, aligned."""
 
     rate_hz: float
-    position: Array
-    torque: Array
+    position: Array  # (P, N, n), q of every period
+    torque: Array  # (P, N, n)
     measured: Mask  # (P, N, n), where the torque was measured
     rows: tuple[int, int]  # (int, int), the samples of the stretch that the periods cover
     start_s: float = 0.0
-    velocity: Array | None = None
-    acceleration: Array | None = None
-    advance: Array | None = None
+    velocity: Array | None = None  # (P, N, n), recorded q̇, where the stretch has it
+    acceleration: Array | None = None  # (P, N, n), recorded q̈
+    advance: Array | None = None  # (n,), how far a joint gets from period to period [rad or m]; None where nobody asked
 
     @property
     def count(self) -> int:

@@ -35,16 +35,12 @@ DIFFERENCE_ORDER = 2
 
 @dataclass(frozen=True, eq=False)
 class PositionNoise:
-    """Noise of the measured positions.
-
-    `limit_hz`: widest band in which the q̈ that is used keeps to `NOISE_SHARE`; None where the whole spectrum does.
-    `joint_limits_hz`: (n,), the same joint by joint; infinite where the whole spectrum does, or where the joint stands
-        still.
-    """
+    """Noise of the measured positions."""
 
     density: Array  # (n,), one-sided spectral density S_n [rad²/Hz or m²/Hz]
+    # widest band in which the q̈ that is used keeps to `NOISE_SHARE`; None where the whole spectrum does
     limit_hz: float | None
-    joint_limits_hz: Array
+    joint_limits_hz: Array  # (n,), the same by joint; infinite where the whole spectrum does, or where it stands still
     step: Array  # (n,), step that the encoder rounds to [rad or m]; zero where it shows none
 
 

@@ -145,13 +145,10 @@ SHORTEST_STRETCH = 32
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """How a recording was sampled.
-
-    `rows`: tuple of (int, int), row ranges without a long gap, each at least `SHORTEST_STRETCH` complete rows.
-    """
+    """How a recording was sampled."""
 
     rate_hz: float
-    rows: tuple[tuple[int, int], ...]
+    rows: tuple[tuple[int, int], ...]  # ranges without a long gap, each at least `SHORTEST_STRETCH` complete rows
     samples: int
     missed: int
     dropped: int

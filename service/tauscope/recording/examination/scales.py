@@ -133,15 +133,12 @@ NEIGHBOURS = 3  # rows on either side that a row is judged by
 
 @dataclass(frozen=True)
 class PositionScale:
-    """Typical steps of one joint's position.
-
-    `surprise`: 90th percentile of the change beyond what the neighbours foretell, while the joint moves [rad or m].
-    """
+    """Typical steps of one joint's position."""
 
     is_wrapped: bool
     step: float  # encoder's step, or the least noise [rad or m]
     move: float  # 95th percentile of the change from row to row, while the joint moves [rad or m]
-    surprise: float
+    surprise: float  # 90th percentile of the change beyond what the neighbours foretell, while it moves [rad or m]
     hold: int  # rows for which the source holds a value; 1 where it does not
 
 

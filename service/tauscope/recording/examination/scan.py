@@ -32,19 +32,14 @@ REST_HOLDS = 4  # holds of one value after which it is a rest, and no update tha
 
 @dataclass(eq=False)
 class JointDefects:
-    """Defects of one joint's samples.
+    """Defects of one joint's samples."""
 
-    `hold`, `effort_hold`: rows for which position, effort are held; 1 where they are not.
-    `rows`: dict of str to (m,) int64, rows, ascending: spikes, frozen, repeated of positions, zeros, stuck,
-        effort_spikes of efforts.
-    `jumps`, `wraps`: list of (int, float), first row behind a jump, and its height [rad or m].
-    """
-
-    hold: int
-    effort_hold: int
+    hold: int  # rows for which the position is held; 1 where it is not
+    effort_hold: int  # the same of the effort
+    # of spikes, frozen, repeated positions; of zeros, stuck, effort_spikes: (m,) int64, ascending
     rows: dict[str, Numbers] = field(default_factory=lambda: defaultdict(lambda: NO_NUMBERS))
-    jumps: list[tuple[int, float]] = field(default_factory=list)
-    wraps: list[tuple[int, float]] = field(default_factory=list)
+    jumps: list[tuple[int, float]] = field(default_factory=list)  # first row behind each, and its height [rad or m]
+    wraps: list[tuple[int, float]] = field(default_factory=list)  # as `jumps`
 
     def position_edit(self, count: int, lost: Numbers) -> ColumnEdit:
         """Edit of a position of `count` rows, further rows `lost` (m,): jumps count from the longest piece."""
