@@ -26,10 +26,9 @@ _KEPT = {"qd": "velocity", "qdd": "acceleration", "qref": "reference", "temp": "
 def make_efforts(
     robot: Robot, recordings: Sequence[Recording], held_out: Sequence[Recording] = ()
 ) -> tuple[Robot, tuple[Recording, ...], tuple[Recording, ...]]:
-    """Make torque where recordings hold commands in its place; delays that nothing states are estimated.
+    """Torque where recordings hold commands; delays not stated are estimated. Returns the robot with them, notes.
 
-    The robot has these delays, and notes on what the torque is made of. Raises RecordingError where a joint has no
-    loop, or its loop lacks a voltage.
+    Raises RecordingError where a joint has no loop, or its loop lacks a voltage.
     """
     commands = [each for each in recordings if each.effort_kind is EffortKind.COMMAND]
     unseen = [each for each in held_out if each.effort_kind is EffortKind.COMMAND]

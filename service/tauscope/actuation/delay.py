@@ -27,10 +27,7 @@ class Delay:
 
 
 def shift_command(time: Array, command: Array, delay: float, rate_hz: float | None, at: Array) -> Array:
-    """`command`, (N,), at `at`, (M,), late by a delay and held from one update of the loop to the next.
-
-    `time`: (N,), of the recorded commands [s]; without `rate_hz` there is an update with every sample.
-    """
+    """`command`, (N,), at `at`, (M,), late by a delay, held between updates at `rate_hz` or rows; `time`: (N,) [s]."""
     since = at if rate_hz is None else time[0] + np.floor((at - time[0]) * rate_hz + 1e-9) / rate_hz
     known = np.isfinite(command)
     return np.interp(since - delay, time[known], command[known])
@@ -58,10 +55,7 @@ def joint_torque(robot: Robot, samples: Samples, joint: int, delay: float) -> Ar
 
 
 def estimate_delays(robot: Robot, recordings: Sequence[Recording]) -> tuple[Delay, ...]:
-    """Delays of all joints: those stated, else those that leave the least torque unexplained.
-
-    A joint that tells nothing takes the median of the others, or zero.
-    """
+    """Delays of all joints: stated, or of least unexplained torque; one that tells nothing takes the others' median."""
     loops = [joint.actuator for joint in robot.joints]
     open_ = [joint for joint, loop in enumerate(loops) if loop is not None and loop.delay is None]
     found: dict[int, Delay] = {}

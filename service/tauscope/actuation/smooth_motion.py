@@ -54,10 +54,7 @@ class SmoothMotion:
         return put_onto(self.samples.time, values, self.time)
 
     def moves(self, joint: int) -> NDArray[np.bool_]:
-        """Rows in which a joint moves, and every delay has a command, (N,).
-
-        The filter spreads friction at rest over half a period of its band: rows nearer to rest are left out.
-        """
+        """Rows in which a joint moves, and every delay has a command, (N,); not those the filter mixes with rest."""
         speed = np.abs(self.velocity[:, joint])
         reach = 2 * int(0.5 * self.rate / self.band) + 1
         moving = binary_erosion(speed > REST * speed.max(), [True] * reach, border_value=1)
@@ -72,6 +69,6 @@ class SmoothMotion:
 
 
 def put_onto(time: Array, values: Array, at: Array, missing: float = 0.0) -> Array:
-    """Values (M,) at other instants (N,); missed ones are bridged, and `missing` where all are. `time`: (M,) [s]."""
+    """`values`, (M,) at `time`, (M,), at instants `at`, (N,); missed ones are bridged, `missing` where all are."""
     known = np.isfinite(values)
     return np.interp(at, time[known], values[known]) if known.any() else np.full(len(at), missing)

@@ -136,10 +136,7 @@ LOST = 1e3  # position error beyond which the simulated arm is lost and held the
 def simulate_motion(
     model: RolloutModel, plant: Plant, drive: Drive, motion: RecordedMotion, horizon_s: float | None
 ) -> Array:
-    """Positions of the simulated arm at the rows of the recording, (N, n), restarted at every horizon.
-
-    Raises TauscopeError where the recording holds no torque for a joint.
-    """
+    """Simulated positions at a recording's rows, (N, n), restarted every horizon. Raises TauscopeError."""
     steps = len(motion.time)
     every = steps if horizon_s is None else max(round(horizon_s / STEP_S), 1)
     found = np.empty_like(motion.position)

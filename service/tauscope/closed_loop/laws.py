@@ -51,12 +51,9 @@ class JointLaws:
         has_offset: tuple[bool, ...],
         friction_by_load: LoadFriction | None = None,
     ) -> None:
-        """Take a model.
+        """Take a model; `effects`: not in the MJCF, `has_offset`: whose offset is; `friction_by_load`: refined.
 
-        `effects`: that the MJCF does not hold and whose torque follows from position, velocity and load.
         `held`: (n,), dry friction that the MJCF's bristles hold [Nm or N].
-        `has_offset`: joints whose constant torque the MJCF holds.
-        `friction_by_load`: of a refinement.
         """
         friction: tuple[JointFriction, ...] = model.friction
         self._stiction = np.array([each.stiction for each in friction])

@@ -55,10 +55,7 @@ def refine_model(
     recordings: Sequence[Recording],
     progress: Callable[[str], None] = lambda step: None,
 ) -> Refined:
-    """Refine a model without findings; terms of friction by load that are not significant are left out.
-
-    Raises RecordingError where no recording is long enough. `loops`: one a joint, with their delays.
-    """
+    """Refine a model without findings by `loops` with delays. Raises RecordingError where no motion is long enough."""
     arm = RefinableModel(model, tuple(loops), Segments.of(recordings, loops))
     progress(f"refine {len(arm.terms)} parameters on {arm.segments.count} segments")
     optional = np.array([term.is_optional for term in arm.terms])

@@ -109,13 +109,10 @@ def roll_out(
     progress: Progress = lambda step: None,
     training: Sequence[Recording] = (),
 ) -> Rollout:
-    """Simulate what a recording commanded, without and with the findings of a model.
+    """Simulate what a recording commanded, without and with a model's findings. `exports`: as `read_export_models`.
 
-    Raises RecordingMismatchError where the model is of another arm, or nothing states a model. Raises TauscopeError
-    where a recording holds neither commands for loops nor torque, or there is no simulator.
-
-    `exports`: of a model file, as `read_export_models` reads it; empty where the robot file's own model is judged
-    alone; `training`: with commands, by which the model without findings is refined; the other recordings judge it.
+    Raises RecordingMismatchError for another arm's model or none, TauscopeError without commands, torque or simulator.
+    `training`: with commands, by which the model without findings is refined; the other recordings judge it.
     """
     models = _models(robot, exports)
     known = exports[-1].robot if exports else None

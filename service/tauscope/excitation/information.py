@@ -45,10 +45,8 @@ MotionGradient = MotionSamples  # derivatives of a scalar by q, q̇ and q̈ of e
 class ExcitationRegressor:
     """The regressor L of a motion, joint by joint, its information matrix and the way back from it.
 
-    `noise_std`: (n,), expected torque noise of each joint, by which its rows are divided [Nm or N]; equal weights where
-        None.
-    `steepest`: (n,), largest K_v that the samples resolve: a steeper sign function is taken so, for a gradient that
-        means something [s/rad or s/m]; None for the curve as it is.
+    `noise_std`: (n,), expected torque noise, by which rows are divided [Nm or N]; equal weights where None.
+    `steepest`: (n,), largest K_v of the samples, for gradients [s/rad or s/m]; None for the curve as it is.
     """
 
     def __init__(

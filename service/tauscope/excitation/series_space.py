@@ -15,14 +15,10 @@ from tauscope.trajectory.limits import MotionLimits
 
 
 class SeriesSpace:
-    """Series of one period and number of harmonics as vectors x, one row a joint.
+    """Series of one period and harmonics as vectors x. Raises ExcitationError for too few harmonics.
 
     Row j is (centre, coefficients): the centre as part of half the position range away from its middle, the
-    coefficients as parts of the speed limit. All entries are of order one.
-
-    `period_s`: fundamental period [s].
-
-    Raises ExcitationError for too few harmonics.
+    coefficients as parts of the speed limit. All entries are of order one. `period_s`: fundamental period [s].
     """
 
     def __init__(self, limits: MotionLimits, period_s: float, harmonics: int) -> None:

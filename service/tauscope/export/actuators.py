@@ -42,10 +42,7 @@ class ActuatorChoice:
 def actuator_elements(
     robot: Robot, links: Sequence[LinkInertia], rotors: Sequence[float], names: Sequence[str], choice: ActuatorChoice
 ) -> tuple[list[str], list[str]]:
-    """Actuator elements, one a joint, and notes on gains that were chosen. Raises ExportError.
-
-    `names`: of the joints, as quoted attribute values; `rotors`: reflected rotor inertias [kg m² or kg].
-    """
+    """Elements, one a joint, and notes on gains chosen; `names`: quoted; `rotors` [kg m² or kg]. Raises ExportError."""
     if choice.kind is ActuatorKind.MOTOR:
         return [_motor(joint, name) for joint, name in zip(robot.joints, names, strict=True)], []
     gains, notes = joint_gains(robot, links, rotors, choice)

@@ -69,10 +69,7 @@ SUFFIXES = {
 
 
 def make_export(export_format: ExportFormat, model: ExportModel, choice: ActuatorChoice | None = None) -> bytes:
-    """The content of an export. Raises ExportError if the format cannot hold this model.
-
-    Controllers get the delivered friction; simulators the physically consistent links with the friction that fits them.
-    """
+    """An export's content: for controllers delivered friction, for simulators consistent links. Raises ExportError."""
     match export_format:
         case ExportFormat.JSON:
             return to_json(model.compensation, effect_entries(model)).encode()

@@ -84,10 +84,7 @@ SEGMENT_S = 2.0  # length of a segment of Welch's method [s]
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """Rms of the noise in the common band [Nm or N]; None where nothing tells it.
-
-    Repetitions differ by noise alone. Noise above the band says what is within it as far as it is white.
-    """
+    """Rms of noise in the common band [Nm or N]; None where neither repetitions nor noise above the band tell it."""
 
     rms: float | None
     kind: FloorKind

@@ -41,10 +41,7 @@ class Choice:
 
 
 def fold_numbers(motions: Sequence[MotionRows]) -> list[Folds]:
-    """Folds of every row, (R,): by part of the motion, and by recording where there are several.
-
-    A motion that repeats is cut alike in every repetition: no fold has rows of the same motion as another.
-    """
+    """Folds of every row, (R,), by recording and part of the motion: no two hold rows of the same repeated motion."""
     recordings = sorted({each.recording for each in motions})
     splits = [np.concatenate([np.floor(each.progress * FOLDS).astype(np.intp) for each in motions])]
     if len(recordings) > 1:
@@ -54,12 +51,7 @@ def fold_numbers(motions: Sequence[MotionRows]) -> list[Folds]:
 
 
 def choose_black_box(inputs: Inputs, target: Array, splits: Sequence[Folds], learners: Sequence[Learner]) -> Choice:
-    """The learners' sizes and weights of the smallest error on folds that they have not learned from.
-
-    Of several splits, the one by which most is predicted: motion may be told by other recordings, or by its neighbours.
-
-    `target`: (R,), what is to be predicted [Nm or N].
-    """
+    """Sizes and weights of learners of least error on unseen folds of the best split; `target`: (R,) [Nm or N]."""
     choices = [_stack(inputs, target, folds, learners) for folds in splits]
     return min(choices, key=lambda each: each.error)
 
@@ -117,10 +109,7 @@ class JointHeadroom:
 
 
 def joint_headroom(training: Sequence[MotionRows], held_out: Sequence[MotionRows], joint: int) -> JointHeadroom:
-    """Train black boxes on the training motion, and judge the chosen one once on held-out motion.
-
-    They start from the model with all findings: from the nominal model they would have to learn those again.
-    """
+    """Train black boxes from the model with all findings, and judge the chosen one once on held-out motion."""
     known, asked = _rows(training, joint), _rows(held_out, joint)
     plain, explained = (_residual(held_out, model, joint) for model in ("plain", "explained"))
     left = np.full_like(explained, np.nan)

@@ -53,10 +53,7 @@ class BoostedTrees:
 
 @dataclass(frozen=True)
 class KernelRidge:
-    """Ridge regression on a Gaussian kernel and the columns themselves, all standardised.
-
-    k(x, y) = exp(-‖x - y‖² / (2 w² d)) with d columns.
-    """
+    """Ridge regression on d standardised columns and a Gaussian kernel, k(x, y) = exp(-‖x - y‖² / (2 w² d))."""
 
     width: float
     own_joint: bool

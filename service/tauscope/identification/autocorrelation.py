@@ -46,10 +46,7 @@ class Autoregression:
 
     @property
     def long_run_ratio(self) -> float:
-        """Spectral density at frequency zero over that of white noise of the same variance, at least 1.
-
-        By this much a slowly varying coefficient's variance exceeds what independent residuals would give it.
-        """
+        """Spectral density at frequency zero over white noise's, ≥ 1: inflates a slow coefficient's variance."""
         if self.variance <= 0.0:
             return 1.0
         gain = 1.0 / (1.0 - self.coefficients.sum()) ** 2

@@ -177,10 +177,7 @@ def _passed_share(motion: Motion, motions: Dataset) -> float:
 
 
 def _unrepeated_power(prepared: PreparedMotion) -> Array:
-    """Variance of what torque does not repeat from period to period, in the band, (n,); infinite where nothing repeats.
-
-    Measured samples alone tell it; one that was missed counts as its period's mean.
-    """
+    """Variance of measured torque that differs between periods, in the band, (n,); infinite if nothing repeats."""
     motion = prepared.motion
     if motion.repetitions == 1:
         return np.full(motion.torque.shape[2], np.inf)
@@ -217,10 +214,7 @@ def _inertia(structure: ModelStructure, parameters: Array, position: Array) -> A
 
 
 def _crossing(motions: Dataset, structure: ModelStructure, parameters: Array, residual_std: Array) -> float | None:
-    """Lowest frequency above the motion's own at which the model leaves more than half of the torque unexplained.
-
-    Measured, not modelled torque is compared: noise of the positions makes modelled torque, which explains nothing.
-    """
+    """Lowest frequency above the motion's at which more than half of the measured torque is unexplained."""
     frequency = np.linspace(0.0, motions.cutoff_hz or 0.0, SPECTRUM_POINTS + 1)[1:]
     measured, unexplained = np.zeros(SPECTRUM_POINTS), np.zeros(SPECTRUM_POINTS)
     for prepared in motions:

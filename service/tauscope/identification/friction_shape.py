@@ -58,8 +58,7 @@ def project_grids(
 ) -> list[JointGrid]:
     """Candidate columns of every joint, projected off the `shared` ones, (z,) int; one pass over the data.
 
-    `noise_std`: (n,), residual standard deviation of every joint, for the weights [Nm or N].
-    `slopes`: (g,) a joint, its candidates [s/rad or s/m].
+    `noise_std`: (n,), of residuals, for the weights [Nm or N]; `slopes`: (g,) a joint, candidates [s/rad or s/m].
     """
     joints = range(structure.robot.joint_count)
     gram = [np.zeros((len(values) + 1, len(values) + 1)) for values in slopes]
@@ -163,10 +162,7 @@ class EstimatedShape:
     delta_given: bool
 
     def open_at_limit(self) -> "EstimatedShape":
-        """The shape, its constants open where δ is at the limit of its range.
-
-        Two steps as near as they may be are one step of another form than an arctangent, and no fall with speed.
-        """
+        """The shape, open where δ is at its limit: two such near steps are one of another form than an arctangent."""
         if self.delta is None or self.delta_given or self.delta * SEPARATION < AT_LIMIT * self.k_v:
             return self
         return replace(self, k_v_identifiable=self.k_v_given, delta_identifiable=False)
@@ -182,12 +178,10 @@ def estimate_shapes(
     speed: Array,
     tight: Sequence[bool] | None = None,
 ) -> tuple[EstimatedShape, ...]:
-    """Shape constants of all joints; those that the robot file states are kept.
+    """Shape constants of all joints; those stated are kept. `noise_std`: (n,), by which rows are weighted.
 
-    `noise_std`: (n,), residual standard deviation in the common band, for the weights.
-    `unit`: (n,), one noise variance, inflated by autocorrelation, relative to `noise_std`²: the measure of what the
-    data can tell; zeros for the best candidates whatever they are worth.
-    `speed`: (n,), rms velocity of every joint, which the candidates are relative to [rad/s or m/s].
+    `unit`: (n,), one noise variance, inflated by autocorrelation, over `noise_std`²; zeros for the best candidates
+    whatever they are worth. `speed`: (n,), rms velocity, which candidates are relative to [rad/s or m/s].
     """
     given = [joint.friction_shape for joint in structure.robot.joints]
     steps = [*structure.coefficients("stiction").values(), *structure.coefficients("stribeck").values()]
@@ -271,10 +265,8 @@ def _described(
 ) -> EstimatedShape:
     """The joint's constants refined, with what the data can tell about them; `unit` is one noise variance.
 
-    A gentle step has a long tail: A(K_v v) = 1 - 2/(π K_v v) for large v. It stands in for viscous friction that bends
-    with speed, which the model has no other column for, and the slope it takes for that is wrong at the low speeds that
-    it is there for. So K_v is known only where the passage through zero tells it: where steeper steps fit clearly worse
-    even beside a column v|v|. That column is for the question alone and never in the model.
+    A gentle step's long tail, A(K_v v) = 1 - 2/(π K_v v), stands in for viscous friction that bends with speed: K_v
+    is known only where steeper steps fit clearly worse even beside a column v|v|, which the model never has.
     """
     slopes = grid.slopes
     k_v, k_v_known = float(slopes[indices[0]]), True
@@ -329,10 +321,7 @@ def _with_stribeck(
     variance: float,
     residual_energy: float,
 ) -> list[int]:
-    """The best pair [K_v, δ] where it explains enough more than K_v alone, else the plain choice.
-
-    K_v alone may lie between two grid points: it is given the next point's column too, which spans what lies between.
-    """
+    """The best pair [K_v, δ] where it explains enough more than K_v, with the next grid point's column, alone."""
     pairs = _stribeck_options(grid, shape)
     if not pairs:
         return plain

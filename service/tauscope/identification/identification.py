@@ -113,9 +113,8 @@ def identify(
     options: Options = Options(),
     progress: Progress = lambda step: None,
 ) -> Identification:
-    """Identify a robot arm from recordings.
+    """Identify a robot arm. Raises RecordingMismatchError, RecordingError for a recording too short or broken,
 
-    Raises RecordingMismatchError for another number of joints, RecordingError where a recording is too short or broken,
     and IdentificationError where the recordings hold too little for the parameters.
     """
     for recording in (*recordings, *held_out):

@@ -38,10 +38,7 @@ class JointFactor:
 
     @cached_property
     def least_squared_residual(self) -> float:
-        """‖A_j Θ_j - y_j‖² where the joint's equations are solved alone: the last entry of R_j, squared.
-
-        Where columns are zero or combinations but for rounding, rounding would decide over that entry.
-        """
+        """‖A_j Θ_j - y_j‖² of the joint solved alone: R_j's last entry, squared, unless rounding decides it."""
         columns, target = self.triangle[:, :-1], self.triangle[:, -1]
         if _is_well_conditioned(columns[:-1]):
             return float(target[-1] ** 2)

@@ -71,10 +71,7 @@ def _doubt_friction_at_rest(motions: Dataset, structure: ModelStructure) -> None
 
 
 def _estimate_shapes(motions: Dataset, structure: ModelStructure, speed: Array) -> tuple[EstimatedShape, ...]:
-    """Shape constants; a Stribeck term stays where it is far from zero against the residual that it leaves.
-
-    Its significance cannot be judged by the residual without it: what it would explain is the colour in that residual.
-    """
+    """Shape constants; a Stribeck term stays where it is far from zero against the residual that it leaves itself."""
     count = structure.robot.joint_count
     factors = factorise(motions, structure)
     noise_std, _ = _preliminary_residual(motions, structure, factors)
@@ -149,10 +146,7 @@ def _judge(
 
 
 def _stribeck_gain(structure: ModelStructure, parameters: Array, covariance: Array, joint: int) -> float:
-    """What a joint's Stribeck term takes off the criterion [noise variances]; 0 where friction does not fall.
-
-    (τ_sc/σ)², less what it costs to raise τ_s + τ_sc to `LEAST_COULOMB` of τ_s where it is below.
-    """
+    """What a Stribeck term takes off the criterion [noise variances] less the cost of `LEAST_COULOMB`; 0 if rising."""
     stiction, stribeck = (structure.coefficient(joint, name) for name in ("stiction", "stribeck"))
     if stiction is None or stribeck is None or parameters[stribeck] >= 0.0:
         return 0.0

@@ -117,8 +117,8 @@ def _most_probable(
 ) -> tuple[float, float, Array, Array]:
     """Width of the prior, width of highest evidence, and mean and covariance.
 
-    Friction is eliminated first: its prior does not depend on w. What is left is diagonal in the singular vectors of
-    R C, with C Cᵀ the prior covariance of the base parameters at w = 1, and every width costs a sum.
+    Friction, whose prior does not depend on w, is eliminated first; the rest is diagonal in the singular vectors of
+    R C, C Cᵀ the prior covariance of the base parameters at w = 1: every width costs a sum.
     """
     white = np.column_stack([factor @ root, target - factor @ mean])
     friction = white[:, bodies:-1]

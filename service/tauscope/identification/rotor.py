@@ -50,10 +50,7 @@ def separable_rotors(robot: Robot, base: BaseParameters) -> tuple[bool, ...]:
 def needed_rotors(
     factors: tuple[JointFactor, ...], structure: ModelStructure, noise_std: Array, inflation: Array
 ) -> tuple[bool, ...]:
-    """Whether the data ask for a rotor, (n,): the least needed one is dropped until all that stay count.
-
-    `noise_std`: (n,), residual standard deviation; `inflation`: (n,), of variances by autocorrelation, at least 1.
-    """
+    """Whether data ask for a rotor, (n,): the least needed drop out; `noise_std`, `inflation` of variances: (n,)."""
     joints = {joint for joint, terms in enumerate(structure.terms) if terms.rotor}
     if _gain_of_all(factors, structure, noise_std) < min(
         (_needed_gain(structure, joint, inflation[joint], factors[joint].rows) for joint in joints), default=np.inf

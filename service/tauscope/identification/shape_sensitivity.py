@@ -59,10 +59,7 @@ def refine_structure(
     shapes: Sequence[ShapeParameter],
     speed: Array,
 ) -> ModelStructure:
-    """The structure with its estimated shape constants at the joint optimum, by Gauss–Newton steps.
-
-    `parameters`: (p,); `weight`: (n,), 1/σ_j; `speed`: (n,), rms velocity [rad/s or m/s].
-    """
+    """The structure at its joint optimum by Gauss–Newton; `parameters`: (p,); `weight`, 1/σ_j, and `speed`: (n,)."""
     start = structure
     for _ in range(STEPS):
         gram, target = _normal_equations(motions, structure, parameters, weight, shapes)

@@ -38,12 +38,9 @@ def read_batches(
     first_row: int = 0,
     has_episodes: bool = False,
 ) -> Recording:
-    """Take all rows of the wanted columns.
+    """Take all rows of the wanted columns, from `first_row` in messages on; `has_episodes`: by ``episode_index``.
 
     Raises RecordingError, which names row and column, and RecordingMismatchError for another number of joints.
-
-    `first_row`: number of the file's first row in messages.
-    `has_episodes`: whether a column `episode_index` splits the rows into episodes, each on a clock of its own.
     """
     reading, layout = find_layout(header, choice.reading, choice.file)
     require_joint_count(layout.joint_count, choice.joint_count, choice.file)
@@ -215,10 +212,7 @@ _NUMBER_TYPE = re.compile(r"u?int(8|16|32|64)|halffloat|float|double")
 
 
 def read_parquet(path: Path, choice: Choice) -> Recording:
-    """Read a Parquet recording batch by batch; null is a missed sample.
-
-    Raises MissingExtraError, RecordingError, which names row and column, and RecordingMismatchError for other joints.
-    """
+    """Read batch by batch; null is a missed sample. Raises MissingExtraError, RecordingError with row and column."""
     name = choice.file
     arrow = _arrow(name)
     with path.open("rb") as stream, _arrow_errors(arrow, name):

@@ -88,9 +88,8 @@ def convert_recording(
     robot: Robot | None = None,
     reading: Reading = SI,
 ) -> Conversion:
-    """Write a recording, in SI, in the format that the target's suffix names.
+    """Write a recording, in SI, as the target's suffix says; MCAP holds whole nanoseconds, q, τ and q̇ only.
 
-    MCAP holds time in whole nanoseconds, positions, torques and velocities; CSV and Parquet hold every column exactly.
     Raises RecordingError where the source cannot be read, or the target cannot hold it or exists.
     """
     source_path, target_path = Path(source), Path(target)

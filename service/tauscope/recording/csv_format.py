@@ -35,10 +35,9 @@ _SAMPLE_BYTES = 2**16
 
 
 def read_csv(path: Path, choice: Choice) -> Recording:
-    """Read a CSV recording, in time linear and in memory bounded in its number of lines.
+    """Read a CSV in time linear and in memory bounded in its lines; an empty field or ``nan`` is a missed sample.
 
-    Comma, semicolon, tab, | or blanks between the fields; an empty field or ``nan`` is a missed sample. Raises
-    RecordingError, which names line and column, and RecordingMismatchError for another number of joints.
+    Raises RecordingError, which names line and column, and RecordingMismatchError for another number of joints.
     """
     name = choice.file
     with path.open("rb") as file:

@@ -49,11 +49,10 @@ def read_journal(path: Path) -> Journal:
 
 
 def journal_recording(journal: Journal, name: str) -> Recording:
-    """The recording of a journal's motion, without the ramp; time runs from the motion's first sample.
+    """A journal's motion from its first sample, without ramp: reported columns, qref, taucmd and period where known.
 
-    Columns are those that the drives report (i where they report no torque), qref, taucmd where effort was commanded,
-    and period where the motion is repeated. Where the host commanded effort, tau (i) is the mean of what acted before
-    and after the sample. Raises RecordingError where the motion was never reached.
+    Where the host commanded effort, tau (i) is the mean of what acted before and after the sample. Raises
+    RecordingError where the motion was never reached.
     """
     rows, header = journal.motion, journal.header
     if not len(rows):

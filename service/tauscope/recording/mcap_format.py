@@ -106,10 +106,7 @@ class _Part:
 
 
 def read_by_index(file: BinaryIO, size: int, sink: MessageSink) -> bool:
-    """Hand the wanted messages over in the order of the file; False where its index is unsound or most is wanted.
-
-    Raises DamageError where a chunk is not as the index says.
-    """
+    """Hand wanted messages over; False if most is wanted or the index unsound. Raises DamageError at bad chunks."""
     try:
         summary = _read_summary(file, size)
         if summary is None:

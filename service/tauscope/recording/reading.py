@@ -73,11 +73,9 @@ _FOREIGN = (
 def read_recording(
     path: str | Path, joint_count: int | None = None, joint_names: Sequence[str] | None = None, reading: Reading = SI
 ) -> Recording:
-    """Read a recording: CSV, Parquet, MCAP, a ROS 1 bag, or a rosbag2 folder or database; told apart by content.
+    """Read CSV, Parquet, MCAP, a ROS 1 bag, or a rosbag2 folder or database, told apart by content.
 
-    Raises RecordingError, which names the place, and RecordingMismatchError where it has other joints than asked for.
-
-    `joint_count`: joints that the recording must have; None where any number is welcome, or as many as `joint_names`.
+    Raises RecordingError, which names the place; RecordingMismatchError for other joints than `joint_count` asks for.
     """
     path = find_path(path)
     name = printable(str(path), _LONGEST_PATH)

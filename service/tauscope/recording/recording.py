@@ -58,10 +58,7 @@ class Recording:
         )
 
     def joint_torque(self, effort: Array, robot: Robot) -> Array:
-        """τ = sign · k · effort, with k = 1 where torque was recorded; `effort` and τ (N, n) [Nm or N].
-
-        Raises RecordingMismatchError for another number of joints, and RecordingError for commands without an actuator.
-        """
+        """τ = sign · k · effort, k = 1 of recorded torque; `effort` and τ (N, n). Raises a RecordingMismatchError."""
         if self.effort_kind is EffortKind.COMMAND:
             raise RecordingError(
                 f"{self.name}: column tau1 is missing, and joint 1 ({robot.joints[0].name}) has no position loop that"

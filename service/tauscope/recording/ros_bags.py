@@ -30,10 +30,7 @@ _LARGEST_HEADER_BYTES = 2**16
 
 
 def add_ros1_bag(path: Path, name: str, log: JointStateLog) -> None:
-    """Add the joint states of a ROS 1 bag to a log; chunks without messages of their topics are not read.
-
-    Raises MissingExtraError where rosbags is not installed, and RecordingError for a damaged bag or one without index.
-    """
+    """Add joint states by the bag's index. Raises MissingExtraError without rosbags, RecordingError where damaged."""
     with require_extra(f"{name}: a ROS 1 bag"):
         rosbag1: Any = import_module("rosbags.rosbag1")
     unreadable = (ValueError, KeyError, IndexError, EOFError, OSError, RuntimeError, MemoryError, struct.error)

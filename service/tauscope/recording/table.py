@@ -33,11 +33,7 @@ class MemoryTable:
 
 
 class SpooledTable:
-    """Rows in an unnamed temporary file of the system's temporary folder (TMPDIR); it vanishes with this object.
-
-    Read by `preadv` and not mapped: pages of a map count as memory of this process. No file position is shared, so that
-    several threads may read at once.
-    """
+    """Rows in an unnamed temporary file (TMPDIR), read by `preadv`: mapped pages count as memory of the process."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self.names = names

@@ -21,10 +21,7 @@ from tauscope.strict_model import ResultModel
 
 
 def envelope_indices(values: Array, most: int) -> NDArray[np.intp]:
-    """Samples, increasing (M,), that keep the look of `values`, (N,): least and greatest of each of most/2 buckets.
-
-    No peak is lost, and of a bucket that is all NaN one is kept, so that the gap shows.
-    """
+    """Samples, increasing (M,), with least and greatest of each of most/2 buckets of `values`, (N,); NaN gaps show."""
     count = len(values)
     if count <= most:
         return np.arange(count)

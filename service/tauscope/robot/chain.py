@@ -72,11 +72,7 @@ class ChainMotion:
             met.add(master.joint)
 
     def friction(self, stated: Mapping[str, tuple[float, float]]) -> tuple[FrictionCoefficients, ...]:
-        """Friction of the independent joints, from dry friction and damping of each that moves.
-
-        A joint that follows with multiplier m brakes its master with |m| times its dry friction and m² times its
-        damping.
-        """
+        """Friction of independent joints: one that follows adds |m| times its dry friction, m² times its damping."""
         total = {name: np.zeros(2) for name in self.independent}
         for name, (dry, damping) in stated.items():
             master = self.moving[name]

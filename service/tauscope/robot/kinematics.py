@@ -29,12 +29,9 @@ def rotation_of_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Array:
 
 
 def rotation_of_z_to(axis: Array) -> Array:
-    """A rotation that carries z to an axis: R [0, 0, 1]ᵀ = axis, shape (3, 3).
+    """A rotation (3, 3) that carries z to the unit vector `axis`, (3,): Rodrigues' R = 1 + [v] + [v]²/(1 + c).
 
-    Rodrigues' formula R = 1 + [v] + [v]²/(1 + c) with v = z × axis, c = z·axis. Where the axis points down, 1 + c loses
-    its digits: there z is carried to -axis, after half a turn about x.
-
-    `axis`: (3,), unit vector.
+    v = z × axis, c = z·axis. Where the axis points down, 1 + c loses its digits: half a turn about x comes first.
     """
     if axis[2] < 0.0:
         return rotation_of_z_to(-axis) @ np.diag([1.0, -1.0, -1.0])
@@ -88,9 +85,9 @@ def _along_x(row: DenavitHartenbergRow) -> Placement:
 
 
 def link_placements(chain: Robot | Sequence[Segment], q: Array) -> Array:
-    """Every link frame seen from the base, (N, m, 4, 4), by `q`, (N, n) [rad or m].
+    """Link frames seen from the base, (N, m, 4, 4), T_j = T_{j-1} · before_j · motion_z(q_j) · after_j, by `q`, (N, n).
 
-    T_j = T_{j-1} · before_j · motion_z(q_j) · after_j. Raises RecordingMismatchError for another number of joints.
+    Raises RecordingMismatchError for another number of joints.
     """
     segments = chain.segments if isinstance(chain, Robot) else tuple(chain)
     position = np.asarray(q, dtype=np.float64)

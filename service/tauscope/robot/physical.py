@@ -52,9 +52,8 @@ def find_defect(link: LinkInertia, tolerance: float = ROUNDING) -> str | None:
 def nearest_body(link: LinkInertia) -> LinkInertia:
     """The nearest body; the link itself where a body can have its parameters.
 
-    min ‖A⁻¹ (J - J₀) A⁻ᵀ‖_F over J ⪰ 0, J the pseudo-inertia and A Aᵀ that of a compact body about the same centre of
-    mass: negative eigenvalues of A⁻¹ J₀ A⁻ᵀ become zero (Higham 1988). A positive mass and its centre stay. The answer
-    does not depend on units or on the frame. Without a mass that tells the centre, A is a body at the frame's origin.
+    min ‖A⁻¹ (J - J₀) A⁻ᵀ‖_F over J ⪰ 0, A Aᵀ the pseudo-inertia of a compact body about the same centre of mass, or
+    without a mass at the origin: negative eigenvalues of A⁻¹ J₀ A⁻ᵀ become zero (Higham 1988), mass and centre stay.
     """
     if find_defect(link, ROUND_OFF) is None:
         return link

@@ -60,10 +60,9 @@ def read_mjcf_chain(
     tip: str | None = None,
     locked: Mapping[str, float] | None = None,
 ) -> Chain:
-    """The chain from body `base` to body `tip` of an MJCF; by default from the root to the deepest body.
+    """The chain from body `base` to `tip` of an MJCF, by default from root to deepest; `locked`: positions [rad or m].
 
-    Raises RobotFileError where MuJoCo refuses the file or no chain of hinges and slides leads there, MissingExtraError
-    without MuJoCo. `locked`: position of joints that do not move [rad or m].
+    Raises RobotFileError without a chain of hinges and slides, MissingExtraError without MuJoCo.
     """
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         with require_extra(f"{label}: reading an MJCF"):

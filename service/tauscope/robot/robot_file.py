@@ -26,10 +26,9 @@ KINEMATICS_OF_ROOT = {"robot": "urdf", "mujoco": "mjcf"}  # kinds of kinematics 
 
 
 def read_robot(path: Path | str, *, expands_xacro: bool = True) -> Robot:
-    """The robot that a robot file describes, or a URDF or MJCF by itself.
+    """The robot of a robot file, or a URDF or MJCF by itself. Raises RobotFileError: file, line, place, joint.
 
-    Raises RobotFileError, which names file, line, place and joint. `expands_xacro`: whether the command ``xacro`` may
-    read it, which evaluates Python and opens any file: never for a file of strangers.
+    `expands_xacro`: whether the command ``xacro`` may read it, which opens any file: never for strangers' files.
     """
     source = find_path(path)
     data = read_bounded(source, LARGEST_XML)

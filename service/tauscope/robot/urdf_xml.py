@@ -158,10 +158,7 @@ def inertia_about_frame(mass: float, centre: Placement, inertia: np.ndarray) -> 
 def lumped_inertia(
     label: str, link: int, bodies: Iterable[tuple[Element, Placement]], findings: list[Finding]
 ) -> tuple[LinkInertia | None, list[Repair]]:
-    """Sum of the inertials of bodies that move with link `link`, each at its placement; None where none has any.
-
-    Raises RobotFileError if an `<inertial>` is incomplete or not made of numbers.
-    """
+    """Sum of placed inertials that move with link `link`, None where it has none. Raises RobotFileError."""
     vectors, repairs = [], []
     for body, placement in bodies:
         element = only_child(label, body, "inertial", findings)

@@ -247,10 +247,7 @@ class TaskResult:
 
 
 def command_words(verb: str, robot: str, **options: Any) -> tuple[str, ...]:
-    """The command line that does the same, with every option spelled out; outputs are left to whoever repeats it.
-
-    `**options`: by the name of the option; `recordings` has none, an empty tuple is left out.
-    """
+    """The command line that does the same, each of `options` spelled out but outputs; empty tuples are left out."""
     words = ["tauscope", verb, robot]
     for name, value in options.items():
         option = f"--{name.replace('_', '-')}"

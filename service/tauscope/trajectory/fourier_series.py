@@ -70,10 +70,7 @@ class FourierSeries:
 
 
 def between_samples(harmonics: int, samples: int) -> float:
-    """Factor by which a trigonometric polynomial may exceed its largest equispaced sample: 1/cos(π M / K).
-
-    Ehlich and Zeller's bound for degree M and K > 2 M samples a period.
-    """
+    """Factor 1/cos(π M / K) by which degree M may exceed its largest of K > 2 M samples (Ehlich and Zeller)."""
     if samples <= 2 * harmonics:
         raise ExcitationError(f"{samples} samples a period cannot bound {harmonics} harmonics; take more samples")
     return float(1.0 / np.cos(np.pi * harmonics / samples))

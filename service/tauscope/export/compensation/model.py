@@ -152,11 +152,7 @@ SCHEMA = "tauscope.compensation/1"
 
 
 def to_document(model: CompensationModel, effects: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
-    """The model as plain data, the same for JSON and YAML.
-
-    Coefficients stand three times: as joint torque, in mA and in ‰ of rated torque; None where the unit is not known,
-    as the joint's remarks say.
-    """
+    """The model as plain data for JSON and YAML: coefficients as torque, in mA, in ‰ of rated torque, or None."""
     return {
         "schema": SCHEMA,
         "robot": model.robot,

@@ -53,12 +53,9 @@ def nearest_consistent_parameters(
 ) -> ConsistentParameters:
     """Nearest x to a weighted least-squares estimate such that every link can exist and G x ≤ h.
 
-    min ‖R x - z‖² + ‖W (x - μ)‖², pseudo-inertia ⪰ ε, G x ≤ h; see the module for ε. The program is convex: there is
-    one answer, certified by `duality_gap`. Raises IdentificationError where R or z is not finite, the inequalities
-    contradict each other, or the solver does not reach the accuracy that is asked for.
-
-    `factor`: (r, p), R, whitened: a unit of R x is one standard deviation of the noise; of any rank. Columns: ten
-    standard parameters for each link, then friction coefficients. `target`: (r,), z.
+    min ‖R x - z‖² + ‖W (x - μ)‖², pseudo-inertia ⪰ ε, G x ≤ h: convex, the answer certified by `duality_gap`. Raises
+    IdentificationError where inequalities contradict each other, or the solver is not accurate. `factor`: (r, p), R,
+    whitened: ten parameters a link, then friction coefficients; `target`: (r,), z.
     """
     inequalities = inequalities or LinearInequalities.none(prior.mean.size)
     _check_input(factor, target, prior, inequalities)

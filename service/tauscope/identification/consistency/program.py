@@ -88,10 +88,7 @@ def assemble(
 
 
 def solve(program: ConicProgram) -> tuple[Array, str, float]:
-    """The optimum u, (p,), "interior" or the solver's word, and the duality gap relative to the criterion or to 1.
-
-    Raises IdentificationError where inequalities contradict each other, or the solver does not reach its accuracy.
-    """
+    """The optimum u, (p,), "interior" or the solver's word, and duality gap. Raises IdentificationError without one."""
     interior = solve_triangular(program.triangle, program.centre)
     if program.admits(interior):
         return interior, "interior", 0.0

@@ -197,10 +197,9 @@ class Conditioner:
         return periods if periods is not None and repeats(periods, highest, self.noise.density) else None
 
     def _transients(self, begin: int, end: int, rows: tuple[int, int], cutoff_hz: float | None) -> Iterator[Motion]:
-        """Motion of the rows begin:end in windows that join without a seam.
+        """Motion of the rows begin:end in windows that join without a seam: they overlap by what filters cost.
 
-        Consecutive windows overlap by what filters cost. Where averaged periods lie before or after, the filters run on
-        into them by half the kernel: an output belongs to where its kernel's centre lies.
+        Filters run on into averaged periods beside it by half the kernel: an output belongs to its kernel's centre.
         """
         trim = Trim.design(self.timing.rate_hz, cutoff_hz, self.state_hz)
         if end - begin < trim.factor:

@@ -101,10 +101,7 @@ def with_turns_removed(periods: Periods, joint_types: Sequence[JointType]) -> Pe
 
 
 def repeats(periods: Periods, cutoff_hz: float, noise_density: Array) -> bool:
-    """Whether the motion below a cut-off repeats so well that an average of its periods is a motion.
-
-    `noise_density`: (n,), one-sided spectral density of the positions' noise [rad²/Hz or m²/Hz].
-    """
+    """Whether motion below a cut-off repeats well; `noise_density`: (n,), one-sided, of q [rad²/Hz or m²/Hz]."""
     samples = periods.position.shape[1]
     frequency = np.fft.rfftfreq(samples, 1.0 / periods.rate_hz)[:, None]
     weight = np.where(frequency <= cutoff_hz, frequency**4, 0.0)

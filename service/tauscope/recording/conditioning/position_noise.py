@@ -93,10 +93,7 @@ def lowest_limit(limits_hz: Array) -> float | None:
 def acceleration_spectrum(
     signals: Sequence[Array], rate_hz: float, order: int, floor: Array | float = 0.0
 ) -> AccelerationSpectrum:
-    """Spectrum of q̈ by differences of q (order 2), q̇ (1) or q̈ (0), pieces of (N, n).
-
-    `floor`: (n,) or float, least density of the signal's noise.
-    """
+    """Spectrum of q̈ by differences of q (order 2), q̇ (1), q̈ (0), (N, n); `floor`: (n,) or float, of its density."""
     accelerations = [np.diff(values, n=order, axis=0) * rate_hz**order for values in signals]
     length = min(SEGMENT, max(len(values) for values in accelerations))
     spectra = [segment_spectra(values, rate_hz, length) for values in accelerations]
@@ -134,10 +131,7 @@ def _gain(frequency: Array, rate_hz: float, order: int) -> Array:
 
 
 def segment_spectra(values: Array, rate_hz: float, length: int) -> Array:
-    """One-sided spectral densities (S, F, n) of segments of `values`, (N, n): Welch's, before their mean.
-
-    Segments overlap by half or a little more, so that no sample is left out. Half the time of `scipy.signal.welch`.
-    """
+    """Spectral densities (S, F, n) of overlapping segments of `values`, (N, n); quicker than `scipy.signal.welch`."""
     whole, last = min(length, len(values)), max(len(values) - length, 0)
     begins = np.linspace(0, last, int(np.ceil(last / (length - length // 2))) + 1).astype(int)
     segments = np.lib.stride_tricks.sliding_window_view(np.ascontiguousarray(values.T), whole, axis=1)[:, begins]

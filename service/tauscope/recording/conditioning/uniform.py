@@ -84,10 +84,7 @@ def read_stretch(recording: Recording, robot: Robot, start: int, stop: int, timi
 
 
 def uniform_grid(elapsed: Array, rate_hz: float) -> Grid | None:
-    """The uniform grid of stamps `elapsed`, (N,) since the first; None where they lie off it.
-
-    They may deviate by `UNIFORM_TOLERANCE` and half of their own last digit.
-    """
+    """The uniform grid of stamps `elapsed`, (N,) since the first; None where they are off by `UNIFORM_TOLERANCE`."""
     tolerance = UNIFORM_TOLERANCE + 0.5 * _last_digit(elapsed) * rate_hz
     fits = [_fit_grid(index, elapsed, rate_hz) for index in _possible_indices(elapsed * rate_hz)]
     good = [(grid, deviation) for grid, deviation in fits if deviation <= tolerance]

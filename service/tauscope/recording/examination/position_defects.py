@@ -34,11 +34,7 @@ class PositionDefect(NamedTuple):
 def scan_position(
     rows: Numbers, time: Array, position: Array, scale: PositionScale, interval: float, core: tuple[int, int]
 ) -> Iterator[PositionDefect]:
-    """Defects of one joint's known `position`, (N,), with its `rows` and `time`, (N,).
-
-    `interval`: usual time from row to row [s].
-    `core`: rows that this block answers for; the others are neighbours.
-    """
+    """Defects of one joint's known `position`, (N,), with its `rows` and `time`, (N,); `core`: rows to answer for."""
     if len(position) < 8:
         return
     plain = np.diff(position)

@@ -221,10 +221,7 @@ def neighbour_windows(values: Array) -> Array:
 
 
 def distance_beyond(windows: Array) -> Array:
-    """Distance of the middle of `windows`, (N, 7), beyond the range of the others, (N,); 0 within it.
-
-    The range leaves the highest and the lowest neighbour out, which may be a spike, too. A step lies within it.
-    """
+    """Distance of the middle of `windows`, (N, 7), beyond the others less their two extremes, (N,); 0 within."""
     values = windows[:, NEIGHBOURS]
     others = np.sort(np.delete(windows, NEIGHBOURS, axis=1), axis=1)
     return np.maximum(np.maximum(values - others[:, -2], others[:, 1] - values), 0.0)

@@ -41,10 +41,7 @@ def is_joint_name(words: Sequence[str]) -> bool:
 
 
 def role_of(words: Sequence[str]) -> tuple[str, int] | None:
-    """The group of CONTRACT.md that words name, and how far they are from the first choice; None where none.
-
-    The last word that names a quantity decides: ``actual_current_as_torque`` is a torque.
-    """
+    """The group of CONTRACT.md that the last word naming a quantity names, and its distance from the first choice."""
     if tuple(words[-2:]) == ("qfrc", "actuator"):  # the joint torque of MuJoCo's actuators
         return "tau", 0
     if _FOREIGN.intersection(words):
