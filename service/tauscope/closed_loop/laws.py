@@ -51,10 +51,7 @@ class JointLaws:
         has_offset: tuple[bool, ...],
         friction_by_load: LoadFriction | None = None,
     ) -> None:
-        """Take a model; `effects`: not in the MJCF, `has_offset`: whose offset is; `friction_by_load`: refined.
-
-        `held`: (n,), dry friction that the MJCF's bristles hold [Nm or N].
-        """
+        """Take a model, `effects` and offsets beside the MJCF; `held`: (n,), dry friction that its bristles hold."""
         friction: tuple[JointFriction, ...] = model.friction
         self._stiction = np.array([each.stiction for each in friction])
         self._stribeck = np.array([each.stribeck for each in friction])
