@@ -6,14 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauscope.actuation import estimate_delays, is_open, require_loops
-from tauscope.closed_loop.drive import (
-    LoopDrive,
-    RecordedMotion,
-    TorqueDrive,
-    loop_damping,
-    record_motion,
-    simulate_motion,
-)
+from tauscope.closed_loop import drive as drives
 from tauscope.closed_loop.model import RolloutModel, rollout_model, stated_model
 from tauscope.closed_loop.plant import STEP_S, make_plant
 from tauscope.closed_loop.refine import Refined, refine_model
@@ -46,7 +39,7 @@ Progress = Callable[[str], None]
 class Trace:
     """One recording and its simulations."""
 
-    motion: RecordedMotion
+    motion: drives.RecordedMotion
     simulated: dict[str, Array]  # dict of str to (N, n), positions by model, from one start [rad or m]
     entry: RecordingEntry
 
@@ -123,12 +116,12 @@ def roll_out(
         refined = _refine(_plain_model(robot, exports), loops, training, progress)
         models.append(rollout_model("refined", refined.model, refined.friction))
     # MuJoCo integrates an actuator's damping implicitly; a servo computes it of the velocity that it has measured.
-    damping = loop_damping(loops) if loops and robot.mjcf is not None else np.zeros(robot.joint_count)
+    damping = drives.loop_damping(loops) if loops and robot.mjcf is not None else np.zeros(robot.joint_count)
     plants = [make_plant(model.mjcf, model.joints, damping) for model in models]
     traces = []
     for recording in recordings:
         progress(f"simulate {recording.name}")
-        motion = record_motion(recording)
+        motion = drives.record_motion(recording)
         entries, simulated = [], {}
         for model, plant in zip(models, plants, strict=True):
             runs: dict[float | None, Array] = {}
@@ -136,12 +129,12 @@ def roll_out(
             for horizon in (*(h for h in HORIZONS_S if h < motion.time[-1] - motion.time[0]), None):
                 own = loops if refined is None or model.name != "refined" else refined.loops
                 drive = (
-                    LoopDrive(own, recording, motion.time, is_damped=robot.mjcf is None)
+                    drives.LoopDrive(own, recording, motion.time, is_damped=robot.mjcf is None)
                     if own
-                    else TorqueDrive(robot, recording, motion, model.inertia)
+                    else drives.TorqueDrive(robot, recording, motion, model.inertia)
                 )
-                runs[horizon] = simulate_motion(model, plant, drive, motion, horizon)
-                stabiliser = drive.stabiliser_rms.tolist() if isinstance(drive, TorqueDrive) else None
+                runs[horizon] = drives.simulate_motion(model, plant, drive, motion, horizon)
+                stabiliser = drive.stabiliser_rms.tolist() if isinstance(drive, drives.TorqueDrive) else None
             simulated[model.name] = runs[None]
             entries.append(_entry(model.name, motion, runs, stabiliser))
         length = float(motion.rows[-1] - motion.rows[0])
@@ -234,7 +227,7 @@ def _refine(
 
 
 def _entry(
-    name: str, motion: RecordedMotion, runs: dict[float | None, Array], stabiliser: list[float] | None
+    name: str, motion: drives.RecordedMotion, runs: dict[float | None, Array], stabiliser: list[float] | None
 ) -> ModelEntry:
     real, free = motion.measured, runs[None]
     turned = _reversal_error(motion.rows, real, free, motion.time, motion.velocity)

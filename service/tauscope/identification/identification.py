@@ -113,10 +113,7 @@ def identify(
     options: Options = Options(),
     progress: Progress = lambda step: None,
 ) -> Identification:
-    """Identify a robot arm. Raises RecordingMismatchError, RecordingError for a recording too short or broken,
-
-    and IdentificationError where the recordings hold too little for the parameters.
-    """
+    """Identify an arm. Raises RecordingError for one too short, broken or of another arm, IdentificationError."""
     for recording in (*recordings, *held_out):
         if recording.joint_count != robot.joint_count:
             raise RecordingMismatchError(

@@ -8,14 +8,7 @@ from pathlib import Path
 from pydantic import Field
 
 from tauscope.errors import RecordingError
-from tauscope.recording.column_files import (
-    PARQUET_MAGIC,
-    ZIP_MAGIC,
-    read_npz,
-    read_npz_header,
-    read_parquet,
-    read_parquet_header,
-)
+from tauscope.recording import column_files
 from tauscope.recording.columns import find_layout, is_column, require_joint_count, suggest_layout
 from tauscope.recording.csv_format import read_csv, read_csv_header
 from tauscope.recording.intake import Choice
@@ -45,11 +38,11 @@ class _Format:
 
 
 _FORMATS = (
-    _Format(PARQUET_MAGIC, read_parquet, read_parquet_header, reads_ranges=True),
+    _Format(column_files.PARQUET_MAGIC, column_files.read_parquet, column_files.read_parquet_header, reads_ranges=True),
     _Format(MCAP_MAGIC, add_log=add_mcap, reads_ranges=True),
     _Format(SQLITE_MAGIC, add_log=add_database),
     _Format(ROS1_MAGIC, add_log=add_ros1_bag),
-    _Format(ZIP_MAGIC, read_npz, read_npz_header),
+    _Format(column_files.ZIP_MAGIC, column_files.read_npz, column_files.read_npz_header),
 )
 _CSV = _Format(b"", read_csv, read_csv_header)
 _FOLDER = _Format(b"", add_log=add_rosbag2, reads_ranges=True)

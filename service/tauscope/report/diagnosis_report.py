@@ -8,18 +8,10 @@ from tauscope.diagnosis.documents.plots import DiagnosisPlots, diagnosis_plots
 from tauscope.diagnosis.documents.result import FindingEntry
 from tauscope.diagnosis.next_experiment import PlannedExperiment
 from tauscope.number_text import chance, counted, significant
+from tauscope.report import tables
 from tauscope.report.figures import difference_figure, heat_map, heat_table, motion_figure, proof_figure, shift_figure
 from tauscope.report.page import Card, Drawing, Fold, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.provenance import Provenance
-from tauscope.report.tables import (
-    csv_text,
-    detectable_table,
-    difference_table,
-    headroom_table,
-    located_table,
-    residual_table,
-    shift_table,
-)
 from tauscope.report.words import (
     MOST_FINDINGS,
     constancy_sentence,
@@ -97,7 +89,7 @@ def _where(plots: DiagnosisPlots, document: DiagnosisDocument, types: list[Joint
         drawn = heat_map(plots.histograms, document.joints, after=True)
         parts.append(Part(title="What is left with the findings", figure=Drawing(drawn, f"{label}, after", "")))
     parts.append(
-        Part(table=located_table(document), numbers=Numbers("Numbers of the maps", heat_table(plots.histograms)))
+        Part(table=tables.located_table(document), numbers=Numbers("Numbers of the maps", heat_table(plots.histograms)))
     )
     pairs = zip(document.mismatch, types, strict=True)
     sentences = [location_sentence(entry, joint_type) for entry, joint_type in pairs if entry.significant]
@@ -135,18 +127,20 @@ def _cards(entries: Sequence[FindingEntry], joints: Sequence[str]) -> list[Card]
 
 
 def _how_much(document: DiagnosisDocument) -> Section:
-    parts = [Part(title="Residual rms at the recorded rate", table=residual_table(document))]
+    parts = [Part(title="Residual rms at the recorded rate", table=tables.residual_table(document))]
     if document.parameter_differences:
         svg = difference_figure("differences", document)
         drawing = Drawing(svg, "How far the simulation's parameters are off", "The arm less what it is compared with.")
-        parts.append(Part(title="What the simulation has wrong", figure=drawing, table=difference_table(document)))
+        parts.append(
+            Part(title="What the simulation has wrong", figure=drawing, table=tables.difference_table(document))
+        )
     if document.parameter_shifts:
         drawing = Drawing(
             shift_figure("shifts", document),
             "How far parameters moved when the findings were added",
             "What the left-out effects had been hiding in: estimates with the findings less those without.",
         )
-        parts.append(Part(title="What had been absorbed where", figure=drawing, table=shift_table(document)))
+        parts.append(Part(title="What had been absorbed where", figure=drawing, table=tables.shift_table(document)))
     return Section("how-much", "How much", parts, [constancy_sentence(document)])
 
 
@@ -157,10 +151,10 @@ def _proof(plots: DiagnosisPlots, document: DiagnosisDocument, units: list[str])
     for number, (overlay, unit) in enumerate(zip(plots.overlays, units, strict=True), start=1):
         spectrum = spectra.get(overlay.joint)
         names = ("time", "measured", "before", "after")
-        text = csv_text({name: getattr(overlay, name) for name in names})
+        text = tables.csv_text({name: getattr(overlay, name) for name in names})
         if spectrum is not None:
             names = ("frequency", "before", "after", "noise")
-            text += "\n\n" + csv_text({name: getattr(spectrum, name) for name in names})
+            text += "\n\n" + tables.csv_text({name: getattr(spectrum, name) for name in names})
         parts.append(
             Part(
                 title=overlay.joint,
@@ -186,7 +180,7 @@ def _headroom(document: DiagnosisDocument) -> Iterator[Section]:
         " box predicts."
     )
     statements = [entry.statement for entry in document.headroom]
-    yield Section("headroom", "Headroom", [Part(table=headroom_table(document))], [sentence, *statements])
+    yield Section("headroom", "Headroom", [Part(table=tables.headroom_table(document))], [sentence, *statements])
 
 
 def _next(document: DiagnosisDocument, planned: PlannedExperiment | None) -> Section:
@@ -213,5 +207,5 @@ def _detectable(document: DiagnosisDocument) -> Section:
         "The smallest size of each effect that nine of ten such data sets would have shown. What is smaller may be"
         " there and not be named; – stands where no torque along this motion shows it, or it is one with a parameter."
     )
-    part = Part(table=detectable_table(document))
+    part = Part(table=tables.detectable_table(document))
     return Section("detectable", "What would have been seen", [part], [sentence])

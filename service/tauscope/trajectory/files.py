@@ -9,14 +9,8 @@ from tauscope.errors import ExcitationError, RobotFileError, explain_os_errors
 from tauscope.robot import Robot
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.messages import shown
+from tauscope.trajectory import document as documents
 from tauscope.trajectory.csv_format import parse_trajectory_csv, trajectory_csv
-from tauscope.trajectory.document import (
-    EXCITATION_SCHEMA,
-    ExcitationDocument,
-    TrajectoryDocument,
-    trajectory_document,
-    trajectory_of,
-)
 from tauscope.trajectory.trajectory import Trajectory
 
 LARGEST_FILE = 256 * 2**20  # bytes of the largest trajectory file that is read
@@ -48,14 +42,14 @@ def parse_trajectory_json(text: str | bytes, name: str, robot: Robot) -> Traject
             f"{robot.joint_count}; take one that was made for it"
         )
     try:
-        return trajectory_of(document)
+        return documents.trajectory_of(document)
     except ExcitationError as error:
         raise ExcitationError(f"{name}: {error}") from None
 
 
 def trajectory_json(trajectory: Trajectory) -> str:
     """A trajectory as a JSON document, schema ``tauscope.trajectory/1``."""
-    return trajectory_document(trajectory).model_dump_json(by_alias=True, indent=1) + "\n"
+    return documents.trajectory_document(trajectory).model_dump_json(by_alias=True, indent=1) + "\n"
 
 
 def write_trajectory(trajectory: Trajectory, path: str | Path, *, rate_hz: float = DEFAULT_RATE_HZ) -> None:
@@ -69,11 +63,11 @@ def write_trajectory(trajectory: Trajectory, path: str | Path, *, rate_hz: float
         path.write_text(text, encoding="utf-8")
 
 
-def _document(text: str | bytes) -> TrajectoryDocument:
+def _document(text: str | bytes) -> documents.TrajectoryDocument:
     """The trajectory's document, by itself or within an excitation's."""
-    if _Schema.model_validate_json(text).schema_ == EXCITATION_SCHEMA:
-        return ExcitationDocument.model_validate_json(text).trajectory
-    return TrajectoryDocument.model_validate_json(text)
+    if _Schema.model_validate_json(text).schema_ == documents.EXCITATION_SCHEMA:
+        return documents.ExcitationDocument.model_validate_json(text).trajectory
+    return documents.TrajectoryDocument.model_validate_json(text)
 
 
 class _Schema(BaseModel):

@@ -4,14 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tauscope.recording.conditioning import filters
 from tauscope.recording.conditioning.common_band import OPEN_BAND_FRACTION, AllPass, BandFilter, Decimator, HarmonicBand
-from tauscope.recording.conditioning.filters import (
-    DIFFERENCE_MARGIN,
-    STATE_BAND_RATIO,
-    derivative,
-    smooth_each,
-    smoothing_margin,
-)
 from tauscope.recording.conditioning.motion_source import MotionSource
 from tauscope.recording.conditioning.periods import Periods, fourier_derivatives
 from tauscope.recording.conditioning.uniform import Mask, Stretch
@@ -62,11 +56,11 @@ class Trim:
     @staticmethod
     def design(rate_hz: float, cutoff_hz: float | None, state_hz: Array | None = None) -> "Trim":
         """Band and margin; `state_hz`: (n,), cut-off of the motion's own smoothing, `state_cutoff` where None."""
-        margin = 2 * DIFFERENCE_MARGIN
+        margin = 2 * filters.DIFFERENCE_MARGIN
         if cutoff_hz is None or cutoff_hz >= OPEN_BAND_FRACTION * rate_hz:
             return Trim(AllPass(rate_hz), None, rate_hz, margin)
         smoothing = state_cutoff(rate_hz, cutoff_hz) if state_hz is None else state_hz
-        margin += smoothing_margin(rate_hz, float(np.min(smoothing)))
+        margin += filters.smoothing_margin(rate_hz, float(np.min(smoothing)))
         return Trim(Decimator.design(rate_hz, cutoff_hz), cutoff_hz, smoothing, margin)
 
     @property
@@ -86,7 +80,7 @@ class Trim:
 
 def state_cutoff(rate_hz: float, cutoff_hz: float | None) -> float:
     """Cut-off [Hz] of the motion's own smoothing for a given common band."""
-    return rate_hz / 2.0 if cutoff_hz is None else min(STATE_BAND_RATIO * cutoff_hz, rate_hz / 2.0)
+    return rate_hz / 2.0 if cutoff_hz is None else min(filters.STATE_BAND_RATIO * cutoff_hz, rate_hz / 2.0)
 
 
 def transient_motion(stretch: Stretch, trim: Trim, source: MotionSource) -> Motion | None:
@@ -95,15 +89,15 @@ def transient_motion(stretch: Stretch, trim: Trim, source: MotionSource) -> Moti
     if not trim.outputs(count):
         return None
     cutoffs = np.broadcast_to(trim.state_hz, stretch.position.shape[1])
-    position = smooth_each(stretch.position, rate, cutoffs)
-    velocity = derivative(position, rate)
+    position = filters.smooth_each(stretch.position, rate, cutoffs)
+    velocity = filters.derivative(position, rate)
     use_velocity = _usable(stretch.velocity, source.velocity)
     if stretch.velocity is not None and use_velocity.any():
-        velocity[:, use_velocity] = smooth_each(stretch.velocity[:, use_velocity], rate, cutoffs[use_velocity])
-    acceleration = derivative(velocity, rate)
+        velocity[:, use_velocity] = filters.smooth_each(stretch.velocity[:, use_velocity], rate, cutoffs[use_velocity])
+    acceleration = filters.derivative(velocity, rate)
     use_acceleration = _usable(stretch.acceleration, source.acceleration)
     if stretch.acceleration is not None and use_acceleration.any():
-        acceleration[:, use_acceleration] = smooth_each(
+        acceleration[:, use_acceleration] = filters.smooth_each(
             stretch.acceleration[:, use_acceleration], rate, cutoffs[use_acceleration]
         )
     inner = slice(trim.margin, count - trim.margin)
