@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from export.exported import friction, mjcf_of
 from tauscope.errors import ExportError
-from tauscope.export.compensation import JointFriction
+from tauscope.export.compensation.model import JointFriction
 from tauscope.export.joint_model import JointModel
 from tauscope.export.urdf import patch_urdf
 from tauscope.robot import Joint, JointLimits, JointType, LinkInertia, Placement, Robot, Segment

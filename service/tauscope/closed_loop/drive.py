@@ -38,8 +38,6 @@ class RecordedMotion:
 class Drive(Protocol):
     """Torque of all joints."""
 
-    is_closed: bool
-
     def torque(self, step: int, position: Array, velocity: Array) -> Array:
         """Torque at a step, (n,) [Nm or N]. `position`, `velocity`: (n,), q, q̇ of the simulated arm."""
         ...
@@ -63,8 +61,6 @@ def loop_damping(loops: Sequence[Actuator]) -> Array:
 
 class LoopDrive:
     """Position or velocity loops on recorded commands."""
-
-    is_closed = True
 
     def __init__(self, loops: Sequence[Actuator], recording: Recording, time: Array, *, is_damped: bool) -> None:
         """Put commands, supplies and gains on the steps; the plant has the loops' damping unless `is_damped`."""
@@ -98,8 +94,6 @@ class LoopDrive:
 
 class TorqueDrive:
     """Recorded torque, and a stabiliser that draws the simulated arm to the real one."""
-
-    is_closed = False
 
     def __init__(self, robot: Robot, recording: Recording, motion: RecordedMotion, inertia: Array) -> None:
         samples = recording.samples()

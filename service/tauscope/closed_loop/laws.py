@@ -11,7 +11,7 @@ import numpy as np
 
 from tauscope.dynamics.friction import smooth_sign
 from tauscope.effects import Signals
-from tauscope.export.compensation import JointFriction
+from tauscope.export.compensation.model import JointFriction
 from tauscope.export.model import ExportModel, FoundEffect
 from tauscope.recording.recording import Array
 

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from tauscope.closed_loop.laws import JointLaws, LoadFriction
-from tauscope.export.compensation import JointFriction
+from tauscope.export.compensation.model import JointFriction
 from tauscope.export.mjcf import to_mjcf
 from tauscope.export.mjcf_findings import IN_THE_MODEL, add_findings
 from tauscope.export.model import ExportModel, Origin

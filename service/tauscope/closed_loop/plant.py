@@ -1,6 +1,6 @@
 """The simulator of a rollout, found by its entry point: MuJoCo is in the ``sim`` extra."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import entry_points
 from typing import Protocol, cast
 
@@ -40,12 +40,8 @@ class Plant(Protocol):
         ...
 
 
-class PlantMaker(Protocol):
-    """Compiles an MJCF to a plant."""
-
-    def __call__(self, mjcf: str, joints: Sequence[str], step_s: float, damping: Array) -> Plant:
-        """The plant with these driven joints, base first; damping is that of their loops (n,)."""
-        ...
+# Makes a plant of an MJCF, its driven joints, base first, the step [s], and the damping of their loops, (n,).
+PlantMaker = Callable[[str, Sequence[str], float, Array], Plant]
 
 
 def make_plant(mjcf: str, joints: Sequence[str], damping: Array) -> Plant:

@@ -25,6 +25,7 @@ from tauscope.recording import Recording
 from tauscope.recording.recording import Array, take_commands
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import Actuator, Robot
+from tauscope.strict_model import take_fields
 
 HORIZONS_S = (0.1, 1.0, 10.0)  # times between restarts at the real state [s]: one command, one move, one task
 STABILISED = ResultWarning(
@@ -81,10 +82,7 @@ class Rollout:
             rms_after=refined.after,
             is_better=bool(own < min(others)),
             parameters=[
-                RefinedEntry(
-                    name=each.term.name, value=each.value, std=each.std, unit=each.term.unit, p_value=each.p_value
-                )
-                for each in refined.terms
+                take_fields(RefinedEntry, each, name=each.term.name, unit=each.term.unit) for each in refined.terms
             ],
             left_out=list(refined.left_out),
         )

@@ -41,16 +41,10 @@ def recording_table(document: RolloutDocument) -> Table:
 
 def refinement_table(entry: RefinementEntry) -> Table:
     """Refined parameters with their standard errors, and p of no such term."""
-    rows = [
-        (
-            each.name,
-            significant(each.value, 3),
-            significant(each.std, 2),
-            each.unit,
-            ABSENT if each.p_value is None else "< 0.001" if each.p_value < LEAST_P else f"{each.p_value:.3f}",
-        )
-        for each in entry.parameters
-    ]
+    rows = []
+    for each in entry.parameters:
+        p_value = ABSENT if each.p_value is None else "< 0.001" if each.p_value < LEAST_P else f"{each.p_value:.3f}"
+        rows.append((each.name, significant(each.value, 3), significant(each.std, 2), each.unit, p_value))
     return Table(("parameter", "value", "± std", "unit", "p"), rows, words=1)
 
 

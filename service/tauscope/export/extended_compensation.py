@@ -9,8 +9,8 @@ from datetime import datetime
 
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.errors import ExportError
-from tauscope.export.compensation import RecordingSource, to_c_header, to_python
-from tauscope.export.compensation.source_code import identifier
+from tauscope.export.compensation.model import RecordingSource
+from tauscope.export.compensation.source_code import identifier, to_c_header, to_python
 from tauscope.export.model import ExportModel, FoundEffect, Origin, of_extended_model
 from tauscope.recording import EffortKind
 

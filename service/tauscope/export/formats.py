@@ -7,7 +7,7 @@ from typing import Any
 
 from tauscope.errors import ExportError
 from tauscope.export.actuators import ActuatorChoice
-from tauscope.export.compensation import to_json, to_yaml
+from tauscope.export.compensation.model import to_json, to_yaml
 from tauscope.export.extended_compensation import source_code
 from tauscope.export.mjcf import to_mjcf
 from tauscope.export.mjcf_findings import effects_in

@@ -12,7 +12,7 @@ from tauscope.diagnosis.extended_model import consistent_links
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.torque_scale import on_the_arm
 from tauscope.effects import Effect
-from tauscope.export.compensation import (
+from tauscope.export.compensation.model import (
     CompensationModel,
     JointCompensation,
     JointFriction,

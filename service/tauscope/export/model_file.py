@@ -19,7 +19,7 @@ from tauscope.diagnosis.extended_model import (
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.effects.rotor_inertia import RotorInertia
 from tauscope.errors import ExportError, IdentificationError, RobotFileError
-from tauscope.export.compensation import RecordingSource
+from tauscope.export.compensation.model import RecordingSource
 from tauscope.export.model import ExportModel, Origin, of_extended_model
 from tauscope.identification import Identification
 from tauscope.recording import EffortKind

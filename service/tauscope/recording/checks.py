@@ -13,7 +13,8 @@ from pydantic import Field, PlainSerializer
 
 from tauscope.errors import RecordingError
 from tauscope.number_text import counted
-from tauscope.recording.examination import find_implausible, find_missing_effort, mend_recording
+from tauscope.recording.examination.examine import find_missing_effort, mend_recording
+from tauscope.recording.examination.plausibility import find_implausible
 from tauscope.recording.reading import read_recording
 from tauscope.recording.recording import Array, EffortKind, Recording, Samples
 from tauscope.recording.units import SI, Reading

@@ -122,9 +122,7 @@ def _read_names(file: BinaryIO, name: str, reading: Reading) -> _Names:
         if number == 1:
             line = line.removeprefix(_BYTE_ORDER_MARK)
         if len(line) == _LONGEST_LINE_BYTES:
-            raise RecordingError(
-                f"{name}: line {number} has more than {_LONGEST_LINE_BYTES} characters: is this a CSV file?"
-            )
+            raise _line_error(name, number)
         _require_text(line, number, name)
         if not _is_empty(line):
             return _parse_names(file, line.strip(b"\r\n"), number, at, comment, name, reading)
@@ -201,9 +199,7 @@ def _chunks(file: BinaryIO, line: int, name: str) -> Iterator[_Chunk]:
         if end == 0:
             rest += data
             if len(rest) > _LONGEST_LINE_BYTES:
-                raise RecordingError(
-                    f"{name}: line {line} has more than {_LONGEST_LINE_BYTES} characters: is this a CSV file?"
-                )
+                raise _line_error(name, line)
             continue
         text = rest + data[:end]
         rest = data[end:]
@@ -273,6 +269,10 @@ def _refuse_units(fields: Sequence[bytes], number: int, header: _Header, name: s
         raise RecordingError(
             f"{name}: line {number} looks like a row of units ({text}); delete it or start it with '#'"
         )
+
+
+def _line_error(name: str, number: int) -> RecordingError:
+    return RecordingError(f"{name}: line {number} has more than {_LONGEST_LINE_BYTES} characters: is this a CSV file?")
 
 
 def _require_text(line: bytes, number: int, name: str) -> None:

@@ -14,6 +14,7 @@ _NANOSECONDS = 1_000_000_000
 _STATES = {"timestamp": 1, "joints": 2}
 _STATE = {"name": 1, "position": 2, "velocity": 3, "acceleration": 4, "effort": 5}
 _QUANTITIES = ("position", "velocity", "effort")
+_NAN = struct.pack("<d", np.nan)
 
 Value = int | bytes
 
@@ -33,7 +34,7 @@ def decode_foxglove_protobuf(schema: bytes) -> Callable[[bytes], JointState]:
             elif number == states["joints"]:
                 joints.append(dict(_fields(_require_bytes(value))))
         names = tuple(_require_bytes(joint.get(state["name"], b"")).decode("utf-8") for joint in joints)
-        rows = {name: [_double(joint.get(number)) for joint in joints] for number, name in wanted.items()}
+        rows = {name: [_double(joint.get(number, _NAN)) for joint in joints] for number, name in wanted.items()}
         arrays = (np.array(rows.get(name, ()), dtype=np.float64) for name in _QUANTITIES)
         return JointState(stamp, names, *(array if np.isfinite(array).any() else np.empty(0) for array in arrays))
 
@@ -87,9 +88,7 @@ def _varint(message: bytes, at: int) -> tuple[int, int]:
             return value, at
 
 
-def _double(value: Value | None) -> float:
-    if value is None:
-        return np.nan
+def _double(value: Value) -> float:
     return float(struct.unpack("<d", _require_bytes(value))[0])
 
 
@@ -166,13 +165,12 @@ def decode_foxglove_json(message: bytes) -> JointState:
     names = [joint.get("name") for joint in joints]
     if not all(isinstance(name, str) for name in names):
         raise ValueError("a joint has no name")
-    fields = ("position", "velocity", "effort")
-    known = [{field: joint[field] for field in fields if _is_number(joint.get(field))} for joint in joints]
-    return JointState(json_stamp(content.get("timestamp")), tuple(names), *(_gather(known, field) for field in fields))
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    known = [
+        {field: joint[field] for field in _QUANTITIES if type(joint.get(field)) in (int, float)} for joint in joints
+    ]
+    return JointState(
+        json_stamp(content.get("timestamp")), tuple(names), *(_gather(known, field) for field in _QUANTITIES)
+    )
 
 
 def _gather(joints: Sequence[Mapping[str, float]], field: str) -> Array:

@@ -79,18 +79,13 @@ def _where(plots: DiagnosisPlots, document: DiagnosisDocument, types: list[Joint
         " as a multiple of the noise."
     )
     label = "Residual of every joint by velocity, position, load, acceleration and time, as a multiple of the noise"
-    parts = [
-        Part(
-            title="What the model leaves",
-            figure=Drawing(heat_map(plots.histograms, document.joints, after=False), f"{label}, before", caption),
-        )
-    ]
+    drawn = heat_map(plots.histograms, document.joints, after=False)
+    parts = [Part(title="What the model leaves", figure=Drawing(drawn, f"{label}, before", caption))]
     if document.findings:
         drawn = heat_map(plots.histograms, document.joints, after=True)
         parts.append(Part(title="What is left with the findings", figure=Drawing(drawn, f"{label}, after", "")))
-    parts.append(
-        Part(table=tables.located_table(document), numbers=Numbers("Numbers of the maps", heat_table(plots.histograms)))
-    )
+    numbers = Numbers("Numbers of the maps", heat_table(plots.histograms))
+    parts.append(Part(table=tables.located_table(document), numbers=numbers))
     pairs = zip(document.mismatch, types, strict=True)
     sentences = [location_sentence(entry, joint_type) for entry, joint_type in pairs if entry.significant]
     return Section("where", "Where", parts, sentences or ["At no joint is there more than noise."])
@@ -131,9 +126,8 @@ def _how_much(document: DiagnosisDocument) -> Section:
     if document.parameter_differences:
         svg = difference_figure("differences", document)
         drawing = Drawing(svg, "How far the simulation's parameters are off", "The arm less what it is compared with.")
-        parts.append(
-            Part(title="What the simulation has wrong", figure=drawing, table=tables.difference_table(document))
-        )
+        differences = tables.difference_table(document)
+        parts.append(Part(title="What the simulation has wrong", figure=drawing, table=differences))
     if document.parameter_shifts:
         drawing = Drawing(
             shift_figure("shifts", document),
@@ -155,17 +149,13 @@ def _proof(plots: DiagnosisPlots, document: DiagnosisDocument, units: list[str])
         if spectrum is not None:
             names = ("frequency", "before", "after", "noise")
             text += "\n\n" + tables.csv_text({name: getattr(spectrum, name) for name in names})
-        parts.append(
-            Part(
-                title=overlay.joint,
-                figure=Drawing(
-                    proof_figure(f"proof-{number}", overlay, spectrum, unit),
-                    f"Torque of {overlay.joint}, measured and modelled without and with the findings",
-                    f"{file_title(overlay.recording)}, the stretch in which the findings take most off the residual.",
-                ),
-                numbers=Numbers(f"Numbers of {overlay.joint}", text=text),
-            )
+        drawing = Drawing(
+            proof_figure(f"proof-{number}", overlay, spectrum, unit),
+            f"Torque of {overlay.joint}, measured and modelled without and with the findings",
+            f"{file_title(overlay.recording)}, the stretch in which the findings take most off the residual.",
         )
+        numbers = Numbers(f"Numbers of {overlay.joint}", text=text)
+        parts.append(Part(title=overlay.joint, figure=drawing, numbers=numbers))
     motion = "on held-out motion, from which neither model was made" if held_out else "on the model's own motion"
     band = f"Torque below {significant(document.cutoff_hz, 3)} Hz {motion}."
     return Section("proof", "The proof", parts, [band])
@@ -193,9 +183,8 @@ def _next(document: DiagnosisDocument, planned: PlannedExperiment | None) -> Sec
     parts = []
     if planned is not None:
         svg = motion_figure("next-motion", planned.trajectory, list(document.joints))
-        caption = (
-            f"{significant(planned.trajectory.duration_s, 3)} s, within the robot file's limits, from rest to rest."
-        )
+        length = significant(planned.trajectory.duration_s, 3)
+        caption = f"{length} s, within the robot file's limits, from rest to rest."
         parts.append(Part(figure=Drawing(svg, "Positions of the motion to record next", caption)))
     words = ["tauscope", "run", "ROBOT.yaml", "--trajectory", wanted.trajectory or "NEXT.json", "--out", "next.csv"]
     note = None if wanted.trajectory else "`tauscope diagnose … --next-trajectory NEXT.json` writes the motion."

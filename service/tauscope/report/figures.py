@@ -125,17 +125,7 @@ def _draw_panel(axis: Axes, entries: Sequence[BaseParameterEntry]) -> None:
     values = np.array([entry.value for entry in entries])
     reach = DEVIATIONS * np.array([entry.std or 0.0 for entry in entries])
     axis.axvline(0.0, color=MUTED, linewidth=0.6)
-    axis.errorbar(
-        values,
-        places,
-        xerr=reach,
-        linestyle="none",
-        marker="o",
-        markersize=3.2,
-        color=PREDICTED,
-        elinewidth=1.1,
-        capsize=2.2,
-    )
+    axis.errorbar(values, places, xerr=reach, fmt="o", markersize=3.2, color=PREDICTED, elinewidth=1.1, capsize=2.2)
     axis.grid(visible=False, axis="y")
     _name_rows(axis, [_shorten(entry.name, LONGEST_LABEL) for entry in entries])
 
@@ -267,16 +257,9 @@ def _draw_curve(axis: Axes, curve: FrictionCurve) -> None:
     inside = (curve.velocity >= curve.seen[0]) & (curve.velocity <= curve.seen[1])
     low, high = (curve.torque + sign * DEVIATIONS * curve.std for sign in (-1.0, 1.0))
     axis.fill_between(curve.velocity, low, high, color=BAND, linewidth=0, label="95 % confidence")
-    axis.plot(
-        curve.bin_velocity,
-        curve.bin_torque,
-        linestyle="none",
-        marker="o",
-        markersize=2.4,
-        markeredgewidth=0,
-        color=MEASURED,
-        label="measured less rigid body, mean a velocity bin",
-    )
+    dots = {"markersize": 2.4, "markeredgewidth": 0, "color": MEASURED}
+    label = "measured less rigid body, mean a velocity bin"
+    axis.plot(curve.bin_velocity, curve.bin_torque, "o", label=label, **dots)
     axis.plot(curve.velocity, curve.torque, color=PREDICTED, linestyle=(0, (2, 2)), linewidth=0.9, label="no data")
     axis.plot(curve.velocity[inside], curve.torque[inside], color=PREDICTED, linewidth=1.3, label="model")
     for edge in curve.seen:
@@ -289,9 +272,7 @@ PROOF_INCHES = 3.5
 
 def proof_figure(name: str, overlay: TorqueOverlay, spectrum: ResidualSpectrum | None, unit: str) -> Markup:
     """Draw torque, residual and the residual's spectrum of one joint, without and with the findings."""
-    time, measured, before, after = (
-        np.array(values) for values in (overlay.time, overlay.measured, overlay.before, overlay.after)
-    )
+    time, measured, before, after = map(np.array, (overlay.time, overlay.measured, overlay.before, overlay.after))
 
     def draw(figure: Figure) -> None:
         # t: torque, r: residual below it, s: spectrum beside both

@@ -63,10 +63,8 @@ def _key_figures(result: IdentificationDocument) -> Iterator[KeyFigure]:
     worst = max(range(len(ratios)), key=ratios.__getitem__)
     yield KeyFigure("Residual / noise", significant(ratios[worst], 3), f"at {result.joints[worst]}, the largest of all")
     yield KeyFigure("Condition number", significant(result.condition_number, 3), "of the unweighted regressor")
-    entries = (*result.conditioning, *result.held_out_conditioning)
-    yield KeyFigure(
-        "Samples", f"{sum(entry.samples for entry in entries):,}".replace(",", " "), f"{masked_samples(result)} masked"
-    )
+    samples = sum(entry.samples for entry in (*result.conditioning, *result.held_out_conditioning))
+    yield KeyFigure("Samples", f"{samples:,}".replace(",", " "), f"{masked_samples(result)} masked")
 
 
 def _fit_section(result: IdentificationDocument, identification: Identification) -> Section:

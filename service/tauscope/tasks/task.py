@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from tauscope.errors import RecordingMismatchError
-from tauscope.export.compensation import RecordingSource
+from tauscope.export.compensation.model import RecordingSource
 from tauscope.export.model import Origin
 from tauscope.recording import EffortKind, Reading, Recording, flow_text, open_recording
 from tauscope.remote_files import find_path

@@ -93,13 +93,8 @@ def choose_sources(stretches: Sequence[Stretch], noise: PositionNoise) -> Motion
     best = limits.copy()
     chosen = np.zeros((2, joint_count), dtype=bool)
     for order, used in ((1, chosen[0]), (0, chosen[1])):
-        recorded = [stretch.velocity if order else stretch.acceleration for stretch in stretches]
         for joint in range(joint_count):
-            pieces = [
-                (stretch.position[:, joint], values[:, joint])
-                for stretch, values in zip(stretches, recorded, strict=True)
-                if values is not None and np.isfinite(values[:, joint]).all()
-            ]
+            pieces = _whole_pieces(stretches, joint, order)
             if not pieces or not np.isfinite(limits[joint]):
                 continue
             rate = stretches[0].rate_hz
@@ -111,6 +106,16 @@ def choose_sources(stretches: Sequence[Stretch], noise: PositionNoise) -> Motion
     return MotionSource(chosen[0], chosen[1], limits, _quieter_bands(stretches, noise))
 
 
+def _whole_pieces(stretches: Sequence[Stretch], joint: int, order: int) -> list[tuple[Array, Array]]:
+    """Positions, and recorded velocity (order 1) or acceleration (0), of stretches where none is missing."""
+    recorded = [stretch.velocity if order else stretch.acceleration for stretch in stretches]
+    return [
+        (stretch.position[:, joint], values[:, joint])
+        for stretch, values in zip(stretches, recorded, strict=True)
+        if values is not None and np.isfinite(values[:, joint]).all()
+    ]
+
+
 def _quieter_bands(stretches: Sequence[Stretch], noise: PositionNoise) -> Array | None:
     """Band from which on each joint's recorded velocity is the quieter source, (n,) [Hz]; None without velocities.
 
@@ -120,11 +125,7 @@ def _quieter_bands(stretches: Sequence[Stretch], noise: PositionNoise) -> Array 
     bands, fits = np.full(joint_count, np.inf), []
     for joint in range(joint_count):
         limit = float(noise.joint_limits_hz[joint])
-        pieces = [
-            (stretch.position[:, joint], stretch.velocity[:, joint])
-            for stretch in stretches
-            if stretch.velocity is not None and np.isfinite(stretch.velocity[:, joint]).all()
-        ]
+        pieces = _whole_pieces(stretches, joint, 1)
         fit = _fit_velocity(pieces, rate, limit) if pieces and np.isfinite(limit) else None
         if fit is None:
             continue

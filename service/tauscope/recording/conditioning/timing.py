@@ -176,7 +176,9 @@ def find_stretches(recording: Recording) -> Timing:
             " needed: check which q columns are empty"
         )
     typical, rate = _typical_interval(interval)
-    breaks = np.flatnonzero(interval > _longest_bridge(typical)) + 1
+    longest = max(min(BRIDGED_SAMPLES * typical, LONGEST_BRIDGE_S), BRIDGED_SECONDS)
+    longest = max(min(longest, MOST_BRIDGED_SAMPLES * typical), FEWEST_BRIDGED_SAMPLES * typical)
+    breaks = np.flatnonzero(interval > longest) + 1
     edges = np.concatenate([[0], breaks, [count]])
     long_enough = np.diff(edges) >= SHORTEST_STRETCH
     first, last = edges[:-1][long_enough], edges[1:][long_enough] - 1
@@ -185,9 +187,7 @@ def find_stretches(recording: Recording) -> Timing:
             f"{recording.name}: broken by {len(breaks)} gaps into pieces of fewer than {SHORTEST_STRETCH} samples:"
             " record again, or check column t"
         )
-    complete = np.concatenate(
-        [first, last]
-    )  # counted among themselves: each is as many further as incomplete ones before
+    complete = np.concatenate([first, last])  # of complete rows: each is as many further as incomplete ones before
     row = complete + np.searchsorted(incomplete - np.arange(len(incomplete)), complete, side="right")
     rows = tuple((int(a), int(b) + 1) for a, b in zip(row[: len(first)], row[len(first) :], strict=True))
     dropped = count - int(np.sum(last - first + 1))
@@ -245,11 +245,6 @@ def _is_last_digit(median_s: float, interval: Array) -> bool:
     steps = interval / median_s
     is_decimal = abs(np.log10(median_s) - np.rint(np.log10(median_s))) < 1e-3
     return bool(is_decimal and np.abs(steps - np.rint(steps)).max() < 1e-2)
-
-
-def _longest_bridge(typical_s: float) -> float:
-    longest = max(min(BRIDGED_SAMPLES * typical_s, LONGEST_BRIDGE_S), BRIDGED_SECONDS)
-    return max(min(longest, MOST_BRIDGED_SAMPLES * typical_s), FEWEST_BRIDGED_SAMPLES * typical_s)
 
 
 def _runs(

@@ -84,11 +84,6 @@ class Sketch:
         return np.concatenate([window.effort[1:-1] for window in self.windows])
 
     @cached_property
-    def position_at_slope(self) -> Array:
-        """Position of the rows of `slope`, (N, n)."""
-        return np.concatenate([window.position[1:-1] for window in self.windows])
-
-    @cached_property
     def top_speed(self) -> Array:
         """Largest |Δq/Δt| of every joint, (n,) [rad/s or m/s]; 0 where it is not known."""
         return np.fmax.reduce(np.abs(self.slope), axis=0, initial=0.0)

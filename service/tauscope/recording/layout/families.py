@@ -29,15 +29,11 @@ _FOREIGN = {
     *_split("qfrc gravity error bias limit limits max min accelerometer imu"),
 }
 _QUALIFIERS = _split("present actual measured meas act raw filtered msr computed applied")
+_NO_NAMES = {*_CORES, *_COMMANDED, *_QUALIFIERS}  # they name a quantity or how it came about, and no joint
 # Words that make a family second choice.
 _LEVELS: Mapping[str, int] = {"computed": 1, "force": 2, "theta": 2, "load": 2, "state": 3, "axis": 4}
 _TIMES = _split("t time zeit timestamp stamp sim_time time_s seconds sec clock elapsed duration")  # the likeliest first
 _UNIT = re.compile(r"(?<![A-Za-z])(deg(?:rees?)?|mA|mNm|percent|pct)(?![A-Za-z])|([°%])")
-
-
-def is_joint_name(words: Sequence[str]) -> bool:
-    """Whether words may name a joint: none of them names a quantity, or says how it came about."""
-    return not any(word in _CORES or word in _COMMANDED or word in _QUALIFIERS for word in words)
 
 
 def role_of(words: Sequence[str]) -> tuple[str, int] | None:
@@ -177,12 +173,11 @@ def _find_segment_families(header: Sequence[str]) -> list[Family]:
     for column in header:
         for template, name in _segments(column):
             groups.setdefault(template, {})[name] = column
-    named = [
-        (template, columns)
+    return [
+        Family(template, tuple(columns.values()), is_guessed=True)
         for template, columns in groups.items()
-        if all(not key.isdecimal() and is_joint_name(words_of(key)) for key in columns)
+        if all(not name.isdecimal() and _NO_NAMES.isdisjoint(words_of(name)) for name in columns)
     ]
-    return [Family(template, tuple(columns.values()), is_guessed=True) for template, columns in named]
 
 
 def _segments(column: str) -> list[tuple[str, str]]:
