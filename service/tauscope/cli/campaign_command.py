@@ -46,14 +46,8 @@ def campaign(
         if backend not in driver_names():
             raise typer.BadParameter(f"{backend!r} is not one of {', '.join(map(repr, driver_names()))}.")
         backend = json.dumps({"name": backend})
-    steps = {
-        "backend": backend,
-        "excitation": excitation,
-        "held_out": held_out,
-        "run": run,
-        "identification": identification,
-        "diagnosis": diagnosis,
-    }
+    steps = {"backend": backend, "excitation": excitation, "held_out": held_out, "run": run}
+    steps |= {"identification": identification, "diagnosis": diagnosis}
     request = _request(robot, steps)
     with explain_os_errors(ExportError, f"{out}: cannot be made", "; name a new folder"):
         out.mkdir()

@@ -129,16 +129,15 @@ def _ask(layout: RecordingLayout) -> RecordingLayout:
 
 
 def _clock(report: RecordingReport) -> Table:
-    periods = report.periods
+    periods, marked = report.periods, ABSENT
+    if periods is not None:
+        marked = f"{periods.count} of {periods.shortest} … {periods.longest} samples"
     rows = [
         ("duration", f"{significant(report.duration_s, 6)} s"),
         ("rate", f"{significant(report.rate_hz, 5)} Hz"),
         ("steps", f"{significant(1e3 * report.steps.minimum)} … {significant(1e3 * report.steps.maximum)} ms"),
         ("gaps", str(report.gaps.count)),
-        (
-            "periods",
-            ABSENT if periods is None else f"{periods.count} of {periods.shortest} … {periods.longest} samples",
-        ),
+        ("periods", marked),
         ("missed values (NaN)", str(sum(report.missed.values()))),
         ("effort", EFFORT_WORDS[report.effort_kind]),
         ("columns", " ".join(report.columns)),

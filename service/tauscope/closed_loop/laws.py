@@ -58,22 +58,17 @@ class JointLaws:
         self._delta = np.array([each.delta or 0.0 for each in friction])
         self._offset = np.array([0.0 if has else each.offset for each, has in zip(friction, has_offset, strict=True)])
         self._held, self._effects, self._by_load = held, effects, friction_by_load
-        count = model.robot.joint_count
-        zeros = np.zeros((count, 1))
+        at_rest = ("position", "velocity", "acceleration", "load", "torque", "step")
+        bodies = np.concatenate([link.to_vector() for link in model.links])
         self._signals = Signals(
             robot=model.robot,
             rate_hz=1.0,
             time=np.zeros((1, 1)),
             recording=0,
-            position=zeros.copy(),
-            velocity=zeros.copy(),
-            acceleration=zeros.copy(),
-            load=zeros.copy(),
-            torque=zeros.copy(),
-            step=zeros.copy(),
+            **{name: np.zeros((model.robot.joint_count, 1)) for name in at_rest},
             steepness=np.array([each.k_v for each in friction]),
-            bodies=np.concatenate([link.to_vector() for link in model.links]),
-            links=np.concatenate([link.to_vector() for link in model.links]),
+            bodies=bodies,
+            links=bodies,
             periodic=False,
         )
 
@@ -95,15 +90,9 @@ class JointLaws:
         return np.maximum(level - self._held, 0.0), torque
 
     def _evaluate(self, position: Array, velocity: Array, load: Array, step: Array) -> Array:
-        now = replace(
-            self._signals,
-            position=position[:, None],
-            velocity=velocity[:, None],
-            load=load[:, None],
-            step=step[:, None],
-            of_motion={},
-            _memory={},
-        )
+        state = {"position": position, "velocity": velocity, "load": load, "step": step}
+        columns = {name: values[:, None] for name, values in state.items()}
+        now = replace(self._signals, **columns, of_motion={}, _memory={})
         total = np.zeros(len(position))
         for found in self._effects:
             (columns,) = found.effect.columns(now, found.shape[None])

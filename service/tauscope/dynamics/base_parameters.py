@@ -19,8 +19,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.dynamics.chain_step import Array, euler_zxz, from_euler_zxz
+from tauscope.dynamics.chain_step import Array, euler_zxz
 from tauscope.dynamics.regressor import torque_regressor
+from tauscope.robot.kinematics import rotation_about
 from tauscope.robot.robot import STANDARD_PARAMETERS, JointType, Placement, Robot
 
 Columns = NDArray[np.intp]
@@ -101,7 +102,8 @@ def _as_meant(robot: Robot) -> Robot:
     def exact(placement: Placement) -> Placement:
         rotation = placement.rotation
         for _ in range(2):  # A tilt made zero leaves one turn of two, which may be nearly right only now.
-            rotation = from_euler_zxz(*(_right_angle(angle) for angle in euler_zxz(rotation)))
+            first, about_x, last = (_right_angle(angle) for angle in euler_zxz(rotation))
+            rotation = rotation_about(2, first) @ rotation_about(0, about_x) @ rotation_about(2, last)
         reach = float(np.linalg.norm(placement.translation))
         return Placement(rotation, _without_small(placement.translation, max(_LENGTH, RIGHT_ANGLE * reach)))
 

@@ -20,17 +20,14 @@ ABOUT_Z: Plane = (0, 1)
 class Step:
     """Constants of one segment: turns and offsets before the joint's motion and after it.
 
-    `angle`: turn about the joint's axis that is added to its position, where it is revolute [rad].
-    `turns_before`, `turns_after`: list of (Plane, float, float), constant turns: plane, cosine, sine.
-    `before`: translation of the placement before the joint, in frame j-1 [m].
-    `after`: translation of the placement after the joint, in frame j [m].
+    `turns_before`, `turns_after`: plane, cosine and sine of each; `before`: in frame j-1, `after`: in frame j [m].
     """
 
     def __init__(self, segment: Segment) -> None:
         self.revolute = segment.type is JointType.REVOLUTE
         first, about_x, third = euler_zxz(segment.before.rotation)
         fourth, about_x_after, last = euler_zxz(segment.after.rotation)
-        # The middle turns are about the joint's own axis and merge with its angle.
+        # The middle turns are about the joint's own axis and merge with its angle, where it is revolute [rad].
         self.angle = third + fourth
         middle = [] if self.revolute else [(ABOUT_Z, self.angle)]
         self.turns_before = _turns([(ABOUT_Z, first), (ABOUT_X, about_x), *middle])
@@ -55,18 +52,6 @@ def euler_zxz(rotation: Array) -> tuple[float, float, float]:
     c, s = np.cos(first), np.sin(first)
     x, y = c * rotation[0] + s * rotation[1], c * rotation[1] - s * rotation[0]
     return first, float(np.arctan2(-y[2], rotation[2, 2])), float(np.arctan2(-x[1], x[0]))
-
-
-def from_euler_zxz(first: float, about_x: float, last: float) -> Array:
-    """The rotation R = Rz(φ) Rx(β) Rz(γ). `first`: φ [rad]; `about_x`: β [rad]; `last`: γ [rad]. Returns (3, 3), R."""
-    (c1, c2, c3), (s1, s2, s3) = np.cos([first, about_x, last]), np.sin([first, about_x, last])
-    return np.array(
-        [
-            [c1 * c3 - s1 * c2 * s3, -c1 * s3 - s1 * c2 * c3, s1 * s2],
-            [s1 * c3 + c1 * c2 * s3, -s1 * s3 + c1 * c2 * c3, -c1 * s2],
-            [s2 * s3, s2 * c3, c2],
-        ]
-    )
 
 
 # Below this a sine, cosine or length is rounding (cos π/2 = 6e-17); 1e-8 is a user's own digits and is kept.

@@ -91,11 +91,8 @@ def _active(robot: Robot, margins: Margins, options: ExcitationOptions) -> tuple
     found = []
     for kind, kept in kinds.items():
         left = table.get(kind, (None,) * robot.joint_count)
-        found += [
-            f"{kind} of {joint.name}"
-            for joint, value in zip(robot.joints, left, strict=True)
-            if value is not None and value <= kept + ACTIVE
-        ]
+        pairs = zip(robot.joints, left, strict=True)
+        found += [f"{kind} of {joint.name}" for joint, part in pairs if part is not None and part <= kept + ACTIVE]
     if margins.workspace_m is not None and margins.workspace_m <= ACTIVE_CLEARANCE_M:
         found.append("workspace")
     return tuple(found)

@@ -93,20 +93,17 @@ class Feasibility:
 
     def _refuse(self, postures: Array, parts: list[Array]) -> None:
         """Name the constraint that no posture keeps, or else those that no posture keeps together."""
-        place = 0
         torque, workspace = self.states.torque, self.states.workspace
         if torque is not None:
-            least = parts[place].min(axis=0)
+            least = parts[0].min(axis=0)
             if least.max() > SETTLED:
                 j = int(np.argmax(least))
-                joint = self.robot.joints[j]
+                joint, needed = self.robot.joints[j], least[j] * torque.available[j]
                 unit = joint.type.torque_unit
-                needed = least[j] * torque.available[j]
                 raise ExcitationError(
                     f"{joint.name}: torque limit: at rest the prior model needs {needed:.4g} {unit} or more in every "
                     f"posture, {torque.available[j]:.4g} {unit} may be used; check the limit, the model and the margin"
                 )
-            place += 1
         if workspace is not None:
             worst = workspace.clearance(postures).max(axis=0)
             blocked = int(np.argmin(worst))
@@ -115,15 +112,11 @@ class Feasibility:
                     f"workspace: {workspace.names[blocked]} meet in every posture, by {-worst[blocked]:.3g} m or more; "
                     "lower the floor or move the box"
                 )
-        raise ExcitationError(
-            f"none of {len(postures)} random postures keeps {self._names()} at once; relax one of them"
-        )
-
-    def _names(self) -> str:
         kinds = ["the position limits"]
-        kinds += ["the torque limits"] if self.states.torque is not None else []
-        kinds += ["the workspace"] if self.states.workspace is not None else []
-        return " and ".join([", ".join(kinds[:-1]), kinds[-1]] if len(kinds) > 1 else kinds)
+        kinds += ["the torque limits"] if torque is not None else []
+        kinds += ["the workspace"] if workspace is not None else []
+        names = " and ".join(filter(None, [", ".join(kinds[:-1]), kinds[-1]]))
+        raise ExcitationError(f"none of {len(postures)} random postures keeps {names} at once; relax one of them")
 
 
 def require_room(robot: Robot, limits: MotionLimits) -> None:

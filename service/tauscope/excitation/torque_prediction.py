@@ -13,13 +13,9 @@ SMALL_TORQUE = 1e-2  # part of the torque limit below which |τ| is rounded off,
 
 
 class TorquePrediction:
-    """Largest torque that each joint will need: |rigid-body torque| + friction, whichever way friction acts.
+    """Upper bound of |τ|: rigid-body torque and the larger of stiction and Coulomb level, whichever way friction acts.
 
-    Friction counts with the larger of stiction and Coulomb level whatever the direction: near a reversal it acts
-    either way, and the sum is an upper bound of |τ|.
-
-    `velocity`: (n,), speed limits [rad/s or m/s].
-    `available`: (n,), torque that may be used, infinite where there is no limit [Nm or N].
+    `velocity`: (n,), speed limits [rad/s or m/s]; `available`: (n,), torque, infinite where unlimited [Nm or N].
     """
 
     def __init__(

@@ -75,10 +75,8 @@ def make_export(export_format: ExportFormat, model: ExportModel, choice: Actuato
             return to_json(model.compensation, effect_entries(model)).encode()
         case ExportFormat.YAML:
             return to_yaml(model.compensation, effect_entries(model)).encode()
-        case ExportFormat.C:
-            return source_code(model, ".h").encode()
-        case ExportFormat.PYTHON:
-            return source_code(model, ".py").encode()
+        case ExportFormat.C | ExportFormat.PYTHON:
+            return source_code(model, ".h" if export_format is ExportFormat.C else ".py").encode()
         case ExportFormat.URDF:
             if model.origin.urdf is None:
                 text = "its chain does not come from a URDF; export an MJCF (.xml) instead"

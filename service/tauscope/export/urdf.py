@@ -28,14 +28,11 @@ def patch_urdf(
 ) -> PatchedUrdf:
     """Write links and friction into a URDF in place; comments, meshes, order and white space stay byte for byte.
 
-    A link's ``<inertial>`` gets the centre of mass, rpy 0, and the inertia about the centre of mass along the link
-    frame's axes. ``<dynamics>`` gets damping = τ_v and friction = τ_s + τ_sc, the Coulomb level at speed. Links on
-    fixed joints below are part of the identified link: their own inertials are set to zero, not removed, because
-    simulators make up a mass from the shapes of a link that has none. Bodies on joints beside the chain stay, and
-    their mass is taken off the link that carries them. Raises ExportError if the file is not a URDF, a joint is not in
-    it or does not move, or a link cannot exist.
-
-    `remarks`: further lines of the comment.
+    An ``<inertial>`` gets the centre of mass, rpy 0, and the inertia about it along the link frame's axes, a joint's
+    ``<dynamics>`` damping = τ_v and friction = τ_s + τ_sc. Links on fixed joints below are part of the identified link:
+    their inertials become zero, for simulators make up a mass for a shape without one. Bodies on joints beside the
+    chain stay, their mass is taken off the link that carries them. `remarks`: further lines of the comment. Raises
+    ExportError if it is no URDF, a joint is not in it or does not move, or a link cannot exist.
     """
     data, label = _read(source)
     text = XmlText(data, label)

@@ -208,12 +208,9 @@ def estimate_shapes(
 
 def _candidate_slopes(speed: Array, given: Sequence[FrictionShape]) -> list[Array]:
     """Per joint a logarithmic grid relative to its rms velocity, then the stated constants."""
-    grids = []
-    for shape, typical in zip(given, speed, strict=True):
-        grid = np.logspace(*GRID_DECADES, GRID_POINTS) / typical
-        stated = [value for value in (shape.k_v, shape.delta) if value is not None]
-        grids.append(np.append(grid, stated))
-    return grids
+    grid = np.logspace(*GRID_DECADES, GRID_POINTS)
+    stated = [[value for value in (shape.k_v, shape.delta) if value is not None] for shape in given]
+    return [np.append(grid / typical, own) for typical, own in zip(speed, stated, strict=True)]
 
 
 def _search(grids: list[JointGrid], given: Sequence[FrictionShape]) -> list[list[int]]:
@@ -246,12 +243,6 @@ def _plain_options(grid: JointGrid, shape: FrictionShape) -> list[list[int]]:
     if shape.k_v is not None:
         return [[GRID_POINTS, stated]]
     return [[k, stated] for k in _steps(grid, shape) if grid.slopes[k] >= SEPARATION * shape.delta]
-
-
-def _stribeck_options(grid: JointGrid, shape: FrictionShape) -> list[list[int]]:
-    """Pairs of constants with a Stribeck term, for joints whose file states no δ."""
-    slopes = grid.slopes
-    return [[k, d] for k in _steps(grid, shape) for d in range(GRID_POINTS) if slopes[k] >= SEPARATION * slopes[d]]
 
 
 def _described(
@@ -322,7 +313,8 @@ def _with_stribeck(
     residual_energy: float,
 ) -> list[int]:
     """The best pair [K_v, δ] where it explains enough more than K_v, with the next grid point's column, alone."""
-    pairs = _stribeck_options(grid, shape)
+    slopes = grid.slopes
+    pairs = [[k, d] for k in _steps(grid, shape) for d in range(GRID_POINTS) if slopes[k] >= SEPARATION * slopes[d]]
     if not pairs:
         return plain
     gains = conditional.gains(pairs, physical=True)

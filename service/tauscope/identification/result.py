@@ -236,16 +236,10 @@ def _friction(result: Identification, parameters: np.ndarray) -> list[FrictionEn
             if value is not None and (joint, name) in shape_std:
                 errors[name] = value * (shape_std[joint, name] or 0.0)
         values = {name: float(parameters[present[name]]) if name in present else 0.0 for name in columns}
-        entries.append(
-            FrictionEntry(
-                joint=result.robot.joints[joint].name,
-                **values,
-                k_v=shape.k_v,
-                delta=shape.delta,
-                std=errors,
-                identifiable={name: known[name] for name in (*_COEFFICIENTS, "k_v", "delta")},
-            )
-        )
+        told = {name: known[name] for name in (*_COEFFICIENTS, "k_v", "delta")}
+        shapes = {"k_v": shape.k_v, "delta": shape.delta}
+        name = result.robot.joints[joint].name
+        entries.append(FrictionEntry(joint=name, **values, **shapes, std=errors, identifiable=told))
     return entries
 
 

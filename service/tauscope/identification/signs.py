@@ -5,7 +5,7 @@ masses are positive and friction takes power. So the most probable bodies are es
 all, and the signs under which they explain the torque best are found one after the other.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -66,7 +66,8 @@ def reversed_joints(
     signs = np.ones(structure.robot.joint_count)
     parameters = FullParameters.of(structure).map @ consistent.parameters
     while True:
-        tried = [(other, _estimate(structure, factors, ratios, other)) for other in _neighbours(signs)]
+        others = [*(signs * (1.0 - 2.0 * np.eye(len(signs)))), -signs]  # one joint turned, or all
+        tried = [(other, _estimate(structure, factors, ratios, other)) for other in others]
         other, best = max(tried, key=lambda each: _log_likelihood(factors, ratios, *each))
         # Beside a wrong sign the residual is as coloured as the motion: the whiter hypothesis tells the noise.
         left = evaluate(motions, structure, [best, -best])
@@ -77,12 +78,6 @@ def reversed_joints(
             return tuple(int(joint) for joint in np.flatnonzero(signs < 0.0))
         signs, ratios = other, colour
         parameters = _estimate(structure, factors, ratios, signs)
-
-
-def _neighbours(signs: Array) -> Iterator[Array]:
-    for joint in range(len(signs)):
-        yield np.where(np.arange(len(signs)) == joint, -signs, signs)
-    yield -signs
 
 
 def _estimate(structure: ModelStructure, factors: tuple[JointFactor, ...], ratios: Array, signs: Array) -> Array:

@@ -65,13 +65,9 @@ def link_warnings(
         return []
     copy = "repeats column q{0}: it is no second encoder, and is not used", "record the encoder on the link itself"
     strange = "does not move with column q{0}; it is not used", "check its unit, its sign and its joint"
-    return [
-        ResultWarning(
-            code="link-encoder",
-            joint=joints[joint],
-            text=f"column qlink{joint + 1} {text.format(joint + 1)}",
-            remedy=remedy,
-        )
-        for places, (text, remedy) in ((found.copies, copy), (found.strangers, strange))
-        for joint in places
-    ]
+    warnings = []
+    for places, (what, remedy) in ((found.copies, copy), (found.strangers, strange)):
+        for joint in places:
+            text = f"column qlink{joint + 1} {what.format(joint + 1)}"
+            warnings.append(ResultWarning(code="link-encoder", joint=joints[joint], text=text, remedy=remedy))
+    return warnings

@@ -84,15 +84,10 @@ class Recording:
         period: Array | None = None,
         **optional: Array | None,
     ) -> "Recording":
-        """Make a recording of arrays, held to the same rules as a file.
+        """Make a recording of arrays, held to the same rules as a file: `time`, (N,), strictly increasing [s].
 
-        Raises RecordingError, which names argument, row (counted from 0) and joint; TypeError for an unknown argument.
-
-        `time`: (N,), strictly increasing [s].
-        `position`: (N, n), q [rad or m].
-        `effort`: (N, n), τ [Nm or N], or drive units.
-        `period`: (N,), index of the repeated excitation period, NaN outside the repeated part.
-        `optional`: (N, n), the optional columns by their names in `Samples`, such as ``velocity``.
+        `position`, `effort`: (N, n), q and τ or drive units; `period`: (N,), NaN outside the repeated part; `optional`:
+        (N, n), as `Samples` names them. Raises RecordingError: argument, row from 0, joint; TypeError for others.
         """
         unknown = optional.keys() - {_ARGUMENTS[group] for group in OPTIONAL_GROUPS}
         if unknown:
@@ -128,16 +123,8 @@ class Recording:
         return columns if places else None
 
 
-_ARGUMENTS = {
-    "volt": "voltage",
-    "kp": "gain",
-    "qd": "velocity",
-    "qdd": "acceleration",
-    "qref": "reference",
-    "taucmd": "effort_command",
-    "temp": "temperature",
-    "qlink": "link_position",
-}
+_NAMES = ("velocity", "acceleration", "reference", "effort_command", "temperature", "link_position", "voltage", "gain")
+_ARGUMENTS = dict(zip(OPTIONAL_GROUPS, _NAMES, strict=True))
 
 
 def _check(argument: str, array: Array, name: str, shape: tuple[int | None, ...] | None) -> Array:

@@ -22,26 +22,19 @@ class EffortKind(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """A stretch of a recording as it was measured; NaN marks a sample that was missed.
-
-    `effort`: (N, n), τ [Nm or N], or drive units (current), or commanded positions, as `Recording.effort_kind` says,
-        sign and constant not yet applied.
-    `velocity`, `acceleration`, `reference`, `effort_command`, `temperature`, `link_position`, `voltage`, `gain`: (N,
-        n) or None, the optional columns qd, qdd, qref, taucmd, temp, qlink, volt, kp; a joint without such a column is
-        NaN.
-    """
+    """A stretch of a recording as it was measured; NaN: a sample that was missed, or a joint without the column."""
 
     time: Array  # (N,), strictly increasing [s]
     position: Array  # (N, n), q [rad or m]
-    effort: Array
-    velocity: Array | None = None
-    acceleration: Array | None = None
-    reference: Array | None = None
-    effort_command: Array | None = None
-    temperature: Array | None = None
-    link_position: Array | None = None
-    voltage: Array | None = None
-    gain: Array | None = None
+    effort: Array  # (N, n), τ, drive units or commanded positions, as `effort_kind` says; sign and constant not applied
+    velocity: Array | None = None  # (N, n), column qd
+    acceleration: Array | None = None  # (N, n), column qdd
+    reference: Array | None = None  # (N, n), column qref
+    effort_command: Array | None = None  # (N, n), column taucmd
+    temperature: Array | None = None  # (N, n), column temp
+    link_position: Array | None = None  # (N, n), column qlink
+    voltage: Array | None = None  # (N, n), column volt
+    gain: Array | None = None  # (N, n), column kp
     period: Array | None = None  # (N,), index of the repeated excitation period, NaN outside the repeated part
 
     @property

@@ -107,18 +107,12 @@ def _what(document: DiagnosisDocument) -> Section:
 
 
 def _cards(entries: Sequence[FindingEntry], joints: Sequence[str]) -> list[Card]:
-    return [
-        Card(
-            rank,
-            effect_title(entry.effect),
-            place_title(entry.joint),
-            entry.probability,
-            chance(entry.probability),
-            entry.statement,
-            finding_facts(entry, joints),
-        )
-        for rank, entry in enumerate(entries, start=1)
-    ]
+    cards = []
+    for rank, entry in enumerate(entries, start=1):
+        title, place, facts = effect_title(entry.effect), place_title(entry.joint), finding_facts(entry, joints)
+        odds = chance(entry.probability)
+        cards.append(Card(rank, title, place, entry.probability, odds, entry.statement, facts))
+    return cards
 
 
 def _how_much(document: DiagnosisDocument) -> Section:

@@ -50,20 +50,16 @@ class Master:
 
 
 class ChainMotion:
-    """Which joints of a chain move, and how.
-
-    `moving`: base first, those that are their own masters, and those that follow one of them.
-    `independent`: those that the others follow, in the order in which they first move the chain.
-    `couplings`: of each that moves; None where it is the next one itself.
-    """
+    """Which joints of a chain move, and how."""
 
     def __init__(self, masters: Mapping[str, Master | None]) -> None:
         """Take the joints of a chain that are not held, base first, and what each follows."""
         every = {name: master or Master(name) for name, master in masters.items()}
         own = {name for name, master in masters.items() if master is None}
+        # Base first, those that are their own masters, and those that follow one of them.
         self.moving = {name: master for name, master in every.items() if master.joint in own}
         self.independent = tuple(dict.fromkeys(master.joint for master in self.moving.values()))
-        self.couplings: dict[str, Coupling | None] = {}
+        self.couplings: dict[str, Coupling | None] = {}  # None of one that is the next one itself
         met: set[str] = set()
         for name, master in self.moving.items():
             is_next = master.joint not in met and (master.multiplier, master.offset) == (1.0, 0.0)

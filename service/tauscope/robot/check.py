@@ -85,9 +85,8 @@ def _remarks(robot: Robot, source: str) -> Iterator[Finding]:
         yield Finding(Severity.WARNING, repair.place, f"{repair.text}; {repair.remedy}")
     size = float(np.linalg.norm(robot.gravity))
     if not EARTH[0] <= size <= EARTH[1]:
-        yield Finding(
-            Severity.WARNING, f"{source}: gravity", f"is {size:g} m/s², not 9.81: is the arm's weight balanced?"
-        )
+        text = f"is {size:g} m/s², not 9.81: is the arm's weight balanced?"
+        yield Finding(Severity.WARNING, f"{source}: gravity", text)
     for key in ("position", "velocity"):
         without = [joint.name for joint in robot.joints if getattr(joint.limits, key) is None]
         if without:

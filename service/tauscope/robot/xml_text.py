@@ -39,16 +39,8 @@ def parse_xml(data: bytes, label: str, findings: list[Finding]) -> Element:
     if doctype >= 0:
         line = text.count("\n", 0, doctype) + 1
         raise RobotFileError(f"{label}:{line}: a DOCTYPE is not accepted in a robot description; remove it")
-    parser = etree.XMLParser(
-        encoding="utf-8",
-        resolve_entities=False,
-        no_network=True,
-        load_dtd=False,
-        huge_tree=False,
-        remove_comments=True,
-        remove_pis=True,
-        recover=True,
-    )
+    closed = {"resolve_entities": False, "no_network": True, "load_dtd": False, "huge_tree": False}
+    parser = etree.XMLParser(encoding="utf-8", remove_comments=True, remove_pis=True, recover=True, **closed)
     try:
         root = etree.fromstring(text.encode("utf-8"), parser)
     except etree.XMLSyntaxError as error:

@@ -31,7 +31,6 @@ class BackendChoice(StrictModel):
     scenario: dict[str, Any] | None = Field(
         default=None, description="what the simulated arm conceals: content of a scenario file; null: nothing"
     )
-
     keep_settings: bool = Field(
         default=False, description="whether servos keep in EEPROM what a run changed; false: it is put back"
     )

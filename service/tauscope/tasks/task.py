@@ -119,9 +119,7 @@ class ReadingOptions(StrictModel):
             "units": ",".join(f"{column}={unit}" for column, unit in (self.units or {}).items()) or None,
             "rate": self.rate_hz,
             "trust_units": self.trust_units or None,
-            "columns": self.columns
-            if self.columns is None or isinstance(self.columns, str)
-            else flow_text(self.columns),
+            "columns": flow_text(self.columns) if isinstance(self.columns, dict) else self.columns,
             "decimal": self.decimal,
             "delimiter": self.delimiter,
             "topic": self.topic,

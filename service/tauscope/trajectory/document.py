@@ -104,11 +104,12 @@ class TrajectoryDocument(TrajectoryPart):
 
 def trajectory_document(trajectory: Trajectory) -> TrajectoryDocument:
     """The document of a trajectory."""
-    limits = trajectory.limits
+    limits, entry = trajectory.limits, None
+    if limits is not None:
+        torque = [float(value) if np.isfinite(value) else None for value in limits.torque]
+        entry = take_fields(LimitsEntry, limits, torque=torque)
     segments = [_segment_entry(segment) for segment in trajectory.segments]
-    return take_fields(
-        TrajectoryDocument, trajectory, limits=None if limits is None else _limits_entry(limits), segments=segments
-    )
+    return take_fields(TrajectoryDocument, trajectory, limits=entry, segments=segments)
 
 
 def trajectory_of(document: TrajectoryDocument) -> Trajectory:
@@ -172,11 +173,6 @@ def _series_of(entry: SeriesEntry, joints: int, key: str) -> FourierSeries:
         raise ExcitationError(f"{key}.cosine: holds no coefficients; give one row a joint, one number a harmonic")
     cosine, sine = (_array(getattr(entry, n), (joints, harmonics), f"{key}.{n}") for n in ("cosine", "sine"))
     return FourierSeries(entry.period_s, centre, cosine, sine)
-
-
-def _limits_entry(limits: MotionLimits) -> LimitsEntry:
-    torque = [float(value) if np.isfinite(value) else None for value in limits.torque]
-    return take_fields(LimitsEntry, limits, torque=torque)
 
 
 def _limits_of(entry: LimitsEntry, joints: int) -> MotionLimits:

@@ -21,10 +21,7 @@ class MotionSamples:
 
 @dataclass(frozen=True, eq=False)
 class FourierSeries:
-    """One finite Fourier series a joint about a centre, M harmonics of ω_f = 2π/T, the seed paper's section 5.2.
-
-    q̇_i(t) = Σ_l a_l cos(ω_f l t) + b_l sin(ω_f l t)
-    """
+    """q̇_i(t) = Σ_l a_l cos(ω_f l t) + b_l sin(ω_f l t), M harmonics of ω_f = 2π/T: the seed paper's section 5.2."""
 
     period_s: float  # fundamental period T [s]
     centre: Array  # (n,), mean position [rad or m]

@@ -145,8 +145,7 @@ class Trajectory:
 def ramp(start: Array, end: Array, limits: MotionLimits, *, fraction: float = RAMP_FRACTION) -> MoveSegment:
     """A straight minimum-jerk move from `start` to `end`, (n,), within the limits of velocity and acceleration.
 
-    It stays between them: where both are within the position limits, so is all of it. Raises ExcitationError for a
-    posture that is not finite or has another number of joints.
+    Between postures within the position limits all of it is. Raises ExcitationError for a posture that is none.
     """
     start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     joints = len(limits.velocity)
