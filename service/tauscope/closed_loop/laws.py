@@ -6,6 +6,7 @@ form M6 of Duclusaud et al. (ICRA 2025).
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -58,14 +59,15 @@ class JointLaws:
         self._delta = np.array([each.delta or 0.0 for each in friction])
         self._offset = np.array([0.0 if has else each.offset for each, has in zip(friction, has_offset, strict=True)])
         self._held, self._effects, self._by_load = held, effects, friction_by_load
-        at_rest = ("position", "velocity", "acceleration", "load", "torque", "step")
+        names, shape = ("position", "velocity", "acceleration", "load", "torque", "step"), (model.robot.joint_count, 1)
+        at_rest: dict[str, Any] = {name: np.zeros(shape) for name in names}
         bodies = np.concatenate([link.to_vector() for link in model.links])
         self._signals = Signals(
             robot=model.robot,
             rate_hz=1.0,
             time=np.zeros((1, 1)),
             recording=0,
-            **{name: np.zeros((model.robot.joint_count, 1)) for name in at_rest},
+            **at_rest,
             steepness=np.array([each.k_v for each in friction]),
             bodies=bodies,
             links=bodies,

@@ -261,13 +261,12 @@ def _lag(time: Array, measured: Array, simulated: Array) -> Array:
     for joint in range(measured.shape[1]):
         real, other = measured[:, joint], simulated[:, joint]
         errors = np.array([np.nanmean((real[at] - other[at - shift]) ** 2) for shift in shifts])
-        best = int(np.argmin(errors))
+        best, between = int(np.argmin(errors)), 0.0
         if 0 < best < len(shifts) - 1:
             before, least, after = errors[best - 1 : best + 2]
             bend = before - 2.0 * least + after
-            found[joint] = step * (shifts[best] + (0.5 * (before - after) / bend if bend > 0.0 else 0.0))
-        else:
-            found[joint] = step * shifts[best]
+            between = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
+        found[joint] = step * (shifts[best] + between)
     return found
 
 

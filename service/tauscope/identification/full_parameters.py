@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tauscope.identification.consistency import FrictionColumns
+from tauscope.identification.consistency.inequalities import FrictionColumns
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 

@@ -8,7 +8,7 @@ from scipy import stats
 
 from tauscope.dynamics.base_parameters import BaseParameters
 from tauscope.identification.band import preliminary_terms
-from tauscope.identification.consistency import LEAST_COULOMB
+from tauscope.identification.consistency.inequalities import LEAST_COULOMB
 from tauscope.identification.covariance import parameter_covariance
 from tauscope.identification.dataset import Dataset, rms_speed
 from tauscope.identification.friction_shape import EstimatedShape, estimate_shapes, shape_parameters

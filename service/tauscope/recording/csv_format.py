@@ -171,10 +171,8 @@ def _parse_names(
 def _find_header(lines: Sequence[bytes], row: bytes, dialect: csv_dialect.Dialect) -> int | None:
     """The first line with as many names as the row has fields; lines before it say something else."""
     cells = len(dialect.split(row))
-    for index, line in enumerate(lines):
-        if not _is_empty(line) and len(dialect.name_fields(line, row)) == cells:
-            return index
-    return None
+    named = (not _is_empty(line) and len(dialect.name_fields(line, row)) == cells for line in lines)
+    return next((index for index, is_header in enumerate(named) if is_header), None)
 
 
 def _name_numbers(comment: bytes, row: Sequence[bytes], dialect: csv_dialect.Dialect) -> list[bytes]:

@@ -301,14 +301,9 @@ def _merge(batches: Sequence[Batch]) -> Batch:
         each.velocity if each.velocity.shape[1] or not has_velocity else np.full_like(each.position, np.nan)
         for each in states
     ]
-    merged = JointStates(
-        np.concatenate([each.stamp for each in states])[order],
-        states[0].names,
-        np.concatenate([each.position for each in states])[order],
-        np.concatenate(velocity)[order],
-        np.concatenate([each.effort for each in states])[order],
-    )
-    return rows[order], merged
+    parts = ([each.position for each in states], velocity, [each.effort for each in states])
+    stamp = np.concatenate([each.stamp for each in states])[order]
+    return rows[order], JointStates(stamp, states[0].names, *(np.concatenate(part)[order] for part in parts))
 
 
 def _require_equal(states: JointStates, place: str) -> None:

@@ -58,20 +58,16 @@ def journal_recording(journal: Journal, name: str) -> Recording:
     if not len(rows):
         ramp = f" of {len(journal.rows)} cycles of the ramp" if len(journal.rows) else ""
         raise RecordingError(f"{name}: the run ended before its motion began{ramp}: there is nothing to keep")
-    is_torque = header.effort_unit == "Nm"
-    is_held = header.mode == "torque"
+    is_torque, is_held = header.effort_unit == "Nm", header.mode == "torque"
     return Recording.from_arrays(
         name,
         (rows["time_ns"] - rows["time_ns"][0]) * 1e-9,
         rows["position"],
         _sample_effort(rows, 1e9 / header.rate_hz) if is_held else rows["effort"],
         effort_kind=EffortKind.TORQUE if is_torque else EffortKind.CURRENT,
-        velocity=_find_reported(rows["velocity"]),
-        reference=_find_reported(rows["reference"]),
         effort_command=_find_reported(rows["command"]),
-        temperature=_find_reported(rows["temperature"]),
-        voltage=_find_reported(rows["voltage"]),
         period=_find_reported(rows["period"]),
+        **{name: _find_reported(rows[name]) for name in ("velocity", "reference", "temperature", "voltage")},
     )
 
 

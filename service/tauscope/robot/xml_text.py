@@ -6,6 +6,7 @@ namespaces. Any other fault of the text is refused by line.
 
 import codecs
 import re
+from typing import Any
 
 from lxml import etree
 
@@ -39,7 +40,7 @@ def parse_xml(data: bytes, label: str, findings: list[Finding]) -> Element:
     if doctype >= 0:
         line = text.count("\n", 0, doctype) + 1
         raise RobotFileError(f"{label}:{line}: a DOCTYPE is not accepted in a robot description; remove it")
-    closed = {"resolve_entities": False, "no_network": True, "load_dtd": False, "huge_tree": False}
+    closed: dict[str, Any] = {"resolve_entities": False, "no_network": True, "load_dtd": False, "huge_tree": False}
     parser = etree.XMLParser(encoding="utf-8", remove_comments=True, remove_pis=True, recover=True, **closed)
     try:
         root = etree.fromstring(text.encode("utf-8"), parser)

@@ -58,9 +58,8 @@ def role_of(words: Sequence[str]) -> tuple[str, int] | None:
 def time_rank(words: Sequence[str]) -> int | None:
     """How likely a column is the time; the least is the likeliest, None where it is none."""
     name = "_".join(word for word in words if word not in ("ms", "us", "ns", "s"))
-    for rank, time in enumerate(_TIMES):
-        if name == time:
-            return rank
+    if name in _TIMES:
+        return _TIMES.index(name)
     return next((len(_TIMES) + rank for rank, time in enumerate(_TIMES) if name.endswith(f"_{time}")), None)
 
 
