@@ -83,5 +83,5 @@ def verify_audit(
     typer.echo(f"{found.entries} entries, none changed, moved or missing; the last one's hash is {found.head}")
 
 
-key = make_group("API keys of the service.", add=add_key, list=list_keys, revoke=revoke_key)
-audit = make_group("Who did what through the service.", verify=verify_audit)
+key = make_group(add=add_key, list=list_keys, revoke=revoke_key)
+audit = make_group(verify=verify_audit)

@@ -182,4 +182,4 @@ def _targets(robot: Robot, trajectory: Path | None, options: RunOptions) -> NDAr
     return read_trajectory(trajectory, robot).samples(options.rate_hz or _RATE_HZ).position
 
 
-bus = make_group("Look at field buses.", scan=scan)
+bus = make_group(scan=scan)

@@ -91,6 +91,4 @@ def _row(result: fleets.FleetResult, columns: tuple[str, ...]) -> list[str]:
     return [str(result.entry.row), result.entry.name, state, *figures, f"{result.seconds:.2f}", result.error or ""]
 
 
-fleet = make_group(
-    "The same analysis for many robots, results in one table.", identify=identify_fleet, diagnose=diagnose_fleet
-)
+fleet = make_group(identify=identify_fleet, diagnose=diagnose_fleet)

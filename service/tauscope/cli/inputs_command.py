@@ -185,7 +185,5 @@ def _row(joint: JointSummary) -> list[str]:
     ]
 
 
-robot = make_group("Look at robot files.", check=check_robot_file)
-recording = make_group(
-    "Look at recordings, and convert them.", map=map_file, check=check_recording_file, convert=convert_file
-)
+robot = make_group(check=check_robot_file)
+recording = make_group(map=map_file, check=check_recording_file, convert=convert_file)

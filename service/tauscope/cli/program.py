@@ -77,10 +77,11 @@ class Verbs(TyperGroup):
             return None
         from tauscope.cli.verbs import add_verb
 
-        found = vars(import_module(f"tauscope.cli.{VERBS[cmd_name][0]}_command"))[cmd_name]
+        module, words = VERBS[cmd_name]
+        found = vars(import_module(f"tauscope.cli.{module}_command"))[cmd_name]
         if isinstance(found, typer.Typer):
             group = get_group(found)
-            group.name = cmd_name
+            group.name, group.help = cmd_name, words
             return group
         single = typer.Typer(rich_markup_mode=None, add_completion=False)
         add_verb(single, found)

@@ -166,4 +166,4 @@ def restore(
     say(f"restored {data}: {counted(count, 'file')} and the database")
 
 
-store = make_group("Look after what is kept.", check=check_store, prune=prune_store)
+store = make_group(check=check_store, prune=prune_store)
